@@ -112,7 +112,7 @@ def train(
     """Learns metric depth from recordings, without depth labels, on this machine's processor.
 
     `config` is a preset ("tiny", "light", "resnet50", "paper", "monodepth2", "monodepth2-50", "lite-mono", "lite-mono-small", "lite-mono-tiny",
-    "lite-mono-8m", "r-msfm3", "r-msfm6"), the path of a TOML file, or a dict over a preset:
+    "lite-mono-8m", "r-msfm3", "r-msfm6", "sfmlearner"), the path of a TOML file, or a dict over a preset:
     `{"preset": "light", "steps": 500, "loss": {"smoothness": 0.01}}` (tables in tables or dots in keys; None takes an optional key
     away; the keys are those of docs/reference/configuration.md). `data` are recordings of any known layout, and `validation` some to
     validate on, else the end of each drive is held out; `camera` is "2", "3" or "both".

@@ -297,6 +297,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                     Step::Multiply([a, b], to) => recurrent::multiply(arena, [a, b], to),
                     Step::Blend([h, q, z], to) => recurrent::blend(arena, [h, q, z], to),
                     Step::ConvexUpsample(step) => step.run(arena),
+                    Step::DepthToSpace(from, to) => movement::depth_to_space(arena, from, to),
                 }
             }
             let kind = match step {
@@ -318,6 +319,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                 Step::Multiply(..) => "multiply",
                 Step::Blend(..) => "blend",
                 Step::ConvexUpsample(_) => "convex",
+                Step::DepthToSpace(..) => "pixels",
             };
             after(name, kind);
         }

@@ -19,7 +19,7 @@ impl ValueId {
 pub struct ValueShape {
     /// Channels.
     pub channels: usize,
-    /// The image's width and height are divided by 2 this many times.
+    /// The image's width and height are divided by 2 this many times, rounding up.
     pub halvings: u32,
     /// Whether it is a single pixel instead, a mean over the image; `halvings` is then 0.
     pub pooled: bool,
@@ -32,7 +32,8 @@ impl ValueShape {
         if self.pooled {
             (1, 1)
         } else {
-            (width >> self.halvings, height >> self.halvings)
+            let halved = |side: usize| side.div_ceil(1 << self.halvings);
+            (halved(width), halved(height))
         }
     }
 }
@@ -162,7 +163,9 @@ impl Graph {
             Op::Conv(conv) => [conv.residual, None, None],
             Op::Gate { input, channel, .. } => [Some(*input), Some(*channel), None],
             Op::AddPixel { input, pixel } => [Some(*input), Some(*pixel), None],
-            Op::CrossCovariance { input, .. } => [Some(*input), None, None],
+            Op::CrossCovariance { input, .. } | Op::DepthToSpace { input } => {
+                [Some(*input), None, None]
+            }
             Op::ConvexUpsample { input, weights, .. } => [Some(*input), Some(*weights), None],
             Op::Multiply { inputs: [a, b] } => [Some(*a), Some(*b), None],
             Op::Blend {
@@ -206,6 +209,8 @@ impl Graph {
                 Op::UpsampleConcat { .. }
                 | Op::Concat { .. }
                 | Op::ChannelExtent { .. }
+                // Nothing is filled up.
+                | Op::DepthToSpace { .. }
                 // A single channel, not filled up.
                 | Op::ConvexUpsample { .. },
             )
@@ -285,12 +290,30 @@ impl Graph {
         all.iter().map(|count| *count as f64).sum::<f64>() * 2e-9
     }
 
+    /// How often an operation wants the image to be halved without a rest. Convolutions round up, and what follows them may be cut;
+    /// what is doubled is doubled whole.
+    fn exact_halvings(&self, node: usize, op: &Op) -> u32 {
+        match op {
+            Op::UpsampleConcat { input, .. }
+            | Op::Enlarge { input }
+            | Op::ConvexUpsample { input, .. } => self.shapes[input.0].halvings,
+            Op::MaxPool { .. } | Op::Depthwise(_) | Op::Position { .. } => {
+                self.shapes[node + 1].halvings
+            }
+            _ => 0,
+        }
+    }
+
     /// Checks that the graph can run on images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] unless every halving is exact and every reflected border has pixels to mirror.
+    /// [`Error::Size`] unless every halving that has to be is exact and every reflected border has pixels to mirror.
     pub fn check_size(&self, width: usize, height: usize) -> Result<(), Error> {
-        let deepest = self.shapes.iter().map(|s| s.halvings).max().unwrap_or(0);
+        let nodes = self.nodes.iter().enumerate();
+        let deepest = nodes
+            .map(|(i, node)| self.exact_halvings(i, &node.op))
+            .max();
+        let deepest = deepest.unwrap_or(0);
         let step = 1_usize.checked_shl(deepest).unwrap_or(usize::MAX);
         let mirrored = self.nodes.iter().map(|node| match &node.op {
             Op::Conv(conv) if conv.border == Border::Reflect => {

@@ -209,7 +209,7 @@ fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
             | Op::Multiply { inputs: [input, _] }
             | Op::Blend { state: input, .. } => all[input.0].clone(),
             Op::ConvexUpsample { .. } => vec![Some(0)],
-            Op::ChannelExtent { .. } => (0..count).map(Some).collect(),
+            Op::ChannelExtent { .. } | Op::DepthToSpace { .. } => (0..count).map(Some).collect(),
             Op::UpsampleConcat { .. } | Op::Concat { .. } => {
                 let mut joined = Vec::new();
                 let mut shift = 0;

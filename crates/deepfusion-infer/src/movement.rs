@@ -156,3 +156,20 @@ pub(crate) unsafe fn copy<E: Element>(arena: Shared<E>, from: &View, to: &View) 
         }
     });
 }
+
+/// Every pixel's channels become 2×2 pixels of `to`'s channels each, row by row; those beyond its edge are left out.
+///
+/// # Safety
+/// As [`max_pool`]; the channels of `from` are four times those of `to`, without gaps.
+pub(crate) unsafe fn depth_to_space<E: Element>(arena: Shared<E>, from: &View, to: &View) {
+    (0..to.height).into_par_iter().for_each(|y| {
+        for x in 0..to.width {
+            let part = (2 * (y % 2) + x % 2) * to.channels;
+            // SAFETY: channels of a pixel of `from`, which nobody writes, and a pixel of `to`, whose row is this task's alone.
+            unsafe {
+                let pixel = arena.read(from.at(x / 2, y / 2) + part, to.channels);
+                pixel_to(arena, to, to.at(x, y)).copy_from_slice(pixel);
+            }
+        }
+    });
+}

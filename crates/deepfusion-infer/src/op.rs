@@ -31,7 +31,7 @@ pub enum Border {
 }
 
 /// A convolution with square kernels that keeps the size (`kernel` odd, padded by half of its reach) or halves it
-/// (`stride` 2), then adds a residual and applies an activation: y = a(w ⋆ x + b + r).
+/// (`stride` 2, rounding up), then adds a residual and applies an activation: y = a(w ⋆ x + b + r).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conv {
     /// Its input.
@@ -171,6 +171,12 @@ pub enum Op {
         /// 1 to 3.
         halvings: u32,
     },
+    /// Every pixel's channels become 2×2 pixels of a quarter as many: channel (2·i + j)·C + c is channel c of the one at row i and column j.
+    /// Cut to the size of a value that is halved once less. After a convolution to 4·C channels this is a transposed one of stride 2.
+    DepthToSpace {
+        /// Four times the output's channels.
+        input: ValueId,
+    },
     /// Where each pixel is, in sines and cosines ([`deepfusion_kernels::position_code`]): depends on no other value.
     Position {
         /// Channels for each axis.
@@ -215,6 +221,7 @@ impl Op {
             Self::Position { .. } => [None; 3],
             Self::MaxPool { input }
             | Self::Enlarge { input }
+            | Self::DepthToSpace { input }
             | Self::ChannelNorm { input, .. }
             | Self::CrossCovariance { input, .. }
             | Self::GlobalMean { input }

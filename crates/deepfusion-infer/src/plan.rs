@@ -55,6 +55,8 @@ pub(crate) enum Step<C> {
     /// State, candidate and share, into the last.
     Blend([View; 3], View),
     ConvexUpsample(ConvexUpsample),
+    /// Channels to pixels.
+    DepthToSpace(View, View),
 }
 
 /// A graph laid out for one image size.
@@ -177,6 +179,7 @@ impl<C> Plan<C> {
                     out: view(to),
                 })
             }
+            Outline::DepthToSpace(from, to) => Step::DepthToSpace(view(from), view(to)),
             Outline::Depthwise(node) => {
                 let Some(Op::Depthwise(op)) = nodes[node].take() else {
                     unreachable!("the outline names each convolution once")
@@ -245,6 +248,7 @@ enum Outline {
     Blend([ValueId; 3], ValueId),
     /// A value by weights, that many times doubled.
     ConvexUpsample([ValueId; 2], u32, ValueId),
+    DepthToSpace(ValueId, ValueId),
 }
 
 impl Outline {
@@ -268,6 +272,7 @@ impl Outline {
             | Self::Multiply(_, to)
             | Self::Blend(_, to)
             | Self::ConvexUpsample(_, _, to)
+            | Self::DepthToSpace(_, to)
             | Self::Position(_, to) => *to,
         }
     }
@@ -330,6 +335,7 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
                 let from = [*input, *weights];
                 steps.push(Outline::ConvexUpsample(from, *halvings, value));
             }
+            Op::DepthToSpace { input } => steps.push(Outline::DepthToSpace(*input, value)),
             Op::UpsampleConcat { .. } | Op::Concat { .. } => {
                 let mut first = 0;
                 for (part, in_place) in parts(graph, value) {

@@ -20,6 +20,7 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
             let halvings = halvings.ok_or("larger than the image")?;
             Ok(ValueShape { halvings, ..input })
         }
+        Op::DepthToSpace { input } => after_depth_to_space(image(shape(*input)?)?),
         Op::ChannelNorm { input, epsilon } => {
             if !(*epsilon > 0.0 && epsilon.is_finite()) {
                 return Err(format!("an epsilon of {epsilon}, expected above 0"));
@@ -151,6 +152,18 @@ fn after_convex(
     let large = input.halvings.checked_sub(halvings);
     Ok(ValueShape {
         halvings: large.ok_or("larger than the image")?,
+        ..input
+    })
+}
+
+fn after_depth_to_space(input: ValueShape) -> Result<ValueShape, String> {
+    if !input.channels.is_multiple_of(4) || input.channels == 0 {
+        return Err(format!("{} channels for 2×2 pixels", input.channels));
+    }
+    let halvings = input.halvings.checked_sub(1);
+    Ok(ValueShape {
+        channels: input.channels / 4,
+        halvings: halvings.ok_or("larger than the image")?,
         ..input
     })
 }

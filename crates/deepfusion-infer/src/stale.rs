@@ -106,5 +106,6 @@ fn written<E: Element, C: ConvForm<E>>(step: &Step<C>, mut write: impl FnMut(usi
         Step::Gate(gate) => all(&gate.out, gate.out.channels),
         Step::Multiply(_, to) | Step::Blend(_, to) => all(to, to.channels),
         Step::ConvexUpsample(step) => all(&step.out, step.out.channels),
+        Step::DepthToSpace(_, to) => all(to, to.channels),
     }
 }

@@ -1,4 +1,4 @@
-//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder; or Lite-Mono
+//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder; or Lite-Mono, R-MSFM, DispNet
 //! (docs/concepts/network.md).
 
 use burn::module::{Module, Param};
@@ -6,6 +6,7 @@ use burn::tensor::{Device, Tensor};
 
 use crate::attention::{Attention, AttentionMasks, GlobalAggregation};
 use crate::decoder::DisparityDecoder;
+use crate::disp_net::DispNet;
 use crate::hce::HierarchicalContext;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, freeze_statistics};
@@ -15,17 +16,20 @@ use crate::resample::doubled;
 use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
 use crate::{DepthNetConfig, Error};
+use deepfusion_model::DISP_NET_LEVELS;
 
 /// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
 const FIRST_SCALE: f32 = 0.2;
 
-/// Disparity of a single image: a ResNet and its decoder at four scales, Lite-Mono at three, or R-MSFM's refinements.
+/// Disparity of a single image: a ResNet and its decoder or DispNet at four scales, Lite-Mono at three, or R-MSFM's refinements.
 #[derive(Module, Debug)]
 pub struct DepthNet {
     /// Lite-Mono. Where there is one, there is nothing else but the uncertainty head.
     pub lite_mono: Option<LiteMono>,
     /// R-MSFM. Where there is one, there is nothing else.
     pub r_msfm: Option<RMsfm>,
+    /// DispNet. Where there is one, there is nothing else but the uncertainty head.
+    pub disp_net: Option<DispNet>,
     /// The backbone.
     pub encoder: Option<ResNet>,
     /// Context encoding of the features of `layer1`…`layer4`; empty where there is none.
@@ -56,7 +60,7 @@ pub struct DepthOutput {
 /// What a [`DepthNet`] computes on the way from features to disparities: the paper's Fig. 5.
 #[derive(Debug, Clone)]
 pub struct Inspection {
-    /// The encoder's features, fine to coarse: five of a ResNet, three of Lite-Mono and of R-MSFM.
+    /// The encoder's features, fine to coarse: five of a ResNet, three of Lite-Mono and of R-MSFM, seven of DispNet.
     pub features: Vec<Tensor<4>>,
     /// What the decoder reads: the same with context, under their masks, aggregated.
     pub refined: Vec<Tensor<4>>,
@@ -91,6 +95,12 @@ impl DepthNet {
                 r_msfm: Some(body),
                 ..Self::empty()
             }
+        } else if let Some(disp_net) = &config.disp_net {
+            let body = DispNet::new(disp_net, normalisation, head_bias, &mut rng, device)?;
+            Self {
+                disp_net: Some(body),
+                ..Self::empty()
+            }
         } else if let Some(lite_mono) = &config.lite_mono {
             let body = LiteMono::new(lite_mono, normalisation, head_bias, &mut rng, device)?;
             Self {
@@ -100,9 +110,10 @@ impl DepthNet {
         } else {
             Self::with_resnet(config, head_bias, &mut rng, device)?
         };
-        let finest = match &config.lite_mono {
-            Some(lite_mono) => lite_mono.decoder_widths()[0],
-            None => config.decoder.widths[4],
+        let finest = match (&config.lite_mono, &config.disp_net) {
+            (Some(lite_mono), _) => lite_mono.decoder_widths()[0],
+            (None, Some(disp_net)) => disp_net.decoder_widths()[DISP_NET_LEVELS - 1],
+            (None, None) => config.decoder.widths[4],
         };
         // Drawn last: the other weights are those of the same seed without it.
         net.uncertainty = config.uncertainty.then(|| {
@@ -124,6 +135,7 @@ impl DepthNet {
         Self {
             lite_mono: None,
             r_msfm: None,
+            disp_net: None,
             encoder: None,
             hce: Vec::new(),
             attention: Vec::new(),
@@ -189,12 +201,13 @@ impl DepthNet {
 
     /// Disparities, and the feature that the finest head reads; R-MSFM has none.
     fn forward_with_feature(&self, images: Tensor<4>) -> (Vec<Tensor<4>>, Tensor<4>) {
-        match &self.lite_mono {
-            Some(net) => {
+        match (&self.lite_mono, &self.disp_net) {
+            (Some(net), _) => {
                 let features = net.encoder.forward(images);
                 net.decoder.forward_with_feature(features)
             }
-            None => {
+            (None, Some(net)) => net.forward_with_feature(images),
+            (None, None) => {
                 let (encoder, decoder) = self.resnet();
                 decoder.forward_with_feature(self.refine(encoder.forward(images), |_| ()))
             }
@@ -203,12 +216,12 @@ impl DepthNet {
 
     #[expect(
         clippy::expect_used,
-        reason = "what is neither Lite-Mono nor R-MSFM has both"
+        reason = "what is neither Lite-Mono nor R-MSFM nor DispNet has both"
     )]
     fn resnet(&self) -> (&ResNet, &DisparityDecoder) {
         let (encoder, decoder) = (self.encoder.as_ref(), self.decoder.as_ref());
         let both = encoder.zip(decoder);
-        both.expect("a network has a ResNet and its decoder, or is Lite-Mono or R-MSFM")
+        both.expect("a network has a ResNet and its decoder, or is Lite-Mono, R-MSFM or DispNet")
     }
 
     /// ln b of the finest feature.
@@ -283,7 +296,7 @@ impl DepthNet {
     /// - output: as of [`ResNet::forward`]
     ///
     /// # Panics
-    /// If the network is Lite-Mono or R-MSFM, as [`Self::forward`] else.
+    /// If the network is Lite-Mono, R-MSFM or DispNet, as [`Self::forward`] else.
     pub fn encode(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
         self.resnet().0.forward(images)
     }
@@ -295,7 +308,7 @@ impl DepthNet {
     /// - output: as [`Self::forward`]
     ///
     /// # Panics
-    /// If the network is Lite-Mono or R-MSFM.
+    /// If the network is Lite-Mono, R-MSFM or DispNet.
     pub fn decode(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
         self.resnet().1.forward(self.refine(features, |_| ()))
     }
@@ -304,7 +317,7 @@ impl DepthNet {
     ///
     /// # Errors
     /// As [`weights::load_torchvision_resnet`], or [`weights::load_torchvision_half`] for R-MSFM; [`Error::UnknownArchitecture`] if the network
-    /// is Lite-Mono.
+    /// is Lite-Mono or DispNet.
     pub fn with_torchvision_encoder(mut self, path: &std::path::Path) -> Result<Self, Error> {
         if let Some(net) = &mut self.r_msfm {
             net.encoder = weights::load_torchvision_half(net.encoder.clone(), path)?;
@@ -315,7 +328,14 @@ impl DepthNet {
             .take()
             .ok_or_else(|| Error::UnknownArchitecture {
                 origin: path.display().to_string(),
-                reason: "its weights are a ResNet's, and the network to start is Lite-Mono".into(),
+                reason: format!(
+                    "its weights are a ResNet's, and the network to start is {}",
+                    if self.disp_net.is_some() {
+                        "DispNet"
+                    } else {
+                        "Lite-Mono"
+                    }
+                ),
             })?;
         self.encoder = Some(weights::load_torchvision_resnet(encoder, path)?);
         Ok(self)
@@ -327,6 +347,14 @@ impl DepthNet {
     /// - `images`: as for [`Self::forward`]
     pub fn inspect(&self, images: Tensor<4>) -> Inspection {
         let mut masks = Vec::new();
+        if let Some(net) = &self.disp_net {
+            let features = net.features(images);
+            return Inspection {
+                refined: features.clone(),
+                features,
+                masks,
+            };
+        }
         let (features, refined) = match (&self.lite_mono, &self.r_msfm) {
             (Some(net), _) => {
                 let features = net.encoder.forward(images);

@@ -31,6 +31,12 @@ impl WeightRng {
             .collect()
     }
 
+    /// Xavier's weights of `pairs` of an input and an output channel, `area` taps each: uniform in ±√(6 / (area·channels)), `channels` inputs
+    /// and outputs together (Glorot and Bengio, AISTATS 2010, Eq. 16).
+    pub(crate) fn xavier(&mut self, pairs: usize, area: usize, channels: usize) -> Vec<f32> {
+        self.uniform(pairs * area, (6.0 / (area * channels) as f32).sqrt())
+    }
+
     /// `count` values, normal with mean 0 and the standard deviation `std` (Box–Muller).
     pub fn normal(&mut self, count: usize, std: f32) -> Vec<f32> {
         (0..count)
@@ -53,6 +59,8 @@ pub enum WeightInit {
     UniformFanIn,
     /// Normal with standard deviation 0.02, the bias 0: Lite-Mono's decoder.
     Normal2Percent,
+    /// Uniform in ±√(6 / (fan_in + fan_out)), the bias 0: DispNet's.
+    XavierUniform,
     /// Zero, the bias too: the initial output is zero.
     Zeros,
 }

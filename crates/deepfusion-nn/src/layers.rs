@@ -105,6 +105,10 @@ impl Conv2dConfig {
                 let weight = rng.uniform(count, bound);
                 (weight, rng.uniform(self.channels_out, bound))
             }
+            WeightInit::XavierUniform => {
+                let (from, to) = (self.channels_in, self.channels_out);
+                (rng.xavier(from * to, area, from + to), vec![0.0; to])
+            }
             WeightInit::Normal2Percent => (rng.normal(count, 0.02), vec![0.0; self.channels_out]),
             WeightInit::Zeros => (vec![0.0; count], vec![0.0; self.channels_out]),
         };

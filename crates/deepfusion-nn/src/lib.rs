@@ -9,6 +9,7 @@
 mod attention;
 mod decoder;
 mod depth_net;
+pub mod disp_net;
 mod flow_decoder;
 mod hce;
 mod init;
@@ -25,11 +26,13 @@ pub mod weights;
 pub use attention::{Attention, AttentionMasks, GlobalAggregation};
 pub use decoder::{DecoderStage, DisparityDecoder, SCALES};
 pub use deepfusion_model::{
-    AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale, FlowDecoderConfig,
-    HceConfig, InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize, NetworkError as Error,
-    PoseNetConfig, R_MSFM_STATE, RMsfmConfig, ResNetConfig, ResNetDepth, TakenUp,
+    AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale, DispNetConfig,
+    FlowDecoderConfig, HceConfig, InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize,
+    NetworkError as Error, PoseNetConfig, R_MSFM_STATE, RMsfmConfig, ResNetConfig, ResNetDepth,
+    TakenUp,
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
+pub use disp_net::DispNet;
 pub use flow_decoder::{FLOW_LEVELS, FlowDecoder, FlowLevel, FlowOutput};
 pub use hce::HierarchicalContext;
 pub use init::{WeightInit, WeightRng};

@@ -125,6 +125,36 @@ fn r_msfms_costs_are_those_of_its_graph_and_its_weights() {
     }
 }
 
+/// Its graph has transposed kernels as convolutions of which three quarters are zeros.
+#[test]
+fn disp_nets_costs_are_those_of_its_graph_and_its_weights() {
+    let mut config = DepthNetConfig::disp_net();
+    for uncertainty in [false, true] {
+        config.uncertainty = uncertainty;
+        let weights = collect(&DepthNet::new(&config, &Device::flex()).unwrap());
+        let graph = depth_graph_with_uncertainty(&config, weights.clone()).unwrap();
+        let products = graph.multiply_adds(SIZE.width, SIZE.height);
+        let costs = config.costs(SIZE);
+        for cost in &costs {
+            let of = format!("{}.", cost.name);
+            assert_eq!(cost.parameters, learned(&weights, &of), "{of}");
+        }
+        let all = |of: fn(&ModuleCost) -> u64| costs.iter().map(of).sum::<u64>();
+        assert_eq!(all(|c| c.parameters), learned(&weights, ""));
+        let true_products = graph.nodes().iter().zip(&products).map(|(node, count)| {
+            if node.name.ends_with(".enlarge") {
+                count / 4
+            } else if node.name.ends_with(".told") {
+                // No layer: 10·σ + 0.01.
+                0
+            } else {
+                *count
+            }
+        });
+        assert_eq!(all(|c| c.multiply_adds), true_products.sum::<u64>());
+    }
+}
+
 #[test]
 fn the_pose_networks_parameters_are_its_weights() {
     let mut config = PoseNetConfig::new(ResNetDepth::ResNet50);

@@ -11,8 +11,8 @@ use deepfusion_infer::{Engine, Precision};
 use deepfusion_model::{depth_graph, depth_graph_with_uncertainty};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{
-    AttentionConfig, AttentionForm, DepthNet, DepthNetConfig, Error, HceConfig, LiteMonoSize,
-    ResNetDepth,
+    AttentionConfig, AttentionForm, DepthNet, DepthNetConfig, DispNetConfig, Error, HceConfig,
+    LiteMonoSize, ResNetDepth,
 };
 
 /// Weights as after some training: batch norms with statistics and factors of their own.
@@ -37,6 +37,10 @@ fn trained(config: &DepthNetConfig) -> Weights {
             } else if name.starts_with("r_msfm.weights.expand") {
                 // A quarter of it is the logarithm of a weight.
                 *value *= 20.0;
+            } else if name.starts_with("disp_net.heads") {
+                *value *= 8.0;
+            } else if name.starts_with("disp_net.encoder.0.halve.bias") {
+                *value = spread(i) - 0.5;
             } else if name == "r_msfm.update.change_2.weight" {
                 *value *= 20.0;
             } else if name == "decoder.heads.0.weight" {
@@ -208,6 +212,26 @@ fn r_msfm() {
         };
         check(&config, 128, 64);
     }
+}
+
+/// At sizes whose sixth and seventh halvings round up.
+#[test]
+fn disp_net() {
+    let small = |base_width: usize| DepthNetConfig {
+        disp_net: Some(DispNetConfig { base_width }),
+        initial_depth_m: None,
+        ..DepthNetConfig::disp_net()
+    };
+    check(&small(32), 96, 64);
+    check(&small(12), 416, 128);
+    let sure = DepthNetConfig {
+        uncertainty: true,
+        ..small(6)
+    };
+    check(&sure, 96, 160);
+    let weights = trained(&sure);
+    let both = depth_graph_with_uncertainty(&sure, weights).unwrap();
+    assert_eq!(both.outputs().len(), 2);
 }
 
 #[test]

@@ -193,6 +193,7 @@ impl<'a> Reader<'a> {
                     (&node.name, Op::Enlarge { input }, node)
                 }
                 "Resize" => self.upsample(node)?,
+                "DepthToSpace" => self.depth_to_space(node)?,
                 "Concat" => {
                     let inputs = (0..node.input.len()).map(|i| self.input(node, i));
                     let inputs = inputs.collect::<Result<_, _>>()?;
@@ -381,6 +382,18 @@ impl<'a> Reader<'a> {
             None => (None, node),
         };
         Ok((&last.name, Op::UpsampleConcat { input, skip }, last))
+    }
+
+    /// `DepthToSpace [→ Slice]`: name, operation, last node.
+    fn depth_to_space(
+        &mut self,
+        node: &'a NodeProto,
+    ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let input = self.input(node, 0)?;
+        let cut = node.name.strip_suffix(".whole");
+        let cut = cut.and_then(|name| self.after_named(node, "Slice", name));
+        let last = cut.unwrap_or(node);
+        Ok((&last.name, Op::DepthToSpace { input }, last))
     }
 
     /// `Mul [→ Add] → Mul`: name, operation, last node.

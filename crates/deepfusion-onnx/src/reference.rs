@@ -1,6 +1,6 @@
 //! Runs a graph in a simple way, one operation after another, as a reference for faster engines.
 
-use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId};
+use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId, ValueShape};
 use deepfusion_kernels::{ConvShape, conv2d, gelu_exact, position_code};
 
 use crate::{DepthMaps, DepthModel, Error};
@@ -160,6 +160,15 @@ impl Plan<'_> {
                 let (value, weights) = (&values[input.0], &values[weights.0]);
                 convex(value, weights, self.shape(*input), 1 << halvings)
             }
+            Op::DepthToSpace { input } => {
+                let small = self.graph.shape(*input);
+                let large = ValueShape {
+                    halvings: small.halvings.saturating_sub(1),
+                    ..small
+                };
+                let size = large.size(self.width, self.height);
+                pixels_of_channels(&values[input.0], self.shape(*input), size)
+            }
             Op::Depthwise(op) => depthwise(op, &values[op.input.0], self.shape(op.input)),
             Op::Enlarge { input } => enlarged(&values[input.0], self.shape(*input)),
             Op::ChannelNorm { input, epsilon } => {
@@ -272,6 +281,25 @@ fn enlarged(x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
             y.extend((0..2 * width).map(|column| {
                 let of = along(column);
                 (0.75 * of(near) + 0.25 * of(next)) as f32
+            }));
+        }
+    }
+    y
+}
+
+/// Four channels to the four pixels of a block, cut to a size.
+fn pixels_of_channels(
+    x: &[f32],
+    [channels, height, width]: [usize; 3],
+    (out_width, out_height): (usize, usize),
+) -> Vec<f32> {
+    let channels = channels / 4;
+    let mut y = Vec::with_capacity(channels * out_width * out_height);
+    for channel in 0..channels {
+        for row in 0..out_height {
+            y.extend((0..out_width).map(|column| {
+                let plane = (2 * (row % 2) + column % 2) * channels + channel;
+                x[(plane * height + row / 2) * width + column / 2]
             }));
         }
     }

@@ -335,9 +335,31 @@ impl Writer {
                 self.emit("Add", name, &[&h, &step], vec![])?
             }
             Op::ConvexUpsample { input, weights, .. } => self.convex(name, *input, *weights)?,
+            Op::DepthToSpace { input } => self.depth_to_space(name, *input)?,
         };
         self.values.push(value);
         Ok(())
+    }
+
+    /// Whole, and then cut where the larger size is an odd number of pixels.
+    fn depth_to_space(&mut self, name: &str, input: ValueId) -> Result<String, Error> {
+        let [_, height, width] = self.shapes[self.values.len()];
+        let [_, small_height, small_width] = self.shapes[input.0];
+        let attributes = vec![
+            AttributeProto::int("blocksize", 2),
+            AttributeProto::text("mode", "DCR"),
+        ];
+        let input = self.value(input);
+        if [height, width] == [2 * small_height, 2 * small_width] {
+            return self.emit("DepthToSpace", name, &[&input], attributes);
+        }
+        let whole = format!("{name}.whole");
+        let whole = self.emit("DepthToSpace", &whole, &[&input], attributes)?;
+        let starts = self.shared(TensorProto::ints("cut.starts", &[0, 0]))?;
+        let axes = self.shared(TensorProto::ints("cut.axes", &[2, 3]))?;
+        let ends = TensorProto::ints(&format!("{name}.ends"), &[height as i64, width as i64]);
+        let ends = self.constant(name, ends)?;
+        self.emit("Slice", name, &[&whole, &starts, &ends, &axes], vec![])
     }
 
     fn upsample(

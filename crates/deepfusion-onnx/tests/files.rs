@@ -124,6 +124,74 @@ fn other_networks_are_refused_by_the_node() {
     );
 }
 
+/// An image of odd sides, halved rounding up, and enlarged again by channels that become pixels.
+#[test]
+fn channels_become_pixels_and_are_cut() {
+    let mut graph = Graph::new([0.5; 3], [0.5; 3]);
+    let mut layer = |name: &str, input: ValueId, channels: [usize; 2], stride: usize| {
+        let [channels_in, channels_out] = channels;
+        let count = channels_out * channels_in * 9;
+        let conv = Conv {
+            input,
+            weight: (0..count)
+                .map(|i| ((i * i) % 23) as f32 / 50.0 - 0.2)
+                .collect(),
+            bias: (0..channels_out).map(|i| i as f32 / 10.0).collect(),
+            channels_in,
+            channels_out,
+            kernel: 3,
+            stride,
+            dilation: 1,
+            border: Border::Zero,
+            residual: None,
+            activation: Activation::Identity,
+        };
+        let input = graph.push(name, Op::Conv(Box::new(conv))).unwrap();
+        let pixels = format!("{name}.pixels");
+        match stride {
+            2 => input,
+            _ => graph.push(pixels, Op::DepthToSpace { input }).unwrap(),
+        }
+    };
+    let small = layer("small", ValueId::IMAGE, [3, 2], 2);
+    let output = layer("large", small, [2, 4], 1);
+    graph.add_output(output);
+    let model = DepthModel {
+        graph,
+        width: 7,
+        height: 5,
+        ..model(0)
+    };
+    let bytes = write(&model).unwrap();
+    assert_eq!(read(&bytes).unwrap(), model);
+    let has = |text: &str| bytes.windows(text.len()).any(|w| w == text.as_bytes());
+    assert!(has("large.pixels.whole") && has("Slice"));
+    let rgb: Vec<u8> = (0..105_u32).map(|i| (i * 7 % 256) as u8).collect();
+    let mut alone = model.graph.clone();
+    alone.add_output(ValueId(2));
+    let outputs = reference::run(&alone, &rgb, 7, 5).unwrap();
+    let [pixels, channels] = &outputs[..] else {
+        panic!("two outputs")
+    };
+    assert_eq!((pixels.len(), channels.len()), (35, 4 * 12));
+    for y in 0..5 {
+        for x in 0..7 {
+            let channel = 2 * (y % 2) + x % 2;
+            let expected = channels[channel * 12 + y / 2 * 4 + x / 2];
+            assert_eq!(pixels[7 * y + x], expected, "{x} {y}");
+        }
+    }
+    // Where nothing is to be cut, nothing is.
+    let even = DepthModel {
+        width: 8,
+        height: 6,
+        ..model
+    };
+    let bytes = write(&even).unwrap();
+    assert_eq!(read(&bytes).unwrap(), even);
+    assert!(!bytes.windows(5).any(|w| w == b"Slice"));
+}
+
 #[test]
 fn models_that_cannot_be_written_are_refused() {
     let part = |model: &DepthModel| match write(model) {

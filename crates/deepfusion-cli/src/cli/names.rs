@@ -63,6 +63,10 @@ pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
                 "R-MSFM3 (3.5 M parameters): a disparity refined three times",
             ),
             (Preset::RMsfm6, "R-MSFM6 (3.8 M): refined six times"),
+            (
+                Preset::Sfmlearner,
+                "SfMLearner's DispNet (31.6 M parameters), 416×128, batch 4",
+            ),
         ],
     )
 }

@@ -9,14 +9,14 @@ use super::values::share;
 /// `deepfusion weights …`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum WeightsCommand {
-    /// Make a run of weights of torchvision's ResNet, of Monodepth2, Lite-Mono or R-MSFM (.pth, .safetensors).
+    /// Make a run of weights of torchvision's ResNet, of Monodepth2, Lite-Mono, R-MSFM or SfMLearner (.pth, .safetensors).
     #[command(
         after_help = "Examples:\n  deepfusion weights import encoder.pth depth.pth pose_encoder.pth pose.pth --out runs/monodepth2\n  \
         deepfusion weights import resnet18-5c106cde.pth --out runs/imagenet18"
     )]
     #[cfg(feature = "train")]
     Import {
-        /// The files: one of a ResNet, or another network's encoder, depth, pose_encoder and pose.
+        /// The files: one of a ResNet or of SfMLearner's DispNet, or another network's encoder, depth, pose_encoder and pose.
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
         /// Folder of the run to make.

@@ -9,6 +9,7 @@ mod oracle;
 mod plain;
 mod recurrent;
 mod remains;
+mod transposed;
 
 use proptest::prelude::*;
 

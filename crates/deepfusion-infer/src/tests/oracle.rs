@@ -55,7 +55,8 @@ fn conv(conv: &Conv, values: &[Image]) -> Image {
             Border::Reflect => Some((2 * (n - 1) - i) as usize),
         }
     };
-    let (h, w) = (input.height / conv.stride, input.width / conv.stride);
+    let halved = |side: usize| side.div_ceil(conv.stride);
+    let (h, w) = (halved(input.height), halved(input.width));
     Image::from_fn(conv.channels_out, h, w, |o, y, x| {
         let mut sum = f64::from(conv.bias[o]);
         for c in 0..conv.channels_in {
@@ -282,6 +283,15 @@ pub(super) fn run(graph: &Graph, image: &[f32], height: usize, width: usize) -> 
                 weights,
                 halvings,
             } => convex(&values[input.0], &values[weights.0], 1 << halvings),
+            Op::DepthToSpace { input } => {
+                let shape = graph.shape(crate::ValueId(values.len()));
+                let (w, h) = shape.size(width, height);
+                let v = &values[input.0];
+                Image::from_fn(shape.channels, h, w, |c, y, x| {
+                    let part = 2 * (y % 2) + x % 2;
+                    v.at(part * shape.channels + c, y / 2, x / 2)
+                })
+            }
             Op::AddPixel { input, pixel } => {
                 let (v, p) = (&values[input.0], &values[pixel.0]);
                 Image::from_fn(v.channels, v.height, v.width, |c, y, x| {

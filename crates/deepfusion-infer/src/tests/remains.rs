@@ -3,7 +3,7 @@
 use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;
 use super::plain::Plain;
-use super::{attention, lite, network, odd_network, recurrent};
+use super::{attention, lite, network, odd_network, recurrent, transposed};
 use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
 use crate::engine::Typed;
@@ -67,6 +67,7 @@ fn graphs() -> Vec<(Graph, usize, usize)> {
         (odd_network(), 24, 16),
         (lite::small_network(), 32, 32),
         (recurrent::small_network(), 32, 32),
+        (transposed::small_network(), 24, 20),
         (dense_network(48), 20, 12),
         (widening_network(), 12, 8),
     ]

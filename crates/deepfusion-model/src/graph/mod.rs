@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 
 mod decoder;
+mod disp_net;
 mod encoder;
 mod lite_mono;
 mod r_msfm;
@@ -50,14 +51,16 @@ pub fn depth_graph_with_uncertainty(
         weights,
         repeated: BTreeMap::new(),
     };
-    let outputs = match (&config.lite_mono, &config.r_msfm) {
-        (Some(lite_mono), _) => builder.lite_mono(lite_mono, config.uncertainty)?,
-        (None, Some(r_msfm)) => vec![builder.r_msfm(config, r_msfm)?],
-        (None, None) => {
-            let features = builder.encoder(&config.encoder)?;
-            let features = builder.skips(config, features)?;
-            builder.decoder(config, features)?
-        }
+    let outputs = if let Some(lite_mono) = &config.lite_mono {
+        builder.lite_mono(lite_mono, config.uncertainty)?
+    } else if let Some(r_msfm) = &config.r_msfm {
+        vec![builder.r_msfm(config, r_msfm)?]
+    } else if let Some(disp_net) = &config.disp_net {
+        builder.disp_net(config, disp_net)?
+    } else {
+        let features = builder.encoder(&config.encoder)?;
+        let features = builder.skips(config, features)?;
+        builder.decoder(config, features)?
     };
     for output in outputs {
         builder.graph.add_output(output);

@@ -1,6 +1,6 @@
 //! What each part of the networks costs: parameters, multiply-adds, values.
 
-use super::{DepthNetConfig, InputSize, POSE_WIDTH, PoseNetConfig, ResNetConfig};
+use super::{DISP_NET_LEVELS, DepthNetConfig, InputSize, POSE_WIDTH, PoseNetConfig, ResNetConfig};
 
 /// What a part of a network costs for one image, batch normalisation folded into the convolutions.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -128,6 +128,16 @@ impl DepthNetConfig {
     pub fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
         if let Some(r_msfm) = &self.r_msfm {
             return r_msfm.costs(&self.encoder, size);
+        }
+        if let Some(disp_net) = &self.disp_net {
+            let mut costs = disp_net.costs(size);
+            if self.uncertainty {
+                let finest = disp_net.decoder_widths()[DISP_NET_LEVELS - 1];
+                let mut cost = ModuleCost::new("uncertainty");
+                cost.conv([finest, 1], 3, size.width * size.height, After::Bias);
+                costs.push(cost);
+            }
+            return costs;
         }
         if let Some(lite_mono) = &self.lite_mono {
             let mut costs = lite_mono.costs(size);

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionConfig, DecoderConfig, HceConfig, InputNormalisation, LiteMonoConfig, LiteMonoSize,
-    NetworkError, RMsfmConfig, ResNetConfig, ResNetDepth,
+    AttentionConfig, DecoderConfig, DispNetConfig, HceConfig, InputNormalisation, LiteMonoConfig,
+    LiteMonoSize, NetworkError, RMsfmConfig, ResNetConfig, ResNetDepth,
 };
 
 /// ln b is held within these, in learning and in a prediction: errors of ln depth between 0.25 % and a factor of 7.
@@ -66,7 +66,7 @@ pub struct DepthScale {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DepthNetConfig {
-    /// The backbone. Where there is a `lite_mono` or an `r_msfm`, only `normalisation` and `frozen_statistics` of it are read.
+    /// The backbone. Where there is a `lite_mono`, an `r_msfm` or a `disp_net`, only `normalisation` and `frozen_statistics` of it are read.
     pub encoder: ResNetConfig,
     /// Lite-Mono in place of the ResNet and its decoder; absent: those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -74,6 +74,9 @@ pub struct DepthNetConfig {
     /// R-MSFM in place of them; absent: those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub r_msfm: Option<RMsfmConfig>,
+    /// SfMLearner's DispNet in place of them; absent: those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disp_net: Option<DispNetConfig>,
     /// Hierarchical context encoding of the features of `layer1`…`layer4` on their way to the decoder;
     /// absent: the decoder reads the features as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -110,6 +113,7 @@ impl DepthNetConfig {
             encoder: ResNetConfig::new(depth),
             lite_mono: None,
             r_msfm: None,
+            disp_net: None,
             hce: None,
             attention: None,
             aggregation: false,
@@ -167,10 +171,22 @@ impl DepthNetConfig {
         }
     }
 
+    /// SfMLearner's DispNet: its normalisation, a range of 0.1 to 100, starting at 10 m.
+    #[must_use]
+    pub fn disp_net() -> Self {
+        let encoder = ResNetConfig::new(ResNetDepth::ResNet18);
+        Self {
+            encoder: encoder.with_normalisation(InputNormalisation::Centred),
+            disp_net: Some(DispNetConfig::default()),
+            initial_depth_m: Some(10.0),
+            ..Self::monodepth2(ResNetDepth::ResNet18)
+        }
+    }
+
     /// Whether the network is a ResNet with its decoder, whose features others may share.
     #[must_use]
     pub fn is_resnet(&self) -> bool {
-        self.lite_mono.is_none() && self.r_msfm.is_none()
+        self.lite_mono.is_none() && self.r_msfm.is_none() && self.disp_net.is_none()
     }
 
     /// The disparities that the network gives while it learns, in the order in which it gives them. A decoder's scales count alike, their
@@ -199,7 +215,7 @@ impl DepthNetConfig {
             .collect()
     }
 
-    /// Lite-Mono and R-MSFM have an encoder and a decoder of their own; settings of others would say nothing.
+    /// Lite-Mono, R-MSFM and DispNet have an encoder and a decoder of their own; settings of others would say nothing.
     fn validate_own_body(&self) -> Result<(), NetworkError> {
         let read = ResNetConfig {
             normalisation: self.encoder.normalisation,
@@ -217,7 +233,7 @@ impl DepthNetConfig {
             None => Ok(()),
             Some((field, _)) => Err(NetworkError::config(
                 field,
-                "left as it is where there is a lite_mono or an r_msfm, which do not read it",
+                "left as it is where there is a lite_mono, an r_msfm or a disp_net, which do not read it",
                 "another value",
             )),
         }
@@ -239,6 +255,22 @@ impl DepthNetConfig {
         Ok(())
     }
 
+    fn validate_disp_net(&self, disp_net: &DispNetConfig) -> Result<(), NetworkError> {
+        disp_net.validate()?;
+        let others = [
+            ("lite_mono", self.lite_mono.is_some()),
+            ("r_msfm", self.r_msfm.is_some()),
+        ];
+        match others.into_iter().find(|(_, there)| *there) {
+            None => Ok(()),
+            Some((field, _)) => Err(NetworkError::config(
+                field,
+                "absent where there is a disp_net",
+                "another network",
+            )),
+        }
+    }
+
     /// # Errors
     /// [`NetworkError::Config`] for a network that cannot be built, or a depth range that is none.
     pub fn validate(&self) -> Result<(), NetworkError> {
@@ -254,6 +286,9 @@ impl DepthNetConfig {
         self.r_msfm
             .as_ref()
             .map_or(Ok(()), |r_msfm| self.validate_r_msfm(r_msfm))?;
+        self.disp_net
+            .as_ref()
+            .map_or(Ok(()), |disp_net| self.validate_disp_net(disp_net))?;
         if !self.is_resnet() {
             self.validate_own_body()?;
         }

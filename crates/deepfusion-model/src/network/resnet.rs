@@ -62,6 +62,8 @@ pub enum InputNormalisation {
     ImageNet,
     /// (x − 0.45) / 0.225 on every channel.
     Monodepth,
+    /// (x − 0.5) / 0.5 on every channel: SfMLearner's.
+    Centred,
 }
 
 impl InputNormalisation {
@@ -71,6 +73,7 @@ impl InputNormalisation {
         match self {
             Self::ImageNet => [0.485, 0.456, 0.406],
             Self::Monodepth => [0.45; 3],
+            Self::Centred => [0.5; 3],
         }
     }
 
@@ -80,6 +83,7 @@ impl InputNormalisation {
         match self {
             Self::ImageNet => [0.229, 0.224, 0.225],
             Self::Monodepth => [0.225; 3],
+            Self::Centred => [0.5; 3],
         }
     }
 }

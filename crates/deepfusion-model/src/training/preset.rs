@@ -46,6 +46,8 @@ pub enum Preset {
     /// R-MSFM6: refined six times, 3.8 M.
     #[serde(rename = "r-msfm6")]
     RMsfm6,
+    /// SfMLearner's DispNet (31.6 M parameters), 416×128, batch 4.
+    Sfmlearner,
 }
 
 /// What a run computes on, as far as a preset's sizes follow it.
@@ -64,7 +66,7 @@ const MIN_STEPS: usize = 1200;
 
 impl Preset {
     /// All presets.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Tiny,
         Self::Light,
         Self::Resnet50,
@@ -77,6 +79,7 @@ impl Preset {
         Self::LiteMono8m,
         Self::RMsfm3,
         Self::RMsfm6,
+        Self::Sfmlearner,
     ];
 
     /// Its name, on the command line and in files.
@@ -95,6 +98,7 @@ impl Preset {
             Self::LiteMono8m => "lite-mono-8m",
             Self::RMsfm3 => "r-msfm3",
             Self::RMsfm6 => "r-msfm6",
+            Self::Sfmlearner => "sfmlearner",
         }
     }
 
@@ -218,6 +222,18 @@ impl Preset {
         match self {
             Self::RMsfm3 => r_msfm(3),
             Self::RMsfm6 => r_msfm(6),
+            Self::Sfmlearner => {
+                let mut config = monodepth2(ResNetDepth::ResNet18);
+                config.size = InputSize {
+                    width: 416,
+                    height: 128,
+                };
+                config.batch = 4;
+                // Theirs does not fall.
+                (config.learning_rate, config.learning_rate_drop) = (2e-4, 1.0);
+                config.depth_net = DepthNetConfig::disp_net();
+                config
+            }
             Self::LiteMono => lite_mono(LiteMonoSize::Full),
             Self::LiteMonoSmall => lite_mono(LiteMonoSize::Small),
             Self::LiteMonoTiny => lite_mono(LiteMonoSize::Tiny),
@@ -284,6 +300,7 @@ mod tests {
             assert_eq!(on(Compute::Processor), (320, 96, 4), "{preset}");
             let full = match preset {
                 Preset::Tiny => (320, 96, 4),
+                Preset::Sfmlearner => (416, 128, 4),
                 _ => (640, 192, 12),
             };
             assert_eq!(on(Compute::Gpu), full, "{preset}");

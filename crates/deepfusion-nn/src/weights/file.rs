@@ -9,9 +9,13 @@ use deepfusion_model::weights::{FileKind, floats, read_safetensors};
 use super::{WeightTensor, Weights};
 use crate::Error;
 
+/// How the names of the tensors begin that lie beside an epoch or an optimiser's state.
+const NESTED: &str = "state_dict.";
+
 /// Reads every float tensor of a `.safetensors`, `.pth` or `.pt` file; the format is recognised by
 /// content, not by name. f64, f16 and bf16 become f32; integers (PyTorch's `num_batches_tracked`)
-/// and entries that are not tensors are skipped.
+/// and entries that are not tensors are skipped. Of a `.pth` that holds a `state_dict` beside other things, as training programs save
+/// it, these are the `state_dict`'s.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it holds no weights.
@@ -42,7 +46,11 @@ fn read_pytorch(path: &Path) -> Result<Weights, Error> {
         let shape = tensor.shape().to_vec();
         weights.tensors.insert(name, WeightTensor { shape, values });
     }
-    Ok(weights)
+    Ok(if weights.tensors.keys().any(|n| n.starts_with(NESTED)) {
+        weights.renamed(|name| Some(name.strip_prefix(NESTED)?.to_owned()))
+    } else {
+        weights
+    })
 }
 
 fn format_error(path: &Path, reason: impl Into<String>) -> Error {

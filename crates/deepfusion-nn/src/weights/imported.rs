@@ -2,6 +2,9 @@
 
 use burn::tensor::Device;
 
+use std::path::Path;
+
+use super::disp_net::{is_disp_net, load_disp_net};
 use super::lite_mono::{is_lite_mono, load_lite_mono};
 use super::monodepth2::{Monodepth2Files, Pose, load_monodepth2};
 use super::r_msfm::{is_r_msfm, load_r_msfm};
@@ -19,6 +22,18 @@ pub struct Imported {
     pub pose: Option<Pose>,
     /// The image size it was trained at, where `encoder.pth` says so.
     pub input_size: Option<InputSize>,
+}
+
+/// Reads a file that holds a whole depth network, DispNet's; `None` for other files.
+///
+/// # Errors
+/// As [`load_disp_net`].
+pub fn load_whole(file: &Path, device: &Device) -> Result<Option<Imported>, Error> {
+    if is_disp_net(&read(file)?) {
+        load_disp_net(file, device).map(Some)
+    } else {
+        Ok(None)
+    }
 }
 
 /// Reads Lite-Mono's, R-MSFM's or Monodepth2's files; which they are, the names of their tensors say.

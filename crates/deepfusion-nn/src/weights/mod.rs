@@ -4,6 +4,7 @@
 //! PyTorch's `.pth` files can be read. An import renames the tensors of a foreign file to ours and then requires an exact
 //! fit: nothing missing, nothing left over, every shape equal.
 
+mod disp_net;
 mod file;
 mod imported;
 mod lite_mono;
@@ -15,8 +16,9 @@ mod torchvision;
 pub use deepfusion_model::weights::{
     WeightTensor, Weights, read_bytes, read_safetensors_under, write_safetensors,
 };
+pub use disp_net::{is_disp_net, load_disp_net};
 pub use file::read;
-pub use imported::{Imported, load_networks};
+pub use imported::{Imported, load_networks, load_whole};
 pub use lite_mono::load_lite_mono;
 pub use module::{apply, collect};
 pub use monodepth2::{Monodepth2Files, Pose, load_monodepth2};

@@ -4,6 +4,7 @@
 mod against_pytorch;
 mod common;
 mod depth_network;
+mod disp_net;
 mod flow_decoder;
 mod lite_mono;
 mod operations;

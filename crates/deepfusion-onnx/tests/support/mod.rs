@@ -226,7 +226,7 @@ pub(crate) fn model(seed: u64) -> DepthModel {
         let shape = graph.shape(input);
         let channels_out = 1 + r.below(5);
         let name = format!("stage.{i}");
-        let op = match r.below(11) {
+        let op = match r.below(12) {
             0 if shape.halvings < 2 => Op::MaxPool { input },
             1 if shape.halvings > 0 => {
                 let fitting = |v: &&ValueId| graph.shape(**v).halvings + 1 == shape.halvings;
@@ -245,6 +245,12 @@ pub(crate) fn model(seed: u64) -> DepthModel {
             7 => mixed(r, &mut graph, input, &name),
             8 if shape.halvings > 0 => Op::Enlarge { input },
             9 => gated(r, &mut graph, input, &name),
+            11 if shape.halvings > 0 => {
+                let wide = conv(r, &graph, input, 4 * channels_out);
+                let name = format!("{name}.wide");
+                let input = graph.push(name, Op::Conv(Box::new(wide))).unwrap();
+                Op::DepthToSpace { input }
+            }
             10 if shape.halvings > 0 => {
                 enlarged_by_weights(r, &mut graph, input, &name, shape.halvings)
             }

@@ -4,7 +4,9 @@ use burn::module::{Module, Param};
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Gradients, Tensor};
 use deepfusion_nn::ops::{self, ConvOptions};
-use deepfusion_nn::{DepthNet, DepthNetConfig, LiteMonoSize, PoseNet, PoseNetConfig, ResNetDepth};
+use deepfusion_nn::{
+    DepthNet, DepthNetConfig, DispNetConfig, LiteMonoSize, PoseNet, PoseNetConfig, ResNetDepth,
+};
 
 use super::NeededBy;
 use super::inputs::{Inputs, Outcome, gradient, outcome, values};
@@ -116,6 +118,11 @@ pub(super) fn all() -> Vec<Case> {
         }),
         case("depth network, R-MSFM3", NeededBy::RMsfm, |on| {
             depth_net(&DepthNetConfig::r_msfm(3), on)
+        }),
+        case("depth network, DispNet", NeededBy::DispNet, |on| {
+            let mut config = DepthNetConfig::disp_net();
+            config.disp_net = Some(DispNetConfig { base_width: 8 });
+            depth_net(&config, on)
         }),
         case("pose network", NeededBy::Learning, pose_net),
         case("optimiser", NeededBy::Learning, optimiser),

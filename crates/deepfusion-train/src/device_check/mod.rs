@@ -23,6 +23,8 @@ pub enum NeededBy {
     LiteMono,
     /// R-MSFM alone.
     RMsfm,
+    /// DispNet alone.
+    DispNet,
     /// Learning from video.
     Views,
     /// Learning from known depth.

@@ -193,6 +193,7 @@ fn remedy(checks: &[OperationCheck]) -> String {
         (NeededBy::Depth, "no data set with `learn = \"depth\"`"),
         (NeededBy::LiteMono, "no lite-mono preset"),
         (NeededBy::RMsfm, "no r-msfm preset"),
+        (NeededBy::DispNet, "not the preset sfmlearner"),
     ];
     let wrong = without
         .iter()
@@ -210,6 +211,7 @@ mod tests {
             NeededBy::Network,
             NeededBy::LiteMono,
             NeededBy::RMsfm,
+            NeededBy::DispNet,
             NeededBy::Views,
             NeededBy::Depth,
             NeededBy::Flow,

@@ -2,7 +2,8 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
 use deepfusion_nn::weights::{
-    Monodepth2Files, detect_resnet, load_networks, load_torchvision_resnet, read,
+    Imported, Monodepth2Files, detect_resnet, load_networks, load_torchvision_resnet, load_whole,
+    read,
 };
 use deepfusion_nn::{DepthNet, DepthNetConfig, PoseNet, PoseNetConfig};
 use deepfusion_train::{
@@ -16,11 +17,16 @@ use crate::progress::say;
 /// `deepfusion weights import`.
 pub(crate) fn run(files: &[PathBuf], out: &Path) -> Result<()> {
     let device = Device::flex();
-    let encoders_only = matches!(files, [file] if !file.is_dir());
-    let (config, model) = match files {
-        [file] if encoders_only => from_resnet(file, &device)?,
-        [folder] => from_files(&Monodepth2Files::in_folder(folder), &device)?,
-        files => from_files(&named(files), &device)?,
+    let whole = match files {
+        [file] if !file.is_dir() => load_whole(file, &device)?,
+        _ => None,
+    };
+    let encoders_only = whole.is_none() && matches!(files, [file] if !file.is_dir());
+    let (config, model) = match (whole, files) {
+        (Some(network), _) => of_networks(network, &device)?,
+        (None, [file]) if encoders_only => from_resnet(file, &device)?,
+        (None, [folder]) => from_files(&Monodepth2Files::in_folder(folder), &device)?,
+        (None, files) => from_files(&named(files), &device)?,
     };
     let folder = RunFolder::create(&output::run_folder(Some(out), "weights")?)?;
     folder.write_config(&config, &TrainFindings::default())?;
@@ -54,7 +60,8 @@ fn preset_of(net: &DepthNetConfig) -> Preset {
     let layers = |net: &DepthNetConfig| {
         let lite_mono = net.lite_mono.as_ref();
         let stages = lite_mono.map(|own| (own.widths, own.dilations.each_ref().map(Vec::len)));
-        (stages, net.r_msfm.clone(), net.encoder.depth)
+        let (r_msfm, disp_net) = (net.r_msfm.clone(), net.disp_net.clone());
+        (stages, r_msfm, disp_net, net.encoder.depth)
     };
     let family = Preset::ALL
         .into_iter()
@@ -64,7 +71,11 @@ fn preset_of(net: &DepthNetConfig) -> Preset {
 }
 
 fn from_files(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
-    let imported = load_networks(files, device)?;
+    of_networks(load_networks(files, device)?, device)
+}
+
+/// A run of networks as files held them.
+fn of_networks(imported: Imported, device: &Device) -> Result<(TrainConfig, Model)> {
     let mut config = preset_of(&imported.depth_config).config();
     config.depth_net = imported.depth_config;
     if let Some(size) = imported.input_size {
@@ -105,7 +116,7 @@ mod tests {
     fn a_networks_layers_say_its_preset() {
         let all = Preset::ALL.into_iter();
         let family: Vec<Preset> = all.skip_while(|p| *p != Preset::Monodepth2).collect();
-        assert_eq!(family.len(), 8);
+        assert_eq!(family.len(), 9);
         for preset in family {
             // As an import leaves it.
             let mut net = preset.config().depth_net;

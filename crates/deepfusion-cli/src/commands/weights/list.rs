@@ -6,7 +6,7 @@ use crate::failure::Result;
 use crate::output;
 
 /// What can be imported: name, files, what it gives, terms.
-const KNOWN: [[&str; 4]; 5] = [
+const KNOWN: [[&str; 4]; 6] = [
     [
         "torchvision ResNet-18, 34, 50, 101",
         "resnet*.pth or .safetensors",
@@ -29,6 +29,12 @@ const KNOWN: [[&str; 4]; 5] = [
         "R-MSFM3, R-MSFM6",
         "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
         "the whole networks; depth up to an unknown factor",
+        "its authors' own; see their repository",
+    ],
+    [
+        "SfMLearner's DispNet",
+        "dispnet_model_best.pth.tar",
+        "the depth network; depth up to an unknown factor",
         "its authors' own; see their repository",
     ],
     [

@@ -1,0 +1,129 @@
+//! The settings of DispNet as SfMLearner has it (Zhou et al., CVPR 2017): an image halved seven times and enlarged again, with a disparity at
+//! each of the four finest sizes that the next one reads.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{InputSize, NetworkError};
+
+/// How often the image is halved, and enlarged again.
+pub const DISP_NET_LEVELS: usize = 7;
+
+/// Sides of the kernels of each halving, in pixels.
+pub const DISP_NET_KERNELS: [usize; DISP_NET_LEVELS] = [7, 5, 3, 3, 3, 3, 3];
+
+/// What a scale tells the next one: 10·σ + 0.01, factor and summand. The published networks' disparity, whatever the range of depths.
+pub const DISP_NET_TOLD: [f64; 2] = [10.0, 0.01];
+
+/// Disparities that the network gives.
+const SCALES: usize = 4;
+
+/// What a `DispNet` is built from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DispNetConfig {
+    /// Channels of the first layer, even; 32 is the published network.
+    #[serde(default = "default_base_width")]
+    pub base_width: usize,
+}
+
+fn default_base_width() -> usize {
+    32
+}
+
+impl Default for DispNetConfig {
+    fn default() -> Self {
+        Self {
+            base_width: default_base_width(),
+        }
+    }
+}
+
+impl DispNetConfig {
+    /// # Errors
+    /// [`NetworkError::Config`] for a width that has no half, or is no network's.
+    pub fn validate(&self) -> Result<(), NetworkError> {
+        let width = self.base_width;
+        if width.is_multiple_of(2) && (2..=256).contains(&width) {
+            return Ok(());
+        }
+        Err(NetworkError::config(
+            "disp_net.base_width",
+            "an even number, 2 to 256",
+            width,
+        ))
+    }
+
+    /// Channels after each halving.
+    #[must_use]
+    pub fn widths(&self) -> [usize; DISP_NET_LEVELS] {
+        [1, 2, 4, 8, 16, 16, 16].map(|factor| factor * self.base_width)
+    }
+
+    /// Channels after each enlargement, coarse to fine.
+    #[must_use]
+    pub fn decoder_widths(&self) -> [usize; DISP_NET_LEVELS] {
+        [32, 32, 16, 8, 4, 2, 1].map(|factor| factor * self.base_width / 2)
+    }
+
+    /// Channels that an enlargement reads.
+    #[must_use]
+    pub fn before(&self, stage: usize) -> usize {
+        match stage {
+            0 => self.widths()[DISP_NET_LEVELS - 1],
+            _ => self.decoder_widths()[stage - 1],
+        }
+    }
+
+    /// Channels that are appended to an enlargement's: those of the halving of its size, none at the image's own.
+    #[must_use]
+    pub fn skip(&self, stage: usize) -> usize {
+        let level = (DISP_NET_LEVELS - 2).checked_sub(stage);
+        level.map_or(0, |level| self.widths()[level])
+    }
+
+    /// The scale of the disparity that an enlargement's layer gives, 0 at the image's size; the coarse ones give none.
+    #[must_use]
+    pub fn scale_of(stage: usize) -> Option<usize> {
+        (DISP_NET_LEVELS - 1)
+            .checked_sub(stage)
+            .filter(|scale| *scale < SCALES)
+    }
+
+    /// Whether an enlargement's layer reads the disparity of the scale before.
+    #[must_use]
+    pub fn is_told(stage: usize) -> bool {
+        Self::scale_of(stage).is_some_and(|scale| scale + 1 < SCALES)
+    }
+
+    /// Pixels at 1/2^`halvings` of a size, rounded up.
+    pub(super) fn pixels(size: InputSize, halvings: usize) -> usize {
+        size.width.div_ceil(1 << halvings) * size.height.div_ceil(1 << halvings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The paper's figure.
+    #[test]
+    fn stages_have_the_published_channels() {
+        let config = DispNetConfig::default();
+        assert_eq!(config.widths(), [32, 64, 128, 256, 512, 512, 512]);
+        assert_eq!(config.decoder_widths(), [512, 512, 256, 128, 64, 32, 16]);
+        let stages = 0..DISP_NET_LEVELS;
+        let read: Vec<_> = stages
+            .clone()
+            .map(|s| (config.before(s), config.skip(s), DispNetConfig::is_told(s)))
+            .collect();
+        assert_eq!(read[0], (512, 512, false));
+        assert_eq!(read[3], (256, 128, false));
+        assert_eq!(read[4..], [(128, 64, true), (64, 32, true), (32, 0, true)]);
+        let scales: Vec<_> = stages.filter_map(DispNetConfig::scale_of).collect();
+        assert_eq!(scales, [3, 2, 1, 0]);
+        for base_width in [0, 3, 1000] {
+            assert!(DispNetConfig { base_width }.validate().is_err());
+        }
+    }
+}
