@@ -313,7 +313,7 @@ fn what_is_embedded_is_listed_and_used() {
         .map(|network| network["name"].as_str().unwrap())
         .collect();
     assert_eq!(names, deepfusion_weights::names().collect::<Vec<_>>());
-    assert_eq!(list["importable"].as_array().unwrap().len(), 5);
+    assert_eq!(list["importable"].as_array().unwrap().len(), 6);
     assert_eq!(text.contains("none in this build"), names.is_empty());
     ok(
         at,

@@ -10,6 +10,7 @@ mod attention;
 mod decoder;
 mod depth_net;
 pub mod disp_net;
+mod explainability;
 mod flow_decoder;
 mod hce;
 mod init;
@@ -33,6 +34,7 @@ pub use deepfusion_model::{
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
 pub use disp_net::DispNet;
+pub use explainability::Explainability;
 pub use flow_decoder::{FLOW_LEVELS, FlowDecoder, FlowLevel, FlowOutput};
 pub use hce::HierarchicalContext;
 pub use init::{WeightInit, WeightRng};

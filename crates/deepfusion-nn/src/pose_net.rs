@@ -3,6 +3,7 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
 
+use crate::explainability::Explainability;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
 use crate::resnet::ResNet;
@@ -60,6 +61,8 @@ pub struct PoseNet {
     pub encoder: ResNet,
     /// The decoder.
     pub decoder: PoseDecoder,
+    /// The explainability masks, where it has them.
+    pub explainability: Option<Explainability>,
     #[module(skip)]
     metres_per_unit: f64,
 }
@@ -91,9 +94,15 @@ impl PoseNet {
             conv2: conv(POSE_WIDTH, POSE_WIDTH, 3),
             output: conv(POSE_WIDTH, 6 * config.poses, 1),
         };
+        // Drawn last: the other weights are those of the same seed without it.
+        let channels = config.encoder.channels()[4];
+        let explainability = config
+            .explainability
+            .then(|| Explainability::new(channels, &mut rng, device));
         Ok(Self {
             encoder,
             decoder,
+            explainability,
             metres_per_unit: config.metres_per_unit,
         })
     }
@@ -105,6 +114,22 @@ impl PoseNet {
     /// - output: `[batch, 3]` twice
     pub fn forward(&self, stacked: Tensor<4>) -> PoseOutput {
         let [.., coarsest] = self.encoder.forward(stacked);
+        self.motion(coarsest)
+    }
+
+    /// The same, and the logits of the explainability masks, where it has them.
+    ///
+    /// # Shapes
+    /// - `stacked`: as for [`Self::forward`]
+    /// - output: as of [`Self::forward`]; `[batch, 2, height, width]`, of the first and the second image
+    pub fn forward_explained(&self, stacked: Tensor<4>) -> (PoseOutput, Option<Tensor<4>>) {
+        let [.., coarsest] = self.encoder.forward(stacked);
+        let masks = self.explainability.as_ref();
+        let logits = masks.map(|net| net.forward(coarsest.clone()));
+        (self.motion(coarsest), logits)
+    }
+
+    fn motion(&self, coarsest: Tensor<4>) -> PoseOutput {
         let raw = self.decoder.forward(coarsest);
         PoseOutput {
             axis_angle: raw.clone().narrow(1, 0, 3).mul_scalar(RADIANS_PER_UNIT),

@@ -159,6 +159,9 @@ fn disp_nets_costs_are_those_of_its_graph_and_its_weights() {
 fn the_pose_networks_parameters_are_its_weights() {
     let mut config = PoseNetConfig::new(ResNetDepth::ResNet50);
     config.encoder.base_width = 8;
-    let weights = collect(&PoseNet::new(&config, &Device::flex()).unwrap());
-    assert_eq!(config.cost(SIZE).parameters, learned(&weights, ""));
+    for explainability in [false, true] {
+        config.explainability = explainability;
+        let weights = collect(&PoseNet::new(&config, &Device::flex()).unwrap());
+        assert_eq!(config.cost(SIZE).parameters, learned(&weights, ""));
+    }
 }

@@ -39,6 +39,8 @@ pub struct ForwardPass {
     pub motions: Vec<Motion>,
     /// The same, measured by the vehicle's sensors.
     pub measured: Vec<Motion>,
+    /// Logits of the targets' explainability masks by view, T×1×H×W; empty without them.
+    pub explained: Vec<Tensor<4>>,
     /// The optical flow by view; empty without a flow decoder.
     pub flows: Vec<ViewFlow>,
     /// Clean images of the targets, T×3×H×W.
@@ -169,7 +171,7 @@ impl Model {
     pub fn forward(&self, batch: &SnippetBatch) -> ForwardPass {
         let mut pass = match self.config.reprojection {
             Reprojection::Bidirectional => self.forward_bidirectional(batch),
-            Reprojection::Minimum => self.forward_minimum(batch),
+            Reprojection::Minimum | Reprojection::Mean => self.forward_target(batch),
         };
         if let Some(factors) = &batch.factors {
             pass.motions = pass.motions.iter().map(|m| factors.scale(m)).collect();
@@ -215,6 +217,7 @@ impl Model {
         };
         ForwardPass {
             disparities,
+            explained: Vec::new(),
             flows,
             motions: vec![motion],
             measured: vec![Motion::cat(vec![
@@ -229,7 +232,7 @@ impl Model {
     }
 
     /// Frame 0 is the target of every source: T = B, a view each.
-    fn forward_minimum(&self, batch: &SnippetBatch) -> ForwardPass {
+    fn forward_target(&self, batch: &SnippetBatch) -> ForwardPass {
         let target = &batch.network[0];
         // The pose network is given the frames in time order; for a source before the target it
         // then says `target_from_source`.
@@ -245,8 +248,20 @@ impl Model {
                 };
                 Tensor::cat(vec![a.clone(), b.clone()], 1)
             });
-        let all = self.motion(Tensor::cat(stacked.collect(), 0));
+        let (pose, logits) = self
+            .pose_net
+            .forward_explained(Tensor::cat(stacked.collect(), 0));
+        let all = Motion::new(pose.axis_angle, pose.translation);
         let n = batch.len();
+        let explained = logits.into_iter().flat_map(|logits| {
+            let views = batch.offsets.iter().enumerate();
+            views.map(move |(i, offset)| {
+                // Where the source is before it, the target is the second of the two.
+                let target = usize::from(*offset < 0);
+                logits.clone().narrow(0, i * n, n).narrow(1, target, 1)
+            })
+        });
+        let explained = explained.collect();
         let motions = batch.offsets.iter().enumerate().map(|(i, offset)| {
             let motion = all.narrow(i * n, n);
             if *offset < 0 {
@@ -258,6 +273,7 @@ impl Model {
         let (disparities, flows) = self.depth_and_flows(batch);
         ForwardPass {
             disparities,
+            explained,
             flows,
             motions: motions.collect(),
             measured: batch.measured.clone(),

@@ -1,4 +1,4 @@
-//! The objective: L = Σ_s w_s·(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
+//! The objective: L = Σ_s w_s·(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + λ_e·L_e + agreement.
 
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
@@ -85,8 +85,14 @@ impl Model {
                 0 => &finest,
                 _ => &self.views((pass, batch), index, level, &motions),
             };
-            let output =
-                losses::reprojection(compared(views, level, masks.as_deref()), settings.automask);
+            let compared = compared(views, level, masks.as_deref());
+            let output = if self.config.reprojection == Reprojection::Mean {
+                let [_, _, _, width] = level.targets.dims();
+                let logits = pass.explained.iter().map(|logit| meaned(logit, width));
+                losses::mean_reprojection(compared, &logits.collect::<Vec<_>>())
+            } else {
+                losses::reprojection(compared, settings.automask)
+            };
             reprojection.push(output.loss.clone().mul_scalar(scale.weight));
             finest_output.get_or_insert(output);
             if settings.smoothness > 0.0 {
@@ -106,6 +112,11 @@ impl Model {
         });
         let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
         sum.add(speed, schedule.speed_weight, |terms| &mut terms.speed);
+        let explained =
+            (settings.explainability > 0.0).then(|| losses::explainability(&pass.explained));
+        sum.add(explained, settings.explainability, |terms| {
+            &mut terms.explainability
+        });
         let affine = (settings.affine > 0.0)
             .then(|| self.affine_loss((pass, batch), &finest, &motions, masks.as_deref()));
         sum.add(affine, settings.affine, |terms| &mut terms.affine);
@@ -238,7 +249,7 @@ impl Model {
             let one_way = match self.config.reprojection {
                 // The view's two halves are the two directions.
                 Reprojection::Bidirectional => None,
-                Reprojection::Minimum => Some(losses::flow_view(
+                Reprojection::Minimum | Reprojection::Mean => Some(losses::flow_view(
                     source,
                     &pass.targets,
                     &f.back,
@@ -323,7 +334,7 @@ impl Model {
         match self.config.reprojection {
             // The second half of the targets looks back, as far.
             Reprojection::Bidirectional => Tensor::cat(vec![samples.clone(), samples], 0),
-            Reprojection::Minimum => samples,
+            Reprojection::Minimum | Reprojection::Mean => samples,
         }
     }
 
@@ -384,12 +395,20 @@ fn compared(views: &ScaleViews, level: &Level, masks: Option<&[Tensor<4, Bool>]>
 
 /// A mask at a smaller width, true where most of its pixels are.
 fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
-    let factor = mask.dims()[3] / width;
-    if factor == 1 {
+    if mask.dims()[3] == width {
         return mask.clone();
     }
+    meaned(&mask.clone().float(), width).greater_elem(0.5)
+}
+
+/// The means of an image's blocks at a smaller width.
+fn meaned(image: &Tensor<4>, width: usize) -> Tensor<4> {
+    let factor = image.dims()[3] / width;
+    if factor == 1 {
+        return image.clone();
+    }
     let options = AvgPoolOptions::new([factor, factor]).with_stride([factor, factor]);
-    avg_pool2d(mask.clone().float(), options).greater_elem(0.5)
+    avg_pool2d(image.clone(), options)
 }
 
 /// Mean over the views of the distance between rigid flow and flow, where both explain the pixel and it is

@@ -10,13 +10,16 @@ use crate::{LossTerms, TrainConfig, ViewMotion};
 /// Smoothness and the affine term are left out, though depth changes them: a flat depth minimises the former, and
 /// neither measures how well the images are explained. Flow and masks exist only in training.
 ///
+/// The explainability masks' price is included: without it the masks alone could make the error small.
+///
 /// The loss on known depth is included at its own weight, and is the whole value for a run that learns from known depth alone.
 pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
     let views = match config.view_motion {
         ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
         ViewMotion::Distance | ViewMotion::Vehicle => held_out.reprojection,
     };
-    views + config.loss.depth.weight * held_out.depth
+    let masks = config.loss.explainability * held_out.explainability;
+    views + masks + config.loss.depth.weight * held_out.depth
 }
 
 #[cfg(test)]

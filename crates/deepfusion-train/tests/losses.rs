@@ -9,8 +9,8 @@
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_train::losses::{
-    DepthTruth, RigidView, affine_invariant, agreement, depth_seen_from_target, epipolar_distance,
-    flow, flow_view, moving_pixels,
+    DepthTruth, RigidView, View, affine_invariant, agreement, depth_seen_from_target,
+    epipolar_distance, explainability, flow, flow_view, mean_reprojection, moving_pixels,
 };
 use deepfusion_train::{DepthLossConfig, FlowLossConfig, Motion, MovingConfig, Synthesised};
 use std::path::Path;
@@ -457,4 +457,32 @@ fn the_likelihood_of_the_error_of_depth_equals_pytorchs() {
     assert!(inverse.grad(&loss().backward()).is_none());
     let inputs = [("log_scale", log_scale.clone())];
     reference.check("uncertainty", loss(), &inputs);
+}
+
+#[test]
+fn sources_count_as_far_as_their_masks_say() {
+    let reference = Reference::of("explainability.safetensors");
+    let leaf = |name: String| {
+        let tensor = reference.tensor::<4>(&format!("explainability/{name}"));
+        tensor.require_grad()
+    };
+    let errors = [0, 1].map(|k| leaf(format!("error{k}")));
+    let logits = [0, 1].map(|k| leaf(format!("logit{k}")));
+    let views = [0, 1].map(|k: usize| View {
+        error: errors[k].clone(),
+        valid: reference.mask(&format!("explainability/seen{k}")),
+        unwarped_error: reference.tensor(&format!("explainability/unwarped{k}")),
+        moving: None,
+    });
+    let seen = mean_reprojection(views.to_vec(), &logits).loss;
+    let loss = seen + explainability(&logits).mul_scalar(0.2);
+    let [first, second] = errors;
+    let [own, other] = logits;
+    let inputs = [
+        ("error0", first),
+        ("error1", second),
+        ("logit0", own),
+        ("logit1", other),
+    ];
+    reference.check("explainability", loss, &inputs);
 }

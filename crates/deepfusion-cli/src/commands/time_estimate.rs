@@ -111,7 +111,7 @@ fn work(config: &TrainConfig) -> u64 {
     // Both ways, the sources have depth, too.
     let depths = match config.reprojection {
         Reprojection::Bidirectional => 1 + sources,
-        Reprojection::Minimum => 1,
+        Reprojection::Minimum | Reprojection::Mean => 1,
     };
     let sets = 0..config.data.sets.len().max(1);
     let learned = |from: fn(Learn) -> bool| sets.clone().any(|set| from(config.learn(set)));

@@ -1,6 +1,9 @@
 //! What each part of the networks costs: parameters, multiply-adds, values.
 
-use super::{DISP_NET_LEVELS, DepthNetConfig, InputSize, POSE_WIDTH, PoseNetConfig, ResNetConfig};
+use super::{
+    DISP_NET_LEVELS, DepthNetConfig, EXPLAINABILITY_WIDTHS, InputSize, POSE_WIDTH, PoseNetConfig,
+    ResNetConfig,
+};
 
 /// What a part of a network costs for one image, batch normalisation folded into the convolutions.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -253,6 +256,29 @@ impl PoseNetConfig {
         all.conv([width; 2], 3, pixels, After::Bias);
         all.conv([width; 2], 3, pixels, After::Bias);
         all.conv([width, 6 * self.poses], 1, pixels, After::Bias);
+        if self.explainability {
+            self.explainability_cost(size, &mut all);
+        }
         all
+    }
+
+    /// Five layers, the feature enlarged between them, and the masks of both frames.
+    fn explainability_cost(&self, size: InputSize, all: &mut ModuleCost) {
+        let mut from = self.encoder.channels()[4];
+        for (index, width) in EXPLAINABILITY_WIDTHS.into_iter().enumerate() {
+            let pixels = (size.width >> (5 - index)) * (size.height >> (5 - index));
+            if index > 0 {
+                all.give(from, pixels);
+            }
+            all.conv([from, width], 3, pixels, After::Bias);
+            from = width;
+        }
+        all.conv(
+            [from, 2],
+            3,
+            (size.width >> 1) * (size.height >> 1),
+            After::Bias,
+        );
+        all.give(2, size.width * size.height);
     }
 }

@@ -8,6 +8,9 @@ use super::{InputNormalisation, NetworkError, ResNetConfig, ResNetDepth};
 /// Channels between the layers of the pose decoder.
 pub const POSE_WIDTH: usize = 256;
 
+/// Channels of the layers of the explainability masks, coarse to fine.
+pub const EXPLAINABILITY_WIDTHS: [usize; 5] = [256, 128, 64, 32, 16];
+
 /// What a `PoseNet` is built from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -21,6 +24,10 @@ pub struct PoseNetConfig {
     /// keeps the raw output near one.
     #[serde(default = "one_metre")]
     pub metres_per_unit: f64,
+    /// Whether it also says, pixel by pixel, how far a warp between the two frames can explain them (SfMLearner's explainability masks);
+    /// `loss.explainability` then holds the masks up.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub explainability: bool,
 }
 
 fn one_pose() -> usize {
@@ -39,6 +46,7 @@ impl PoseNetConfig {
             encoder: ResNetConfig::new(depth).with_frames(2),
             poses: one_pose(),
             metres_per_unit: one_metre(),
+            explainability: false,
         }
     }
 
@@ -52,6 +60,7 @@ impl PoseNetConfig {
                 .with_normalisation(InputNormalisation::Monodepth),
             poses: 2,
             metres_per_unit: 0.01,
+            explainability: false,
         }
     }
 
@@ -64,6 +73,13 @@ impl PoseNetConfig {
                 "pose.encoder.frames",
                 "2 (a pose network sees a pair)",
                 self.encoder.frames,
+            ));
+        }
+        if self.explainability && self.encoder.is_dilated() {
+            return Err(NetworkError::config(
+                "pose.encoder.output_stride",
+                "32 where explainability is on",
+                self.encoder.output_stride,
             ));
         }
         if !(1..=16).contains(&self.poses) {

@@ -34,6 +34,10 @@ pub struct LossConfig {
     pub speed_warmup_steps: usize,
     /// Whether pixels that the unwarped source explains better contribute that constant instead.
     pub automask: bool,
+    /// λ_e of the explainability masks' −ln E, which keeps them from explaining nothing: above 0 where `pose_net.explainability` is true, 0
+    /// (absent) elsewhere.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub explainability: f64,
     /// λ_a of the affine invariant loss, which both frames' depths are needed for.
     #[serde(default)]
     pub affine: f64,
@@ -215,6 +219,7 @@ impl LossConfig {
             ("loss.smoothness", self.smoothness),
             ("loss.speed", self.speed),
             ("loss.rotation", self.rotation),
+            ("loss.explainability", self.explainability),
             ("loss.affine", self.affine),
             ("loss.flow.weight", self.flow.weight),
             ("loss.flow.consistency", self.flow.consistency),
@@ -250,6 +255,14 @@ impl LossConfig {
         }
         Ok(())
     }
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands out references"
+)]
+fn is_zero(weight: &f64) -> bool {
+    *weight == 0.0
 }
 
 fn wrong(field: &'static str, expected: &str, found: String) -> Error {

@@ -46,7 +46,7 @@ pub enum Preset {
     /// R-MSFM6: refined six times, 3.8 M.
     #[serde(rename = "r-msfm6")]
     RMsfm6,
-    /// SfMLearner's DispNet (31.6 M parameters), 416×128, batch 4.
+    /// SfMLearner: DispNet (31.6 M parameters), colours alone compared, explainability masks; 416×128, batch 4.
     Sfmlearner,
 }
 
@@ -164,6 +164,7 @@ impl Preset {
                 rotation: 0.0,
                 speed_warmup_steps: 500,
                 automask: true,
+                explainability: 0.0,
                 affine: 0.0,
                 flow: FlowLossConfig::default(),
                 moving: MovingConfig::default(),
@@ -232,6 +233,11 @@ impl Preset {
                 // Theirs does not fall.
                 (config.learning_rate, config.learning_rate_drop) = (2e-4, 1.0);
                 config.depth_net = DepthNetConfig::disp_net();
+                // Every source counts, as far as its mask says.
+                config.reprojection = Reprojection::Mean;
+                config.pose_net.explainability = true;
+                config.loss.explainability = 0.2;
+                (config.loss.ssim_weight, config.loss.automask) = (0.0, false);
                 config
             }
             Self::LiteMono => lite_mono(LiteMonoSize::Full),

@@ -16,6 +16,8 @@ pub enum Reprojection {
     Bidirectional,
     /// The smallest error of all sources at each pixel: Monodepth2's.
     Minimum,
+    /// The mean error of all sources at each pixel, each times its explainability mask where there are such masks: SfMLearner's.
+    Mean,
 }
 
 /// Where the motion of the reversed pair comes from in bidirectional reprojection.

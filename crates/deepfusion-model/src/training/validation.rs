@@ -114,6 +114,7 @@ impl TrainConfig {
                 found,
             );
         }
+        self.validate_explainability()?;
         match (self.reprojection, self.frames.as_slice()) {
             (_, []) => fail("frames", "at least one offset", "[]".into()),
             (_, frames) if frames.contains(&0) => {
@@ -123,6 +124,42 @@ impl TrainConfig {
                 "frames",
                 "[1] for bidirectional reprojection",
                 format!("{frames:?}"),
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// Masks and their term need each other, and every source's own error; the automask compares the sources'.
+    fn validate_explainability(&self) -> Result<(), Error> {
+        let fail = |field, expected: &str, found: String| {
+            Err(Error::Config {
+                field,
+                expected: expected.into(),
+                found,
+            })
+        };
+        let weight = self.loss.explainability;
+        let mean = self.reprojection == Reprojection::Mean;
+        match (self.pose_net.explainability, weight > 0.0) {
+            (true, false) => fail(
+                "loss.explainability",
+                "above 0 where pose_net.explainability is true: nothing else keeps the masks up",
+                weight.to_string(),
+            ),
+            (false, true) => fail(
+                "loss.explainability",
+                "0 where pose_net.explainability is false: there are no masks",
+                weight.to_string(),
+            ),
+            (true, true) if !mean => fail(
+                "reprojection",
+                "mean where pose_net.explainability is true",
+                format!("{:?}", self.reprojection).to_lowercase(),
+            ),
+            _ if mean && self.loss.automask => fail(
+                "loss.automask",
+                "false where reprojection is mean",
+                "true".into(),
             ),
             _ => Ok(()),
         }
@@ -141,7 +178,8 @@ impl TrainConfig {
             return Ok(());
         }
         if self.reprojection != Reprojection::Minimum {
-            return fail("reprojection", "minimum", "bidirectional".into());
+            let found = format!("{:?}", self.reprojection).to_lowercase();
+            return fail("reprojection", "minimum", found);
         }
         if self.loss.flow.weight > 0.0 {
             return fail("loss.flow.weight", "0", self.loss.flow.weight.to_string());

@@ -3,6 +3,7 @@
 mod affine;
 mod agreement;
 mod depth;
+mod explainability;
 mod flow;
 mod mean;
 mod moving;
@@ -14,6 +15,7 @@ mod uncertainty;
 pub use affine::{affine_invariant, depth_seen_from_target, seen_in_both};
 pub use agreement::{agreement, both_explain};
 pub use depth::{DepthLoss, DepthTruth, depth, log_depth_error};
+pub use explainability::{explainability, mean_reprojection};
 pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid, visible};
 pub use mean::{mean_where, share};
 pub use moving::{RigidView, epipolar_distance, moving_pixels};
@@ -44,6 +46,8 @@ pub struct LossTerms {
     pub depth: f64,
     /// L_nll of a network that predicts uncertainty, on known depth.
     pub uncertainty: f64,
+    /// L_e: −ln of the explainability masks, unweighted.
+    pub explainability: f64,
     /// Share of pixels that the warp finds in view, at full resolution.
     pub valid_share: f64,
     /// Share of pixels that the warped source explains best (the rest are masked).
@@ -55,7 +59,7 @@ pub struct LossTerms {
 impl LossTerms {
     /// Names and values, in the order of `log.csv`.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, f64); 12] {
+    pub fn named(&self) -> [(&'static str, f64); 13] {
         [
             ("total", self.total),
             ("reprojection", self.reprojection),
@@ -66,6 +70,7 @@ impl LossTerms {
             ("agreement", self.agreement),
             ("depth", self.depth),
             ("uncertainty", self.uncertainty),
+            ("explainability", self.explainability),
             ("valid_share", self.valid_share),
             ("explained_share", self.explained_share),
             ("moving_share", self.moving_share),
@@ -84,6 +89,7 @@ impl LossTerms {
             agreement,
             depth,
             uncertainty,
+            explainability,
             valid_share,
             explained_share,
             moving_share,
@@ -98,6 +104,7 @@ impl LossTerms {
             agreement,
             depth,
             uncertainty,
+            explainability,
             valid_share,
             explained_share,
             moving_share,
@@ -119,6 +126,7 @@ impl LossTerms {
         self.agreement += weight * other.agreement;
         self.depth += weight * other.depth;
         self.uncertainty += weight * other.uncertainty;
+        self.explainability += weight * other.explainability;
         self.valid_share += weight * other.valid_share;
         self.explained_share += weight * other.explained_share;
         self.moving_share += weight * other.moving_share;
@@ -141,7 +149,7 @@ mod tests {
 
     #[test]
     fn terms_are_set_in_the_order_of_their_names() {
-        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        let values: Vec<f64> = (0..13).map(f64::from).collect();
         let mut terms = LossTerms::default();
         terms.set_from(&values);
         assert_eq!(terms.named().map(|(_, value)| value).to_vec(), values);

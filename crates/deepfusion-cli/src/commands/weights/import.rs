@@ -87,7 +87,10 @@ fn of_networks(imported: Imported, device: &Device) -> Result<(TrainConfig, Mode
             pose_net
         }
         None => {
-            config.pose_net = PoseNetConfig::monodepth2(config.depth_net.encoder.depth);
+            config.pose_net = PoseNetConfig {
+                explainability: config.pose_net.explainability,
+                ..PoseNetConfig::monodepth2(config.depth_net.encoder.depth)
+            };
             PoseNet::new(&config.pose_net, device)?
         }
     };
