@@ -82,13 +82,18 @@
 //! | [`runtime`] | trained networks that run: [`DepthEstimator`] over the fused engine or ONNX Runtime; no training framework |
 //! | [`model`] | configurations, weights as safetensors, runs on disk |
 //! | [`weights`] | the networks inside the library |
+//! | [`jobs`] | a network over whole recordings and folders: evaluation, prediction in bulk, verdict, scored targets |
+//! | [`eval`] | metrics, the field's protocol, evaluations side by side |
+//! | [`records`] | the JSON beside predictions and targets |
 //! | [`data`] | recordings as datasets, frames and ground truth |
+//! | [`logs`] | speeds and turns from GPS tracks, OBD apps, phones, CAN traces, any table |
 //! | [`calibrate`] | a camera from pictures of a checkerboard |
 //! | [`doctor`] | what is wrong with a recording |
 //! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | ROS bags, read and written |
 //! | [`perception`] | a depth image to 3D targets, tracks, free space |
+//! | [`instances`] | the things in an image, by your ONNX model of segmentation |
 //! | [`geometry`] | cameras, motions, depth images; `cloud`: point clouds and their files |
 //! | [`sim`] | streets with exact depth, to learn from and to test on |
 //! | [`onnx`], [`render`] | networks as ONNX files; pictures, charts and reports |
@@ -104,7 +109,9 @@ pub use deepfusion_data as data;
 pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;
 pub use deepfusion_geometry as geometry;
+pub use deepfusion_instances as instances;
 pub use deepfusion_jobs as jobs;
+pub use deepfusion_logs as logs;
 pub use deepfusion_model as model;
 pub use deepfusion_motion as motion;
 #[cfg(feature = "train")]

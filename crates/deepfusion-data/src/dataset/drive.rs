@@ -44,6 +44,35 @@ pub struct DatasetParts {
     pub scenario: Option<String>,
 }
 
+impl DatasetParts {
+    /// A drive of which no more is known than its frames, their times and speeds: its camera looks ahead, at the vehicle's own place, and nothing
+    /// says how it turned.
+    #[must_use]
+    pub fn of_frames(name: &str, frames: Vec<Frame>, intrinsics: Intrinsics) -> Self {
+        let samples = frames.iter();
+        let samples = samples.filter_map(|frame| Some((frame.time_s?, frame.speed_mps?, 0.0)));
+        let track = VehicleTrack::new(&samples.collect::<Vec<_>>());
+        Self {
+            name: name.to_owned(),
+            split_name: name.to_owned(),
+            camera: Camera::Left,
+            frames,
+            intrinsics,
+            cam_from_vehicle: Some(looks_ahead()),
+            track: Some(track.into()),
+            yaw_known: false,
+            origin_ns: None,
+            camera_ahead_s: 0.0,
+            scenario: None,
+        }
+    }
+}
+
+/// The vehicle's axes (x ahead, y to the left, z up) in a camera's (x to the right, y down, z ahead) at its origin.
+fn looks_ahead() -> Se3 {
+    Se3::from_quaternion([0.5, 0.5, -0.5, 0.5], Se3::identity().translation())
+}
+
 /// Everything a trainer or an evaluator needs from one camera's recording of one drive.
 #[derive(Debug, Clone)]
 pub struct Dataset {
@@ -285,7 +314,7 @@ impl Dataset {
             found,
             expected: (k.width, k.height),
             field: place.field,
-            calibration: place.file,
+            calibration: place.source,
         })
     }
 

@@ -5,7 +5,7 @@ use super::frame::Frame;
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
-use crate::{Error, Result};
+use crate::{CalibrationSource, Error, Result};
 use deepfusion_geometry::{DepthMap, Se3};
 use image::RgbImage;
 use std::fmt;
@@ -16,8 +16,10 @@ use std::path::{Path, PathBuf};
 /// What all layouts share (frames, times, camera, speeds) is in [`crate::DatasetParts`]; this is the rest,
 /// read when it is asked for. The provided methods are those of a recording that has no such thing.
 pub trait Recording: fmt::Debug + Send + Sync {
-    /// The layout.
-    fn kind(&self) -> DatasetKind;
+    /// The layout; another than those of this library where nothing is said.
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Other
+    }
 
     /// The folder its files are in.
     fn folder(&self) -> &Path;
@@ -29,16 +31,29 @@ pub trait Recording: fmt::Debug + Send + Sync {
     fn load_image(&self, frame: &Frame) -> Result<RgbImage>;
 
     /// Where the camera's numbers are from, for the error on an image of another size.
-    fn calibration(&self) -> CalibrationPlace;
+    fn calibration(&self) -> CalibrationPlace {
+        CalibrationPlace {
+            source: self.folder().into(),
+            field: "the recording's camera",
+        }
+    }
 
-    /// What was recorded.
+    /// What was recorded beside the frames.
     ///
     /// # Errors
     /// Where a stream is there and cannot be read.
-    fn streams(&self) -> Result<Vec<Stream>>;
+    fn streams(&self) -> Result<Vec<Stream>> {
+        Ok(Vec::new())
+    }
 
     /// What is missing for the car's motion, asked where the data set lacks times, track or mount.
-    fn no_motion(&self) -> Error;
+    fn no_motion(&self) -> Error {
+        Error::Missing {
+            path: self.folder().to_owned(),
+            what: "times and speeds of the frames",
+            remedy: "give each frame its time and speed",
+        }
+    }
 
     /// What was taken for granted or looks odd, in sentences for the inspection.
     fn warnings(&self) -> &[String] {
@@ -126,11 +141,11 @@ pub trait Recording: fmt::Debug + Send + Sync {
     }
 }
 
-/// The place in a file that says what the camera is.
+/// What says what the camera is, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationPlace {
-    /// The file.
-    pub file: PathBuf,
+    /// The file, or who else says it.
+    pub source: CalibrationSource,
     /// The field that holds the image's size.
     pub field: &'static str,
 }
