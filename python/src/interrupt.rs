@@ -31,7 +31,7 @@ impl Stop {
     }
 }
 
-/// Does `work` without the interpreter on a thread in rayon's pool, while this thread asks for signals. After Ctrl-C `work` is told to
+/// Does `work` without the interpreter on a thread in rayon's pool, while this thread asks for signals. After Ctrl-C `work` is asked to
 /// stop, is waited for, and KeyboardInterrupt raised.
 pub fn interruptible<R: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> R + Send) -> PyResult<R> {
     let stop = &Stop::default();

@@ -108,6 +108,8 @@ pub fn simulate(
 /// What `deepfusion doctor PATH` finds, as JSON.
 #[pyfunction]
 pub fn doctor(py: Python<'_>, path: PathBuf) -> PyResult<String> {
-    let diagnosis = abandonable(py, move || checks::doctor(&path, None))?;
+    let diagnosis = abandonable(py, move || {
+        deepfusion_cli::in_options(checks::doctor(&path, None))
+    })?;
     serde_json::to_string(&diagnosis.record()).map_err(|e| PyValueError::new_err(e.to_string()))
 }

@@ -29,6 +29,7 @@ use std::sync::{Once, OnceLock};
 use clap::Parser;
 
 pub use allocator::keep_memory;
+pub use failure::in_options;
 
 /// The command line that is run, for reports: in Python the process has another one.
 static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();

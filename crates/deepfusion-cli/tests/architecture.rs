@@ -1,4 +1,5 @@
-//! The crates and their arrows, as ARCHITECTURE.md and its drawing say them. `UPDATE_REFERENCE=1` draws anew.
+//! The crates and their arrows, as ARCHITECTURE.md and its drawing say them; what libraries may say, and what documents may name.
+//! `UPDATE_REFERENCE=1` draws anew.
 
 #![allow(
     clippy::unwrap_used,
@@ -115,4 +116,137 @@ fn running_needs_no_training_framework() {
             assert!(!has_burn, "{name} reaches Burn by {used}");
         }
     }
+}
+
+/// Files below a folder, build outputs apart.
+fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if !path.is_dir() {
+            found.push(path);
+        } else if !path.ends_with("target") && !path.ends_with(".git") {
+            files_below(&path, found);
+        }
+    }
+}
+
+/// The string literals of a source, without its comments and the tests at its end.
+fn literals(source: &str) -> Vec<&str> {
+    let source = source.split("#[cfg(test)]\nmod ").next().unwrap();
+    let mut found = Vec::new();
+    let mut at = 0;
+    while let Some(length) = source[at..].find(['"', '\'', '/', 'r']) {
+        let rest = &source[at + length..];
+        let raw = rest.strip_prefix('r').unwrap_or_default();
+        let hashes = raw.len() - raw.trim_start_matches('#').len();
+        let (begin, ends) = if rest.starts_with("//") {
+            (0, rest.find('\n'))
+        } else if raw[hashes..].starts_with('"') {
+            let end = format!("\"{}", &raw[..hashes]);
+            let begin = hashes + 2;
+            (begin, rest[begin..].find(&end).map(|n| begin + n))
+        } else if let Some(text) = rest.strip_prefix('"') {
+            let mut escaped = false;
+            let end = text.find(|c| {
+                let ends = c == '"' && !escaped;
+                escaped = c == '\\' && !escaped;
+                ends
+            });
+            (1, end.map(|n| n + 1))
+        } else if rest.starts_with("'\"'") || rest.starts_with("'\\") {
+            // A quote, or an escaped character: at most `'\''`.
+            (0, Some(2))
+        } else {
+            (0, Some(0))
+        };
+        let end = ends.unwrap_or(rest.len());
+        if begin > 0 {
+            found.push(&rest[begin..end]);
+        }
+        at = source.len().min(at + length + end + 1);
+    }
+    found
+}
+
+#[test]
+fn literals_are_found_beside_comments_characters_and_tests() {
+    let source = "// \"no\"\nlet a = \"one \\\" more\"; let b = '\"'; let c = '\\''; r\"two\"; r#\"thr\"ee\"#;\n#[cfg(test)]\nmod tests { \"no\" }";
+    assert_eq!(literals(source), ["one \\\" more", "two", "thr\"ee"]);
+}
+
+/// A library names settings and files; which option sets one, the command line says (`failure/`).
+#[test]
+fn libraries_name_no_options() {
+    // Other people's programs, and the first lines of files that say which command wrote them.
+    let allowed = [
+        "v4l2-ctl --list-devices",
+        "ros2 bag record --compression-mode",
+        "`data inspect --write-config` found it",
+        "`eval --calibrate-uncertainty`",
+        "`eval --calibrate-confidence`",
+    ];
+    let mut wrong = Vec::new();
+    for name in arrows().keys().filter(|name| *name != "deepfusion-cli") {
+        let mut files = Vec::new();
+        files_below(&root().join("crates").join(name).join("src"), &mut files);
+        files.retain(|file| file.extension().is_some_and(|e| e == "rs"));
+        for file in files {
+            let source = fs::read_to_string(&file).unwrap();
+            for literal in literals(&source) {
+                let mut text = format!(" {}", literal.replace(['`', '('], " "));
+                for known in allowed {
+                    text = text.replace(&known.replace('`', " "), "");
+                }
+                let mut after = text.split(" --").skip(1);
+                if after.any(|option| option.starts_with(|c: char| c.is_ascii_lowercase())) {
+                    wrong.push(format!("{}: {literal}", file.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// What documents name in the repository is there: a path from its root, or the end of a source's path.
+#[test]
+fn paths_in_documents_exist() {
+    let root = root().canonicalize().unwrap();
+    let mut all = Vec::new();
+    let folders = [
+        ".ci", ".github", "benches", "crates", "docs", "fuzz", "python", "recipes", "scripts",
+    ];
+    for folder in folders {
+        files_below(&root.join(folder), &mut all);
+    }
+    let of_repository = all
+        .iter()
+        .filter(|file| file.extension().is_some_and(|e| e == "md"));
+    let pages = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"].map(|page| root.join(page));
+    let mut wrong = Vec::new();
+    for page in of_repository.chain(&pages) {
+        let text = fs::read_to_string(page).unwrap();
+        let mut code = false;
+        for line in text.lines() {
+            if line.starts_with("```") {
+                code = !code;
+            }
+            let quoted = line.split('`').skip(1).step_by(2);
+            let is_path = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+            for path in
+                quoted.filter(|word| !code && word.contains('/') && word.chars().all(is_path))
+            {
+                let first = path.split('/').next().unwrap();
+                let is_source = [".rs", ".py", ".sh"].iter().any(|end| path.ends_with(end));
+                let exists = if folders.contains(&first) {
+                    root.join(path).exists()
+                } else {
+                    !is_source || all.iter().any(|file| file.ends_with(path))
+                };
+                if !exists {
+                    wrong.push(format!("{}: {path}", page.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

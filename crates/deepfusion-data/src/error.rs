@@ -1,6 +1,6 @@
 //! What can go wrong with a recording.
 
-use crate::{DatasetKind, GtKind, NamedTopic};
+use crate::{CalibrationSource, DatasetKind, GtKind, NamedTopic};
 use std::path::{Path, PathBuf};
 
 mod hint;
@@ -65,7 +65,7 @@ pub enum Error {
     /// An image has another size than its camera's calibration.
     #[error(
         "{image}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} ({field} in {})",
-        found.0, found.1, expected.0, expected.1, calibration.display()
+        found.0, found.1, expected.0, expected.1, calibration
     )]
     FrameSize {
         /// The image.
@@ -80,8 +80,8 @@ pub enum Error {
         expected: (u32, u32),
         /// The field that says so.
         field: &'static str,
-        /// The file it stands in.
-        calibration: PathBuf,
+        /// What said it.
+        calibration: CalibrationSource,
     },
     /// Another camera is asked for than the only one there is.
     #[error("{}: there is one camera, which counts as camera 2", path.display())]
@@ -90,10 +90,10 @@ pub enum Error {
         path: PathBuf,
     },
     /// A camera's calibration file cannot be used.
-    #[error("{}: {problem}", path.display())]
+    #[error("{by}: {problem}")]
     CameraFile {
-        /// The file.
-        path: PathBuf,
+        /// The file, or who else says the camera.
+        by: CalibrationSource,
         /// The field and what is wrong with it.
         problem: String,
         /// What to do.
@@ -299,6 +299,12 @@ pub enum Error {
         drive: String,
         /// The frame's number.
         frame: u64,
+    },
+    /// A segment of comma2k19 that has streams, but no video.
+    #[error("{}: the segment's images are absent", path.display())]
+    NoSegmentVideo {
+        /// The video.
+        path: PathBuf,
     },
     /// A recording that has streams, but no images.
     #[error("{}: {why}", path.display())]

@@ -74,7 +74,7 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
     assert!(json["size"].is_null() && json["intrinsics"].is_null());
 
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
-    assert!(matches!(error, Error::NoFrames { .. }), "{error}");
+    assert!(matches!(error, Error::NoSegmentVideo { .. }), "{error}");
     assert!(
         error
             .to_string()

@@ -34,7 +34,7 @@ impl Recording for Messages {
 
     fn calibration(&self) -> CalibrationPlace {
         CalibrationPlace {
-            file: PathBuf::from("/recordings/a.bag"),
+            source: PathBuf::from("/recordings/a.bag").into(),
             field: "/camera/camera_info",
         }
     }

@@ -20,9 +20,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// What `reference/ros_drive.py` knows of its drive.
+/// What `reference/ros_drive.py` says of its drive.
 #[derive(Deserialize)]
-struct Known {
+struct DriveFacts {
     cam_from_vehicle: [[f64; 4]; 4],
     cam_from_lidar: [[f64; 4]; 4],
     vehicle_from_imu: [[f64; 4]; 4],
@@ -36,7 +36,7 @@ fn reference(name: &str) -> PathBuf {
     tests.join(name)
 }
 
-fn known() -> Known {
+fn facts() -> DriveFacts {
     serde_json::from_str(&fs::read_to_string(reference("drive.json")).unwrap()).unwrap()
 }
 
@@ -61,7 +61,7 @@ fn is_transform(found: &Se3, expected: &[[f64; 4]; 4], what: &str) {
 }
 
 /// Mounts are where scipy puts them, and speeds those of the path that the positions are of.
-fn is_the_drive(dataset: &Dataset, known: &Known) {
+fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
     let mount = |name: &str| {
         let mount = dataset.mounts().iter().find(|m| m.name == name).unwrap();
         assert!(mount.source.starts_with("frames "), "{mount:?}");
@@ -118,7 +118,7 @@ fn says(text: &str, parts: &[&str]) {
 
 #[test]
 fn a_drive_needs_no_file_beside_it() {
-    let known = known();
+    let known = facts();
     let dataset = open(&reference("drive.bag")).unwrap();
     is_the_drive(&dataset, &known);
     assert_eq!(dataset.frames().len(), known.images);
@@ -147,7 +147,7 @@ fn a_drive_needs_no_file_beside_it() {
 #[cfg(feature = "ros2")]
 #[test]
 fn the_same_drive_of_ros_2_needs_none_either() {
-    is_the_drive(&open(&reference("drive_ros2")).unwrap(), &known());
+    is_the_drive(&open(&reference("drive_ros2")).unwrap(), &facts());
 }
 
 // --- small bags ---

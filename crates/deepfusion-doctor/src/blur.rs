@@ -2,6 +2,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::survey::Survey;
+use deepfusion_hint::count_of;
 
 /// A frame with less than this share of the drive's usual sharpness is blurred.
 const BLURRED: f64 = 0.5;
@@ -38,9 +39,9 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     outcome.judge_at(Severity::Warning, first, figure, || {
         (
             format!(
-                "{} of {} frames have less than half the drive's usual sharpness, the first of them frame {}",
+                "{} of {} have less than half the drive's usual sharpness, the first of them frame {}",
                 blurred.len(),
-                seen.len(),
+                count_of(seen.len(), "frame"),
                 blurred[0]
             ),
             "expose shorter, fix the mount, or leave these frames out".into(),

@@ -6,6 +6,7 @@ use super::survey::Survey;
 use deepfusion_data::Dataset;
 use deepfusion_hint::Hint;
 use deepfusion_motion::{NoTimeOffset, OffsetConfig, TimeOffset};
+use std::fmt;
 
 /// Largest standard error of an offset that is applied, in seconds: at 3 m/s² of braking it is 0.15 m/s.
 pub const MOST_STD_ERROR_S: f64 = 0.05;
@@ -43,17 +44,15 @@ impl CameraAhead {
 }
 
 /// Why no offset can be applied.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum NoCameraAhead {
     /// Nothing was recorded to compare the pictures with.
-    #[error("{drive}: the clocks cannot be compared: it has no speeds, or its frames no times")]
     NoSpeeds {
         /// The drive.
         drive: String,
     },
     /// The pictures do not follow the vehicle.
-    #[error("{drive}: {source}")]
     NotFound {
         /// The drive.
         drive: String,
@@ -61,10 +60,6 @@ pub enum NoCameraAhead {
         source: NoTimeOffset,
     },
     /// The pictures follow the vehicle too loosely.
-    #[error(
-        "{drive}: the pictures follow the vehicle best {ahead_s:+.2} s off, with a correlation of {correlation:.2}; at least {LEAST_CORRELATION} is \
-         needed"
-    )]
     Weak {
         /// The drive.
         drive: String,
@@ -74,9 +69,6 @@ pub enum NoCameraAhead {
         correlation: f64,
     },
     /// The offset is not known well enough.
-    #[error(
-        "{drive}: the clocks are {ahead_s:+.2} ± {std_error_s:.3} s apart; a standard error of at most {most_s} s is needed"
-    )]
     Unsure {
         /// The drive.
         drive: String,
@@ -88,9 +80,6 @@ pub enum NoCameraAhead {
         most_s: f64,
     },
     /// A drive whose clocks are not as far apart as those of the others.
-    #[error(
-        "{drive}: the clocks are {ahead_s:+.3} ± {std_error_s:.3} s apart, those of the other drives {others_s:+.3} ± {others_error_s:.3} s"
-    )]
     Differ {
         /// The drive.
         drive: String,
@@ -104,9 +93,6 @@ pub enum NoCameraAhead {
         others_error_s: f64,
     },
     /// A drive that does not show its offset, and says another one than the others show.
-    #[error(
-        "{drive}: it says that its camera's clock is {said_s:+.3} s ahead, which its pictures do not show; those of the other drives show {others_s:+.3} s"
-    )]
     SaysOther {
         /// The drive.
         drive: String,
@@ -116,8 +102,84 @@ pub enum NoCameraAhead {
         others_s: f64,
     },
     /// No drive.
-    #[error("no recording to compare clocks of")]
     Nothing,
+}
+
+impl NoCameraAhead {
+    /// The drive it is about; none where there is no drive.
+    #[must_use]
+    pub fn drive(&self) -> Option<&str> {
+        match self {
+            Self::NoSpeeds { drive }
+            | Self::NotFound { drive, .. }
+            | Self::Weak { drive, .. }
+            | Self::Unsure { drive, .. }
+            | Self::Differ { drive, .. }
+            | Self::SaysOther { drive, .. } => Some(drive),
+            Self::Nothing => None,
+        }
+    }
+
+    /// What is wrong, without the drive's name.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        match self {
+            Self::NoSpeeds { .. } => {
+                "the clocks cannot be compared: it has no speeds, or its frames no times".into()
+            }
+            Self::NotFound { source, .. } => source.to_string(),
+            Self::Weak {
+                ahead_s,
+                correlation,
+                ..
+            } => format!(
+                "the pictures follow the vehicle best {ahead_s:+.2} s off, with a correlation of {correlation:.2}; at least {LEAST_CORRELATION} is \
+                 needed"
+            ),
+            Self::Unsure {
+                ahead_s,
+                std_error_s,
+                most_s,
+                ..
+            } => format!(
+                "the clocks are {ahead_s:+.2} ± {std_error_s:.3} s apart; a standard error of at most {most_s} s is needed"
+            ),
+            Self::Differ {
+                ahead_s,
+                std_error_s,
+                others_s,
+                others_error_s,
+                ..
+            } => format!(
+                "the clocks are {ahead_s:+.3} ± {std_error_s:.3} s apart, those of the other drives {others_s:+.3} ± {others_error_s:.3} s"
+            ),
+            Self::SaysOther {
+                said_s, others_s, ..
+            } => format!(
+                "it says that its camera's clock is {said_s:+.3} s ahead, which its pictures do not show; those of the other drives show {others_s:+.3} s"
+            ),
+            Self::Nothing => "no recording to compare clocks of".into(),
+        }
+    }
+}
+
+/// The drive, and the reason.
+impl fmt::Display for NoCameraAhead {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(drive) = self.drive() {
+            write!(f, "{drive}: ")?;
+        }
+        f.write_str(&self.reason())
+    }
+}
+
+impl std::error::Error for NoCameraAhead {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::NotFound { source, .. } => Some(source),
+            _ => None,
+        }
+    }
 }
 
 impl Hint for NoCameraAhead {

@@ -3,7 +3,7 @@
 use super::camera_ahead;
 use super::clock_offset::{rates, settled};
 use super::epipolar::EpipolarPair;
-use super::finding::{Figure, Limit, Outcome, Severity};
+use super::finding::{Figure, Limit, Outcome, Remedy, Severity};
 use super::survey::Survey;
 use deepfusion_motion::{OffsetConfig, Signal, TimeOffset};
 
@@ -39,11 +39,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
                 1e3 * value.abs(),
                 1e3 * error
             ),
-            format!(
-                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given (--clock-offset auto measures it again on opening). \
-                 Better: one clock for all (PTP, trigger)",
-                1e3 * camera_ahead_s
-            ),
+            Remedy::ClockOffset { camera_ahead_s },
         )
     });
     outcome
@@ -62,11 +58,8 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
     let rates = rates.ok_or("no speed and yaw rate to compare the picture with")?;
     if !survey.dataset.yaw_known() {
         // A course takes more pictures and other settings than a yaw rate.
-        let offset = camera_ahead::offset(survey.dataset).map_err(|why| {
-            // The line is the drive's own.
-            let (why, drive) = (why.to_string(), format!("{}: ", survey.dataset.name()));
-            why.strip_prefix(&drive).unwrap_or(&why).to_owned()
-        })?;
+        // The line is the drive's own.
+        let offset = camera_ahead::offset(survey.dataset).map_err(|why| why.reason())?;
         let least_s = MOST_BY_COURSE_S;
         return Ok(Estimate { offset, least_s });
     }

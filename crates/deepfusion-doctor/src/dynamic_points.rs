@@ -2,6 +2,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use deepfusion_data::Dataset;
+use deepfusion_hint::count_of;
 
 const CHECK: &str = "dynamic-points";
 /// Scans looked at.
@@ -21,7 +22,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         Err(error) => return Outcome::skipped(CHECK, error.to_string()),
     };
     if agreement.listed.max(agreement.fast) < LEAST_POINTS {
-        let why = format!("too little moves in {} scans", agreement.scans);
+        let why = format!("too little moves in {}", count_of(agreement.scans, "scan"));
         return Outcome::skipped(CHECK, why);
     }
     // Where one says that nothing moves, it has none of what the other says.
@@ -37,8 +38,8 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     outcome.judge(Severity::Warning, figure, || {
         (
             format!(
-                "of {} points that the topic of dynamic points lists, {} are in the scans and {} move by their radial velocity",
-                agreement.listed, agreement.in_scan, agreement.both
+                "of {} that the topic of dynamic points lists, {} are in the scans and {} move by their radial velocity",
+                count_of(agreement.listed, "point"), agreement.in_scan, agreement.both
             ),
             "topics.dynamic names the topic; its points must be the LiDAR's, in its axes and at its times; lidar.moving_mps may be too high".into(),
         )

@@ -1,7 +1,9 @@
 //! What a check says: a figure against its limit, and, where it does not hold, what is wrong and what to do.
 
+use deepfusion_logs::Clock;
 use serde::{Serialize, Serializer};
 use std::fmt;
+use std::path::PathBuf;
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -55,7 +57,44 @@ pub struct Finding {
     /// What is wrong, and what it does to a training, in a sentence.
     pub what: String,
     /// What to do about it.
-    pub remedy: String,
+    pub remedy: Remedy,
+}
+
+/// What to do about a finding. As text it is in the library's words; the named ones let a program say which of its own options does it.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Remedy {
+    /// Something that no option does, or a program's own words ([`crate::Diagnosis::reworded`]).
+    Words(String),
+    /// The camera's GPS switched on, or another log beside the video.
+    OtherLog,
+    /// The DBC file of a CAN trace, and the speed's signal in it.
+    Signal,
+    /// The log's columns of time and speed and the speed's unit; what the log's own error says of them.
+    Columns(String),
+    /// The unit of the log's speeds.
+    SpeedUnit,
+    /// Faster or longer drives, or the vehicle's own speed.
+    VehicleSpeed,
+    /// Making a drive of the log.
+    Import {
+        /// The log.
+        log: PathBuf,
+        /// Whether the pictures are in a file of their own.
+        video: bool,
+    },
+    /// Poses that need no turns, or a log that has them.
+    Turns {
+        /// Whether a course of positions shows some.
+        from_positions: bool,
+    },
+    /// What connects the clock of a log with the video's.
+    StartOfVideo(Clock),
+    /// The offset of the camera's clock that was measured.
+    ClockOffset {
+        /// How far the camera's clock is ahead of the vehicle's, in seconds.
+        camera_ahead_s: f64,
+    },
 }
 
 /// How a check came out.
@@ -148,7 +187,7 @@ impl Outcome {
         &mut self,
         severity: Severity,
         figure: Figure,
-        what: impl FnOnce() -> (String, String),
+        what: impl FnOnce() -> (String, Remedy),
     ) {
         self.judge_at(severity, None, figure, what);
     }
@@ -159,7 +198,7 @@ impl Outcome {
         severity: Severity,
         frame: Option<u64>,
         figure: Figure,
-        what: impl FnOnce() -> (String, String),
+        what: impl FnOnce() -> (String, Remedy),
     ) {
         if !figure.holds() {
             let (what, remedy) = what();
@@ -181,7 +220,7 @@ impl Outcome {
         severity: Severity,
         frame: Option<u64>,
         what: String,
-        remedy: impl Into<String>,
+        remedy: impl Into<Remedy>,
     ) {
         self.findings.push(Finding {
             severity,
@@ -191,6 +230,67 @@ impl Outcome {
             what,
             remedy: remedy.into(),
         });
+    }
+}
+
+impl From<&str> for Remedy {
+    fn from(words: &str) -> Self {
+        Self::Words(words.to_owned())
+    }
+}
+
+impl From<String> for Remedy {
+    fn from(words: String) -> Self {
+        Self::Words(words)
+    }
+}
+
+impl fmt::Display for Remedy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Words(words) => f.write_str(words),
+            Self::OtherLog => f.write_str(
+                "switch the camera's GPS on and wait for its fix; or bring another log beside the video",
+            ),
+            Self::Signal => {
+                f.write_str("give the DBC file, and the speed's signal as Message.Signal")
+            }
+            Self::Columns(hint) => write!(f, "{hint}, and the speed's unit"),
+            Self::SpeedUnit => f.write_str("say the unit of speed (m/s, km/h, mph, knots)"),
+            Self::VehicleSpeed => {
+                f.write_str("drive faster or longer, or log the vehicle's own speed: OBD, CAN")
+            }
+            Self::Import { log, video } => {
+                let beside = if *video { " with its video" } else { "" };
+                let log = log.display();
+                write!(f, "make a drive of {log}{beside} and the camera; then examine the drive")
+            }
+            Self::Turns { .. } => f.write_str(
+                "poses by the network or by the distance driven need no turns; a second log with a gyroscope brings them",
+            ),
+            Self::StartOfVideo(Clock::LocalDate) => {
+                f.write_str("say the log's time zone; pictures and speeds show what is left between the clocks")
+            }
+            Self::StartOfVideo(Clock::TimeOfDay | Clock::Free) => f.write_str(
+                "say when the first frame was taken, on the log's clock; pictures and speeds show what is left between the clocks",
+            ),
+            Self::StartOfVideo(Clock::Date | Clock::Video) => {
+                f.write_str("pictures and speeds show what is left between the clocks")
+            }
+            Self::ClockOffset { camera_ahead_s } => write!(
+                f,
+                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one clock \
+                 for all (PTP, trigger)",
+                1e3 * camera_ahead_s
+            ),
+        }
+    }
+}
+
+/// As its text.
+impl Serialize for Remedy {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

@@ -104,7 +104,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
                     planes.len(),
                     value.abs()
                 ),
-                format!("correct the {name} of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle"),
+                format!("correct the {name} of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle").into(),
             )
         });
     }

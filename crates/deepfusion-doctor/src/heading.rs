@@ -83,7 +83,8 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
                 format!(
                     "correct the camera's {} on the vehicle by that angle, or, if the mount is right, {name} by {pixels:+.0} px",
                     if axis == 0 { "pitch" } else { "yaw" }
-                ),
+                )
+                .into(),
             )
         });
     }

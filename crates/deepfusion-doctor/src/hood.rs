@@ -84,7 +84,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
                      they teach that what stands still on the vehicle is infinitely far",
                     100.0 * rim.share
                 ),
-                format!("cut them off: {kept}"),
+                format!("cut them off: {kept}").into(),
             )
         });
     }

@@ -86,7 +86,7 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
                     "{name} {value:.1} is far from the middle of {size} pixels: these are the numbers of an image of about {w}x{h}, not of {}x{}",
                     k.width, k.height
                 ),
-                format!("give the matrix of the images' own size: fx and cx times {:.4}, fy and cy times {:.4}", width / f64::from(w), height / f64::from(h)),
+                format!("give the matrix of the images' own size: fx and cx times {:.4}, fy and cy times {:.4}", width / f64::from(w), height / f64::from(h)).into(),
             ),
             None => (
                 format!("{name} {value:.1} is far from the middle of {size} pixels: only a cut-out image has it there"),
@@ -173,7 +173,8 @@ mod tests {
             finding.what
         );
         assert!(
-            finding.remedy.contains("0.52") || finding.remedy.contains("0.515"),
+            finding.remedy.to_string().contains("0.52")
+                || finding.remedy.to_string().contains("0.515"),
             "{}",
             finding.remedy
         );

@@ -37,7 +37,7 @@ pub use camera_ahead::{
     CameraAhead, CommonCameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S,
     NoCameraAhead, camera_ahead, common_camera_ahead,
 };
-pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
+pub use finding::{Figure, Finding, Limit, Outcome, Remedy, Severity, Status};
 pub use log::{doctor_log, is_log};
 pub use plots::{DrivePlots, Line};
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
@@ -87,7 +87,7 @@ impl Diagnosis {
         let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
         let skipped =
             |check: &&'static str| Outcome::skipped(check, "the recording cannot be opened");
-        let failed = std::iter::once(opening::failed(why, remedy));
+        let failed = std::iter::once(opening::failed(why, remedy.map(Remedy::Words)));
         Self {
             recording: failed.chain(others.map(skipped)).collect(),
             drives: Vec::new(),
@@ -98,6 +98,17 @@ impl Diagnosis {
     #[must_use]
     pub fn with_log_within(mut self, path: &Path) -> Self {
         self.recording.extend(log::within(path));
+        self
+    }
+
+    /// The same, each finding in the words that `reword` puts into it: a program names its options there.
+    #[must_use]
+    pub fn reworded(mut self, reword: impl Fn(&mut Finding)) -> Self {
+        let drives = self.drives.iter_mut().flat_map(|drive| &mut drive.outcomes);
+        let outcomes = self.recording.iter_mut().chain(drives);
+        outcomes
+            .flat_map(|outcome| &mut outcome.findings)
+            .for_each(reword);
         self
     }
 

@@ -1,6 +1,6 @@
 //! A log of speeds by itself, before it is put beside a video: what it is good for, what is missing, and what to do.
 
-use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::finding::{Figure, Limit, Outcome, Remedy, Severity, median};
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
 use deepfusion_hint::{Hint, count_of};
@@ -52,13 +52,13 @@ pub(super) fn within(path: &Path) -> Vec<Outcome> {
     match is_video.then(|| read(path, &ReadOptions::default())) {
         Some(Ok(log)) => outcomes(path, &log),
         // The camera's own track without a fix is worth a word; a video of another camera is not.
-        Some(Err(Error::NoSpeed { problem, .. })) if problem.contains("GPS") => {
+        Some(Err(Error::NoGps { why, .. })) => {
             let mut outcome = Outcome::new("log");
             outcome.find(
                 Severity::Warning,
                 None,
-                format!("the camera's own log has no speed: {problem}"),
-                "switch the camera's GPS on and wait for its fix; or bring another log: deepfusion data import LOG --video FILE --out DRIVE",
+                format!("the camera's own log has no speed: {why}"),
+                Remedy::OtherLog,
             );
             vec![outcome]
         }
@@ -79,24 +79,18 @@ fn outcomes(path: &Path, log: &DriveLog) -> Vec<Outcome> {
     ]
 }
 
-/// What to do about a log that cannot be read, with the options that do it.
-fn remedy(error: &Error) -> Option<String> {
+/// What to do about a log that cannot be read.
+fn remedy(error: &Error) -> Option<Remedy> {
     match error {
-        Error::Signal { .. } => Some("give --dbc FILE and --speed Message.Signal".into()),
-        Error::Column { .. } => error
-            .hint()
-            .map(|hint| format!("{hint}: --time COLUMN --speed COLUMN --unit km/h")),
-        _ => error.hint(),
+        Error::Signal { .. } => Some(Remedy::Signal),
+        Error::Column { .. } => error.hint().map(Remedy::Columns),
+        _ => error.hint().map(Remedy::Words),
     }
 }
 
 /// What it is, and what it still needs.
 fn opened(path: &Path, log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log");
-    let (name, video) = match log.format {
-        Format::Gpmf => (path.display().to_string(), ""),
-        _ => (path.display().to_string(), " --video FILE"),
-    };
     outcome.find(
         Severity::Note,
         None,
@@ -107,10 +101,10 @@ fn opened(path: &Path, log: &DriveLog) -> Outcome {
             count_of(log.yaw_rates.len(), "yaw rate"),
             log.notes.join("; ")
         ),
-        format!(
-            "deepfusion data import {name}{video} --out DRIVE, with the camera as --hfov DEGREES, --intrinsics or --calibration (deepfusion calibrate \
-             measures it); then deepfusion doctor DRIVE"
-        ),
+        Remedy::Import {
+            log: path.to_owned(),
+            video: log.format != Format::Gpmf,
+        },
     );
     outcome
 }
@@ -157,7 +151,7 @@ fn moving(log: &DriveLog) -> Outcome {
     outcome.judge(Severity::Error, figure, || {
         (
             format!("{fastest:.0} m/s are {:.0} km/h: the unit is another one, and every depth would be scaled by it", 3.6 * fastest),
-            "say the unit: --unit km/h (m/s, mph, knots)".into(),
+            Remedy::SpeedUnit,
         )
     });
     let moving = log.speeds.iter().filter(|s| s.mps.abs() > MOVING_MPS);
@@ -199,7 +193,7 @@ fn sure(log: &DriveLog) -> Outcome {
     outcome.judge(Severity::Warning, figure, || {
         (
             format!("expect distances, and with them a short drive's scale, within ±{share:.0} %: such pairs weigh less in training, above 20 % nothing"),
-            "drive faster or longer, or log the vehicle's own speed: OBD, CAN (--dbc FILE --speed Message.Signal)".into(),
+            Remedy::VehicleSpeed,
         )
     });
     outcome
@@ -212,47 +206,40 @@ fn turns(log: &DriveLog) -> Outcome {
         outcome.judge(
             Severity::Note,
             Figure::new("yaw rates", count, "", Limit::AtLeast(1.0)),
-            || (String::new(), String::new()),
+            || (String::new(), "".into()),
         );
         return outcome;
     }
-    let (what, remedy) = if log.course_rates.is_empty() {
-        (
-            "nothing says how the vehicle turned: --view-motion vehicle cannot train, and --clock-offset auto has changes of speed alone to go by",
-            "--view-motion posenet or distance need no turns; a second log with a gyroscope brings them: deepfusion data import LOG GYROSCOPE …",
-        )
+    let from_positions = !log.course_rates.is_empty();
+    let what = if from_positions {
+        "turns are known from positions alone: enough to compare the clocks on a few minutes with bends, not for the vehicle's own poses"
     } else {
-        (
-            "turns are known from positions alone: enough for --clock-offset auto on a few minutes with bends, not for --view-motion vehicle",
-            "--view-motion posenet or distance need no turns; a second log with a gyroscope brings them: deepfusion data import LOG GYROSCOPE …",
-        )
+        "nothing says how the vehicle turned: the vehicle's own poses cannot train, and clocks are compared by changes of speed alone"
     };
+    let remedy = Remedy::Turns { from_positions };
     outcome.find(Severity::Note, None, what.into(), remedy);
     outcome
 }
 
 fn clock(log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log-clock");
-    let auto = "data import --clock-offset auto measures what is left between the clocks";
-    let (severity, what, remedy) = match log.clock {
+    let (severity, what) = match log.clock {
         // The camera wrote it itself.
         Clock::Video => return Outcome::skipped("log-clock", "the camera's own clock"),
         Clock::Date => (
             Severity::Note,
             "dates in UTC: the video begins when its recorder says that it was made, to a second or so",
-            auto.to_owned(),
         ),
         Clock::LocalDate => (
             Severity::Warning,
             "dates without a zone, taken for UTC: hours off where they are local",
-            format!("deepfusion data import … --zone +02:00; {auto}"),
         ),
         Clock::TimeOfDay | Clock::Free => (
             Severity::Warning,
             "times that are no dates: nothing says when the video began, unless the log began with it",
-            format!("deepfusion data import … --start TIME says it; {auto}"),
         ),
     };
+    let remedy = Remedy::StartOfVideo(log.clock);
     outcome.find(severity, None, what.into(), remedy);
     outcome
 }

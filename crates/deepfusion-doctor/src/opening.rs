@@ -1,6 +1,6 @@
 //! Whether everything can be read: the recording, its images, its motion.
 
-use super::finding::{Outcome, Severity};
+use super::finding::{Outcome, Remedy, Severity};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Error, Result};
 use deepfusion_hint::Hint;
@@ -18,7 +18,7 @@ pub(super) fn pairs(dataset: &Dataset) -> Result<usize> {
 }
 
 /// Of a recording that cannot be opened.
-pub(super) fn failed(why: String, remedy: Option<String>) -> Outcome {
+pub(super) fn failed(why: String, remedy: Option<Remedy>) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
     let remedy = remedy.unwrap_or_else(|| "correct what the message names".into());
     outcome.find(Severity::Error, None, why, remedy);

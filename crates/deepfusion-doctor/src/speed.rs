@@ -38,7 +38,7 @@ fn by_road(dataset: &Dataset, outcome: &mut Outcome) {
         (
             warning.map_or_else(String::new, |w| w.to_string()),
             match unit {
-                Some(unit) => format!("divide the speeds: they seem to be in {unit} (speed_unit says so for tables and bare numbers)"),
+                Some(unit) => format!("divide the speeds: they seem to be in {unit} (speed_unit says so for tables and bare numbers)").into(),
                 None => "see the speed signal's unit and factor, and the camera's focal length".into(),
             },
         )

@@ -50,7 +50,8 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             format!(
                 "multiply vehicle.wheelbase_m by {:.2}, or vehicle.steering_ratio if that is the wrong one",
                 1.0 / factor
-            ),
+            )
+            .into(),
         )
     });
     outcome

@@ -71,7 +71,7 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
                      true one (or the yaw rate has another unit), and depths would be wrong by as much",
                     1.0 / slope
                 ),
-                format!("calibrate at the size of these images; fx and fy times {slope:.2} would fit"),
+                format!("calibrate at the size of these images; fx and fy times {slope:.2} would fit").into(),
             )
         });
     }

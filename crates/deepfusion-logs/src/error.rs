@@ -55,6 +55,14 @@ pub enum Error {
         /// What was looked for.
         problem: String,
     },
+    /// A camera's own track, which has no speed.
+    #[error("{}: {why}", path.display())]
+    NoGps {
+        /// The video.
+        path: PathBuf,
+        /// Why not.
+        why: NoGps,
+    },
     /// A CAN trace without a signal to decode.
     #[error("{}: a CAN trace, and {problem}", path.display())]
     Signal {
@@ -81,6 +89,18 @@ pub enum Error {
     /// A DBC file or a signal of it cannot be used.
     #[error(transparent)]
     Motion(#[from] deepfusion_motion::Error),
+}
+
+/// Why a camera's own track has no speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoGps {
+    /// It has no GPS at all.
+    #[error("its metadata holds no GPS: it was switched off")]
+    SwitchedOff,
+    /// It has one without a fix.
+    #[error("the camera's GPS never had a fix")]
+    NoFix,
 }
 
 /// What is wrong with the choice of a column.
@@ -111,23 +131,28 @@ impl Hint for Error {
             Self::Motion(error) => return error.hint(),
             Self::Line { .. } => "correct the line or delete it, or export the log anew",
             Self::Bytes { .. } => "copy the file again from where it was recorded",
-            Self::Column { problem, .. } => match problem {
-                ColumnProblem::NoSpeedUnit(_) => {
-                    "say the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
-                }
-                ColumnProblem::NoTimeUnit(_) => {
-                    "name the column time_s, time_ms, time_us or time_ns"
-                }
-                _ => {
-                    "say which column is the time and which the speed, by their names in the header"
-                }
-            },
-            Self::NoSpeed { .. } => {
+            Self::Column { problem, .. } => return problem.hint(),
+            Self::NoSpeed { .. } | Self::NoGps { .. } => {
                 "GPX, NMEA, tables with a header, phones' export folders, GoPro's videos and CAN traces are read"
             }
             Self::Signal { .. } => "give the DBC file, and the speed's signal as Message.Signal",
             Self::NoStart { .. } => "say when the first frame was taken, on the log's clock",
             Self::Exists { .. } => "choose another folder, or take the file away",
+        };
+        Some(text.to_owned())
+    }
+}
+
+impl Hint for ColumnProblem {
+    fn hint(&self) -> Option<String> {
+        let text = match self {
+            Self::NoSpeedUnit(_) => {
+                "say the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
+            }
+            Self::NoTimeUnit(_) => "name the column time_s, time_ms, time_us or time_ns",
+            Self::Missing(_) | Self::NoTime | Self::NoSpeed => {
+                "say which column is the time and which the speed, by their names in the header"
+            }
         };
         Some(text.to_owned())
     }

@@ -1,7 +1,7 @@
 //! GoPro's metadata: a track of its own in the video, of keys, lengths and values. Times need no clock: each payload belongs to about a
 //! second of the video, over which its readings are spread evenly.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, NoGps, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::mp4::{Broken, Sample, samples};
 use crate::turns::{Heading, Sensor, yaw_rates};
@@ -36,24 +36,24 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     // SAFETY: the file is only read; whoever cuts it meanwhile gets an error of the system's, as with every mapped file.
     let bytes = unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, e))?;
     let broken = |broken: Broken| broken.of(path);
-    let no_speed = |problem: &str| Error::NoSpeed {
-        path: path.to_owned(),
-        problem: problem.into(),
-    };
     let Some(payloads) = samples(&bytes, b"gpmd").map_err(broken)? else {
-        return Err(no_speed(
-            "a video without a track of GoPro's metadata (gpmd)",
-        ));
+        return Err(Error::NoSpeed {
+            path: path.to_owned(),
+            problem: "a video without a track of GoPro's metadata (gpmd)".into(),
+        });
     };
     let mut found = Found::default();
     for payload in &payloads {
         found.payload(&bytes, payload).map_err(broken)?;
     }
     if found.speeds.len() < 2 {
-        return Err(no_speed(match found.without_fix {
-            0 => "its metadata holds no GPS: it was switched off",
-            _ => "the camera's GPS never had a fix",
-        }));
+        return Err(Error::NoGps {
+            path: path.to_owned(),
+            why: match found.without_fix {
+                0 => NoGps::SwitchedOff,
+                _ => NoGps::NoFix,
+            },
+        });
     }
     let mut notes = vec![format!(
         "speeds of the camera's GPS, {} readings on the video's own clock",

@@ -43,7 +43,7 @@ mod wide_table;
 
 pub use dates::time_on_clock;
 pub use drive_folder::{Camera, DriveFolder, Media};
-pub use error::{ColumnProblem, Error, Result};
+pub use error::{ColumnProblem, Error, NoGps, Result};
 pub use gopro_lens::GoproLens;
 pub use log::{Clock, DriveLog, Format, Speed, YawRate};
 pub use read::{is_gps_track, may_hold_log, read};

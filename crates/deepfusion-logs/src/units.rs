@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::fmt;
 use std::str::FromStr;
 
@@ -66,3 +67,10 @@ impl FromStr for SpeedUnit {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is not a unit of speed: m/s, km/h, mph or knots")]
 pub struct UnknownUnit(pub String);
+
+impl Hint for UnknownUnit {
+    /// The message itself lists the units.
+    fn hint(&self) -> Option<String> {
+        None
+    }
+}

@@ -67,6 +67,22 @@ pub enum Error {
         /// What to do about it.
         remedy: String,
     },
+    /// No run where one should be.
+    #[error("{path}: {reason}")]
+    NotARun {
+        /// The folder.
+        path: PathBuf,
+        /// What it lacks.
+        reason: &'static str,
+    },
+    /// Weights that this program did not write.
+    #[error("{path}: no checkpoint of this program: `{key}` is missing from its metadata")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it lacks.
+        key: String,
+    },
     /// A checkpoint that training cannot go on from; its weights are whole.
     #[error("{path}: {reason}")]
     NotResumable {
@@ -110,10 +126,10 @@ impl Hint for Error {
             ),
             Self::Config { field, .. } => Some(format!("set `{field}` so in the configuration")),
             Self::Setting { .. } | Self::PresetAsKey { .. } => Some(
-                "`deepfusion config show` prints every key and what it means".into(),
+                "docs/reference/configuration.md lists every key and what it means".into(),
             ),
             Self::ConfigFile { .. } => Some(
-                "name a preset and the keys in which it differs; `deepfusion config show` prints them all".into(),
+                "name a preset and the keys in which it differs; docs/reference/configuration.md lists them all".into(),
             ),
             Self::Io { source, action, .. } => match source.kind() {
                 std::io::ErrorKind::StorageFull => {
@@ -125,6 +141,10 @@ impl Hint for Error {
                 _ => None,
             },
             Self::Checkpoint { remedy, .. } => Some(remedy.clone()),
+            Self::NotARun { .. } => Some("give the folder of a run".into()),
+            Self::Foreign { .. } => {
+                Some("weights of other programs are imported: deepfusion-nn".into())
+            }
             Self::NotResumable { .. } => Some("start a new run from these weights".into()),
             Self::RunExists { .. } => Some("resume it, or choose another folder".into()),
             Self::Network(error) => error.hint(),

@@ -94,7 +94,7 @@ impl RunFolder {
     /// A folder that holds a run, or a checkpoint file in one; the latter also says which checkpoint.
     ///
     /// # Errors
-    /// [`Error::Checkpoint`] when there is no run.
+    /// [`Error::NotARun`].
     pub fn open(path: &Path) -> Result<(Self, Option<CheckpointKind>), Error> {
         let (folder, kind) = match path.file_name().and_then(|n| n.to_str()) {
             Some("last.safetensors") => (path.parent(), Some(CheckpointKind::Last)),
@@ -108,10 +108,9 @@ impl RunFolder {
             } else {
                 "no such run"
             };
-            return Err(Error::Checkpoint {
+            return Err(Error::NotARun {
                 path: path.to_owned(),
-                reason: reason.into(),
-                remedy: "give the folder that `train`, `demo` or `weights import` wrote".into(),
+                reason,
             });
         }
         let folder = Self {
@@ -264,7 +263,7 @@ impl Checkpoint {
     /// What the metadata of a file say.
     ///
     /// # Errors
-    /// [`Error::Checkpoint`] for a file of another version, or of another program.
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Foreign`] for one of another program.
     pub fn of(path: &Path, file: &Weights) -> Result<Self, Error> {
         let version = Self::number(path, file, "format_version")?;
         if version != CHECKPOINT_VERSION as usize {
@@ -292,16 +291,13 @@ impl Checkpoint {
     /// A number among a file's metadata.
     ///
     /// # Errors
-    /// [`Error::Checkpoint`] where it is missing.
+    /// [`Error::Foreign`] where it is missing.
     pub fn number(path: &Path, file: &Weights, key: &str) -> Result<usize, Error> {
         let text = file.metadata.get(key);
         text.and_then(|t| t.parse().ok())
-            .ok_or_else(|| Error::Checkpoint {
+            .ok_or_else(|| Error::Foreign {
                 path: path.to_owned(),
-                reason: format!(
-                    "no checkpoint of this program: `{key}` is missing from its metadata"
-                ),
-                remedy: "`weights import` reads weights of other programs".into(),
+                key: key.to_owned(),
             })
     }
 }

@@ -75,9 +75,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::Decode(_) => "is it complete? A partial copy ends early",
-            Self::Node { .. } | Self::Model { .. } => {
-                "only files written by `deepfusion export` of this version are read"
-            }
+            Self::Node { .. } | Self::Model { .. } => "only files that this version wrote are read",
             Self::TooLarge { .. } => "choose a network with fewer weights",
             Self::NoLibrary { .. } => {
                 "`pip install onnxruntime` is enough, or set ORT_DYLIB_PATH to libonnxruntime.so of 1.17 or later"

@@ -37,9 +37,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Data(inner) => inner.hint(),
-            Self::Log { .. } => {
-                Some("it should be the log.csv that `train` wrote into the run's folder".into())
-            }
+            Self::Log { .. } => Some("it should be the log.csv of a run's folder".into()),
             Self::Size { .. } | Self::Encode(_) => None,
         }
     }

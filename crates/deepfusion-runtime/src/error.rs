@@ -58,10 +58,9 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoSuchModel { known, .. } => Some(match known.as_slice() {
-                [] => "give the folder that `train`, `demo` or `weights import` wrote; this build has no embedded network"
-                    .into(),
+                [] => "give the folder of a run; this build has no embedded network".into(),
                 known => format!(
-                    "give the folder that `train`, `demo` or `weights import` wrote, or an embedded network: {}",
+                    "give the folder of a run, or an embedded network: {}",
                     known.join(", ")
                 ),
             }),

@@ -130,8 +130,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoSamples { .. } => Some(
-                "training needs consecutive frames of a moving camera, with time stamps and speeds; \
-                 `deepfusion data inspect` shows what is there"
+                "training needs consecutive frames of a moving camera, with time stamps and speeds"
                     .into(),
             ),
             Self::NoYawRate { .. } => Some(

@@ -51,12 +51,12 @@ impl BatchFactors {
         }
     }
 
-    /// Inverse depth, 1/m, of sigmoid disparities: d = 1/D_max + (1/D_min − 1/D_max)·σ with each sample's range.
+    /// Disparity, 1/m, of sigmoid disparities: d = 1/D_max + (1/D_min − 1/D_max)·σ with each sample's range.
     ///
     /// # Shapes
     /// - `sigmoid`, output: `[T, 1, H, W]`, T as in [`Self::scale`]
     #[must_use]
-    pub fn inverse_depth(&self, sigmoid: Tensor<4>) -> Tensor<4> {
+    pub fn metric_disparity(&self, sigmoid: Tensor<4>) -> Tensor<4> {
         let [n, ..] = sigmoid.dims();
         let of = |values: &Tensor<1>| repeated(values, n).reshape([n, 1, 1, 1]);
         sigmoid.mul(of(&self.span)).add(of(&self.nearest_zero))
@@ -100,7 +100,11 @@ mod tests {
         let factors = BatchFactors::new(&samples, 0.6, &device);
         let sigmoid = [0.0_f32, 1.0, 0.25, 0.5, 0.1, 0.9, 0.0, 1.0];
         let tensor = Tensor::from_data(TensorData::new(sigmoid.to_vec(), [4, 1, 1, 2]), &device);
-        let found: Vec<f32> = factors.inverse_depth(tensor).into_data().iter().collect();
+        let found: Vec<f32> = factors
+            .metric_disparity(tensor)
+            .into_data()
+            .iter()
+            .collect();
         for (i, (found, sigmoid)) in found.iter().zip(sigmoid).enumerate() {
             let SampleFactors { range, focal, .. } = samples[(i / 2) % 2];
             let expected = range.disparity(f64::from(sigmoid)) / focal;

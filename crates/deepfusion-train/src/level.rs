@@ -75,7 +75,6 @@ fn cameras(pass: &ForwardPass, scale: usize) -> (Tensor<3>, Tensor<3>) {
 }
 
 /// Maps pixel coordinates of an image to those of the image resized by `factor`, 1×3×3.
-#[allow(clippy::cast_possible_truncation)]
 fn resizing(factor: f64, device: &Device) -> Tensor<3> {
     let (scale, shift) = (factor as f32, (0.5 * (factor - 1.0)) as f32);
     let matrix = [[scale, 0.0, shift], [0.0, scale, shift], [0.0, 0.0, 1.0]];

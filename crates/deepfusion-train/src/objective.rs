@@ -45,8 +45,8 @@ pub struct DepthPass {
     pub terms: LossTerms,
     /// True over predicted depth, the geometric mean over the pixels: 1 when the scale is metric.
     pub scale_ratio: f64,
-    /// Inverse depth at the finest scale, B×1×H×W in 1/m.
-    pub inverse_depth: Tensor<4>,
+    /// Disparity at the finest scale, B×1×H×W in 1/m.
+    pub metric_disparity: Tensor<4>,
 }
 
 /// The views of one scale.
@@ -159,7 +159,7 @@ impl Model {
                 0 => disparity,
                 halvings => self.enlarged(halvings as usize, disparity, height, width),
             };
-            batch.factors.inverse_depth(disparity)
+            batch.factors.metric_disparity(disparity)
         };
         let scales = self.config.depth_net.scales().into_iter();
         let inverse: Vec<_> = scales.zip(disparities).map(full_size).collect();
@@ -175,7 +175,7 @@ impl Model {
             total,
             terms,
             scale_ratio: (-bias).exp(),
-            inverse_depth: inverse[0].clone().detach(),
+            metric_disparity: inverse[0].clone().detach(),
         }
     }
 
@@ -194,7 +194,7 @@ impl Model {
             CompareAt::Full => self.enlarge[smaller.ilog2() as usize].apply(disparity),
             CompareAt::Own => disparity,
         };
-        let inverse_depth = self.inverse_depth(disparity, batch);
+        let metric_disparity = self.metric_disparity(disparity, batch);
         let synthesised: Vec<_> = level
             .sources
             .iter()
@@ -202,7 +202,7 @@ impl Model {
             .map(|(source, motion)| {
                 synthesise(
                     source.clone(),
-                    inverse_depth.clone(),
+                    metric_disparity.clone(),
                     motion,
                     &level.intrinsics,
                     &level.inverse_intrinsics,
@@ -221,9 +221,9 @@ impl Model {
 
     /// 1/depth in 1/m, of a sigmoid disparity: d = 1/D_max + (1/D_min − 1/D_max)·σ, with the range of the run
     /// or of each sample's data set.
-    fn inverse_depth(&self, disparity: Tensor<4>, batch: &SnippetBatch) -> Tensor<4> {
+    fn metric_disparity(&self, disparity: Tensor<4>, batch: &SnippetBatch) -> Tensor<4> {
         if let Some(factors) = &batch.factors {
-            return factors.inverse_depth(disparity);
+            return factors.metric_disparity(disparity);
         }
         let range = self.range();
         let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
@@ -282,7 +282,7 @@ impl Model {
         moving: Option<&[Tensor<4, Bool>]>,
     ) -> Tensor<1> {
         let depth = self
-            .inverse_depth(pass.disparities[0].clone(), batch)
+            .metric_disparity(pass.disparities[0].clone(), batch)
             .recip();
         let views = finest.synthesised.iter().zip(motions).enumerate();
         mean_of(views, |(index, (view, motion))| {
@@ -430,21 +430,21 @@ fn agreement(
     })
 }
 
-/// A term among the others.
-type Place = fn(&mut LossTerms) -> &mut f64;
+/// Where a term stands among the others.
+type TermField = fn(&mut LossTerms) -> &mut f64;
 
 /// The sum that is differentiated, and its terms, which stay on the device until all are read at once.
 #[derive(Default)]
 struct Sum {
     total: Option<Tensor<1>>,
-    terms: Vec<(Place, Tensor<1>)>,
+    terms: Vec<(TermField, Tensor<1>)>,
 }
 
 impl Sum {
     /// Adds a term if there is one; what is kept of it is its unweighted value.
-    fn add(&mut self, term: Option<Tensor<1>>, weight: f64, place: Place) {
+    fn add(&mut self, term: Option<Tensor<1>>, weight: f64, field: TermField) {
         let Some(term) = term else { return };
-        self.note(term.clone(), place);
+        self.note(term.clone(), field);
         let weighted = term.mul_scalar(weight);
         self.total = Some(match self.total.take() {
             Some(total) => total + weighted,
@@ -453,8 +453,8 @@ impl Sum {
     }
 
     /// Keeps a value that is no part of the sum.
-    fn note(&mut self, value: Tensor<1>, place: Place) {
-        self.terms.push((place, value.detach().inner()));
+    fn note(&mut self, value: Tensor<1>, field: TermField) {
+        self.terms.push((field, value.detach().inner()));
     }
 
     /// The sum, its terms as numbers, and one number more (NaN if none is asked for): a single transfer from the device.
@@ -463,13 +463,13 @@ impl Sum {
         let total = self.total.expect("a loss has a term at least");
         self.terms
             .push((|terms| &mut terms.total, total.clone().detach().inner()));
-        let (places, mut values): (Vec<_>, Vec<_>) = self.terms.into_iter().unzip();
+        let (fields, mut values): (Vec<_>, Vec<_>) = self.terms.into_iter().unzip();
         values.extend(other.map(|other| other.detach().inner()));
         let values = Tensor::cat(values, 0).into_data();
         let mut values = values.iter::<f32>().map(f64::from);
         let mut terms = LossTerms::default();
-        for (place, value) in places.iter().zip(values.by_ref()) {
-            *place(&mut terms) = value;
+        for (field, value) in fields.iter().zip(values.by_ref()) {
+            *field(&mut terms) = value;
         }
         (total, terms, values.next().unwrap_or(f64::NAN))
     }

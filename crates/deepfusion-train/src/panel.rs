@@ -68,7 +68,7 @@ impl SamplePanel {
     pub(crate) fn of_depth(pass: &DepthPass, batch: &DepthBatch) -> Self {
         let [_, _, height, width] = batch.clean.dims();
         let truth = &batch.truth;
-        let error = log_depth_error(pass.inverse_depth.clone(), truth);
+        let error = log_depth_error(pass.metric_disparity.clone(), truth);
         let planes = [&truth.known, &truth.log_depth, &truth.far].map(first);
         let [known, log_depth, far] = &planes;
         let disparity = |i: usize| match (known[i] > 0.0, far[i] > 0.0) {
@@ -81,7 +81,7 @@ impl SamplePanel {
             height,
             name: batch.names.first().cloned().unwrap_or_default(),
             image: first(&batch.network),
-            disparity: first(&pass.inverse_depth),
+            disparity: first(&pass.metric_disparity),
             supervision: Supervision::Depth {
                 truth: (0..known.len()).map(disparity).collect(),
                 error: first(&error),

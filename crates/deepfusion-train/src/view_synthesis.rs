@@ -18,13 +18,13 @@ pub struct Synthesised {
 ///
 /// # Shapes
 /// - `source`: `[N, C, H, W]`
-/// - `target_inverse_depth`: `[N, 1, H, W]`, 1/m
+/// - `target_disparity`: `[N, 1, H, W]`, 1/m
 /// - `source_from_target`: N motions
 /// - `intrinsics`, `inverse_intrinsics`: `[N, 3, 3]`, in pixels of these images
 #[must_use]
 pub fn synthesise(
     source: Tensor<4>,
-    target_inverse_depth: Tensor<4>,
+    target_disparity: Tensor<4>,
     source_from_target: &Motion,
     intrinsics: &Tensor<3>,
     inverse_intrinsics: &Tensor<3>,
@@ -36,7 +36,7 @@ pub fn synthesise(
         .matmul(inverse_intrinsics.clone());
     let translation = source_from_target.translation.clone().reshape([n, 3, 1]);
     let shift = intrinsics.clone().matmul(translation).reshape([n, 3]);
-    let coords = ops::project(target_inverse_depth, homography, shift);
+    let coords = ops::project(target_disparity, homography, shift);
     Synthesised {
         valid: ops::in_view(coords.clone(), [height, width]),
         image: ops::warp(source, coords.clone()),

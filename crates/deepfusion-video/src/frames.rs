@@ -7,7 +7,7 @@
 
 use crate::cache::{Origin, frame_path, keep};
 use crate::probe::{Probed, probe};
-use crate::program::{READ, in_either_words, run};
+use crate::program::{Printed, READ, in_either_words, outcome};
 use crate::{Error, Result};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -94,7 +94,7 @@ impl VideoFrames {
 
 fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
     // One file a frame: none doubled or dropped to keep a rate.
-    in_either_words(|mode| ffmpeg(video, part, mode))?;
+    in_either_words(|mode| ffmpeg(video, part, mode))?.succeeded("ffmpeg", (video, READ))?;
     let written = std::fs::read_dir(part)
         .map_err(|e| Error::file(part, e))?
         .count();
@@ -109,7 +109,7 @@ fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
     Ok(())
 }
 
-fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Vec<u8>> {
+fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Printed> {
     let arguments: [&OsStr; 15] = [
         "-v".as_ref(),
         "error".as_ref(),
@@ -128,5 +128,5 @@ fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Vec<u8>> {
         // Within the folder: a `%` in its own path would count as a number's place.
         "%010d.jpg".as_ref(),
     ];
-    run("ffmpeg", &arguments, (video, READ), part)
+    outcome("ffmpeg", &arguments, (video, READ), part, None)
 }

@@ -34,32 +34,38 @@ pub(crate) fn run<S: AsRef<OsStr>>(
     (file, what): (&Path, &str),
     folder: &Path,
 ) -> Result<Vec<u8>> {
-    Ok(output(program, arguments, (file, what), folder)?.text)
+    let printed = outcome(program, arguments, (file, what), folder, None)?;
+    Ok(printed.succeeded(program, (file, what))?.text)
 }
 
-/// As [`run`], with what it complained of.
-///
-/// # Errors
-/// As [`run`].
-pub(crate) fn output<S: AsRef<OsStr>>(
-    program: &'static str,
-    arguments: &[S],
-    (file, what): (&Path, &str),
-    folder: &Path,
-) -> Result<Printed> {
-    let printed = outcome(program, arguments, (file, what), folder, None)?;
-    if printed.succeeded {
-        return Ok(printed);
+impl Printed {
+    /// It, where the program ended as it should.
+    ///
+    /// # Errors
+    /// [`Error::Program`].
+    pub(crate) fn succeeded(
+        self,
+        program: &'static str,
+        (file, what): (&Path, &str),
+    ) -> Result<Self> {
+        if self.succeeded {
+            return Ok(self);
+        }
+        Err(Error::Program {
+            path: file.to_owned(),
+            program,
+            problem: format!("failed: {}", self.complaint),
+            remedy: match what {
+                WRITE => "see whether the disk is full; a newer ffmpeg may have an encoder for MP4",
+                _ => "play the file to see whether it is whole; a newer ffmpeg may know its codec",
+            },
+        })
     }
-    Err(Error::Program {
-        path: file.to_owned(),
-        program,
-        problem: format!("failed: {}", printed.complaint),
-        remedy: match what {
-            WRITE => "see whether the disk is full; a newer ffmpeg may have an encoder for MP4",
-            _ => "play the file to see whether it is whole; a newer ffmpeg may know its codec",
-        },
-    })
+
+    /// Whether the program failed for not knowing an option. ffmpeg ends with the same code for everything and says which in words.
+    fn does_not_know(&self, option: &str) -> bool {
+        !self.succeeded && self.complaint.contains(option)
+    }
 }
 
 /// Runs a program to its end, whether it succeeds or not, with `input` on its standard input.
@@ -121,10 +127,12 @@ pub(crate) fn outcome<S: AsRef<OsStr>>(
 ///
 /// # Errors
 /// Those of `run`.
-pub(crate) fn in_either_words<T>(run: impl Fn(&str) -> Result<T>) -> Result<T> {
-    match run("-fps_mode") {
-        Err(Error::Program { problem, .. }) if problem.contains("fps_mode") => run("-vsync"),
-        other => other,
+pub(crate) fn in_either_words(run: impl Fn(&str) -> Result<Printed>) -> Result<Printed> {
+    let printed = run("-fps_mode")?;
+    if printed.does_not_know("fps_mode") {
+        run("-vsync")
+    } else {
+        Ok(printed)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Pictures to a video file.
 
-use crate::program::{WRITE, in_either_words, output, run};
+use crate::program::{WRITE, in_either_words, outcome, run};
 use crate::{Error, Result};
 use image::ImageReader;
 use std::ffi::OsStr;
@@ -133,20 +133,20 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
             "mp4".as_ref(),
             PART.as_ref(),
         ];
-        let done = output("ffmpeg", &arguments, (video, WRITE), aside)?;
-        // It goes on after a picture that it cannot read, or ends there, and calls both a success.
-        if done.complaint.is_empty() {
-            Ok(())
-        } else {
-            Err(Error::Program {
-                path: video.to_owned(),
-                program: "ffmpeg",
-                problem: format!("made only a part of it: {}", done.complaint),
-                remedy: "see whether the disk is full and the pictures can be opened",
-            })
-        }
+        outcome("ffmpeg", &arguments, (video, WRITE), aside, None)
     };
-    in_either_words(with)
+    let done = in_either_words(with)?.succeeded("ffmpeg", (video, WRITE))?;
+    // It goes on after a picture that it cannot read, or ends there, and calls both a success.
+    if done.complaint.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Program {
+            path: video.to_owned(),
+            program: "ffmpeg",
+            problem: format!("made only a part of it: {}", done.complaint),
+            remedy: "see whether the disk is full and the pictures can be opened",
+        })
+    }
 }
 
 /// ffmpeg's list of files, each under the name that `file` gives it; of the last one it would forget the time, were it not

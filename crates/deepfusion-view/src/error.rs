@@ -117,23 +117,20 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::NoSuchFolder { .. } => {
-                Some("give the folder that `predict` or `perceive` wrote".into())
-            }
+            Self::NoSuchFolder { .. } => Some("give a folder of predictions or of targets".into()),
             Self::NotAFolder { path } => {
                 let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
                 let folder = folder.unwrap_or(std::path::Path::new("."));
                 Some(format!("give its folder: {}", folder.display()))
             }
-            Self::NothingToShow { .. } => {
-                Some("make something to look at first: `deepfusion predict`".into())
-            }
+            Self::NothingToShow { .. } => Some(
+                "make something to look at first: depth of images, targets or a training run"
+                    .into(),
+            ),
             Self::OtherKind { .. } => {
                 Some("give two folders of predictions, or two of training runs".into())
             }
-            Self::NoFrames { .. } => {
-                Some("give the folder that `predict` or `perceive` wrote".into())
-            }
+            Self::NoFrames { .. } => Some("give a folder of predictions or of targets".into()),
             Self::File { .. }
             | Self::Content { .. }
             | Self::Stopped { .. }

@@ -102,9 +102,7 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let hint = match self {
-            Self::NotEmbedded { known, .. } if known.is_empty() => {
-                "train one (`deepfusion train`) and give its folder"
-            }
+            Self::NotEmbedded { known, .. } if known.is_empty() => "train one and give its folder",
             Self::NotEmbedded { known, .. } => {
                 return Some(format!(
                     "give {}, or the folder of a run",
@@ -112,7 +110,7 @@ impl Hint for Error {
                 ));
             }
             Self::Card { .. } => {
-                "`deepfusion weights pack` writes a card beside the weights; take both from there"
+                "packing a network writes a card beside the weights; take both from there"
             }
             Self::Version { .. } => {
                 "use the version of the program that packed it, or pack its run again"

@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::{DatasetKind, GIVEN_INTRINSICS};
+use deepfusion_data::{CalibrationSource, DatasetKind};
 use deepfusion_hint::Hint;
 
 use super::{Exit, Reportable};
@@ -26,7 +26,6 @@ as_the_library_says!(
     deepfusion_infer::Error,
     deepfusion_model::NetworkError,
     deepfusion_motion::Error,
-    deepfusion_onnx::Error,
     deepfusion_perception::Error,
     deepfusion_sim::Error,
 );
@@ -72,12 +71,14 @@ impl Reportable for deepfusion_calibrate::Error {
 
 impl Reportable for deepfusion_doctor::NoCameraAhead {
     fn remedy(&self) -> Option<String> {
-        let hint = self.hint()?;
-        Some(hint.replacen(
-            "give the offset in milliseconds",
-            "give the offset in milliseconds: --clock-offset MS (without it the clocks count as one)",
-            1,
-        ))
+        let hint = self.hint();
+        match self {
+            // These end with the offset that is to be given.
+            Self::NotFound { .. } | Self::Weak { .. } | Self::Unsure { .. } => hint.map(|hint| {
+                format!("{hint}: --clock-offset MS (without it the clocks count as one)")
+            }),
+            _ => hint,
+        }
     }
 }
 
@@ -115,10 +116,23 @@ impl Reportable for deepfusion_video::Error {
 impl Reportable for deepfusion_data::Error {
     fn message(&self) -> String {
         match self {
-            Self::CameraFile { .. } | Self::FrameSize { .. } => {
-                self.to_string()
-                    .replacen(GIVEN_INTRINSICS, "--intrinsics", 1)
-            }
+            Self::CameraFile {
+                by: CalibrationSource::Given,
+                problem,
+                ..
+            } => format!("--intrinsics: {problem}"),
+            Self::FrameSize {
+                image,
+                drive,
+                frame,
+                found,
+                expected,
+                field,
+                calibration: CalibrationSource::Given,
+            } => format!(
+                "{image}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} ({field} in --intrinsics)",
+                found.0, found.1, expected.0, expected.1
+            ),
             _ => self.to_string(),
         }
     }
@@ -146,6 +160,8 @@ impl Reportable for deepfusion_data::Error {
                 choice: Some(topic),
                 ..
             } => or(&format!("--topic {topic}")),
+            Self::NoSegmentVideo { .. } => hint
+                .map(|hint| format!("{hint}; `deepfusion data inspect` reports its other streams")),
             Self::NoTopics { .. } => Some("leave --topic out, or give bags alone".into()),
             Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
             Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
@@ -240,6 +256,18 @@ impl Reportable for deepfusion_model::Error {
             Self::RunExists { .. } => {
                 Some("continue it with --resume, or choose another folder with --out".into())
             }
+            Self::Setting { .. } | Self::PresetAsKey { .. } => {
+                Some("`deepfusion config show` prints every key and what it means".into())
+            }
+            Self::ConfigFile { .. } => Some(
+                "name a preset and the keys in which it differs; `deepfusion config show` prints them all".into(),
+            ),
+            Self::NotARun { .. } => {
+                Some("give the folder that `train`, `demo` or `weights import` wrote".into())
+            }
+            Self::Foreign { .. } => {
+                Some("`weights import` reads weights of other programs".into())
+            }
             _ => self.hint(),
         }
     }
@@ -248,6 +276,17 @@ impl Reportable for deepfusion_model::Error {
 /// Where a key of the configuration is set.
 fn option_of(field: &str) -> String {
     format!("set `{field}` so in the config file, or by its option; --help lists them")
+}
+
+impl Reportable for deepfusion_onnx::Error {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Node { .. } | Self::Model { .. } => {
+                Some("only files written by `deepfusion export` of this version are read".into())
+            }
+            _ => self.hint(),
+        }
+    }
 }
 
 impl Reportable for deepfusion_render::Error {
@@ -261,6 +300,9 @@ impl Reportable for deepfusion_render::Error {
     fn remedy(&self) -> Option<String> {
         match self {
             Self::Data(error) => error.remedy(),
+            Self::Log { .. } => {
+                Some("it should be the log.csv that `train` wrote into the run's folder".into())
+            }
             _ => self.hint(),
         }
     }
@@ -276,9 +318,15 @@ impl Reportable for deepfusion_runtime::Error {
 
     fn remedy(&self) -> Option<String> {
         match self {
-            Self::NoSuchModel { known, .. } if known.is_empty() => self
-                .hint()
-                .map(|hint| format!("{hint}: train one with deepfusion train --data DRIVE")),
+            Self::NoSuchModel { known, .. } => {
+                const WROTE: &str = "give the folder that `train`, `demo` or `weights import` wrote";
+                Some(match known.as_slice() {
+                    [] => format!(
+                        "{WROTE}; this build has no embedded network: train one with deepfusion train --data DRIVE"
+                    ),
+                    known => format!("{WROTE}, or an embedded network: {}", known.join(", ")),
+                })
+            }
             Self::Engine { .. } => Some(
                 "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
                  every network on every device"
@@ -290,6 +338,7 @@ impl Reportable for deepfusion_runtime::Error {
             ),
             Self::Weights(error) => error.remedy(),
             Self::Model(error) => error.remedy(),
+            Self::Onnx(error) => error.remedy(),
             _ => self.hint(),
         }
     }
@@ -300,6 +349,10 @@ impl Reportable for deepfusion_weights::Error {
         match self {
             Self::NotEmbedded { known, .. } if known.is_empty() => Some(
                 "train one (deepfusion train --data DRIVE) and give its folder: --model RUN".into(),
+            ),
+            Self::Card { .. } => Some(
+                "`deepfusion weights pack` writes a card beside the weights; take both from there"
+                    .into(),
             ),
             Self::Exists { .. } => {
                 Some("choose another folder or --name, or give --overwrite to replace it".into())
@@ -327,6 +380,9 @@ impl Reportable for deepfusion_train::Error {
         match self {
             Self::Data(error) => error.remedy(),
             Self::Model(error) => error.remedy(),
+            Self::NoSamples { .. } => self
+                .hint()
+                .map(|hint| format!("{hint}; `deepfusion data inspect` shows what is there")),
             Self::Precision { .. } => Some(option_of("precision")),
             Self::CameraKnown { .. } => Some(
                 "a camera that is known is better than one that is learned: leave --intrinsics learn out, or this recording".into(),
@@ -375,6 +431,9 @@ impl Reportable for deepfusion_view::Error {
         match self {
             Self::NoSuchFolder { .. } => {
                 Some("give the folder that `predict --out` or `perceive --out` wrote".into())
+            }
+            Self::NoFrames { .. } => {
+                Some("give the folder that `predict` or `perceive` wrote".into())
             }
             Self::NothingToShow { path } => Some(format!(
                 "make something to look at first: deepfusion predict --model RUN IMAGES --out {}",

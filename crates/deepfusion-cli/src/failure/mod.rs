@@ -1,6 +1,7 @@
 //! How a command fails: `error: …`, what caused it, `hint: …`, and the exit code.
 
 mod context;
+mod findings;
 mod libraries;
 
 use std::error::Error;
@@ -12,6 +13,7 @@ use std::process::ExitCode;
 use anstyle::{AnsiColor, Style};
 
 pub(crate) use context::Context;
+pub use findings::in_options;
 
 /// What a command returns.
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
@@ -156,7 +158,8 @@ impl Failure {
 
     /// What to do about an error that knows no remedy of its own: the system's reason decides.
     fn general_hint(&self) -> &'static str {
-        // The standard library's own type is the one that a chain of foreign errors can be asked for.
+        // No typed way: the causes are errors of other people's crates, which the standard library's chain hides behind `dyn Error`.
+        // Its own error is the one type that any of them may end with.
         let mut system = self.causes().filter_map(|cause| cause.downcast_ref());
         match system.next().map(std::io::Error::kind) {
             Some(ErrorKind::NotFound) => "check the spelling, and that the disk is mounted",

@@ -2,10 +2,11 @@
 
 use super::lens::Lens;
 use super::numbers::{self, Numbers};
+use super::source::CalibrationSource;
 use super::yaml;
 use crate::{CalibrationPlace, Error, Result};
 use deepfusion_geometry::{Distortion, Intrinsics};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What a calibration file says of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +17,8 @@ pub struct CameraCalibration {
     pub distortion: Distortion,
     /// Whether the image's size is said, or does not matter (an angle of view); else it was taken from the images.
     pub size_in_file: bool,
-    /// The file, or what else said it.
-    pub path: PathBuf,
+    /// What said it.
+    pub source: CalibrationSource,
     /// Whether nothing said it ([`crate::OpenOptions::assumed_camera`]).
     pub assumed: bool,
 }
@@ -42,18 +43,22 @@ impl CameraCalibration {
             numbers::parse(&text)
         };
         let numbers = numbers.map_err(|refusal| Error::CameraFile {
-            path: path.to_owned(),
+            by: path.into(),
             problem: refusal.problem,
             remedy: refusal.remedy,
         })?;
-        Self::from_numbers(numbers, image_size, path)
+        Self::from_numbers(numbers, image_size, path.into())
     }
 
-    /// A pinhole camera of four given numbers; `source` names who gave them.
+    /// A pinhole camera of four given numbers; `source` gave them.
     ///
     /// # Errors
     /// [`Error::CameraFile`] where they make no camera.
-    pub fn given(pinhole: [f64; 4], image_size: (u32, u32), source: &Path) -> Result<Self> {
+    pub fn given(
+        pinhole: [f64; 4],
+        image_size: (u32, u32),
+        source: CalibrationSource,
+    ) -> Result<Self> {
         let numbers = Numbers {
             pinhole,
             distortion: Distortion::default(),
@@ -70,12 +75,16 @@ impl CameraCalibration {
         }
     }
 
-    fn from_numbers(numbers: Numbers, image_size: (u32, u32), path: &Path) -> Result<Self> {
+    fn from_numbers(
+        numbers: Numbers,
+        image_size: (u32, u32),
+        source: CalibrationSource,
+    ) -> Result<Self> {
         let size = numbers.size.unwrap_or(image_size);
         let intrinsics = Intrinsics::from_numbers(numbers.pinhole, size);
         if let Some(problem) = intrinsics.implausible() {
             return Err(Error::CameraFile {
-                path: path.to_owned(),
+                by: source,
                 problem,
                 remedy: "give the calibration of these images, in their own pixels".into(),
             });
@@ -84,7 +93,7 @@ impl CameraCalibration {
             intrinsics,
             distortion: numbers.distortion,
             size_in_file: numbers.size.is_some(),
-            path: path.to_owned(),
+            source,
             assumed: false,
         })
     }
@@ -92,7 +101,7 @@ impl CameraCalibration {
     /// The place that says the image's size, for errors.
     pub(crate) fn place(&self) -> CalibrationPlace {
         CalibrationPlace {
-            file: self.path.clone(),
+            source: self.source.clone(),
             field: if self.size_in_file {
                 "the image's size"
             } else {
@@ -107,7 +116,7 @@ impl CameraCalibration {
     /// [`Error::CameraFile`] where matrix and distortion do not fit each other.
     pub fn lens(&self) -> Result<Lens> {
         Lens::new(self.intrinsics, &self.distortion).map_err(|problem| Error::CameraFile {
-            path: self.path.clone(),
+            by: self.source.clone(),
             problem,
             remedy: "take matrix and coefficients from one calibration, for images of this size"
                 .into(),

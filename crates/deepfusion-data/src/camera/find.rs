@@ -1,6 +1,7 @@
 //! Where a recording's camera is looked for.
 
 use super::calibration::CameraCalibration;
+use super::source::CalibrationSource;
 use crate::dataset::{assumed_warning, numbers_of_hfov};
 use crate::dataset_toml::FolderConfig;
 use crate::pictures::{ExifCamera, exif_camera};
@@ -19,10 +20,6 @@ const NAMES: [&str; 8] = [
     "camera-intrinsics.txt",
     "calibration.txt",
 ];
-
-/// What errors name in the place of a calibration's file or field where the caller gave the camera
-/// ([`OpenOptions::intrinsics`], [`OpenOptions::hfov_deg`]).
-pub const GIVEN_INTRINSICS: &str = "given intrinsics";
 
 /// What a camera made, and may have described itself in.
 #[derive(Debug, Clone, Copy)]
@@ -49,15 +46,15 @@ pub(crate) fn find_camera(
     warnings: &mut Vec<String>,
 ) -> Result<CameraCalibration> {
     if let Some(given) = options.given_camera(size) {
-        let given = CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS))?;
+        let given = CameraCalibration::given(given, size, CalibrationSource::Given)?;
         return Ok(given.for_any_size(options.intrinsics.is_none()));
     }
     if let Some(given) = config.intrinsics {
-        return CameraCalibration::given(given, size, &config.path);
+        return CameraCalibration::given(given, size, config.path.as_path().into());
     }
     if let Some(hfov_deg) = config.hfov_deg {
         let given = numbers_of_hfov(hfov_deg, size);
-        let given = CameraCalibration::given(given, size, &config.path)?;
+        let given = CameraCalibration::given(given, size, config.path.as_path().into())?;
         return Ok(given.for_any_size(true));
     }
     let named = config.calibration.as_ref();
@@ -82,7 +79,7 @@ pub(crate) fn find_camera(
     match options.assumed_numbers(size) {
         Some(assumed) => {
             warnings.push(assumed_warning(assumed));
-            let calibration = CameraCalibration::given(assumed, size, folder)?;
+            let calibration = CameraCalibration::given(assumed, size, folder.into())?;
             Ok(CameraCalibration {
                 assumed: true,
                 ..calibration
@@ -114,7 +111,7 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
             let was = name(path);
             let problem = format!("EXIF says {}, but {} in {was}", camera.by, first.by);
             return Err(Error::CameraFile {
-                path: other.clone(),
+                by: other.as_path().into(),
                 problem,
                 remedy: "a recording has one camera: keep apart what was taken with another lens or zoom, or give a calibration".into(),
             });
@@ -139,7 +136,8 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
         warning +=
             "; the images are used as they are stored, not turned as EXIF's orientation says";
     }
-    let calibration = CameraCalibration::given([k.fx, k.fy, k.cx, k.cy], size, path)?;
+    let calibration =
+        CameraCalibration::given([k.fx, k.fy, k.cx, k.cy], size, path.as_path().into())?;
     Ok(Some((calibration, warning)))
 }
 
@@ -153,7 +151,7 @@ fn by_gopro(
         return Ok(None);
     };
     let hfov_deg = 2.0 * (f64::from(size.0) / 2.0 / focal).atan().to_degrees();
-    let calibration = CameraCalibration::given(numbers_of_hfov(hfov_deg, size), size, file)?;
+    let calibration = CameraCalibration::given(numbers_of_hfov(hfov_deg, size), size, file.into())?;
     let warning = format!(
         "the camera is taken from {}: the linear lens of a {}, {:.1}° from corner to corner, so fx = fy = {focal:.1}, the principal point in the \
          middle; a calibration is better",

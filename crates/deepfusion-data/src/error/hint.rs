@@ -64,6 +64,7 @@ impl Hint for Error {
             | Self::Topic { remedy, .. }
             | Self::Frames { remedy, .. }
             | Self::NoFrames { remedy, .. } => remedy,
+            Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
             Self::Clocks { .. } => {

@@ -14,6 +14,7 @@ use crate::{
     Camera, Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result,
     SpeedRange, Stream,
 };
+use deepfusion_hint::count_of;
 use deepfusion_motion::{ImuMount, comma};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -44,10 +45,8 @@ pub(crate) fn has_video(folder: &Path) -> bool {
 /// Opens a segment.
 pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     if !has_video(folder) {
-        return Err(Error::NoFrames {
+        return Err(Error::NoSegmentVideo {
             path: folder.join(VIDEO),
-            why: "the segment's images are absent".into(),
-            remedy: "fetch video.hevc of the segment; `deepfusion data inspect` reports its other streams".into(),
         });
     }
     let config = FolderConfig::read(folder)?;
@@ -65,9 +64,9 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     let times = frame_times(folder)?;
     if times.len() != video.count() {
         warnings.push(format!(
-            "{FRAME_TIMES} has {} times, {VIDEO} {} frames: the first {} are taken",
-            times.len(),
-            video.count(),
+            "{FRAME_TIMES} has {}, {VIDEO} {}: the first {} are taken",
+            count_of(times.len(), "time"),
+            count_of(video.count(), "frame"),
             times.len().min(video.count())
         ));
     }

@@ -261,7 +261,7 @@ impl Rig {
                 distortion: Distortion::default(),
                 size_in_file: true,
                 assumed: false,
-                path: folder.join(PERSPECTIVE),
+                source: folder.join(PERSPECTIVE).into(),
             },
             cam_from_vehicle: cam_from_pose_here * pose_from_vehicle(),
             cam0_from_vehicle: cam_from_pose(Camera::Left)? * pose_from_vehicle(),

@@ -179,7 +179,7 @@ impl<'a> Sequence<'a> {
                 distortion: Distortion::default(),
                 size_in_file: false,
                 assumed: false,
-                path,
+                source: path.into(),
             },
             camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
             image_size: size,

@@ -6,9 +6,9 @@ use crate::logs::frame_times::TimedImage;
 use crate::logs::speed_log::SpeedLog;
 use crate::truth::measured::MeasuredDepth;
 use crate::{
-    CalibrationPlace, Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts,
-    Error, Frame, FrameImage, GtKind, Lens, OpenOptions, Receiver, Recording, Result, Stream,
-    load_rgb,
+    CalibrationPlace, CalibrationSource, Camera, CameraCalibration, CameraPath, Dataset,
+    DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind, Lens, OpenOptions, Receiver,
+    Recording, Result, Stream, load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
 use deepfusion_hint::count_of;
@@ -201,7 +201,7 @@ impl PlainParts {
             found: self.image_size,
             expected: (k.width, k.height),
             field: place.field,
-            calibration: place.file,
+            calibration: place.source,
         })
     }
 
@@ -238,9 +238,14 @@ impl PlainParts {
     }
 
     fn describe_camera(&mut self, lens: &Lens) {
-        let file = self.calibration.path.display().to_string();
-        let name = self.calibration.path.file_name();
-        let file = name.map_or(file, |n| n.to_string_lossy().into_owned());
+        let file = match &self.calibration.source {
+            CalibrationSource::File(path) => path.file_name(),
+            CalibrationSource::Given => None,
+        };
+        let file = file.map_or_else(
+            || self.calibration.source.to_string(),
+            |name| name.to_string_lossy().into_owned(),
+        );
         // A layout with a calibration of its own has images of one size, and what is assumed is learned.
         let known = self.calibration.size_in_file || self.calibration.assumed;
         if !known && !self.kind.brings_calibration() {

@@ -196,7 +196,7 @@ fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
         (bends(lens), OTHER_LENS)
     };
     Error::CameraFile {
-        path: video.to_owned(),
+        by: video.into(),
         problem,
         remedy: format!("{remedy}; calibration.yaml beside the video then says it"),
     }

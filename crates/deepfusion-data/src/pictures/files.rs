@@ -80,24 +80,16 @@ fn reader<R: BufRead + Seek>(input: R, path: &Path) -> Result<ImageReader<R>> {
 }
 
 fn broken(path: &Path, error: &ImageError) -> Error {
-    // The PNG decoder reports a cut file as an unexpected end, at some depth of its causes.
-    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
-    while let Some(e) = cause {
-        let io = e.downcast_ref::<std::io::Error>();
-        let text = e.to_string().to_lowercase();
-        if io.is_some_and(|io| io.kind() == std::io::ErrorKind::UnexpectedEof)
-            || text.contains("unexpected end")
-            || text.contains("unexpected eof")
-            || text.contains("exhausted")
-        {
-            return truncated(path);
+    match error {
+        // As the PNG decoder reports a cut file; a JPEG's end was looked for before.
+        ImageError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof => {
+            truncated(path)
         }
-        cause = e.source();
-    }
-    Error::Image {
-        path: path.to_owned(),
-        problem: format!("cannot be decoded: {error}"),
-        truncated: false,
+        _ => Error::Image {
+            path: path.to_owned(),
+            problem: format!("cannot be decoded: {error}"),
+            truncated: false,
+        },
     }
 }
 

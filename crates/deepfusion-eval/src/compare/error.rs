@@ -85,7 +85,7 @@ impl Hint for Error {
             Self::Version { .. } => {
                 Some("use the program's version that wrote it, or evaluate again".into())
             }
-            Self::NotEvaluated { .. } => Some("measure it first: `deepfusion eval`".into()),
+            Self::NotEvaluated { .. } => Some("measure it first".into()),
             Self::Csv(_) | Self::Published(_) => None,
         }
     }

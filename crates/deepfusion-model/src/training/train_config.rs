@@ -173,7 +173,7 @@ pub struct TrainConfig {
     pub learning_rate_schedule: LearningRateSchedule,
     /// Share of the run after which the learning rate is divided by ten, where it falls by `drop`.
     pub learning_rate_drop: f64,
-    /// Share of each weight, not of biases and norms, that a step of size 1 takes away beside Adam's own (AdamW).
+    /// Share of each weight, not of biases and norms, that a step at a learning rate of 1 takes away beside Adam's own (AdamW).
     #[serde(default)]
     pub weight_decay: f64,
     /// Largest norm of the gradient; longer ones are shortened to it. 0: no limit.

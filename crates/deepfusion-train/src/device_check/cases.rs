@@ -220,17 +220,17 @@ fn warp(on: &Inputs) -> Outcome {
 }
 
 fn project(on: &Inputs) -> Outcome {
-    let inverse_depth = on.noise([2, 1, 12, 20], 14, (0.02, 0.5));
+    let metric_disparity = on.noise([2, 1, 12, 20], 14, (0.02, 0.5));
     let near_identity = Tensor::<3>::from_data(
         [[[1.0, 0.01, 0.5], [-0.01, 1.0, -0.3], [0.0005, 0.0002, 1.0]]],
         &on.device,
     );
     let homography = near_identity.expand([2, 3, 3]).detach().require_grad();
     let shift = on.noise([2, 3], 15, (-0.5, 0.5));
-    let result = ops::project(inverse_depth.clone(), homography.clone(), shift.clone());
+    let result = ops::project(metric_disparity.clone(), homography.clone(), shift.clone());
     outcome(result, |raw| {
         vec![
-            gradient(&inverse_depth, raw),
+            gradient(&metric_disparity, raw),
             gradient(&homography, raw),
             gradient(&shift, raw),
         ]
@@ -275,7 +275,7 @@ fn motion(on: &Inputs) -> Outcome {
 }
 
 fn known_depth(on: &Inputs) -> Outcome {
-    let inverse_depths: Vec<_> = (0..4)
+    let metric_disparities: Vec<_> = (0..4)
         .map(|scale| on.noise([2, 1, 24, 40], 23 + scale, (0.02, 0.5)))
         .collect();
     let far = on
@@ -291,9 +291,12 @@ fn known_depth(on: &Inputs) -> Outcome {
         weight: 1.0,
         gradient: 0.5,
     };
-    let found = depth(&inverse_depths, &truth, &settings);
+    let found = depth(&metric_disparities, &truth, &settings);
     outcome(found.loss, |raw| {
-        inverse_depths.iter().map(|x| gradient(x, raw)).collect()
+        metric_disparities
+            .iter()
+            .map(|x| gradient(x, raw))
+            .collect()
     })
 }
 

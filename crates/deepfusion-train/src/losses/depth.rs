@@ -33,10 +33,10 @@ pub struct DepthLoss {
 /// e = ln D̂ − ln D where depth is known; min(e, 0) where only its least value is; 0 elsewhere.
 ///
 /// # Shapes
-/// - `inverse_depth`, output and the truth: B×1×H×W; inverse depth in 1/m
+/// - `metric_disparity`, output and the truth: B×1×H×W; disparity in 1/m
 #[must_use]
-pub fn log_depth_error(inverse_depth: Tensor<4>, truth: &DepthTruth) -> Tensor<4> {
-    let error = (inverse_depth.log() + truth.log_depth.clone()).neg();
+pub fn log_depth_error(metric_disparity: Tensor<4>, truth: &DepthTruth) -> Tensor<4> {
+    let error = (metric_disparity.log() + truth.log_depth.clone()).neg();
     let too_near = error.clone().neg().clamp_min(0.0).neg();
     error * truth.known.clone() + too_near * truth.far.clone()
 }
@@ -45,15 +45,15 @@ pub fn log_depth_error(inverse_depth: Tensor<4>, truth: &DepthTruth) -> Tensor<4
 /// pixels, and the pairs of pixels, whose depth is known or known to be far; without any the loss is 0.
 ///
 /// # Shapes
-/// - `inverse_depths`: the scales, finest first, each enlarged to B×1×H×W, in 1/m
+/// - `metric_disparities`: the scales, finest first, each enlarged to B×1×H×W, in 1/m
 #[must_use]
 pub fn depth(
-    inverse_depths: &[Tensor<4>],
+    metric_disparities: &[Tensor<4>],
     truth: &DepthTruth,
     config: &DepthLossConfig,
 ) -> DepthLoss {
     let valid = truth.known.clone() + truth.far.clone();
-    let finest = log_depth_error(inverse_depths[0].clone(), truth);
+    let finest = log_depth_error(metric_disparities[0].clone(), truth);
     let error = mean_over(finest.clone().abs(), valid.clone());
     let bias = mean_over(
         finest.clone().detach() * truth.known.clone(),
@@ -67,8 +67,8 @@ pub fn depth(
         .reduce(|a, b| a + b)
         .unwrap_or_else(|| error.zeros_like());
     let mut loss = error.clone() + gradient.clone().mul_scalar(config.gradient);
-    for (scale, inverse_depth) in inverse_depths.iter().enumerate().skip(1) {
-        let coarse = log_depth_error(inverse_depth.clone(), truth).abs();
+    for (scale, metric_disparity) in metric_disparities.iter().enumerate().skip(1) {
+        let coarse = log_depth_error(metric_disparity.clone(), truth).abs();
         let weight = 1.0 / (4.0 * scale as f64);
         loss = loss + mean_over(coarse, valid.clone()).mul_scalar(weight);
     }

@@ -10,15 +10,15 @@ use deepfusion_model::LOG_SCALE_BOUNDS;
 /// No gradient reaches the depth: e counts as a constant.
 ///
 /// # Shapes
-/// - `inverse_depth` (1/m), `log_scale` (ln b) and the truth: B×1×H×W
+/// - `metric_disparity` (1/m), `log_scale` (ln b) and the truth: B×1×H×W
 #[must_use]
 pub fn uncertainty(
-    inverse_depth: Tensor<4>,
+    metric_disparity: Tensor<4>,
     log_scale: Tensor<4>,
     truth: &DepthTruth,
 ) -> Tensor<1> {
     let known = truth.known.clone();
-    let error = log_depth_error(inverse_depth.detach(), truth).abs();
+    let error = log_depth_error(metric_disparity.detach(), truth).abs();
     let log_scale = log_scale.clamp(LOG_SCALE_BOUNDS.0, LOG_SCALE_BOUNDS.1);
     let each = error * log_scale.clone().neg().exp() + log_scale;
     (each * known.clone()).sum() / known.sum().clamp_min(1.0)

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const NAME: &str = "packets.ivf";
 /// Behind which the first packets are tried again, to see which of them it was.
@@ -223,17 +223,7 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
             ],
         });
         let arguments: Vec<&OsStr> = arguments.iter().map(OsStr::new).collect();
-        let printed = outcome("ffmpeg", &arguments, (of, READ), folder, bytes)?;
-        // Before ffmpeg 5.1, which `in_either_words` recognises by this.
-        if !printed.succeeded && printed.complaint.contains("fps_mode") {
-            return Err(Error::Program {
-                path: PathBuf::from(of),
-                program: "ffmpeg",
-                problem: printed.complaint,
-                remedy: "a newer ffmpeg may do it",
-            });
-        }
-        Ok(printed)
+        outcome("ffmpeg", &arguments, (of, READ), folder, bytes)
     })
 }
 

@@ -24,7 +24,7 @@ struct Report {
     operations: Vec<Row>,
 }
 
-/// An operation; errors over the largest value, `null` where there is no number.
+/// An operation; errors over the largest value, `null` where that is infinite or NaN.
 #[derive(Debug, Serialize)]
 struct Row {
     operation: &'static str,

@@ -37,7 +37,7 @@ struct Tool {
 
 /// Prints it.
 pub(super) fn run(json: bool) -> Result<()> {
-    let machine = Machine::look();
+    let machine = Machine::inspect();
     if json {
         output::print_json(&machine)
     } else {
@@ -46,7 +46,7 @@ pub(super) fn run(json: bool) -> Result<()> {
 }
 
 impl Machine {
-    fn look() -> Self {
+    fn inspect() -> Self {
         let (memory_total_mb, memory_free_mb) = memory_mb();
         Self {
             version: env!("CARGO_PKG_VERSION"),

@@ -18,7 +18,7 @@ use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::commands::clocks;
 use crate::devices::ComputeDevice;
 use crate::error::CliError;
-use crate::failure::{Reportable, Result};
+use crate::failure::{Reportable, Result, in_options};
 use crate::output;
 use crate::progress::say;
 
@@ -52,6 +52,7 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     let diagnosis = doctor_with(path, &options).unwrap_or_else(|error| {
         Diagnosis::unopened(error.message(), error.remedy()).with_log_within(path)
     });
+    let diagnosis = in_options(diagnosis);
     show(&diagnosis, args)?;
     if let Some(file) = &args.report {
         report::write(path, &options, &diagnosis, file)?;
@@ -101,7 +102,7 @@ fn log(path: &Path, args: &DoctorArgs) -> Result<()> {
         unit: args.unit,
         dbc: args.dbc.clone(),
     };
-    let diagnosis = doctor_log(path, &options);
+    let diagnosis = in_options(doctor_log(path, &options));
     show(&diagnosis, args)?;
     verdict(path, &diagnosis)
 }

@@ -4,8 +4,10 @@ use super::config::BagConfig;
 use super::index::Index;
 use super::source;
 use super::topics::{Role, Topics};
-use crate::camera::{FISHEYE, GIVEN_INTRINSICS};
-use crate::{CalibrationPlace, CameraCalibration, Error, Lens, OpenOptions, Result};
+use crate::camera::FISHEYE;
+use crate::{
+    CalibrationPlace, CalibrationSource, CameraCalibration, Error, Lens, OpenOptions, Result,
+};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use deepfusion_rosbag::MessageSource;
 use deepfusion_rosbag::msg::CameraInfo;
@@ -29,14 +31,18 @@ pub(super) fn find(
     let topic = topics.of(Role::Image).unwrap_or_default();
     let rectified = topic.contains("rect");
     let place = |file: &Path, field| CalibrationPlace {
-        file: file.to_owned(),
+        source: file.into(),
         field,
     };
     let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
     let mut assumed = false;
     let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
         let given = Intrinsics::from_numbers(numbers, (width, height));
-        (pinhole(given), place(bag, GIVEN_INTRINSICS))
+        let place = CalibrationPlace {
+            source: CalibrationSource::Given,
+            field: "the first image's size, for want of one",
+        };
+        (pinhole(given), place)
     } else if let Some(camera) = config.camera {
         (pinhole(camera.intrinsics()), place(&config.path, "camera"))
     } else if let Some(file) = &config.calibration {
@@ -57,7 +63,7 @@ pub(super) fn find(
         });
     };
     let lens = lens.map_err(|problem| Error::CameraFile {
-        path: place.file.clone(),
+        by: place.source.clone(),
         problem,
         remedy: "calibrate the camera at the size of these images".into(),
     })?;
@@ -70,7 +76,7 @@ pub(super) fn find(
             found: (width, height),
             expected: (found.width, found.height),
             field: place.field,
-            calibration: place.file,
+            calibration: place.source,
         });
     }
     Ok((lens, place, assumed))
@@ -91,7 +97,7 @@ fn calibrated(
     // Such a file is of the raw images: rectified ones have another matrix, and no distortion left to take out.
     if rectified && !calibration.distortion.is_none() {
         return Err(Error::CameraFile {
-            path,
+            by: path.into(),
             problem: "it has a distortion, and the images are of a topic with `rect` in its name, rectified already".into(),
             remedy: format!(
                 "name the raw images' topic (topics.image), or give the rectified camera as [camera], both in {}",

@@ -173,7 +173,7 @@ impl Recording for KittiRecording {
 
     fn calibration(&self) -> CalibrationPlace {
         CalibrationPlace {
-            file: self.calibration.folder.join(Calibration::CAM_TO_CAM),
+            source: self.calibration.folder.join(Calibration::CAM_TO_CAM).into(),
             field: "S_rect",
         }
     }

@@ -130,14 +130,14 @@ impl TableFolder {
         let one_camera = images.iter().all(|image| image.sensor == images[0].sensor);
         let (true, Some((_, first))) = (one_camera, here.first()) else {
             return Err(Error::CameraFile {
-                path: calibrations,
+                by: calibrations.into(),
                 problem: format!("{name}: its images have several calibrations of {CAMERA}"),
                 remedy: "a scene has one camera: leave it out".into(),
             });
         };
         let size = image_size(&self.root.join(&first.file))?;
         let pinhole = first.sensor.pinhole.unwrap_or([f64::NAN; 4]);
-        let calibration = CameraCalibration::given(pinhole, size, &calibrations)?;
+        let calibration = CameraCalibration::given(pinhole, size, calibrations.into())?;
         let vehicle_from_cam = first.sensor.vehicle_from_sensor;
         let poses = images.iter().chain(&scans);
         let mut poses: Vec<(i64, Se3)> = poses.map(|t| (t.ns, t.world_from_vehicle)).collect();
