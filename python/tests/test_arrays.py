@@ -34,7 +34,7 @@ def test_many_images_are_those_of_one_at_a_time(drive, model, tmp_path):
             assert np.array_equal(prediction.depth, expected[i % 6].depth)
             assert np.array_equal(prediction.disparity, expected[i % 6].disparity)
     assert list(model.predict_many([])) == []
-    # What is wrong with one is told at its turn; the others come.
+    # What is wrong with one is raised at its turn; the others come.
     (tmp_path / "broken.png").write_bytes(b"no picture")
     mixed = model.predict_many([files[0], tmp_path / "broken.png", files[1]], camera)
     assert np.array_equal(next(mixed).depth, expected[0].depth)

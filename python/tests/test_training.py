@@ -23,7 +23,7 @@ def street(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def run(street, tmp_path_factory):
-    """A run, with what was told of it."""
+    """A run, with what was reported of it."""
     events = []
     folder = tmp_path_factory.mktemp("runs") / "run"
     run = deepfusion.train(SMALL, street, events.append, out=folder, init="none")

@@ -32,7 +32,7 @@ pub(crate) fn complete(
             for column in c0 - 1..=c0 + across as i32 {
                 let at = (column, row);
                 if !grid.contains_key(&at)
-                    && let Some(corner) = look(image, corners, grid, at)
+                    && let Some(corner) = corner_at(image, corners, grid, at)
                 {
                     found.push((at, corner));
                 }
@@ -56,7 +56,7 @@ pub(crate) fn complete(
 }
 
 /// The corner at a place, if the image has one there.
-fn look(
+fn corner_at(
     image: &GrayImage,
     corners: &[Corner],
     grid: &Grid,

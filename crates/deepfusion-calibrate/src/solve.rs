@@ -6,6 +6,7 @@ use crate::zhang::beginnings;
 use crate::{
     Board, Calibration, Coverage, Error, LensModel, Result, StandardErrors, View, ViewFit,
 };
+use deepfusion_hint::count_of;
 use nalgebra::{Vector2, Vector3};
 
 /// Fewest views. Three have as many equations as the camera has numbers; with five, a bad one can be found.
@@ -218,7 +219,9 @@ fn warnings(found: &Calibration) -> Vec<String> {
     let used = found.used();
     if used < GOOD_VIEWS {
         warnings.push(format!(
-            "{used} views are few: {GOOD_VIEWS} to 30, from many sides, are better"
+            "{} {} few: {GOOD_VIEWS} to 30, from many sides, are better",
+            count_of(used, "view"),
+            if used == 1 { "is" } else { "are" }
         ));
     }
     let tilts: Vec<f64> = found

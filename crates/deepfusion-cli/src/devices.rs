@@ -108,7 +108,7 @@ impl fmt::Display for ComputeDevice {
 pub(crate) enum NoDevice {
     /// No backend has this name.
     Name,
-    /// What stands behind the colon is no number, or the processor is asked for one.
+    /// Something else than a number behind the colon, or the processor is asked for one.
     Index,
 }
 
@@ -191,7 +191,7 @@ pub(crate) fn megabytes(bytes: u64) -> f64 {
 /// This machine's devices of a backend other than the processor's own; `None` where this build does not have it.
 #[cfg(feature = "train")]
 fn found(backend: Backend) -> Option<Vec<Device>> {
-    #[allow(unused_imports)]
+    #[allow(unused_imports, reason = "builds without a GPU backend")]
     use burn::tensor::DeviceType;
     match backend {
         #[cfg(feature = "vulkan")]
@@ -202,7 +202,7 @@ fn found(backend: Backend) -> Option<Vec<Device>> {
         Backend::Cuda => Some(Device::enumerate(DeviceType::Cuda).into_vec()),
         #[cfg(feature = "metal")]
         Backend::Metal => Some(Device::enumerate(DeviceType::Metal).into_vec()),
-        #[allow(unreachable_patterns)]
+        #[allow(unreachable_patterns, reason = "builds with every GPU backend")]
         _ => None,
     }
 }
@@ -210,7 +210,7 @@ fn found(backend: Backend) -> Option<Vec<Device>> {
 /// The device that a backend takes by itself.
 #[cfg(feature = "train")]
 fn preferred(backend: Backend) -> Device {
-    #[allow(unused_imports)]
+    #[allow(unused_imports, reason = "builds without a GPU backend")]
     use burn::tensor::DeviceKind;
     match backend {
         #[cfg(feature = "vulkan")]
@@ -221,7 +221,7 @@ fn preferred(backend: Backend) -> Device {
         Backend::Cuda => Device::cuda(0),
         #[cfg(feature = "metal")]
         Backend::Metal => Device::metal(DeviceKind::DefaultDevice),
-        #[allow(unreachable_patterns)]
+        #[allow(unreachable_patterns, reason = "builds with every GPU backend")]
         _ => Device::flex(),
     }
 }

@@ -33,9 +33,9 @@ pub struct LeftOut {
     pub why: String,
 }
 
-/// What is being looked at.
+/// How far the search for the board is.
 #[derive(Debug, Clone, Copy)]
-pub enum Look<'a> {
+pub enum SearchProgress<'a> {
     /// A video, its frames decoded, begins.
     Video {
         /// Its file.
@@ -70,11 +70,11 @@ pub struct BoardViews {
 ///
 /// # Errors
 /// Inputs that cannot be read, or that are of several sizes or orientations.
-pub fn look(
+pub fn find_views(
     inputs: &[String],
     board: &Board,
     most_frames: usize,
-    progress: &mut dyn FnMut(Look),
+    progress: &mut dyn FnMut(SearchProgress),
 ) -> Result<BoardViews> {
     let (mut files, mut videos) = (Vec::new(), Vec::new());
     for input in inputs {
@@ -89,9 +89,9 @@ pub fn look(
         }
     }
     let mut seen = BoardViews::default();
-    seen.look_at_pictures(&files, board, progress)?;
+    seen.add_pictures(&files, board, progress)?;
     for video in &videos {
-        seen.look_at_video(video, board, most_frames, progress)?;
+        seen.add_video(video, board, most_frames, progress)?;
     }
     Ok(seen)
 }
@@ -116,11 +116,11 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 }
 
 impl BoardViews {
-    fn look_at_pictures(
+    fn add_pictures(
         &mut self,
         files: &[PathBuf],
         board: &Board,
-        progress: &mut dyn FnMut(Look),
+        progress: &mut dyn FnMut(SearchProgress),
     ) -> Result<()> {
         for (done, batch) in files.chunks(BATCH).enumerate() {
             let looked: Vec<Result<(GrayImage, u8, BoardDetection)>> = batch
@@ -128,40 +128,40 @@ impl BoardViews {
                 .map(|file| {
                     let photo = load_photo(file)?;
                     let image = grayscale(&photo.image);
-                    let look = find_board(&image, board);
-                    Ok((image, photo.orientation, look))
+                    let detection = find_board(&image, board);
+                    Ok((image, photo.orientation, detection))
                 })
                 .collect();
             for (file, looked) in batch.iter().zip(looked) {
-                let (image, orientation, look) = looked?;
+                let (image, orientation, detection) = looked?;
                 let name = file.display().to_string();
                 self.fits(&name, image.dimensions(), orientation)?;
                 self.looked_at += 1;
-                match look {
+                match detection {
                     BoardDetection::Board(corners) => self.views.push(View { name, corners }),
                     other => self.leave_out(name, &other, board),
                 }
             }
             let done = (done * BATCH + batch.len()).min(files.len());
-            progress(Look::Done(done, files.len()));
+            progress(SearchProgress::Done(done, files.len()));
         }
         Ok(())
     }
 
     /// Of each part of a video the sharpest frame is looked at; of those with the board, the most different are kept.
-    fn look_at_video(
+    fn add_video(
         &mut self,
         file: &Path,
         board: &Board,
         most: usize,
-        progress: &mut dyn FnMut(Look),
+        progress: &mut dyn FnMut(SearchProgress),
     ) -> Result<()> {
         let folder = file.parent().unwrap_or(Path::new("."));
         let video = VideoFrames::open(file, folder)?;
         let frames = video.count();
         let parts = frames.min(PARTS);
         let name = file.display().to_string();
-        progress(Look::Video { file, frames });
+        progress(SearchProgress::Video { file, frames });
         if frames > 0 {
             // The first look decodes all of them.
             video.frame(0)?;
@@ -174,16 +174,16 @@ impl BoardViews {
                 .par_iter()
                 .map(|i| {
                     let (number, image, sharp) = sharpest(&video, part(*i))?;
-                    let look = find_board(&image, board);
-                    Ok((number, image, sharp, look))
+                    let detection = find_board(&image, board);
+                    Ok((number, image, sharp, detection))
                 })
                 .collect();
             for looked in looked {
-                let (number, image, sharpness, look) = looked?;
+                let (number, image, sharpness, detection) = looked?;
                 let name = format!("{name}, frame {number}");
                 self.fits(&name, image.dimensions(), 1)?;
                 self.looked_at += 1;
-                match look {
+                match detection {
                     BoardDetection::Board(corners) => {
                         let candidate = Candidate { corners, sharpness };
                         candidates.push((candidate, name));
@@ -191,7 +191,7 @@ impl BoardViews {
                     other => self.leave_out(name, &other, board),
                 }
             }
-            progress(Look::Done(batch[0] + batch.len(), parts));
+            progress(SearchProgress::Done(batch[0] + batch.len(), parts));
         }
         let alone: Vec<Candidate> = candidates.iter().map(|(c, _)| c.clone()).collect();
         let picked = pick(&alone, self.size, most);
@@ -235,8 +235,8 @@ impl BoardViews {
         Ok(())
     }
 
-    fn leave_out(&mut self, name: String, look: &BoardDetection, board: &Board) {
-        let why = match look {
+    fn leave_out(&mut self, name: String, detection: &BoardDetection, board: &Board) {
+        let why = match detection {
             BoardDetection::Other {
                 columns,
                 rows,

@@ -37,7 +37,7 @@ pub(crate) fn exp_negative(v: f32) -> f32 {
         + r * (1.0
             + r * (0.5
                 + r * (0.166_666_66 + r * (0.041_665_8 + r * (0.008_333_5 + r * 0.001_394_4)))));
-    #[allow(clippy::cast_possible_truncation)] // -126 <= n <= 0
+    // -126 <= n <= 0
     let power = f32::from_bits((((n as i32) + 127) << 23) as u32);
     p * power
 }

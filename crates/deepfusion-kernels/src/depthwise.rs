@@ -167,10 +167,7 @@ pub fn depthwise_backward_weight(
                         total += f64::from(sum_product(shape.read(x, tap, y), grad));
                     }
                 }
-                #[allow(clippy::cast_possible_truncation)]
-                {
-                    grad_weight[tap.weight] = total as f32;
-                }
+                grad_weight[tap.weight] = total as f32;
             }
         });
 }

@@ -17,7 +17,6 @@ pub fn position_code(per_axis: usize, height: usize, width: usize) -> Vec<f32> {
         let place = TAU * (index + 1) as f64 / (count as f64 + 1e-6);
         let share = (channel / 2 * 2) as f64 / per_axis as f64;
         let angle = place / LONGEST.powf(share);
-        #[allow(clippy::cast_possible_truncation)]
         if channel.is_multiple_of(2) {
             angle.sin() as f32
         } else {

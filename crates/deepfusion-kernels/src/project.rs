@@ -1,7 +1,7 @@
-//! Projects the pixels of one view into another, from inverse depth (the paper's Eq. 3–5).
+//! Projects the pixels of one view into another, from disparity (the paper's Eq. 3–5).
 //!
 //! p' ~ H·p̃ + d·s with d = 1/D, H = K·R·K⁻¹ and s = K·t: the camera's matrices are multiplied once per
-//! image, and inverse depth, the network's prediction, is never inverted.
+//! image, and disparity, the network's prediction, is never inverted.
 
 use crate::{
     lanes::{sum, sum_product},
@@ -52,19 +52,19 @@ fn check(batch: usize, area: usize, homography: usize, shift: usize, coords: usi
 /// outside of every image.
 ///
 /// # Shapes
-/// `inverse_depth` N×H×W (1/m), `homography` N×3×3, `shift` N×3 (pixels × m), `coords` N×2×H×W.
+/// `disparity` N×H×W (1/m), `homography` N×3×3, `shift` N×3 (pixels × m), `coords` N×2×H×W.
 ///
 /// # Panics
 /// When a length does not fit.
 pub fn project<T: Float + Send + Sync>(
     (height, width): (usize, usize),
-    inverse_depth: &[T],
+    disparity: &[T],
     homography: &[T],
     shift: &[T],
     coords: &mut [T],
 ) {
     let area = height * width;
-    let batch = inverse_depth.len() / area.max(1);
+    let batch = disparity.len() / area.max(1);
     check(batch, area, homography.len(), shift.len(), coords.len());
     let to = SharedMut::new(coords);
     let (least, nowhere) = (number::<T>(MIN_DEPTH_M), number::<T>(NOWHERE));
@@ -77,7 +77,7 @@ pub fn project<T: Float + Send + Sync>(
             let at_y = number::<T>(y as f64);
             let [(x0, dx), (y0, dy), (w0, dw)] = [0, 1, 2].map(|i| motion.row(i, at_y));
             let [sx, sy, sw] = motion.s;
-            let depths = &inverse_depth[row * width..][..width];
+            let depths = &disparity[row * width..][..width];
             // SAFETY: each row of an image belongs to one task.
             let us = unsafe { to.slice(2 * n * area + y * width, width) };
             // SAFETY: as above, in the other plane.
@@ -111,7 +111,7 @@ pub struct ProjectGradients<T> {
     pub shift: Vec<T>,
 }
 
-/// Gradients of [`project`]; that of the inverse depth goes to `grad_depth`, overwritten.
+/// Gradients of [`project`]; that of the disparity goes to `grad_depth`, overwritten.
 ///
 /// # Shapes
 /// As [`project`]; `coords` is its output, `grad_coords` N×2×H×W, `grad_depth` N×H×W.
@@ -120,14 +120,14 @@ pub struct ProjectGradients<T> {
 /// When a length does not fit.
 pub fn project_backward<T: Float + Send + Sync>(
     (height, width): (usize, usize),
-    inverse_depth: &[T],
+    disparity: &[T],
     homography: &[T],
     shift: &[T],
     grad_coords: &[T],
     grad_depth: &mut [T],
 ) -> ProjectGradients<T> {
     let area = height * width;
-    let batch = inverse_depth.len() / area.max(1);
+    let batch = disparity.len() / area.max(1);
     check(
         batch,
         area,
@@ -135,11 +135,7 @@ pub fn project_backward<T: Float + Send + Sync>(
         shift.len(),
         grad_coords.len(),
     );
-    assert_eq!(
-        grad_depth.len(),
-        inverse_depth.len(),
-        "depth gradient length"
-    );
+    assert_eq!(grad_depth.len(), disparity.len(), "depth gradient length");
     let columns: Vec<T> = (0..width).map(|x| number(x as f64)).collect();
     let least = number::<T>(MIN_DEPTH_M);
     // A row's gradients of H and s.
@@ -155,7 +151,7 @@ pub fn project_backward<T: Float + Send + Sync>(
                 let at_y = number::<T>(y as f64);
                 let [(x0, dx), (y0, dy), (w0, dw)] = [0, 1, 2].map(|i| motion.row(i, at_y));
                 let [sx, sy, sw] = motion.s;
-                let depths = &inverse_depth[row * width..][..width];
+                let depths = &disparity[row * width..][..width];
                 let us = &grad_coords[2 * n * area + y * width..][..width];
                 let vs = &grad_coords[(2 * n + 1) * area + y * width..][..width];
                 let (gx, rest) = buffer.split_at_mut(width);
@@ -308,7 +304,7 @@ mod tests {
         };
         let mut grad_depth = vec![f64::NAN; 2 * AREA];
         let grads = project_backward(SIZE, &depths, &h, &s, &weights, &mut grad_depth);
-        check_gradient("inverse depth", &depths, &grad_depth, 1e-6, &|d| {
+        check_gradient("disparity", &depths, &grad_depth, 1e-6, &|d| {
             loss(d, &h, &s)
         });
         check_gradient("homography", &h, &grads.homography, 1e-7, &|h| {

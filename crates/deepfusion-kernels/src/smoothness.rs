@@ -89,9 +89,7 @@ impl SmoothnessShape {
             }
             total += f64::from(sum(terms) / count);
         });
-        #[allow(clippy::cast_possible_truncation)]
-        let total = total as f32;
-        total
+        total as f32
     }
 
     fn mean(&self, disparity: &[f32]) -> f32 {

@@ -366,7 +366,7 @@ fn projection_and_smoothness() {
     assert_close("coords", a.0, b.0);
     assert_close("smoothness", a.1, b.1);
     assert_close("in view", a.2, b.2);
-    assert_close("inverse depth", a.3, b.3);
+    assert_close("disparity", a.3, b.3);
     assert_close("homography", a.4, b.4);
     assert_close("shift", a.5, b.5);
 }

@@ -1,5 +1,5 @@
 use crate::{MessageError, Time};
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a bag.
@@ -55,7 +55,7 @@ pub enum Error {
         problem: String,
     },
     /// A chunk's messages cannot be read; those of other chunks can.
-    #[error("{}: chunk at byte {offset} ({messages} messages): {problem}", path.display())]
+    #[error("{}: chunk at byte {offset} ({}): {problem}", path.display(), count_of(*messages, "message"))]
     Chunk {
         /// The bag.
         path: PathBuf,

@@ -2,6 +2,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use crate::{PostProcess, Report};
+use deepfusion_hint::count_of;
 use serde_json::Value;
 
 use super::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
@@ -152,7 +153,7 @@ impl Evaluation {
         let p = &report.protocol;
         let truth = match &report.truth_sha256 {
             Some(digest) => format!("truth {digest}"),
-            None => format!("unknown truth, {} images", report.n),
+            None => format!("unknown truth, {}", count_of(report.n, "image")),
         };
         format!("{:?} {} {} {:?} {truth}", p.crop, p.cap_m, p.min_m, p.gt)
     }
@@ -160,21 +161,21 @@ impl Evaluation {
 
 /// Adds what tells rows of one name in one table apart: the checkpoint, then the engine, then the path.
 fn tell_apart(all: &mut [Evaluation]) {
-    type Part = fn(&Evaluation) -> Option<String>;
-    let parts: [Part; 4] = [
+    type Distinction = fn(&Evaluation) -> Option<String>;
+    let distinctions: [Distinction; 4] = [
         |e| e.post_process().map(str::to_owned),
         |e| e.checkpoint().map(str::to_owned),
         |e| e.engine().map(str::to_owned),
         |e| Some(e.path.display().to_string()),
     ];
-    for part in parts {
+    for distinction in distinctions {
         let mut groups = HashMap::<(String, String), Vec<usize>>::new();
         for (i, evaluation) in all.iter().enumerate() {
             let key = (evaluation.name.clone(), evaluation.ground());
             groups.entry(key).or_default().push(i);
         }
         for members in groups.into_values().filter(|m| m.len() > 1) {
-            let words: Vec<_> = members.iter().map(|i| part(&all[*i])).collect();
+            let words: Vec<_> = members.iter().map(|i| distinction(&all[*i])).collect();
             if words.iter().all(|w| *w == words[0]) {
                 continue;
             }

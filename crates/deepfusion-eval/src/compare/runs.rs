@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
+use deepfusion_hint::count_of;
 
 use super::evaluation::{Evaluation, Origin};
 use super::plausibility::{Flag, Severity, check, identical};
@@ -117,7 +118,7 @@ fn eigen_differences(report: &Report) -> Vec<String> {
     let p = &report.protocol;
     let mut differences = Vec::new();
     if report.n != 697 {
-        differences.push(format!("{} images instead of 697", report.n));
+        differences.push(format!("{} instead of 697", count_of(report.n, "image")));
     }
     if p.crop != Crop::Garg {
         differences.push("no Garg crop".into());

@@ -34,7 +34,7 @@ impl DepthWatch {
 
     /// Brings the frame's depth back to the metres that were learned, where that was asked for, and says whether they
     /// hold; `None` where nothing is known of how the camera moved.
-    pub fn look(
+    pub fn observe(
         &mut self,
         input: &Input,
         image: &RgbImage,

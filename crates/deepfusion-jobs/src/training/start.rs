@@ -249,7 +249,7 @@ impl Start {
         Ok(())
     }
 
-    /// The model with the weights to start from; `told` hears what they are. What may not be meant is a warning ([`tracing::warn`]).
+    /// The model with the weights to start from; `report` is called with what they are. What may not be meant is a warning ([`tracing::warn`]).
     ///
     /// # Errors
     /// As [`Checkpoints::load_networks`]; [`TrainError::Model`] for weights of another architecture.
@@ -257,12 +257,12 @@ impl Start {
         &self,
         mut model: Model,
         device: &Device,
-        told: &mut dyn FnMut(Began),
+        report: &mut dyn FnMut(Began),
     ) -> Result<Model, TrainError> {
         match self {
             Self::Nothing => Ok(model),
             Self::NoneFits => {
-                told(Began::NoneFits);
+                report(Began::NoneFits);
                 Ok(model)
             }
             Self::Packed { network, path } => {
@@ -273,7 +273,7 @@ impl Start {
                 let mut new = vec!["PoseNet"];
                 new.extend(new_head.then_some("the head for uncertainty"));
                 let path = path.as_deref();
-                told(Began::Packed { network, path, new });
+                report(Began::Packed { network, path, new });
                 Ok(model)
             }
             Self::Path(path) => {
@@ -287,7 +287,7 @@ impl Start {
                 let device = device.clone().autodiff();
                 let (model, new) = folder.load_networks(kind, model.config(), &device)?;
                 let checkpoint = folder.checkpoint_path(kind);
-                told(Began::Run { checkpoint, new });
+                report(Began::Run { checkpoint, new });
                 Ok(model)
             }
         }

@@ -59,7 +59,7 @@ impl Seen {
 }
 
 /// Looks at a frame; `closely` also at what needs further runs of the network.
-pub(super) fn look(
+pub(super) fn evidence_of_frame(
     estimator: &mut DepthEstimator,
     dataset: &Dataset,
     target: &Target,

@@ -4,7 +4,7 @@
 //! before it (`look`): how the scene moved tells depth in metres, how well one frame explains the other tells whether depth and
 //! motion fit, and what the mirrored image gives tells how much of it is chance. [`verdict`] puts it together.
 
-mod look;
+mod evidence;
 mod plan;
 #[cfg(feature = "train")]
 mod pose;
@@ -24,7 +24,7 @@ pub use self::plan::{Block, Plan, Target, plan};
 #[cfg(feature = "train")]
 pub use self::pose::{pose_net_is_metric, pose_speeds};
 
-use self::look::{FrameEvidence, look};
+use self::evidence::{FrameEvidence, evidence_of_frame};
 use crate::Result;
 
 /// The standard error of a vehicle's speed where nobody says better, as a share: tyres wear and warm, wheels slip, GPS is smoothed.
@@ -94,7 +94,8 @@ pub fn verdict(
         let mut points = Vec::new();
         for (i, target) in block.targets.iter().enumerate() {
             // What costs a further run of the network is looked at once in a block.
-            let evidence = look(estimator, dataset, target, i == 0, options.focal_correction)?;
+            let evidence =
+                evidence_of_frame(estimator, dataset, target, i == 0, options.focal_correction)?;
             gathered.add(&evidence, target.speed_mps);
             points.extend(evidence.points);
             done += 1;

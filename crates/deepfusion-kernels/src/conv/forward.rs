@@ -84,7 +84,6 @@ pub fn conv2d(
     });
 }
 
-#[allow(clippy::too_many_arguments)]
 fn forward_tile(
     shape: &ConvShape,
     arithmetic: Arithmetic,

@@ -226,9 +226,9 @@ impl<B: KernelBackward> Backward<B, 3> for Project {
         grads: &mut Gradients,
         _checkpointer: &mut Checkpointer,
     ) {
-        let [inverse_depth, homography, shift] = ops.state;
+        let [disparity, homography, shift] = ops.state;
         let grad = grads.consume::<B>(&ops.node);
-        let gradients = B::project_grad(inverse_depth, homography, shift, grad);
+        let gradients = B::project_grad(disparity, homography, shift, grad);
         for (node, grad) in ops.parents.into_iter().zip(gradients) {
             if let Some(node) = node {
                 grads.register::<B>(node.id, grad);
@@ -366,16 +366,16 @@ where
     }
 
     fn kernel_project(
-        inverse_depth: FloatTensor<Self>,
+        disparity: FloatTensor<Self>,
         homography: FloatTensor<Self>,
         shift: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
-        let (inverse_depth, depth_node) = inverse_depth.into_parts();
+        let (disparity, depth_node) = disparity.into_parts();
         let (homography, homography_node) = homography.into_parts();
         let (shift, shift_node) = shift.into_parts();
-        let output = B::kernel_project(inverse_depth.clone(), homography.clone(), shift.clone());
+        let output = B::kernel_project(disparity.clone(), homography.clone(), shift.clone());
         let nodes = [depth_node, homography_node, shift_node];
-        let state = [inverse_depth, homography, shift];
+        let state = [disparity, homography, shift];
         record!(Project, C, nodes, output, state)
     }
 

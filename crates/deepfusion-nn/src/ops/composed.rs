@@ -190,9 +190,9 @@ pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
 
 /// [`super::project`].
 #[must_use]
-pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
-    let [n, _, height, width] = inverse_depth.dims();
-    let device = inverse_depth.device().inner();
+pub fn project(disparity: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
+    let [n, _, height, width] = disparity.dims();
+    let device = disparity.device().inner();
     let along = |size: usize| {
         let steps: Tensor<1> = Tensor::<1, Int>::arange(0..size as i64, &device).float();
         steps
@@ -213,12 +213,12 @@ pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>
         x.clone() * entry(row, 0)
             + y.clone() * entry(row, 1)
             + entry(row, 2)
-            + inverse_depth.clone() * s
+            + disparity.clone() * s
     };
     let w = axis(2);
     let behind = w
         .clone()
-        .lower_equal(inverse_depth.clone().mul_scalar(MIN_DEPTH_M));
+        .lower_equal(disparity.clone().mul_scalar(MIN_DEPTH_M));
     let w = w.mask_fill(behind.clone(), 1.0);
     let coords = [0, 1].map(|row| axis(row).div(w.clone()).mask_fill(behind.clone(), NOWHERE));
     Tensor::cat(coords.to_vec(), 1)

@@ -143,7 +143,6 @@ fn smoothness_shape(image: &Float) -> SmoothnessShape {
     }
 }
 
-#[allow(clippy::cast_possible_truncation)]
 fn single(value: f64) -> f32 {
     value as f32
 }
@@ -263,9 +262,9 @@ impl KernelOps for Flex {
         tensor(out, sizes)
     }
 
-    fn kernel_project(inverse_depth: Float, homography: Float, shift: Float) -> Float {
-        let [batch, _, height, width] = dims(&inverse_depth);
-        let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
+    fn kernel_project(disparity: Float, homography: Float, shift: Float) -> Float {
+        let [batch, _, height, width] = dims(&disparity);
+        let (depth, homography) = (Values::of(disparity), Values::of(homography));
         let shift = Values::of(shift);
         let mut out = zeros(&[2, batch, height, width]);
         kernels::project(

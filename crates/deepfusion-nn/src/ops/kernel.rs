@@ -80,7 +80,7 @@ pub(super) trait KernelOps: Backend {
 
     /// See [`super::project`].
     fn kernel_project(
-        inverse_depth: FloatTensor<Self>,
+        disparity: FloatTensor<Self>,
         homography: FloatTensor<Self>,
         shift: FloatTensor<Self>,
     ) -> FloatTensor<Self>;
@@ -186,9 +186,9 @@ pub(super) trait KernelBackward: Backend {
         radius: usize,
     ) -> FloatTensor<Self>;
 
-    /// Gradients of inverse depth, homography and shift of [`KernelOps::kernel_project`].
+    /// Gradients of disparity, homography and shift of [`KernelOps::kernel_project`].
     fn project_grad(
-        inverse_depth: FloatTensor<Self>,
+        disparity: FloatTensor<Self>,
         homography: FloatTensor<Self>,
         shift: FloatTensor<Self>,
         grad: FloatTensor<Self>,

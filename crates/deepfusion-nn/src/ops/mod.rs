@@ -243,20 +243,20 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
 }
 
 /// The pixel coordinates of one view's points in another view (the paper's Eq. 3–5): p' ~ H·p̃ + d·s, d
-/// the inverse depth. Points behind the other camera are sent far outside of its image.
+/// the disparity. Points behind the other camera are sent far outside of its image.
 ///
 /// # Shapes
-/// - `inverse_depth`: `[N, 1, H, W]`, 1/m
+/// - `disparity`: `[N, 1, H, W]`, 1/m
 /// - `homography`: `[N, 3, 3]`, K·R·K⁻¹
 /// - `shift`: `[N, 3]`, K·t
 /// - output: `[N, 2, H, W]`, u and v in pixels
 #[must_use]
-pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
-    if !on_cpu(&inverse_depth) {
-        return composed::project(inverse_depth, homography, shift);
+pub fn project(disparity: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
+    if !on_cpu(&disparity) {
+        return composed::project(disparity, homography, shift);
     }
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_project(
-        inverse_depth.into_dispatch(),
+        disparity.into_dispatch(),
         homography.into_dispatch(),
         shift.into_dispatch(),
     ))

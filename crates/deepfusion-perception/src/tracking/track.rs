@@ -238,7 +238,7 @@ impl Track {
         };
         let axis = self.axis();
         let mut along = cam_from_world.rotate(&Vector3::new(axis.cos(), 0.0, axis.sin()));
-        // What moves, moves forward.
+        // A dynamic object moves forward.
         if velocity.is_some_and(|v| v.dot(&along) < 0.0) {
             along = -along;
         }

@@ -11,11 +11,14 @@ const NUMBERS: &str = "16UC1, 32FC1, bayer_rggb16, bayer_bggr16, bayer_gbrg16, b
 
 /// A Bayer pattern: the colours of the first row, then of the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs)]
 pub enum BayerPattern {
+    /// Red and green, then green and blue.
     Rggb,
+    /// Blue and green, then green and red.
     Bggr,
+    /// Green and blue, then red and green.
     Gbrg,
+    /// Green and red, then blue and green.
     Grbg,
 }
 

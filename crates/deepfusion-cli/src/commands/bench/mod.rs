@@ -9,6 +9,7 @@ use std::time::Instant;
 use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Preset, TrainConfig};
@@ -107,7 +108,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     }
     output::print(&format!(
         "{} at {}x{}, {:.2} M parameters, {:.2} G multiply-adds, {} engine on {}\n\
-         median of {} runs, ms\n\
+         median of {}, ms\n\
          decode  {:8.2}   JPEG {}x{}\n\
          resize  {:8.2}   Lanczos, to a tensor\n\
          network {:8.2}\n\
@@ -116,7 +117,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
          targets {:8.2}   boxes and tracks from the picture's true depth\n\
          colour  {:8.2}   depth as a picture\n\
          all     {:8.2}   one after another: what an image waits\n\
-         {:.1} frames a second, the stages of {} images overlapped; peak memory {memory}\n",
+         {:.1} frames a second, the stages of {} overlapped; peak memory {memory}\n",
         report.network,
         report.size[0],
         report.size[1],
@@ -124,7 +125,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         report.multiply_adds as f64 / 1e9,
         report.engine,
         report.device,
-        repeats,
+        count_of(repeats, "run"),
         s.decode,
         PICTURE.0,
         PICTURE.1,
@@ -136,7 +137,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         s.colour,
         report.latency_ms,
         report.fps,
-        repeats * IMAGES_PER_REPEAT,
+        count_of(repeats * IMAGES_PER_REPEAT, "image"),
     ))?;
     output::print(&format!("\n{table}"))?;
     output::print(&profile_table(&report.profile_ms))

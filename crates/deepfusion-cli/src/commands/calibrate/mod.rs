@@ -6,7 +6,7 @@ mod summary;
 use deepfusion_calibrate::{Board, Calibration, Error, LEAST_VIEWS, calibrate};
 use deepfusion_data::{Lens, camera_info_yaml};
 use deepfusion_hint::count_of;
-use deepfusion_jobs::board::{BoardViews, LeftOut, Look, look};
+use deepfusion_jobs::board::{BoardViews, LeftOut, SearchProgress, find_views};
 use serde::Serialize;
 
 use crate::cli::CalibrateArgs;
@@ -50,19 +50,19 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         output::require_folder_of(file)?;
     }
     let mut progress = Progress::new("looking for the board");
-    let seen = look(
+    let seen = find_views(
         &args.inputs,
         &board,
         usize::from(args.frames),
-        &mut |look| match look {
-            Look::Video { file, frames } => {
+        &mut |so_far| match so_far {
+            SearchProgress::Video { file, frames } => {
                 say(&format!(
                     "{}: {}",
                     file.display(),
                     count_of(frames, "frame")
                 ));
             }
-            Look::Done(done, total) => progress.set(done, total),
+            SearchProgress::Done(done, total) => progress.set(done, total),
         },
     )?;
     drop(progress);

@@ -137,7 +137,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_recordings(&args.data, &options)?;
     let found = verdict::of_model(args, &model, &mut estimator, &datasets)?;
-    // Who asks for a figure that needs ground truth is told where there is none.
+    // A figure that needs ground truth is an error where there is none.
     let needs_truth = args.gt_depth == GtKind::Annotated || args.points_out.is_some();
     if found.is_some() && !needs_truth && !verdict::has_truth(args, &datasets) {
         return verdict::alone(args, &model, found, UsedCheckpoint::of(&estimator, &model));

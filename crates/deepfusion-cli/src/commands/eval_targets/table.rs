@@ -13,15 +13,15 @@ pub(super) fn text(depth: &str, score: &TargetScore) -> String {
         ),
         String::new(),
         format!(
-            "recall       {:>8}   {} of {} boxes",
+            "recall       {:>8}   {} of {}",
             share(score.recall),
             score.found,
-            score.labels
+            count_of(score.labels, "box")
         ),
         format!(
-            "precision    {:>8}   {} targets on no box",
+            "precision    {:>8}   {} on no box",
             share(score.precision),
-            score.false_targets
+            count_of(score.false_targets, "target")
         ),
         format!("centre       {:>8}", number(score.center_error_m, "m")),
         format!("yaw          {:>8}", number(score.yaw_error_deg, "°")),

@@ -291,7 +291,7 @@ fn predict(
     let infer = |(i, loaded, prepared): (usize, Loaded, PreparedImage)| {
         let seen = job.see(estimator, &prepared).map(|mut seen| {
             let (input, image) = (mine[todo[i]], &loaded.image);
-            seen.scale = watch.look(input, image, loaded.camera, &mut seen.prediction);
+            seen.scale = watch.observe(input, image, loaded.camera, &mut seen.prediction);
             if let Some(ratio) = watch.first_drift() {
                 warn_of_drift(&input.name, ratio);
             }

@@ -176,7 +176,7 @@ impl Adaptation {
         &self,
         opened: Opened,
         warn: &mut dyn FnMut(SampleWarning),
-        told: &mut dyn FnMut(Began),
+        report: &mut dyn FnMut(Began),
     ) -> Result<Trainer> {
         let sets = open_samples(&self.config, opened, warn)?;
         let config = self.config.clone();
@@ -186,7 +186,7 @@ impl Adaptation {
                 let folder = RunFolder::create(self.folders.work())?;
                 self.folders.keep_start(&self.given)?;
                 Trainer::create(config, folder, sets, &self.device, |model| {
-                    self.start.initialise(model, &self.device, told)
+                    self.start.initialise(model, &self.device, report)
                 })?
             }
         })

@@ -43,7 +43,10 @@ pub enum Precision {
 
 /// What multiplies pairs of bf16.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+#[cfg_attr(
+    not(target_arch = "x86_64"),
+    allow(dead_code, reason = "other processors have neither")
+)]
 pub(super) enum Unit {
     /// AVX512-BF16.
     Dot,
@@ -114,7 +117,10 @@ mod tests {
     }
 
     fn units() -> Vec<Unit> {
-        #[allow(unused_mut)]
+        #[cfg_attr(
+            not(target_arch = "x86_64"),
+            expect(unused_mut, reason = "nothing is added")
+        )]
         let mut units = Vec::new();
         #[cfg(target_arch = "x86_64")]
         {

@@ -62,7 +62,6 @@ fn planar_wide(from: &[f32], to: &mut [u16]) {
 }
 
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation)]
 fn narrow(from: &[f32], to: &mut [u16]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to = (rounded(*from) >> 16) as u16;

@@ -187,14 +187,9 @@ impl KernelBackward for Flex {
         tensor(out, sizes)
     }
 
-    fn project_grad(
-        inverse_depth: Float,
-        homography: Float,
-        shift: Float,
-        grad: Float,
-    ) -> [Float; 3] {
-        let sizes: [usize; 4] = dims(&inverse_depth);
-        let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
+    fn project_grad(disparity: Float, homography: Float, shift: Float, grad: Float) -> [Float; 3] {
+        let sizes: [usize; 4] = dims(&disparity);
+        let (depth, homography) = (Values::of(disparity), Values::of(homography));
         let (shift, grad) = (Values::of(shift), Values::of(grad));
         let mut grad_depth = zeros(&sizes);
         let gradients = kernels::project_backward(
