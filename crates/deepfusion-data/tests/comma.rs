@@ -80,7 +80,7 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
             .to_string()
             .contains("video.hevc: the segment's images are absent")
     );
-    assert!(error.hint().unwrap().contains("data inspect"));
+    assert!(error.hint().unwrap().contains("fetch video.hevc"));
 }
 
 /// Ten seconds at 8 m/s and 0.2 rad/s to the left: gyroscope and accelerometer in the device's axes (forward, right,

@@ -262,7 +262,10 @@ fn what_is_no_evaluation_is_an_error() {
     assert!(error.to_string().contains("none.json"), "{error}");
     std::fs::create_dir(at.join("run")).unwrap();
     let error = fails(at.join("run"));
-    assert!(error.hint().unwrap().contains("deepfusion eval"), "{error}");
+    assert!(
+        error.hint().unwrap().contains("measure it first"),
+        "{error}"
+    );
 }
 
 /// Only evaluations of this very checkpoint, on frames known to be unseen, say what its metres are worth.

@@ -323,7 +323,10 @@ fn folders_that_cannot_be_shown_say_why() {
     let empty = of(folder.path());
     assert!(matches!(empty, Error::NothingToShow { .. }));
     assert!(
-        empty.hint().unwrap().contains("deepfusion predict"),
+        empty
+            .hint()
+            .unwrap()
+            .contains("make something to look at first"),
         "{empty}"
     );
     let file = folder.path().join("a.txt");
