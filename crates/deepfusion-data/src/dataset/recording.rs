@@ -9,7 +9,7 @@ use crate::{CalibrationSource, Error, Result};
 use deepfusion_geometry::{DepthMap, Se3};
 use image::RgbImage;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Where a data set's images and labels come from; one implementation a layout.
 ///
