@@ -62,7 +62,7 @@ impl Int8Calibration {
             reason: e.to_string(),
         })?;
         let text = format!(
-            "# The range of what each convolution reads, for `--precision int8`. Written by `weights calibrate`.\n{table}"
+            "# The range of what each convolution reads, for inference in int8. Written by `weights calibrate`.\n{table}"
         );
         deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))?;
         Ok(path)
