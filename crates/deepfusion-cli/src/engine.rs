@@ -14,7 +14,14 @@ use crate::failure::Result;
 /// Loads a network with the engine asked for.
 pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
     let network = model.load(args.set.as_deref())?;
-    let (args, int8) = (args.clone(), network.int8.clone());
+    let int8 = match args.precision {
+        Precision::Int8 => network
+            .int8
+            .clone()
+            .map_err(deepfusion_runtime::Error::from)?,
+        _ => None,
+    };
+    let args = args.clone();
     DepthEstimator::of(network, move |config, weights| {
         runner(&args, config, weights, int8.as_ref())
     })

@@ -32,6 +32,8 @@ fn a_network_is_calibrated_and_measured_in_int8() {
     let exact = json(at, &format!("{eval} f32"));
     if !Engine::has_int8() {
         fails(at, &format!("{eval} int8"), &["engine", "AVX512-VNNI"]);
+        let calibrate = format!("{CALIBRATE} --model run sim");
+        fails(at, &calibrate, &["engine", "AVX512-VNNI"]);
         return;
     }
     fails(
@@ -87,6 +89,18 @@ fn a_network_is_calibrated_and_measured_in_int8() {
     fails(at, &format!("{eval} int8"), &["not calibrated"]);
     fs::write(at.join("run/int8.toml"), "step = 1").unwrap();
     fails(at, &format!("{eval} int8"), &["int8.toml"]);
+    // Of no account to others, and written anew.
+    ok(at, &format!("{eval} f32"));
+    fails(
+        at,
+        &format!("{CALIBRATE} --model run sim --most-deviation 0"),
+        &["int8", "what was calibrated before stays"],
+    );
+    ok(at, &format!("{CALIBRATE} --model run sim"));
+    ok(at, &format!("{eval} int8"));
+    // What was predicted with another calibration is another prediction.
+    ok(at, &format!("{CALIBRATE} {model} sim --most-deviation 1"));
+    fails(at, &predict, &["depth"]);
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub(crate) struct Geometry {
     pub(crate) dilation: usize,
     pub(crate) border: Border,
     pub(crate) activation: Activation,
-    /// The least and the greatest value of the input seen in calibration, where it is to be computed in int8.
+    /// The range of the input that int8 divides into steps, where it is to be computed in int8.
     pub(crate) input_range: Option<[f32; 2]>,
 }
 

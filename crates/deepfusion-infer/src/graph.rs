@@ -1,5 +1,6 @@
 //! A network as a list of operations with their weights, for the engine and for export.
 
+use crate::layout::channels_in_memory;
 use crate::ranges::InputRanges;
 use crate::shape::shape_after;
 use crate::tile::LANES;
@@ -77,10 +78,11 @@ impl Graph {
     /// [`Error::Ranges`] for a name of no convolution that int8 computes, which is another network's, and a range that is none.
     pub fn set_input_ranges(&mut self, ranges: &InputRanges) -> Result<(), Error> {
         let mut found = vec![None; self.nodes.len()];
+        let computed = self.int8_nodes();
         for (name, [low, high]) in ranges {
             let mut nodes = self.nodes.iter();
             let node = nodes.position(|node| node.name == *name);
-            let node = node.filter(|node| self.is_computed_in_int8(*node));
+            let node = node.filter(|node| computed[*node]);
             let node = node.ok_or_else(|| Error::Ranges {
                 reason: format!("`{name}` is no convolution of this network that int8 computes"),
             })?;
@@ -95,21 +97,27 @@ impl Graph {
         Ok(())
     }
 
-    /// Those of the convolutions that int8 computes, by name.
+    /// The convolutions that int8 computes, by name.
     pub fn computed_in_int8(&self) -> impl Iterator<Item = &str> {
-        let each = self.nodes.iter().enumerate();
-        each.filter(|(i, _)| self.is_computed_in_int8(*i))
-            .map(|(_, node)| node.name.as_str())
+        let computed = self.int8_nodes();
+        let each = self.nodes.iter().zip(computed);
+        each.filter(|(_, computed)| *computed)
+            .map(|(node, _)| node.name.as_str())
     }
 
-    /// Whether a node is a convolution for int8: the first, which sees the image, and the heads, whose output is the result, are not.
-    fn is_computed_in_int8(&self, index: usize) -> bool {
-        let Op::Conv(conv) = &self.nodes[index].op else {
-            return false;
+    /// Whether each node is a convolution for int8: the first, which sees the image, and the heads, whose output is the result, are not, nor
+    /// are those whose input's channels are not whole vectors as they lie in memory.
+    fn int8_nodes(&self) -> Vec<bool> {
+        let channels = channels_in_memory(self);
+        let computed = |node: &Node| {
+            let Op::Conv(conv) = &node.op else {
+                return false;
+            };
+            let whole = channels[conv.input.0].is_multiple_of(LANES);
+            let head = conv.channels_out == 1;
+            conv.input != ValueId::IMAGE && !self.shape(conv.input).pooled && whole && !head
         };
-        let seen = self.shape(conv.input);
-        let head = conv.channels_out == 1;
-        conv.input != ValueId::IMAGE && !seen.pooled && seen.channels >= LANES && !head
+        self.nodes.iter().map(computed).collect()
     }
 
     /// What a node reads, where int8 computes it.

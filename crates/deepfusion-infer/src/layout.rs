@@ -182,6 +182,11 @@ impl Layout {
     }
 }
 
+/// How many channels each value has as it lies in memory, where values are in bf16.
+pub(crate) fn channels_in_memory(graph: &Graph) -> Vec<usize> {
+    channels(graph, 2).iter().map(Vec::len).collect()
+}
+
 /// For each value and each of its physical channels the logical one; none for those that fill up. A result takes
 /// `slots` elements.
 fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::element::Element;
 use crate::view::{Shared, View};
 
-/// For each convolution, by its name, the least and the greatest value that it is to read; what lies beyond is held at the end.
+/// For each convolution, by its name, the ends of the range of its input that is divided into steps; what lies beyond is held at them.
 pub type InputRanges = BTreeMap<String, [f32; 2]>;
 
 /// How often convolutions read which values, over the images that [`Engine::observe`](crate::Engine::observe) saw.

@@ -100,6 +100,15 @@ pub enum Error {
         /// What was given.
         path: PathBuf,
     },
+    /// A network of which no convolution bears int8.
+    #[error(
+        "int8: even one convolution alone changes depth by more than {} % on average",
+        100.0 * most_deviation
+    )]
+    NothingInInt8 {
+        /// How far depth may differ from that in f32: mean |ln|.
+        most_deviation: f64,
+    },
     /// A network inside the program, whose card nobody can write to.
     #[error("{name}: is embedded in the program, and calibrated there")]
     EmbeddedNetwork {
@@ -291,6 +300,9 @@ impl Hint for Error {
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
+            Self::NothingInInt8 { .. } => {
+                Some("allow more, or use bf16; what was calibrated before stays".into())
+            }
             Self::EmbeddedNetwork { .. } => {
                 Some("give a run's folder, or the network's file and card".into())
             }

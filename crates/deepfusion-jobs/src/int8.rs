@@ -16,37 +16,54 @@ const COMPARED_ON: usize = 4;
 
 /// How to calibrate.
 #[derive(Debug, Clone, Copy)]
-pub struct Int8Options {
+pub struct Int8Options<'a> {
     /// Look at this many of the images, evenly spread.
     pub images: usize,
     /// Depth may differ from that in f32 by so much on average (|ln|): convolutions that harm it most stay in bf16 until it does not.
     pub most_deviation: f64,
+    /// One of the data sets that the network learned from, where it learned several.
+    pub set: Option<&'a str>,
+}
+
+/// That a network can be calibrated here.
+///
+/// # Errors
+/// [`Error::EmbeddedNetwork`], a processor without int8.
+pub fn check(source: &ModelSource) -> Result<()> {
+    match source {
+        ModelSource::Packed { given, .. } if !Shipped::is_at(given) => {
+            Err(Error::EmbeddedNetwork {
+                name: given.display().to_string(),
+            })
+        }
+        _ => Ok(FusedRunner::check_int8()?),
+    }
 }
 
 /// Finds the ranges of a network, and keeps them beside it: in the run's folder, or in the packed file's card. `shown` hears how far it is,
 /// of how far. Returns what was found and the file that holds it.
 ///
 /// # Errors
-/// [`Error::NoImages`] for none, [`Error::EmbeddedNetwork`] for a network inside the program, a processor without int8, images that
-/// cannot be read, a file that cannot be written.
+/// As [`check`]; [`Error::NoImages`] for none, [`Error::NothingInInt8`] where no convolution bears int8, images that cannot be read, a
+/// file that cannot be written.
 pub fn calibrate(
     source: &ModelSource,
     images: &[Input],
-    options: Int8Options,
+    options: Int8Options<'_>,
     shown: impl FnMut(usize, usize),
 ) -> Result<(Int8Calibration, PathBuf)> {
+    check(source)?;
     let packed = match source {
-        ModelSource::Packed { given, .. } if !Shipped::is_at(given) => {
-            return Err(Error::EmbeddedNetwork {
-                name: given.display().to_string(),
-            });
-        }
         ModelSource::Packed { given, network } => Some((given, network)),
         ModelSource::Run { .. } => None,
     };
-    let network = source.load(None)?;
-    let inputs = prepared(&network, images, options.images)?;
-    let calibration = found(&network, &inputs, options.most_deviation, shown)?;
+    let network = source.load(options.set)?;
+    let calibration = found(&network, images, options, shown)?;
+    if calibration.ranges.is_empty() {
+        return Err(Error::NothingInInt8 {
+            most_deviation: options.most_deviation,
+        });
+    }
     let path = match (packed, source.folder()) {
         (Some((given, network)), _) => {
             let mut network = network.clone();
@@ -74,35 +91,27 @@ pub fn on_a_street(config: &TrainConfig, weights: &Weights) -> Result<Int8Calibr
         ..SimConfig::default()
     })?;
     let input = to_network_input(&street.frame(0).rgb, [0, 0, width, height], width, height);
-    observed(config, weights, 0, &[input], |_| ())
+    observed(config, weights, 0, std::iter::once(Ok(input)))
 }
 
-/// Up to `most` of the images as the network sees them, as far apart as they can be, at the size trained with.
-fn prepared(network: &StoredNetwork, images: &[Input], most: usize) -> Result<Vec<Vec<f32>>> {
+/// An image as the network sees it, at the size trained with.
+fn prepared(network: &StoredNetwork, input: &Input) -> Result<Vec<f32>> {
     let preparer = Preparer {
         size: network.config.size,
         training_camera: network.camera,
         canonical_focal_px: None,
     };
-    if images.is_empty() {
-        return Err(Error::NoImages {
-            input: "the arguments".into(),
-        });
-    }
-    let read = |input: &Input| -> Result<Vec<f32>> {
-        let (image, camera) = match &input.frame {
-            Some((dataset, frame)) => {
-                let camera = dataset.intrinsics(*frame);
-                (dataset.load_image(*frame)?, Some(camera))
-            }
-            None => {
-                let photo = load_photo(&input.path)?;
-                (photo.image, photo.intrinsics)
-            }
-        };
-        Ok(preparer.prepare(&image, camera.as_ref(), false, true).input)
+    let (image, camera) = match &input.frame {
+        Some((dataset, frame)) => {
+            let camera = dataset.intrinsics(*frame);
+            (dataset.load_image(*frame)?, Some(camera))
+        }
+        None => {
+            let photo = load_photo(&input.path)?;
+            (photo.image, photo.intrinsics)
+        }
     };
-    spread(images, most).map(read).collect()
+    Ok(preparer.prepare(&image, camera.as_ref(), false, true).input)
 }
 
 /// Up to `most` of them, evenly spread.
@@ -111,19 +120,17 @@ fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
     (0..count).map(move |i| &all[i * all.len() / count])
 }
 
-/// The ranges of all convolutions that int8 computes.
+/// The ranges of all convolutions that int8 computes, on images as the network sees them.
 fn observed(
     config: &TrainConfig,
     weights: &Weights,
     step: usize,
-    inputs: &[Vec<f32>],
-    mut shown: impl FnMut(usize),
+    inputs: impl Iterator<Item = Result<Vec<f32>>>,
 ) -> Result<Int8Calibration> {
     let mut runner = FusedRunner::new(config, weights.clone(), Precision::F32)?;
     let mut seen = SeenInputs::default();
-    for (i, input) in inputs.iter().enumerate() {
-        runner.observe(input, &mut seen)?;
-        shown(i + 1);
+    for input in inputs {
+        runner.observe(&input?, &mut seen)?;
     }
     let computed = FusedRunner::computed_in_int8(config, weights.clone())?;
     let mut ranges = seen.ranges();
@@ -139,18 +146,29 @@ fn observed(
 /// Ranges, without those of the convolutions that harm depth most in int8, as many as it takes.
 fn found(
     network: &StoredNetwork,
-    inputs: &[Vec<f32>],
-    most_deviation: f64,
+    images: &[Input],
+    options: Int8Options<'_>,
     mut shown: impl FnMut(usize, usize),
 ) -> Result<Int8Calibration> {
+    if images.is_empty() {
+        return Err(Error::NoImages {
+            input: "the arguments".into(),
+        });
+    }
     let (config, weights) = (&network.config, &network.weights);
+    let chosen: Vec<&Input> = spread(images, options.images).collect();
     // Looking at the images, then at each convolution alone.
     let convolutions = FusedRunner::computed_in_int8(config, weights.clone())?.len();
-    let all = inputs.len() + convolutions;
-    let mut calibration = observed(config, weights, network.step, inputs, |done| {
-        shown(done, all);
-    })?;
-    let inputs: Vec<&Vec<f32>> = spread(inputs, COMPARED_ON).collect();
+    let all = chosen.len() + convolutions;
+    let inputs = chosen.iter().enumerate().map(|(i, input)| {
+        shown(i, all);
+        prepared(network, input)
+    });
+    let mut calibration = observed(config, weights, network.step, inputs)?;
+    let compared = spread(&chosen, COMPARED_ON);
+    let inputs: Vec<Vec<f32>> = compared
+        .map(|input| prepared(network, input))
+        .collect::<Result<_>>()?;
     let mut exact = FusedRunner::new(config, weights.clone(), Precision::F32)?;
     let exact = disparities(&mut exact, &inputs)?;
     let deviation = |calibration: &Int8Calibration| -> Result<f64> {
@@ -172,7 +190,7 @@ fn found(
     tracing::debug!(?harm, "each convolution alone in int8");
     loop {
         calibration.deviation = deviation(&calibration)?;
-        if calibration.deviation <= most_deviation {
+        if calibration.deviation <= options.most_deviation {
             break;
         }
         let Some((worst, _)) = harm.pop() else { break };
@@ -181,7 +199,7 @@ fn found(
     Ok(calibration)
 }
 
-fn disparities(runner: &mut FusedRunner, inputs: &[&Vec<f32>]) -> Result<Vec<f32>> {
+fn disparities(runner: &mut FusedRunner, inputs: &[Vec<f32>]) -> Result<Vec<f32>> {
     let mut all = Vec::new();
     for input in inputs {
         all.extend(runner.disparity(input)?);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::{MetricScale, sha256_of_file};
-use deepfusion_runtime::ModelSource;
+use deepfusion_runtime::{ModelSource, Precision};
 use sha2::{Digest, Sha256};
 
 use crate::{Error, Result, intervals};
@@ -28,11 +28,12 @@ pub trait ModelFacts {
     /// Where it cannot be read.
     fn sha256(&self) -> Result<String>;
 
-    /// SHA-256 of configuration, weights and the factors of the intervals: all that what it predicts depends on.
+    /// SHA-256 of configuration, weights, the factors of the intervals and, in int8, the calibration for it: all that what it predicts
+    /// depends on.
     ///
     /// # Errors
     /// Where they cannot be read.
-    fn content_sha256(&self) -> Result<String>;
+    fn content_sha256(&self, precision: Precision) -> Result<String>;
 
     /// The factors of the intervals of a network that says how sure it is: those found for it, else it is taken at its word.
     ///
@@ -64,7 +65,7 @@ impl ModelFacts for ModelSource {
         })
     }
 
-    fn content_sha256(&self) -> Result<String> {
+    fn content_sha256(&self, precision: Precision) -> Result<String> {
         let mut hash = Sha256::new();
         match self {
             Self::Run { folder, kind, .. } => {
@@ -83,6 +84,11 @@ impl ModelFacts for ModelSource {
         let factors = self.interval_factors()?;
         if factors.is_calibrated() {
             hash.update(toml::to_string(&factors)?);
+        }
+        if precision == Precision::Int8
+            && let Some(calibration) = self.int8()
+        {
+            hash.update(toml::to_string(&calibration)?);
         }
         Ok(format!("{:x}", hash.finalize()))
     }

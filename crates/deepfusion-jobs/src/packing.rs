@@ -63,7 +63,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
         camera: findings.camera,
         weights,
         step: state.step,
-        int8: Int8Calibration::of_run(folder.path(), state.step)?,
+        int8: Int8Calibration::of_run(folder.path(), state.step),
     };
     // All of it, and nothing else.
     depth_graph_with_uncertainty(&network.config.depth_net, network.weights.clone())
@@ -105,6 +105,8 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
             .map_err(no_form("the factors of its intervals have no TOML form"))?,
         int8: network
             .int8
+            .clone()
+            .map_err(deepfusion_runtime::Error::from)?
             .as_ref()
             .map(toml::Table::try_from)
             .transpose()

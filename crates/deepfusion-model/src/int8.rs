@@ -24,30 +24,46 @@ pub struct Int8Calibration {
     pub ranges: InputRanges,
 }
 
+/// A calibration that cannot be read: of no account until int8 is asked for.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{origin}: {reason}")]
+pub struct UnreadableCalibration {
+    /// The file, or the network's name.
+    pub origin: String,
+    /// Why not.
+    pub reason: String,
+}
+
 impl Int8Calibration {
-    /// That of a card's table.
+    /// That of a card's table; `name` is what an error calls it.
     ///
     /// # Errors
     /// A table that holds none.
-    pub fn from_table(table: toml::Table) -> Result<Self, toml::de::Error> {
-        table.try_into()
+    pub fn from_table(name: &str, table: toml::Table) -> Result<Self, UnreadableCalibration> {
+        table
+            .try_into()
+            .map_err(|e: toml::de::Error| UnreadableCalibration {
+                origin: name.to_owned(),
+                reason: e.to_string(),
+            })
     }
 
     /// That of a run at this step; `None` where it was not calibrated, or at another step.
     ///
     /// # Errors
-    /// [`Error::ConfigFile`] for a file that holds none, [`Error::Io`].
-    pub fn of_run(folder: &Path, step: usize) -> Result<Option<Self>, Error> {
+    /// A file that holds none, or cannot be read.
+    pub fn of_run(folder: &Path, step: usize) -> Result<Option<Self>, UnreadableCalibration> {
         let path = folder.join(FILE);
+        let unreadable = |reason: String| UnreadableCalibration {
+            origin: path.display().to_string(),
+            reason,
+        };
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(Error::io(&path, "read", e)),
+            Err(e) => return Err(unreadable(e.to_string())),
         };
-        let found: Self = toml::from_str(&text).map_err(|e| Error::ConfigFile {
-            path,
-            reason: e.to_string(),
-        })?;
+        let found: Self = toml::from_str(&text).map_err(|e| unreadable(e.to_string()))?;
         Ok(Some(found).filter(|found| found.step == step))
     }
 
@@ -88,7 +104,8 @@ mod tests {
         let read = |step| Int8Calibration::of_run(run.path(), step).unwrap();
         assert_eq!(read(7), Some(calibration.clone()));
         assert_eq!(read(8), None);
-        let again = Int8Calibration::from_table(toml::Table::try_from(&calibration).unwrap());
+        let again =
+            Int8Calibration::from_table("card", toml::Table::try_from(&calibration).unwrap());
         assert_eq!(again.unwrap(), calibration);
         std::fs::write(&path, "step = 'seven'").unwrap();
         let error = Int8Calibration::of_run(run.path(), 7).unwrap_err();

@@ -17,7 +17,7 @@ pub mod weights;
 
 pub use error::Error;
 pub use graph::{depth_graph, depth_graph_with_uncertainty};
-pub use int8::Int8Calibration;
+pub use int8::{Int8Calibration, UnreadableCalibration};
 pub use network::*;
 pub use run_folder::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
 pub use stored::StoredNetwork;

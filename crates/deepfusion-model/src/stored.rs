@@ -3,7 +3,9 @@ use std::path::Path;
 use deepfusion_geometry::Intrinsics;
 
 use crate::weights::{Weights, read_bytes};
-use crate::{CheckpointKind, Error, Int8Calibration, RunFolder, TrainConfig};
+use crate::{
+    CheckpointKind, Error, Int8Calibration, RunFolder, TrainConfig, UnreadableCalibration,
+};
 
 /// A trained depth network as it is stored, in a run's folder or packed without one: everything that is needed to build it.
 #[derive(Debug, Clone)]
@@ -17,7 +19,7 @@ pub struct StoredNetwork {
     /// Steps it was trained for.
     pub step: usize,
     /// What it was calibrated to for int8, where it was.
-    pub int8: Option<Int8Calibration>,
+    pub int8: Result<Option<Int8Calibration>, UnreadableCalibration>,
 }
 
 impl StoredNetwork {
@@ -34,7 +36,7 @@ impl StoredNetwork {
     /// That of a checkpoint; `set` as in [`Self::of_run`].
     ///
     /// # Errors
-    /// As [`RunFolder::load_depth_weights`], [`TrainConfig::for_set`] and [`Int8Calibration::of_run`].
+    /// As [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
     pub fn of_checkpoint(
         folder: &RunFolder,
         kind: CheckpointKind,
@@ -47,7 +49,7 @@ impl StoredNetwork {
             camera: folder.camera_of(&state, set)?,
             weights,
             step: state.step,
-            int8: Int8Calibration::of_run(folder.path(), state.step)?,
+            int8: Int8Calibration::of_run(folder.path(), state.step),
         })
     }
 
@@ -74,7 +76,7 @@ impl StoredNetwork {
             config: findings.complete(config).for_set(set)?,
             weights: read_bytes(origin, bytes)?,
             step,
-            int8: None,
+            int8: Ok(None),
         })
     }
 }

@@ -272,21 +272,18 @@ impl DepthNet {
     /// # Errors
     /// As [`weights::apply`].
     pub fn with_weights(self, weights: &Weights) -> Result<(Self, bool), Error> {
-        let has = |weights: &Weights| weights.tensors.keys().any(|n| n.starts_with(UNCERTAINTY));
-        if self.uncertainty.is_some() == has(weights) {
-            return Ok((weights::apply(self, weights)?, false));
+        weights::apply_but_for(self, weights, UNCERTAINTY)
+    }
+
+    /// What kind of network it is, for messages.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match (&self.lite_mono, &self.r_msfm, &self.disp_net) {
+            (Some(_), ..) => "Lite-Mono",
+            (_, Some(_), _) => "R-MSFM",
+            (.., Some(_)) => "DispNet",
+            _ => "a ResNet's",
         }
-        let mut weights = weights.clone();
-        match &self.uncertainty {
-            None => weights.tensors.retain(|n, _| !n.starts_with(UNCERTAINTY)),
-            Some(_) => {
-                let own = weights::collect(&self).tensors.into_iter();
-                let head = own.filter(|(name, _)| name.starts_with(UNCERTAINTY));
-                weights.tensors.extend(head);
-            }
-        }
-        let is_new = self.uncertainty.is_some();
-        Ok((weights::apply(self, &weights)?, is_new))
     }
 
     /// The features of a ResNet, for callers that share the encoder with another decoder.
@@ -323,19 +320,13 @@ impl DepthNet {
             net.encoder = weights::load_torchvision_half(net.encoder.clone(), path)?;
             return Ok(self);
         }
+        let kind = self.kind();
         let encoder = self
             .encoder
             .take()
             .ok_or_else(|| Error::UnknownArchitecture {
                 origin: path.display().to_string(),
-                reason: format!(
-                    "its weights are a ResNet's, and the network to start is {}",
-                    if self.disp_net.is_some() {
-                        "DispNet"
-                    } else {
-                        "Lite-Mono"
-                    }
-                ),
+                reason: format!("its weights are a ResNet's, and the network to start is {kind}"),
             })?;
         self.encoder = Some(weights::load_torchvision_resnet(encoder, path)?);
         Ok(self)

@@ -7,6 +7,7 @@ use crate::explainability::Explainability;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
 use crate::resnet::ResNet;
+use crate::weights::{Weights, apply_but_for};
 use crate::{Error, PoseNetConfig};
 use deepfusion_model::POSE_WIDTH;
 
@@ -135,6 +136,15 @@ impl PoseNet {
             axis_angle: raw.clone().narrow(1, 0, 3).mul_scalar(RADIANS_PER_UNIT),
             translation: raw.narrow(1, 3, 3).mul_scalar(self.metres_per_unit),
         }
+    }
+
+    /// The network with these weights, which must fit it, but for the explainability masks: if the weights lack them, the network keeps its
+    /// own; if the network lacks them, theirs are ignored. Returns whether the masks are new.
+    ///
+    /// # Errors
+    /// As [`weights::apply`](crate::weights::apply).
+    pub fn with_weights(self, weights: &Weights) -> Result<(Self, bool), Error> {
+        apply_but_for(self, weights, "explainability.")
     }
 
     /// Metres of translation per unit of the raw output.

@@ -144,7 +144,7 @@ fn disp_nets_costs_are_those_of_its_graph_and_its_weights() {
         let true_products = graph.nodes().iter().zip(&products).map(|(node, count)| {
             if node.name.ends_with(".enlarge") {
                 count / 4
-            } else if node.name.ends_with(".told") {
+            } else if node.name.ends_with(".disparity") {
                 // No layer: 10·σ + 0.01.
                 0
             } else {

@@ -24,6 +24,9 @@ pub enum Error {
     /// Int8 of a network whose convolutions' ranges nobody looked at.
     #[error("int8: the network was not calibrated, or not since it was last trained")]
     NotCalibrated,
+    /// A calibration for int8 that cannot be read.
+    #[error(transparent)]
+    Calibration(#[from] deepfusion_model::UnreadableCalibration),
     /// An image's values are not as many as the network takes.
     #[error("an image of {found} values, where the network takes {expected}")]
     ImageSize {
@@ -72,6 +75,7 @@ impl Hint for Error {
                 )
             }
             Self::NotCalibrated => Some("bf16 needs no calibration".into()),
+            Self::Calibration(_) => Some("calibrate the network again; bf16 needs no calibration".into()),
             Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
             Self::Weights(error) => error.hint(),
             Self::Model(error) => error.hint(),

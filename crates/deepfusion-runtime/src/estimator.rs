@@ -76,7 +76,10 @@ impl DepthEstimator {
     /// # Errors
     /// As [`FusedRunner::with_calibration`].
     pub fn fused(network: StoredNetwork, precision: Precision) -> Result<Self, Error> {
-        let int8 = network.int8.clone();
+        let int8 = match precision {
+            Precision::Int8 => network.int8.clone()?,
+            _ => None,
+        };
         Self::of(network, move |config, weights| {
             let runner = FusedRunner::with_calibration(config, weights, precision, int8.as_ref())?;
             Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)

@@ -46,6 +46,8 @@ impl FusedRunner {
     ) -> Result<Self, Error> {
         let mut graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
         if precision == Precision::Int8 {
+            // Calibration would help nobody whose processor cannot.
+            Self::check_int8()?;
             let set = graph.set_input_ranges(&int8.ok_or(Error::NotCalibrated)?.ranges);
             set.map_err(|e| Error::engine("fused-int8", &e))?;
         }
@@ -56,6 +58,18 @@ impl FusedRunner {
             range: config.depth_net.range,
             uncertainty: config.depth_net.uncertainty,
         })
+    }
+
+    /// That this processor computes in int8.
+    ///
+    /// # Errors
+    /// [`Error::Engine`] where it does not.
+    pub fn check_int8() -> Result<(), Error> {
+        if Engine::has_int8() {
+            return Ok(());
+        }
+        let refused = deepfusion_infer::Error::NoInt8;
+        Err(Error::engine("fused-int8", &refused))
     }
 
     /// The names of the network's convolutions that int8 computes.

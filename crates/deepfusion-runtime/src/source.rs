@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_geometry::Intrinsics;
 use deepfusion_model::{CheckpointKind, Int8Calibration, RunFolder, StoredNetwork, TrainConfig};
-use deepfusion_weights::{DEFAULT, Shipped};
+use deepfusion_weights::{Card, DEFAULT, Shipped};
 
 use crate::Error;
 
@@ -100,6 +100,21 @@ impl ModelSource {
         }
     }
 
+    /// What it was calibrated to for int8; `None` where it was not, or where that cannot be read.
+    #[must_use]
+    pub fn int8(&self) -> Option<Int8Calibration> {
+        match self {
+            Self::Run { folder, kind, .. } => {
+                let step = folder.read_state(*kind).ok()?.step;
+                Int8Calibration::of_run(folder.path(), step).ok()?
+            }
+            Self::Packed { network, .. } => {
+                let Card { name, int8, .. } = &network.card;
+                Int8Calibration::from_table(name, int8.clone()?).ok()
+            }
+        }
+    }
+
     /// The camera that recordings without one are taken to have: the one a run assumed or learned for such recordings. `None` where all that
     /// it learned from said theirs. `set` as in [`Self::load`].
     ///
@@ -186,15 +201,10 @@ pub fn unpacked(
     let Shipped { card, bytes } = network;
     let mut stored =
         StoredNetwork::packed(&card.name, card.config.clone(), bytes, card.steps, set)?;
-    let int8 = card
-        .int8
-        .clone()
-        .map(Int8Calibration::from_table)
+    let int8 = card.int8.clone();
+    stored.int8 = int8
+        .map(|table| Int8Calibration::from_table(&card.name, table))
         .transpose();
-    stored.int8 = int8.map_err(|e| deepfusion_model::Error::ConfigFile {
-        path: card.name.clone().into(),
-        reason: format!("int8: {e}"),
-    })?;
     Ok(stored)
 }
 

@@ -127,11 +127,13 @@ impl Checkpoints for RunFolder {
         let mut model = Model::new(config, device)?;
         if encoders_only {
             let (depth, pose) = (depth.under("encoder."), pose.under("encoder."));
+            let kind = model.depth_net.kind();
             let encoder = model.depth_net.encoder.take();
             let encoder = encoder.ok_or_else(|| deepfusion_nn::Error::UnknownArchitecture {
                 origin: path.display().to_string(),
-                reason: "it holds ResNets, and this configuration's depth network is Lite-Mono"
-                    .into(),
+                reason: format!(
+                    "it holds ResNets, and this configuration's depth network is {kind}"
+                ),
             })?;
             model.depth_net.encoder = Some(weights::apply(encoder, &depth)?);
             model.pose_net.encoder = weights::apply(model.pose_net.encoder, &pose)?;
@@ -139,9 +141,11 @@ impl Checkpoints for RunFolder {
         }
         let (depth_net, new_head) = model.depth_net.with_weights(&depth)?;
         model.depth_net = depth_net;
-        model.pose_net = weights::apply(model.pose_net, &pose)?;
+        let (pose_net, new_masks) = model.pose_net.with_weights(&pose)?;
+        model.pose_net = pose_net;
         let new_decoder = take_flow_decoder(&mut model, &named("flow.")?)?;
         let new = [
+            new_masks.then_some("the explainability masks"),
             new_decoder.then_some("the flow decoder"),
             new_head.then_some("the head for uncertainty"),
         ];

@@ -55,6 +55,9 @@ pub(crate) struct CalibrateWeightsArgs {
     /// Depth may differ from f32's by this share on average; convolutions that harm it most stay in bf16.
     #[arg(long, value_name = "SHARE", default_value_t = 0.005, value_parser = share)]
     pub most_deviation: f64,
+    /// The data set whose metric scale to use, for a run trained on several.
+    #[arg(long = "data-set", alias = "set", value_name = "NAME")]
+    pub set: Option<String>,
     /// Print the ranges as JSON on stdout.
     #[arg(long)]
     pub json: bool,

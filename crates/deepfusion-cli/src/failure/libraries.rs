@@ -332,7 +332,7 @@ impl Reportable for deepfusion_runtime::Error {
                  every network on every device"
                     .into(),
             ),
-            Self::NotCalibrated => Some(
+            Self::NotCalibrated | Self::Calibration(_) => Some(
                 "look at some of your images first: deepfusion weights calibrate --model RUN DRIVE; `--precision bf16` needs no calibration"
                     .into(),
             ),

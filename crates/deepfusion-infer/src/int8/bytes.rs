@@ -63,7 +63,7 @@ impl ByteImage {
         } else {
             1
         };
-        let (width, height) = (input.width / every, input.height / every);
+        let (width, height) = (input.width.div_ceil(every), input.height.div_ceil(every));
         let row = (width + 2 * reach) * input.channels;
         let view = View {
             offset: reach * (row + input.channels),

@@ -1,5 +1,5 @@
-//! Convolutions in int8 with AVX-512's dot products of four bytes (VNNI): inputs as steps of 8 bits between the least and the
-//! greatest value seen in calibration, weights as steps of ±127 of each output channel, sums exact in 32 bits.
+//! Convolutions in int8 with AVX-512's dot products of four bytes (VNNI): inputs as steps of 8 bits of the range
+//! found in calibration, weights as steps of ±127 of each output channel, sums exact in 32 bits.
 //!
 //! Between the operations values stay in bf16, so that all others are as they are there. A convolution first writes its
 //! input as bytes: x ≈ s·(q − z), s = (high − low) / 255, z = −low / s rounded. Then with weights w ≈ s_o·p of each output

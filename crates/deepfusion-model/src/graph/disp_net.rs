@@ -4,7 +4,8 @@ use deepfusion_infer::{Activation, Border, Op, ValueId};
 
 use super::{Builder, Layer, Offset};
 use crate::{
-    DISP_NET_KERNELS, DISP_NET_LEVELS, DISP_NET_TOLD, DepthNetConfig, DispNetConfig, NetworkError,
+    DISP_NET_DISPARITY, DISP_NET_KERNELS, DISP_NET_LEVELS, DepthNetConfig, DispNetConfig,
+    NetworkError,
 };
 
 /// Side of the transposed kernels.
@@ -39,7 +40,7 @@ impl Builder {
             let mut inputs = vec![self.transposed(&format!("{path}.enlarge"), x, width)?];
             inputs.extend(skips.pop());
             if let Some(sigmoid) = disparity {
-                inputs.push(self.told(&path, sigmoid)?);
+                inputs.push(self.coarse_disparity(&path, sigmoid)?);
             }
             let joined = self.push(format!("{path}.joined"), Op::Concat { inputs })?;
             let channels = [self.graph.shape(joined).channels, width];
@@ -66,14 +67,14 @@ impl Builder {
     }
 
     /// A scale's disparity for the next one.
-    fn told(&mut self, path: &str, sigmoid: ValueId) -> Result<ValueId, NetworkError> {
-        let [factor, summand] = DISP_NET_TOLD.map(|number| number as f32);
+    fn coarse_disparity(&mut self, path: &str, sigmoid: ValueId) -> Result<ValueId, NetworkError> {
+        let [factor, summand] = DISP_NET_DISPARITY.map(|number| number as f32);
         let scaled = Layer {
             kernel: 1,
-            ..layer(format!("{path}.told"), sigmoid, [1, 1])
+            ..layer(format!("{path}.disparity"), sigmoid, [1, 1])
         };
         let input = self.conv_with(&scaled, vec![factor], vec![summand])?;
-        self.push(format!("{path}.told.enlarge"), Op::Enlarge { input })
+        self.push(format!("{path}.disparity.enlarge"), Op::Enlarge { input })
     }
 
     /// A transposed convolution of 3×3 and stride 2 with ReLU. Along each axis out(2i) = w₁·x(i) and out(2i + 1) = w₂·x(i) + w₀·x(i + 1),

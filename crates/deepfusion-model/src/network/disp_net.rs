@@ -12,8 +12,8 @@ pub const DISP_NET_LEVELS: usize = 7;
 /// Sides of the kernels of each halving, in pixels.
 pub const DISP_NET_KERNELS: [usize; DISP_NET_LEVELS] = [7, 5, 3, 3, 3, 3, 3];
 
-/// What a scale tells the next one: 10·σ + 0.01, factor and summand. The published networks' disparity, whatever the range of depths.
-pub const DISP_NET_TOLD: [f64; 2] = [10.0, 0.01];
+/// Factor and summand of the disparity that the next scale reads: 10·σ + 0.01. The published networks' disparity, whatever the range of depths.
+pub const DISP_NET_DISPARITY: [f64; 2] = [10.0, 0.01];
 
 /// Disparities that the network gives.
 const SCALES: usize = 4;
@@ -92,7 +92,7 @@ impl DispNetConfig {
 
     /// Whether an enlargement's layer reads the disparity of the scale before.
     #[must_use]
-    pub fn is_told(stage: usize) -> bool {
+    pub fn reads_disparity(stage: usize) -> bool {
         Self::scale_of(stage).is_some_and(|scale| scale + 1 < SCALES)
     }
 
@@ -115,7 +115,13 @@ mod tests {
         let stages = 0..DISP_NET_LEVELS;
         let read: Vec<_> = stages
             .clone()
-            .map(|s| (config.before(s), config.skip(s), DispNetConfig::is_told(s)))
+            .map(|s| {
+                (
+                    config.before(s),
+                    config.skip(s),
+                    DispNetConfig::reads_disparity(s),
+                )
+            })
             .collect();
         assert_eq!(read[0], (512, 512, false));
         assert_eq!(read[3], (256, 128, false));

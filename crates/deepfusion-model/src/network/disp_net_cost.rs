@@ -30,9 +30,9 @@ impl DispNetConfig {
                 After::Bias,
             );
             cost.give(3 * width, Self::pixels(size, halvings + 1));
-            let told = usize::from(Self::is_told(stage));
-            cost.give(told, pixels);
-            let joined = width + self.skip(stage) + told;
+            let coarse = usize::from(Self::reads_disparity(stage));
+            cost.give(coarse, pixels);
+            let joined = width + self.skip(stage) + coarse;
             cost.conv([joined, width], 3, pixels, After::Bias);
             costs.push(cost);
             if Self::scale_of(stage).is_some() {

@@ -16,7 +16,7 @@ use crate::layers::{Conv2d, Conv2dConfig};
 use crate::resample::doubled;
 use crate::resnet::normalised;
 use crate::{DispNetConfig, Error, InputNormalisation};
-use deepfusion_model::{DISP_NET_KERNELS, DISP_NET_TOLD};
+use deepfusion_model::{DISP_NET_DISPARITY, DISP_NET_KERNELS};
 
 /// Two convolutions with ReLU.
 #[derive(Module, Debug)]
@@ -96,8 +96,8 @@ impl DispNet {
         let stages = config.decoder_widths().into_iter().enumerate();
         let decoder = stages.map(|(stage, width)| {
             let enlarge = TransposedConv2d::new([config.before(stage), width], rng, device);
-            let told = usize::from(DispNetConfig::is_told(stage));
-            let joined = width + config.skip(stage) + told;
+            let coarse = usize::from(DispNetConfig::reads_disparity(stage));
+            let joined = width + config.skip(stage) + coarse;
             let join = conv([joined, width], (3, 1), rng, device);
             Doubling { enlarge, join }
         });
@@ -144,7 +144,7 @@ impl DispNet {
     pub fn forward_with_feature(&self, images: Tensor<4>) -> (Vec<Tensor<4>>, Tensor<4>) {
         let [_, _, height, width] = images.dims();
         let mut skips = self.features(images);
-        let [factor, summand] = DISP_NET_TOLD;
+        let [factor, summand] = DISP_NET_DISPARITY;
         let mut disparities: Vec<Tensor<4>> = Vec::new();
         let mut x = skips.pop().unwrap_or_else(|| unreachable!("seven levels"));
         for (stage, doubling) in self.decoder.iter().enumerate() {
@@ -156,8 +156,8 @@ impl DispNet {
             let mut joined = vec![relu(doubling.enlarge.forward(x, size))];
             joined.extend(skip);
             if let Some(disparity) = disparities.last() {
-                let told = disparity.clone().mul_scalar(factor).add_scalar(summand);
-                joined.push(doubled(told));
+                let coarse = disparity.clone().mul_scalar(factor).add_scalar(summand);
+                joined.push(doubled(coarse));
             }
             x = relu(doubling.join.forward(Tensor::cat(joined, 1)));
             if let Some(scale) = DispNetConfig::scale_of(stage) {

@@ -9,7 +9,7 @@ use deepfusion_geometry::DepthRange;
 use super::monodepth2::rename;
 use super::{Imported, Weights, apply, read};
 use crate::{DepthNet, DepthNetConfig, Error};
-use deepfusion_model::{DISP_NET_LEVELS, DISP_NET_TOLD};
+use deepfusion_model::{DISP_NET_DISPARITY, DISP_NET_LEVELS};
 
 /// Whether tensors have the names of DispNet's file.
 #[must_use]
@@ -32,7 +32,7 @@ pub fn load_disp_net(file: &Path, device: &Device) -> Result<Imported, Error> {
             origin: weights.origin,
         });
     }
-    let [factor, summand] = DISP_NET_TOLD;
+    let [factor, summand] = DISP_NET_DISPARITY;
     let depth_config = DepthNetConfig {
         range: DepthRange {
             min_m: 1.0 / (factor + summand),

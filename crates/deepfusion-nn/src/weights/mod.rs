@@ -20,7 +20,7 @@ pub use disp_net::{is_disp_net, load_disp_net};
 pub use file::read;
 pub use imported::{Imported, load_networks, load_whole};
 pub use lite_mono::load_lite_mono;
-pub use module::{apply, collect};
+pub use module::{apply, apply_but_for, collect};
 pub use monodepth2::{Monodepth2Files, Pose, load_monodepth2};
 pub use r_msfm::load_r_msfm;
 pub use torchvision::{detect_resnet, load_torchvision_half, load_torchvision_resnet};

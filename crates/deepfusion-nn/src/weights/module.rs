@@ -52,6 +52,31 @@ pub fn apply<M: Module>(module: M, weights: &Weights) -> Result<M, Error> {
     }))
 }
 
+/// As [`apply`], but for tensors whose names begin with `part`: where the weights lack them the module keeps its own, and where the
+/// module lacks them theirs are passed over. Returns whether the module kept its own, which are new.
+///
+/// # Errors
+/// As [`apply`].
+pub fn apply_but_for<M: Module>(
+    module: M,
+    weights: &Weights,
+    part: &str,
+) -> Result<(M, bool), Error> {
+    let has = |weights: &Weights| weights.tensors.keys().any(|n| n.starts_with(part));
+    let own = collect(&module);
+    let is_new = match (has(&own), has(weights)) {
+        (true, true) | (false, false) => return Ok((apply(module, weights)?, false)),
+        (own_alone, _) => own_alone,
+    };
+    let mut weights = weights.clone();
+    weights.tensors.retain(|name, _| !name.starts_with(part));
+    if is_new {
+        let part = own.tensors.into_iter().filter(|(n, _)| n.starts_with(part));
+        weights.tensors.extend(part);
+    }
+    Ok((apply(module, &weights)?, is_new))
+}
+
 /// Names and shapes of the module's tensors, in the module's order.
 fn shapes<M: Module>(module: &M) -> Vec<(String, Vec<usize>)> {
     struct Shapes {

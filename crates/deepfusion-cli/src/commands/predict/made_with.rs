@@ -19,7 +19,7 @@ pub(super) fn made_with(
 ) -> Result<MadeWith> {
     Ok(MadeWith {
         version: env!("CARGO_PKG_VERSION").into(),
-        weights: model.content_sha256()?,
+        weights: model.content_sha256(args.engine.precision)?,
         engine: format!("{} on {}", estimator.engine(), args.engine.device),
         save: outputs.save.iter().map(|s| word(*s)).collect(),
         max_depth_m: outputs.max_depth_m,

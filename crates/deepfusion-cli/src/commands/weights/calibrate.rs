@@ -13,8 +13,11 @@ use crate::progress::Progress;
 /// `deepfusion weights calibrate`.
 pub(crate) fn run(args: &CalibrateWeightsArgs) -> Result<()> {
     let model = ModelSource::named(&args.model)?;
+    // Before the images are looked for.
+    int8::check(&model)?;
+    let set = args.set.as_deref();
     let options = OpenOptions {
-        assumed_camera: model.assumed_camera(None)?,
+        assumed_camera: model.assumed_camera(set)?,
         ..OpenOptions::default()
     };
     let images = find_inputs(&args.inputs, &options, warnings::print)?;
@@ -22,6 +25,7 @@ pub(crate) fn run(args: &CalibrateWeightsArgs) -> Result<()> {
     let options = Int8Options {
         images: usize::from(args.images),
         most_deviation: args.most_deviation,
+        set,
     };
     let found = int8::calibrate(&model, &images, options, |done, total| {
         shown.set(done, total);
