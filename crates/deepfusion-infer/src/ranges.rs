@@ -153,12 +153,12 @@ mod tests {
         );
     }
 
-    /// One of a million values is a hundred times as great as the others.
+    /// Of a million values below 1 and a single one of 100, an end c costs (100 − c)² + 10⁶·(c/255)²/12: least at c = 43.9.
     #[test]
     fn what_is_rare_and_great_is_cut_off() {
         let many = (0..1_000_000).map(|i| (i % 1000) as f32 * 0.001);
         let [low, high] = range_of(many.chain([100.0]));
-        assert!(low == 0.0 && (1.0..20.0).contains(&high), "{low} {high}");
+        assert!(low == 0.0 && (42.0..46.0).contains(&high), "{low} {high}");
     }
 
     #[test]

@@ -47,7 +47,9 @@ fn by_integers(graph: &Graph, input: &[f32], [low, high]: [f32; 2]) -> Vec<f32> 
     let (low, high) = (low.min(0.0), high.max(0.0));
     let step = (high - low) / 255.0;
     let zero = (-low / step).round();
-    let byte = |x: f32| ((x / step + zero).round_ties_even()).clamp(0.0, 255.0) as i64;
+    // In the engine's order: next to halfway, another would round the other way.
+    let byte = |x: f32| x.mul_add(step.recip(), zero).round_ties_even();
+    let byte = |x: f32| byte(x).clamp(0.0, 255.0) as i64;
     let (width, height) = (SIZE.0 / 2, SIZE.1 / 2);
     let (w, h) = (width as isize, height as isize);
     let inputs = conv.channels_in * conv.kernel * conv.kernel;
