@@ -23,7 +23,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
         at,
         "simulate --out sim --frames 6 --seed 3 --scan-every 2 --size 320x96",
     );
-    // From the embedded network: its depth is good enough to be spoilt.
+    // From the embedded network: its depth is good enough that int8 can harm it.
     ok(
         at,
         "train --data sim --preset tiny --size 320x96 --batch 2 --steps 1 --set learning_rate=1e-6 --out run",

@@ -86,7 +86,8 @@ impl Graph {
             let node = node.ok_or_else(|| Error::Ranges {
                 reason: format!("`{name}` is no convolution of this network that int8 computes"),
             })?;
-            if !(low.is_finite() && high.is_finite() && low <= high) {
+            // The width too: two ends may each be a number, and their distance none.
+            if !((high - low).is_finite() && low <= high) {
                 return Err(Error::Ranges {
                     reason: format!("{low} to {high} is no range of what `{name}` reads"),
                 });

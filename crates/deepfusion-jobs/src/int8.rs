@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{load_photo, to_network_input};
+use deepfusion_data::load_photo;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Int8Calibration, StoredNetwork, TrainConfig};
 use deepfusion_runtime::{DepthRunner, FusedRunner, ModelSource, Precision, Preparer, SeenInputs};
-use deepfusion_sim::{SimConfig, Simulation};
 use deepfusion_weights::Shipped;
 
+use crate::packing::simulated_input;
 use crate::{Error, Input, Result};
 
 /// Images on which depth in int8 is compared with depth in f32.
@@ -83,14 +83,7 @@ pub fn calibrate(
 /// # Errors
 /// Weights of another network.
 pub fn on_a_street(config: &TrainConfig, weights: &Weights) -> Result<Int8Calibration> {
-    let (width, height) = (config.size.width as u32, config.size.height as u32);
-    let street = Simulation::new(&SimConfig {
-        frames: 1,
-        width,
-        height,
-        ..SimConfig::default()
-    })?;
-    let input = to_network_input(&street.frame(0).rgb, [0, 0, width, height], width, height);
+    let input = simulated_input(config)?;
     observed(config, weights, 0, std::iter::once(Ok(input)))
 }
 

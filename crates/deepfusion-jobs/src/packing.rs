@@ -133,15 +133,7 @@ fn learned_from(config: &TrainConfig) -> Vec<String> {
 /// Largest |packed − original| / original over the depths of a simulated picture, both computed in f32.
 fn difference(network: &StoredNetwork, bytes: &[u8]) -> Result<f64> {
     let config = &network.config;
-    let (width, height) = (config.size.width as u32, config.size.height as u32);
-    let street = Simulation::new(&SimConfig {
-        frames: 1,
-        width,
-        height,
-        ..SimConfig::default()
-    })?;
-    let picture = street.frame(0).rgb;
-    let input = to_network_input(&picture, [0, 0, width, height], width, height);
+    let input = simulated_input(config)?;
     let depth = |weights| -> Result<Vec<f64>> {
         let mut runner = FusedRunner::new(config, weights, Precision::F32)?;
         let disparity = runner.disparity(&input)?;
@@ -155,6 +147,27 @@ fn difference(network: &StoredNetwork, bytes: &[u8]) -> Result<f64> {
     let packed = depth(packed)?;
     let relative = original.iter().zip(&packed).map(|(a, b)| (b - a).abs() / a);
     Ok(relative.fold(0.0, f64::max))
+}
+
+/// A picture of a simulated street as the network sees it.
+///
+/// # Errors
+/// A size that cannot be simulated.
+pub(crate) fn simulated_input(config: &TrainConfig) -> Result<Vec<f32>> {
+    let (width, height) = (config.size.width as u32, config.size.height as u32);
+    let street = Simulation::new(&SimConfig {
+        frames: 1,
+        width,
+        height,
+        ..SimConfig::default()
+    })?;
+    let picture = street.frame(0).rgb;
+    Ok(to_network_input(
+        &picture,
+        [0, 0, width, height],
+        width,
+        height,
+    ))
 }
 
 /// To three digits: the last ones depend on the processor.

@@ -44,9 +44,7 @@ impl Scale {
 /// Where a convolution's input lies as bytes: without gaps between pixels, as far beyond the image as the kernel reaches.
 #[derive(Debug, Clone)]
 pub(super) struct ByteImage {
-    /// Of the bytes.
-    view: View,
-    /// The same convolution on them.
+    /// The same convolution on the bytes.
     pub(super) geometry: Geometry,
     /// Every how many pixels of the input one is read.
     every: usize,
@@ -75,7 +73,6 @@ impl ByteImage {
             ..*input
         };
         Self {
-            view,
             geometry: Geometry {
                 input: view,
                 stride: geometry.stride / every,
@@ -97,12 +94,17 @@ impl ByteImage {
         scale: Scale,
         bytes: &mut [u8],
     ) {
-        let reach = self.view.border;
-        let pixels = self.view.width + 2 * reach;
+        let View {
+            border: reach,
+            width,
+            row: row_len,
+            ..
+        } = self.geometry.input;
+        let pixels = width + 2 * reach;
         let first = input.offset - reach * (input.row + input.pitch);
         // Without gaps a row is one piece.
         let joined = input.pitch == input.channels && self.every == 1;
-        let rows = bytes[..self.len].par_chunks_mut(self.view.row).enumerate();
+        let rows = bytes[..self.len].par_chunks_mut(row_len).enumerate();
         rows.for_each(|(y, row)| {
             let start = first + y * self.every * input.row;
             let piece = if joined {

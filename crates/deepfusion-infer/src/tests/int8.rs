@@ -190,7 +190,12 @@ fn int8_without_ranges_or_with_another_networks_is_refused() {
         let error = graph.set_input_ranges(&ranges).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
     }
-    for range in [[f32::NAN, 1.0], [0.0, f32::INFINITY], [2.0, 1.0]] {
+    for range in [
+        [f32::NAN, 1.0],
+        [0.0, f32::INFINITY],
+        [2.0, 1.0],
+        [f32::MIN, f32::MAX],
+    ] {
         let ranges = [("node1".to_owned(), range)].into();
         assert!(graph.set_input_ranges(&ranges).is_err(), "{range:?}");
     }
