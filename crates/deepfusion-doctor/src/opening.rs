@@ -68,7 +68,7 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         );
     }
     for warning in survey.dataset.warnings() {
-        let damaged = warning.contains("damaged") || warning.contains("cannot be read");
+        let damaged = survey.dataset.damage().contains(warning);
         let severity = if damaged {
             Severity::Warning
         } else {

@@ -275,7 +275,7 @@ impl BoardViews {
         let (_, orientation) = self.first.as_ref()?;
         (*orientation != 1).then(|| {
             format!(
-                "EXIF turns the pictures by {}: the calibration is of the upright ones, {}x{}, which `predict` sees; a recording's images are used as they are stored",
+                "EXIF turns the pictures by {}: the calibration is of the upright ones, {}x{}, which a network sees where it is given the pictures alone; a recording's images are used as they are stored",
                 turned(*orientation),
                 self.size.0,
                 self.size.1

@@ -47,7 +47,7 @@ pub(crate) fn yaw_rates(
     let (sign, note) = if changes < CHANGES || agreement.abs() < DECIDED {
         (
             1.0,
-            "taken for positive to the left, as the course of the satellites does not decide it: look at what data inspect says of the turns",
+            "taken for positive to the left, as the course of the satellites does not decide it: check the turns against the images",
         )
     } else if agreement > 0.0 {
         (1.0, "its sign agrees with the course of the satellites")

@@ -423,10 +423,16 @@ impl Dataset {
         self.recording.mounts()
     }
 
-    /// What was taken for granted or looks odd, in sentences.
+    /// What was taken for granted, looks odd or cannot be read, in sentences.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Those of [`Self::warnings`] that say what of the recording cannot be read.
+    #[must_use]
+    pub fn damage(&self) -> &[String] {
+        self.recording.damage()
     }
 
     /// Adds what was noticed beside it.

@@ -55,8 +55,13 @@ pub trait Recording: fmt::Debug + Send + Sync {
         }
     }
 
-    /// What was taken for granted or looks odd, in sentences for the inspection.
+    /// What was taken for granted, looks odd or cannot be read, in sentences for the inspection.
     fn warnings(&self) -> &[String] {
+        &[]
+    }
+
+    /// Those of [`Self::warnings`] that say what cannot be read.
+    fn damage(&self) -> &[String] {
         &[]
     }
 

@@ -176,7 +176,7 @@ def cross_covariance(xca, x):
 def run_attending(block, x):
     z = x
     if hasattr(block, "pos_embd"):
-        z = z + block.pos_embd.token_projection(positions(*x.shape[2:]))
+        z = z + block.pos_embd.token_projection(positions(*x.shape[2:]).to(x))
     seen = cross_covariance(block.xca, on_pixels(block.norm_xca, z))
     z = z + seen * block.gamma_xca.view(-1, 1, 1)
     return x + bottleneck(block, on_pixels(block.norm, z))

@@ -3,7 +3,7 @@
 use super::config::BagConfig;
 use super::index::Index;
 use super::mounts::Mounts;
-use super::streams::{streams, warnings_on};
+use super::streams::{damage_of, oddities_of, streams};
 use super::topics::{Role, Topics};
 use super::{sensors, source};
 use crate::{DatasetKind, DriveInspection, Inspection, OpenOptions, Result, SpeedRange};
@@ -26,7 +26,8 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
         return Ok(None);
     }
     let index = Index::read(bag.as_ref(), &topics, &config)?;
-    let warnings = warnings_on(bag.as_ref(), &index);
+    let mut warnings = damage_of(bag.as_ref(), &index);
+    warnings.extend(oddities_of(&index));
     // Of the mounts only the inertial unit's counts here; what is wrong with the others ends an opening, and no look at it.
     let mounts = Mounts::find(path, &config, &index, &mut Vec::new()).ok();
     let imu = mounts.and_then(|mounts| mounts.vehicle_from_imu);

@@ -7,7 +7,7 @@ use super::mounts::Mounts;
 use super::packet::VideoTopic;
 use super::recording::BagRecording;
 use super::scans::BagScans;
-use super::streams::{streams, warnings_on};
+use super::streams::{damage_of, oddities_of, streams};
 use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use super::{camera, image, sensors, source};
@@ -65,7 +65,9 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let index = Index::read(bag.as_ref(), &topics, &config)?;
     let first = first_image(bag.as_ref(), &index)?;
     let clock = Clock::from_image(&first, &config, options);
-    let mut warnings = warnings_on(bag.as_ref(), &index);
+    let damage = damage_of(bag.as_ref(), &index);
+    let mut warnings = damage.clone();
+    warnings.extend(oddities_of(&index));
 
     let video = BagVideo::of(path, &index, &config)?;
     let picture = match &video {
@@ -143,6 +145,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         video,
         lens,
         mounts: mounts.said,
+        damage,
         warnings,
         cam_from_vehicle,
         scans,

@@ -27,6 +27,8 @@ pub(super) struct BagRecording {
     pub(super) lens: Lens,
     pub(super) streams: Vec<Stream>,
     pub(super) mounts: Vec<Mount>,
+    pub(super) damage: Vec<String>,
+    /// Those of `damage` among them.
     pub(super) warnings: Vec<String>,
     /// Where the vehicle was, exactly, on the vehicle's clock.
     pub(super) truth: Trajectory,
@@ -86,6 +88,10 @@ impl Recording for BagRecording {
 
     fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    fn damage(&self) -> &[String] {
+        &self.damage
     }
 
     fn mounts(&self) -> &[Mount] {

@@ -45,17 +45,21 @@ pub(super) fn streams(
 }
 
 /// What of a bag cannot be read, in sentences.
-pub(super) fn warnings_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
-    let mut warnings: Vec<String> = Vec::new();
-    warnings.extend(index.video.iter().filter_map(|video| video.warning()));
+pub(super) fn damage_of(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
     let damage = bag.damage();
-    warnings.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
+    let mut damage = Vec::from_iter(damage.map(|damage| format!("the bag is damaged: {damage}")));
     if let Some(lost) = index.lost.first() {
-        warnings.push(match index.lost.len() {
+        damage.push(match index.lost.len() {
             1 => format!("1 message or chunk cannot be read: {lost}"),
             n => format!("{n} messages or chunks cannot be read; the first: {lost}"),
         });
     }
+    damage
+}
+
+/// What is odd about a bag that can be read, in sentences.
+pub(super) fn oddities_of(index: &Index) -> Vec<String> {
+    let mut warnings = Vec::from_iter(index.video.iter().filter_map(|video| video.warning()));
     warnings.extend(index.silent.iter().cloned());
     warnings.extend(index.computed.iter().cloned());
     let unstamped = index.unstamped.iter();
