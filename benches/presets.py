@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""Every preset at an equal budget, under one protocol, in one table.
+
+    benches/presets.py DEEPFUSION OUT --data DRIVE ... --eval DRIVE [--steps 400] [--size 192x64] [--workers 2]
+
+trains each row from random weights on the same drives (`--camera both`, batch 4, the preset's own losses and learning rate), measures the last
+checkpoint on the drive of `--eval` (`--gt-depth z --crop garg --cap 80`), and times the network at 640x192 in f32 and bf16 with `bench`, alone.
+What is trained or measured already is not done again, so the script may be stopped. Prints Markdown.
+
+Rows beside the presets: `paper` without the losses that others do not have, which leaves its network and its speed term. The preset `resnet50` is
+`paper` without context, attention and these losses.
+
+--workers trains that many rows at a time, each by its share of the cores. Minutes are the processor's (user and system time), which other work on the
+machine does not lengthen much.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+PRESETS = [
+    "sfmlearner", "monodepth2", "monodepth2-50", "r-msfm3", "r-msfm6", "lite-mono-tiny", "lite-mono-small", "lite-mono", "lite-mono-8m",
+    "tiny", "light", "resnet50", "paper",
+]
+ROWS = {preset: (preset, []) for preset in PRESETS}
+ROWS["paper, without affine, flow, masks"] = "paper", ["--without", "affine,flow,moving"]
+BENCH_SIZE = "640x192"
+
+
+def timed(words, out, threads):
+    """Runs a command with its output in a file; the processor's seconds and the most memory it held, in GiB."""
+    environment = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
+    with out.open("w") as file:
+        process = subprocess.Popen([*map(str, words)], env=environment, stdout=file, stderr=subprocess.STDOUT)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        sys.exit(f"{words}: {out.read_text()[-2000:]}")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2**20
+
+
+def answer(words):
+    run = subprocess.run([*map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if run.returncode != 0:
+        sys.exit(run.stderr)
+    return json.loads(run.stdout)
+
+
+def kept(path, make):
+    """What is in a file of JSON, made first where it is not there."""
+    if not path.exists():
+        value = make()
+        new = path.with_suffix(".new")
+        new.write_text(json.dumps(value))
+        new.rename(path)
+    return json.loads(path.read_text())
+
+
+def config(asked, preset):
+    paths = ", ".join(json.dumps(str(path.resolve())) for path in asked.data)
+    return f'preset = "{preset}"\nvalidation_share = 0.02\n\n[data]\ncamera = "both"\npaths = [{paths}]\n'
+
+
+def trained(asked, name):
+    preset, words = ROWS[name]
+    folder = asked.out / name.replace(", ", "-").replace(" ", "-")
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def make():
+        (folder / "config.toml").write_text(config(asked, preset))
+        train = [asked.program, "train", "--config", folder / "config.toml", "--init", "none", "--size", asked.size, "--batch", 4]
+        train += ["--steps", asked.steps, "--out", folder / "run", *words]
+        seconds, gib = timed(train, folder / "train.log", max(1, os.cpu_count() // asked.workers))
+        return {"seconds": seconds, "gib": gib}
+
+    cost = kept(folder / "cost.json", make)
+    measure = [asked.program, "eval", "--model", folder / "run/last.safetensors", "--data", asked.eval, "--gt-depth", "z", "--crop", "garg"]
+    return cost, kept(folder / "eval.json", lambda: answer([*measure, "--cap", 80, "--json"]))
+
+
+def timed_network(asked, preset, precision):
+    """Of `bench`: parameters, multiply-adds, milliseconds of the network, MB of the process."""
+    words = [asked.program, "bench", "--preset", preset, "--size", BENCH_SIZE, "--repeats", 15, "--precision", precision, "--json"]
+    return kept(asked.out / f"{preset}-{precision}.json", lambda: answer(words))
+
+
+def row(asked, name, cost, measured):
+    f32, bf16 = (timed_network(asked, ROWS[name][0], precision) for precision in ("f32", "bf16"))
+    scale = measured["scale"]["median"]
+    unscaled, scaled = measured["unscaled"], measured["median_scaled"]
+    return [
+        f"`{name}`" if name in PRESETS else name,
+        f"{unscaled['abs_rel']:.3f}", f"{scaled['abs_rel']:.3f}", f"{scale:.2f}", f"{scaled['rmse']:.2f}", f"{scaled['a1']:.2f}",
+        f"{cost['seconds'] / 60:.1f}", f"{cost['gib']:.1f}",
+        f"{f32['parameters'] / 1e6:.1f}", f"{2 * f32['multiply_adds'] / 1e9:.1f}",
+        f"{f32['stages_ms']['network']:.0f}; {bf16['stages_ms']['network']:.0f}", f"{f32['peak_rss_mb']:.0f}; {bf16['peak_rss_mb']:.0f}",
+    ]
+
+
+def main():
+    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    words.add_argument("program")
+    words.add_argument("out", type=Path)
+    words.add_argument("--data", type=Path, nargs="+", required=True)
+    words.add_argument("--eval", type=Path, required=True)
+    words.add_argument("--steps", type=int, default=400)
+    words.add_argument("--size", default="192x64")
+    words.add_argument("--workers", type=int, default=1)
+    words.add_argument("--rows", nargs="+", choices=list(ROWS), default=list(ROWS))
+    asked = words.parse_args()
+    with ThreadPoolExecutor(asked.workers) as pool:
+        results = list(pool.map(lambda name: trained(asked, name), asked.rows))
+    head = [
+        "row", "abs_rel, unscaled", "scaled", "`scale.median`", "RMSE, scaled", "δ1, scaled", "training, processor minutes", "GiB",
+        "parameters, M", "GFLOP", "ms, f32; bf16", "MB, f32; bf16",
+    ]
+    print("| " + " | ".join(head) + " |\n" + "|---" * len(head) + "|")
+    for name, (cost, measured) in zip(asked.rows, results):
+        print("| " + " | ".join(row(asked, name, cost, measured)) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
