@@ -13,14 +13,14 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::layers::freeze_statistics;
-use deepfusion_nn::weights::{self, WeightTensor, Weights};
+use deepfusion_nn::weights;
 use deepfusion_nn::{
     Attention, AttentionConfig, AttentionForm, DecoderConfig, DepthNet, DepthNetConfig,
     GlobalAggregation, HceConfig, HierarchicalContext, ResNet, ResNetConfig, ResNetDepth,
     WeightRng,
 };
 
-use crate::common::{formula, largest_difference, reference, take_gradients, uniform, values};
+use crate::common::{filled, largest_difference, reference, take_gradients, uniform, values};
 
 /// Of a tensor's root mean square.
 const TOLERANCE: f32 = 1e-4;
@@ -33,18 +33,6 @@ fn step(len: usize) -> usize {
     } else {
         (len / AT_MOST) | 1
     }
-}
-
-/// The module with the formula's weights.
-fn filled<M: Module>(module: M) -> M {
-    let mut weights: Weights = weights::collect(&module);
-    for (name, tensor) in &mut weights.tensors {
-        *tensor = WeightTensor {
-            values: formula(name, &tensor.shape, None),
-            shape: tensor.shape.clone(),
-        };
-    }
-    weights::apply(module, &weights).unwrap()
 }
 
 /// Runs a case of the reference: `forward` is what the module does with the input.

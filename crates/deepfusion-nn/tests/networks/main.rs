@@ -6,6 +6,7 @@ mod common;
 mod depth_network;
 mod disp_net;
 mod flow_decoder;
+mod formula;
 mod lite_mono;
 mod operations;
 mod r_msfm;
