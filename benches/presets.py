@@ -1,22 +1,21 @@
 #!/usr/bin/env python3
 """Every preset at an equal budget, under one protocol, in one table.
 
-    benches/presets.py DEEPFUSION OUT --data DRIVE ... --eval DRIVE [--steps 400] [--size 192x64] [--workers 2]
+    benches/presets.py DEEPFUSION OUT --data DRIVE ... --eval DRIVE [--steps 300] [--size 192x64] [--precision f32] [--workers 2]
 
-trains each row from random weights on the same drives (`--camera both`, batch 4, the preset's own losses and learning rate), measures the last
-checkpoint on the drive of `--eval` (`--gt-depth z --crop garg --cap 80`), and times the network at 640x192 in f32 and bf16 with `bench`, alone.
-What is trained or measured already is not done again, so the script may be stopped. Prints Markdown.
+trains each preset from random weights on the same drives (both cameras where there are two, batch 4, the preset's own losses; the rest is in `SETTINGS`),
+measures the last checkpoint on the drive of `--eval` (`--gt-depth z --crop garg --cap 80`), and times the network at 640x192 in f32 and bf16 with
+`bench`. What is trained or measured already is not done again, so the script may be stopped. Prints Markdown.
 
-Rows beside the presets: `paper` without the losses that others do not have, which leaves its network and its speed term. The preset `resnet50` is
-`paper` without context, attention and these losses.
+The preset `resnet50` is `paper` without context, attention, affine, flow and masks.
 
---workers trains that many rows at a time, each by its share of the cores. Minutes are the processor's (user and system time), which other work on the
-machine does not lengthen much.
+--workers trains that many presets at a time, each by its share of the cores. Minutes are the processor's: user and system time.
 """
 
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -26,8 +25,14 @@ PRESETS = [
     "sfmlearner", "monodepth2", "monodepth2-50", "r-msfm3", "r-msfm6", "lite-mono-tiny", "lite-mono-small", "lite-mono", "lite-mono-8m",
     "tiny", "light", "resnet50", "paper",
 ]
-ROWS = {preset: (preset, []) for preset in PRESETS}
-ROWS["paper, without affine, flow, masks"] = "paper", ["--without", "affine,flow,moving"]
+# One for all: views warped by the vehicle's measured motion, which needs speeds and yaw rates and makes every row metric; a learning rate that falls
+# by a cosine.
+SETTINGS = """view_motion = "vehicle"
+learning_rate = 3e-4
+learning_rate_schedule = "cosine"
+learning_rate_warmup_steps = 20
+validation_share = 0.02
+"""
 BENCH_SIZE = "640x192"
 
 
@@ -62,18 +67,19 @@ def kept(path, make):
 
 def config(asked, preset):
     paths = ", ".join(json.dumps(str(path.resolve())) for path in asked.data)
-    return f'preset = "{preset}"\nvalidation_share = 0.02\n\n[data]\ncamera = "both"\npaths = [{paths}]\n'
+    return f'preset = "{preset}"\n{SETTINGS}precision = "{asked.precision}"\n\n[data]\ncamera = "both"\npaths = [{paths}]\n'
 
 
-def trained(asked, name):
-    preset, words = ROWS[name]
-    folder = asked.out / name.replace(", ", "-").replace(" ", "-")
+def trained(asked, preset):
+    folder = asked.out / preset
     folder.mkdir(parents=True, exist_ok=True)
 
     def make():
+        # What was stopped begins anew: its time counts.
+        shutil.rmtree(folder / "run", ignore_errors=True)
         (folder / "config.toml").write_text(config(asked, preset))
         train = [asked.program, "train", "--config", folder / "config.toml", "--init", "none", "--size", asked.size, "--batch", 4]
-        train += ["--steps", asked.steps, "--out", folder / "run", *words]
+        train += ["--steps", asked.steps, "--out", folder / "run"]
         seconds, gib = timed(train, folder / "train.log", max(1, os.cpu_count() // asked.workers))
         return {"seconds": seconds, "gib": gib}
 
@@ -88,12 +94,12 @@ def timed_network(asked, preset, precision):
     return kept(asked.out / f"{preset}-{precision}.json", lambda: answer(words))
 
 
-def row(asked, name, cost, measured):
-    f32, bf16 = (timed_network(asked, ROWS[name][0], precision) for precision in ("f32", "bf16"))
+def row(asked, preset, cost, measured):
+    f32, bf16 = (timed_network(asked, preset, precision) for precision in ("f32", "bf16"))
     scale = measured["scale"]["median"]
     unscaled, scaled = measured["unscaled"], measured["median_scaled"]
     return [
-        f"`{name}`" if name in PRESETS else name,
+        f"`{preset}`",
         f"{unscaled['abs_rel']:.3f}", f"{scaled['abs_rel']:.3f}", f"{scale:.2f}", f"{scaled['rmse']:.2f}", f"{scaled['a1']:.2f}",
         f"{cost['seconds'] / 60:.1f}", f"{cost['gib']:.1f}",
         f"{f32['parameters'] / 1e6:.1f}", f"{2 * f32['multiply_adds'] / 1e9:.1f}",
@@ -107,20 +113,21 @@ def main():
     words.add_argument("out", type=Path)
     words.add_argument("--data", type=Path, nargs="+", required=True)
     words.add_argument("--eval", type=Path, required=True)
-    words.add_argument("--steps", type=int, default=400)
+    words.add_argument("--steps", type=int, default=300)
     words.add_argument("--size", default="192x64")
+    words.add_argument("--precision", choices=["f32", "bf16"], default="f32", help="of the training")
     words.add_argument("--workers", type=int, default=1)
-    words.add_argument("--rows", nargs="+", choices=list(ROWS), default=list(ROWS))
+    words.add_argument("--presets", nargs="+", choices=PRESETS, default=PRESETS)
     asked = words.parse_args()
     with ThreadPoolExecutor(asked.workers) as pool:
-        results = list(pool.map(lambda name: trained(asked, name), asked.rows))
+        results = list(pool.map(lambda preset: trained(asked, preset), asked.presets))
     head = [
-        "row", "abs_rel, unscaled", "scaled", "`scale.median`", "RMSE, scaled", "δ1, scaled", "training, processor minutes", "GiB",
+        "preset", "abs_rel, unscaled", "scaled", "`scale.median`", "RMSE, scaled", "δ1, scaled", "training, processor minutes", "GiB",
         "parameters, M", "GFLOP", "ms, f32; bf16", "MB, f32; bf16",
     ]
     print("| " + " | ".join(head) + " |\n" + "|---" * len(head) + "|")
-    for name, (cost, measured) in zip(asked.rows, results):
-        print("| " + " | ".join(row(asked, name, cost, measured)) + " |", flush=True)
+    for preset, (cost, measured) in zip(asked.presets, results):
+        print("| " + " | ".join(row(asked, preset, cost, measured)) + " |", flush=True)
 
 
 if __name__ == "__main__":
