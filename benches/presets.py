@@ -7,7 +7,7 @@ trains each preset from random weights on the same drives (both cameras where th
 measures the last checkpoint on the drive of `--eval` (`--gt-depth z --crop garg --cap 80`), and times the network at 640x192 in f32 and bf16 with
 `bench`. What is trained or measured already is not done again, so the script may be stopped. Prints Markdown.
 
-The preset `resnet50` is `paper` without context, attention, affine, flow and masks.
+The preset `resnet50` is `paper` with all of its own switched off: context, attention, aggregation, the encoder's stride of 16, affine, flow and masks.
 
 --workers trains that many presets at a time, each by its share of the cores. Minutes are the processor's: user and system time.
 """
@@ -25,7 +25,7 @@ PRESETS = [
     "sfmlearner", "monodepth2", "monodepth2-50", "r-msfm3", "r-msfm6", "lite-mono-tiny", "lite-mono-small", "lite-mono", "lite-mono-8m",
     "tiny", "light", "resnet50", "paper",
 ]
-# One for all: views warped by the vehicle's measured motion, which needs speeds and yaw rates and makes every row metric; a learning rate that falls
+# The same for all: views warped by the vehicle's measured motion, which needs speeds and yaw rates and makes every row metric; a learning rate that falls
 # by a cosine.
 SETTINGS = """view_motion = "vehicle"
 learning_rate = 3e-4

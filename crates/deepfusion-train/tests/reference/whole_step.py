@@ -15,8 +15,7 @@ smoothness. The paper's depth network has the losses of Monodepth2 here; those o
 
 Two things differ from the published trainings, here and in the program: both pairs pass the pose encoder in one batch, so that its
 batch norms see them together; and a source that does not see a pixel does not explain it (there, its border-padded warp takes part in
-the minimum). `main` prints what each does to the loss. Weight decay leaves out biases and the weights of norms, as the program does;
-Lite-Mono's and R-MSFM's decay all.
+the minimum). `main` prints what each does to the loss. Weight decay leaves out biases and the weights of norms, as the program does.
 
 Needs torch, torchvision and numpy.
 """
