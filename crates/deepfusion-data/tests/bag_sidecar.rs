@@ -479,3 +479,23 @@ fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
         &["/can: 25 messages"],
     );
 }
+
+/// What cannot be read is told apart from what is merely odd.
+#[test]
+fn damage_is_a_list_of_its_own_among_the_warnings() {
+    let drive = Drive::new("", |bag| {
+        bag.without_stamps().twist("/twist", 10.0);
+    });
+    let odd = open(&drive.bag).unwrap();
+    assert!(odd.damage().is_empty(), "{:?}", odd.damage());
+    assert!(!odd.warnings().is_empty());
+
+    let bytes = fs::read(&drive.bag).unwrap();
+    fs::write(&drive.bag, &bytes[..bytes.len() - 1]).unwrap();
+    let cut = open(&drive.bag).unwrap();
+    let [damage] = cut.damage() else {
+        panic!("{:?}", cut.damage());
+    };
+    assert!(damage.starts_with("the bag is damaged: "), "{damage}");
+    assert!(cut.warnings().contains(damage), "{:?}", cut.warnings());
+}
