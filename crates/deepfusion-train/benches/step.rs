@@ -14,7 +14,7 @@ use deepfusion_model::depth_graph;
 use deepfusion_nn::ops::{self, Precision::Bf16};
 use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, weights};
 use deepfusion_train::{
-    Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch, TrainConfig,
+    Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch, TrainConfig, ViewMotion,
 };
 
 #[global_allocator]
@@ -112,6 +112,7 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
             Tensor::zeros([batch, 3], device),
             ahead.expand([batch, 3]),
         )],
+        turns_known: None,
         offsets: vec![1],
         names: vec![String::new(); batch],
     }
@@ -139,6 +140,8 @@ fn full_step(criterion: &mut Criterion) {
 fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig) {
     let device = Device::flex().autodiff();
     config.pose_net.metres_per_unit = 0.8;
+    // The views' gradient passes through PoseNet, as in the peers' steps.
+    config.view_motion = ViewMotion::Distance;
     (config.size.width, config.size.height) = (320, 96);
     let mut model = Model::new(&config, &device).expect("the preset is valid");
     let mut adam = Adam::default();

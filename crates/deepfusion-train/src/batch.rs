@@ -28,6 +28,8 @@ pub struct SnippetBatch {
     pub distance_weight: Vec<Option<Tensor<1>>>,
     /// The camera's `source_from_target`, by source, B each: as measured by the vehicle's sensors, and of the other camera as calibrated.
     pub measured: Vec<Motion>,
+    /// Which samples are of drives whose turns were measured, B, 1 or 0; `None` where all are. The others' `measured` says nothing.
+    pub turns_known: Option<Tensor<1>>,
     /// Offsets of the sources in time.
     pub offsets: Vec<i32>,
     /// Drive and frame of each target.
@@ -60,6 +62,7 @@ struct RawBatch {
     distance_weight: Vec<Vec<f32>>,
     rotation: Vec<Vec<f32>>,
     translation: Vec<Vec<f32>>,
+    turns_known: Vec<f32>,
     offsets: Vec<i32>,
     names: Vec<String>,
     /// The scale factors of each sample; empty if they are the same for all.
@@ -182,6 +185,10 @@ impl BatchLoader {
                     translation: Tensor::from_data(TensorData::new(t, [n, 3]), device),
                 })
                 .collect(),
+            turns_known: raw
+                .turns_known
+                .contains(&0.0)
+                .then(|| vectors(raw.turns_known)),
             offsets: raw.offsets,
             names: raw.names,
             factors: (!raw.factors.is_empty())
@@ -200,6 +207,8 @@ struct Item {
     motion: Vec<(f32, [f32; 9], [f32; 3])>,
     /// What the distances weigh, by source.
     weights: Vec<f32>,
+    /// Whether the vehicle's turns were measured.
+    turns_known: bool,
 }
 
 impl Maker {
@@ -240,6 +249,7 @@ impl Maker {
             translation: (0..views)
                 .map(|s| items.iter().flat_map(|i| i.motion[s].2).collect())
                 .collect(),
+            turns_known: items.iter().map(|i| f32::from(i.turns_known)).collect(),
             offsets: self.config.frames.clone(),
             names: samples.iter().map(|s| self.set.name(*s)).collect(),
             factors: if !self.config.has_factors() {
@@ -292,7 +302,8 @@ impl Maker {
         if flip {
             k = k.flipped();
         }
-        // Where no yaw rate was recorded nothing reads this: `SampleSet` refuses configurations that would.
+        // Where no yaw rate was recorded nothing reads this: `SampleSet` refuses configurations that would, and `auto` looks at
+        // `turns_known`.
         let measured = sources.iter().map(|source| {
             let motion = source.motion.source_from_target;
             (
@@ -321,6 +332,9 @@ impl Maker {
         };
         Ok(Item {
             weights: sources.iter().map(weight).collect(),
+            turns_known: sources
+                .iter()
+                .all(|source| source.motion.source_from_target.is_some()),
             clean,
             network,
             intrinsics: row_major(&k.matrix()),

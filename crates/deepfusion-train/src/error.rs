@@ -134,7 +134,7 @@ impl Hint for Error {
                     .into(),
             ),
             Self::NoYawRate { .. } => Some(
-                "train with view_motion posenet or distance and loss.rotation = 0, or give a yaw rate: \
+                "train with view_motion auto, distance or posenet and loss.rotation = 0, or give a yaw rate: \
                  yaw_rate_radps in speed.csv, or imu.csv"
                     .into(),
             ),

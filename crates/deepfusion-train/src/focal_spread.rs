@@ -100,7 +100,8 @@ fn loss_at(model: &Model, (batch, pass): (&SnippetBatch, &ForwardPass), step: f6
         inverse_intrinsics: batch.inverse_intrinsics.clone().repeat_dim(0, times),
         motions: match model.config().view_motion {
             ViewMotion::Vehicle => pass.motions.clone(),
-            ViewMotion::PoseNet | ViewMotion::Distance => {
+            // Of `auto` those that warp are of drives whose turns are not known.
+            ViewMotion::PoseNet | ViewMotion::Distance | ViewMotion::Auto => {
                 let followed = pass.motions.iter().map(|m| following(m, step.exp()));
                 followed.collect()
             }

@@ -122,7 +122,7 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
     if turns.is_empty() {
         return Some(
             "the camera is learned without measured turns: only strong ones determine the focal length then; a yaw rate and view_motion \
-             vehicle determine it much better"
+             auto determine it much better"
                 .into(),
         );
     }
@@ -134,9 +134,13 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
             mean.to_degrees()
         ));
     }
-    (config.view_motion != ViewMotion::Vehicle).then(|| {
+    let turns_unused = matches!(
+        config.view_motion,
+        ViewMotion::PoseNet | ViewMotion::Distance
+    );
+    turns_unused.then(|| {
         "the camera is learned with the turns that PoseNet finds, which determine it only where they are strong; the measured ones, \
-         view_motion vehicle, determine it much better"
+         view_motion auto, determine it much better"
             .into()
     })
 }

@@ -34,6 +34,7 @@ mod shared_frames;
 mod source;
 mod stereo;
 mod trainer;
+mod unmeasured_turns;
 mod update;
 mod view_synthesis;
 mod window;

@@ -311,7 +311,23 @@ impl Model {
         // The other camera's view is nothing that PoseNet could know.
         let views = views.take(batch.offsets.len());
         match self.config.view_motion {
-            ViewMotion::Vehicle => mean_of(views, |pair| losses::motion(pair.0, pair.1)),
+            ViewMotion::Vehicle => mean_of(views, |pair| losses::motion(pair.0, pair.1, None)),
+            ViewMotion::Auto => {
+                let known = batch.turns_known.clone().map(|known| self.both_ways(known));
+                mean_of(views.enumerate(), |(view, (motion, measured))| {
+                    let whole = losses::motion(motion, measured, known.clone());
+                    let Some(known) = &known else {
+                        return whole;
+                    };
+                    let unknown = known.clone().neg().add_scalar(1.0);
+                    let sure = match batch.distance_weight[view].clone() {
+                        Some(weight) => unknown.mul(self.both_ways(weight)),
+                        None => unknown,
+                    };
+                    let distance = self.distance_m(batch, view);
+                    whole + losses::speed(motion, distance, Some(sure), &measured.rotation, 0.0)
+                })
+            }
             ViewMotion::PoseNet | ViewMotion::Distance => {
                 let weight = self.config.loss.rotation;
                 mean_of(views.enumerate(), |(view, (motion, measured))| {
@@ -343,15 +359,28 @@ impl Model {
         match self.config.view_motion {
             ViewMotion::PoseNet => pass.motions.clone(),
             ViewMotion::Vehicle => pass.measured.clone(),
-            ViewMotion::Distance => {
-                let views = pass.motions.iter().enumerate();
-                let scaled = views.map(|(view, m)| match batch.distance_m.get(view) {
-                    Some(_) => m.with_distance(self.distance_m(batch, view)),
-                    None => m.clone(),
-                });
-                scaled.collect()
+            ViewMotion::Distance => self.at_measured_distance(pass, batch),
+            ViewMotion::Auto => {
+                let Some(known) = &batch.turns_known else {
+                    return pass.measured.clone();
+                };
+                let known = self.both_ways(known.clone());
+                let guessed = self.at_measured_distance(pass, batch);
+                let views = pass.measured.iter().zip(guessed);
+                let chosen = views.map(|(measured, guessed)| measured.or(&guessed, known.clone()));
+                chosen.collect()
             }
         }
+    }
+
+    /// PoseNet's motions at the vehicle's distances, by view; the other camera's as calibrated.
+    fn at_measured_distance(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
+        let views = pass.motions.iter().enumerate();
+        let scaled = views.map(|(view, motion)| match batch.distance_m.get(view) {
+            Some(_) => motion.with_distance(self.distance_m(batch, view)),
+            None => motion.clone(),
+        });
+        scaled.collect()
     }
 }
 

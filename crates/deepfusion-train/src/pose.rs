@@ -67,6 +67,23 @@ impl Motion {
         }
     }
 
+    /// These motions where `chosen` (N, 1 or 0) is 1, the `other` ones where it is 0.
+    #[must_use]
+    pub fn or(&self, other: &Self, chosen: Tensor<1>) -> Self {
+        let [n] = chosen.dims();
+        let not_chosen = chosen.clone().neg().add_scalar(1.0);
+        let (here, there) = (chosen.reshape([n, 1]), not_chosen.reshape([n, 1]));
+        let part = |of: &Self, share: Tensor<2>| Self {
+            rotation: of.rotation.clone().mul(share.clone().reshape([n, 1, 1])),
+            translation: of.translation.clone().mul(share),
+        };
+        let (a, b) = (part(self, here), part(other, there));
+        Self {
+            rotation: a.rotation + b.rotation,
+            translation: a.translation + b.translation,
+        }
+    }
+
     /// ‖t‖ as √(‖t‖² + 1e-8), N: its gradient at 0 is finite.
     #[must_use]
     pub fn distance(&self) -> Tensor<1> {

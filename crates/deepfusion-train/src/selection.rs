@@ -2,7 +2,7 @@ use crate::{LossTerms, TrainConfig, ViewMotion};
 
 /// The value that selects `best`: the part of a held-out loss that depth can change, at weights that never change.
 ///
-/// It is the photometric error alone if the vehicle's sensors give the distance of the views (`distance`, `vehicle`):
+/// It is the photometric error alone if the vehicle's sensors give the distance of the views (`distance`, `vehicle`, `auto`):
 /// PoseNet's own loss says nothing about depth and would dominate the choice. With `posenet` the views depend on PoseNet
 /// alone, depth and motion share one scale, and the photometric error cannot see it; the speed term, at its full weight,
 /// can.
@@ -16,7 +16,7 @@ use crate::{LossTerms, TrainConfig, ViewMotion};
 pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
     let views = match config.view_motion {
         ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
-        ViewMotion::Distance | ViewMotion::Vehicle => held_out.reprojection,
+        ViewMotion::Distance | ViewMotion::Vehicle | ViewMotion::Auto => held_out.reprojection,
     };
     let masks = config.loss.explainability * held_out.explainability;
     views + masks + config.loss.depth.weight * held_out.depth
@@ -40,7 +40,7 @@ mod tests {
         };
         let (early, late) = (terms(0.11, 0.05), terms(0.09, 0.5));
         assert!(late.total > early.total);
-        for motion in [ViewMotion::Distance, ViewMotion::Vehicle] {
+        for motion in [ViewMotion::Distance, ViewMotion::Vehicle, ViewMotion::Auto] {
             config.view_motion = motion;
             assert!(selection(&config, &late) < selection(&config, &early));
         }

@@ -11,6 +11,7 @@ mod validation;
 pub use validation::validation_loss;
 
 use crate::learned_focal::{self, check_camera};
+use crate::unmeasured_turns;
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
@@ -209,6 +210,12 @@ impl Trainer {
         &self.model
     }
 
+    /// The samples that are learned from.
+    #[must_use]
+    pub fn samples(&self) -> &SampleSet {
+        &self.train
+    }
+
     /// The configuration, with the units that the run found where it leaves them open.
     #[must_use]
     pub fn config(&self) -> &TrainConfig {
@@ -239,7 +246,11 @@ impl Trainer {
             validation_samples: self.validation.samples.len() + self.validation.depth.len(),
             mean_displacement_m: self.train.mean_displacement_m(),
         });
-        if let Some(message) = learned_focal::warning(&self.config, &self.train) {
+        let warnings = [
+            learned_focal::warning(&self.config, &self.train),
+            unmeasured_turns::warning(&self.config, &self.train),
+        ];
+        for message in warnings.into_iter().flatten() {
             let step = self.state.step;
             listen(TrainEvent::Warning { step, message });
         }

@@ -41,7 +41,7 @@ fn what_reads_turns_is_refused_and_the_rest_trains() {
         change(&mut config);
         SampleSet::split(&config, vec![dataset.clone()], None)
     };
-    for motion in [ViewMotion::PoseNet, ViewMotion::Distance] {
+    for motion in [ViewMotion::PoseNet, ViewMotion::Distance, ViewMotion::Auto] {
         let split = with(&|config| {
             config.view_motion = motion;
             config.loss.rotation = 0.0;

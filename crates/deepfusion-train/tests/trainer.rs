@@ -160,7 +160,7 @@ fn a_step_of_several_batches_reports_all_of_them() {
 fn best_is_chosen_by_what_depth_can_change() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 14);
-    for motion in [ViewMotion::Vehicle, ViewMotion::PoseNet] {
+    for motion in [ViewMotion::Auto, ViewMotion::PoseNet] {
         let (mut config, train, validation) = small(&drive, 8);
         config.view_motion = motion;
         config.loss.speed = 30.0;

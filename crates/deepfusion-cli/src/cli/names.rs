@@ -106,6 +106,10 @@ pub(super) fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
                 ViewMotion::Vehicle,
                 "The vehicle's, from speed and yaw rate",
             ),
+            (
+                ViewMotion::Auto,
+                "vehicle for drives with a yaw rate, distance for the others",
+            ),
         ],
     )
 }

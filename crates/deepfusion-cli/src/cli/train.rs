@@ -12,7 +12,7 @@ use crate::devices::ComputeDevice;
 /// `deepfusion train`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle), or from recorded depth \
+    after_help = "Learns from images and the car's speed alone (and its yaw rate, where there is one), or from recorded depth \
     (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. Options override a config file.\n\n\
     Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume continues the run as \
@@ -77,7 +77,7 @@ pub(crate) struct TrainArgs {
     pub val_split: Option<PathBuf>,
     /// Learn the camera of recordings that do not say theirs, the last resort: one focal length for all of them, from a field of view
     /// of 60 degrees on (another one: --set assumed_camera.hfov_deg=90), the principal point in the middle. It takes drives with
-    /// bends, and --view-motion vehicle where there is a yaw rate.
+    /// bends, and their yaw rate.
     #[arg(long, value_name = "learn", value_parser = learn_camera)]
     pub intrinsics: Option<LearnCamera>,
     /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,

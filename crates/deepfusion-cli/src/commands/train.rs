@@ -3,7 +3,8 @@ use deepfusion_hint::count_of;
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
 use deepfusion_jobs::training::{Began, Start};
 use deepfusion_model::{
-    DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder, TrainConfig,
+    DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder,
+    TrainConfig, ViewMotion,
 };
 use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 
@@ -60,6 +61,9 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
         }
     };
     say(&plan(&trainer));
+    if let Some(advice) = unused_turns(&trainer, args) {
+        say(&advice);
+    }
     let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
     let summary = train(&mut trainer, Some(time_estimate))?;
     if let Some(bytes) = peak_device_bytes(&device) {
@@ -87,6 +91,20 @@ pub(super) fn began(began: Began) {
         ""
     };
     say(&format!("{began}{hint}"));
+}
+
+/// A preset takes PoseNet's pose because that is how its network was published, and the recordings know better.
+fn unused_turns(trainer: &Trainer, args: &TrainArgs) -> Option<String> {
+    let (config, samples) = (trainer.config(), trainer.samples());
+    let by_default = args.view_motion.is_none() && args.config.is_none() && !args.resume;
+    let unused = config.view_motion == ViewMotion::PoseNet && config.loss.speed > 0.0;
+    let known = !samples.samples.is_empty() && samples.without_turns().is_empty();
+    (by_default && unused && known).then(|| {
+        format!(
+            "{} warps by PoseNet's pose, as published; these recordings have a yaw rate, and --view-motion auto learns metres in far fewer steps",
+            config.preset
+        )
+    })
 }
 
 /// What will be done: the network, its images, and how many steps and why.

@@ -256,7 +256,7 @@ impl Preset {
                 config.learning_rate_warmup_steps = 100;
                 config.reversed_pose = ReversedPose::Inverted;
                 config.start_moving = true;
-                config.view_motion = ViewMotion::Distance;
+                config.view_motion = ViewMotion::Auto;
                 config.depth_net.encoder = narrow(config.depth_net.encoder);
                 config.depth_net.decoder = DecoderConfig {
                     widths: [128, 64, 32, 16, 16],
@@ -268,7 +268,7 @@ impl Preset {
                 let mut config = base(ResNetDepth::ResNet18);
                 config.reversed_pose = ReversedPose::Inverted;
                 config.start_moving = true;
-                config.view_motion = ViewMotion::Distance;
+                config.view_motion = ViewMotion::Auto;
                 config
             }
             Self::Resnet50 => base(ResNetDepth::ResNet50),

@@ -43,6 +43,8 @@ pub enum ViewMotion {
     /// The vehicle's own, from speed and yaw rate, and the body's roll and pitch where they are known. PoseNet learns
     /// that motion beside it.
     Vehicle,
+    /// As much of it as each drive's sensors know: `vehicle` for drives with a yaw rate, `distance` for those without one.
+    Auto,
 }
 
 impl ViewMotion {
@@ -53,6 +55,7 @@ impl ViewMotion {
             Self::PoseNet => "posenet",
             Self::Distance => "distance",
             Self::Vehicle => "vehicle",
+            Self::Auto => "auto",
         }
     }
 }
@@ -432,11 +435,12 @@ impl TrainConfig {
         }
     }
 
-    /// Whether anything in training reads how the vehicle turned, not only how far it went.
+    /// Whether anything in training needs to know how the vehicle turned, not only how far it went. `auto` reads it where it is known.
     #[must_use]
     pub fn reads_rotation(&self) -> bool {
         match self.view_motion {
             ViewMotion::Vehicle => true,
+            ViewMotion::Auto => false,
             ViewMotion::PoseNet | ViewMotion::Distance => {
                 self.loss.speed > 0.0 && self.loss.rotation > 0.0
             }
@@ -570,7 +574,7 @@ mod tests {
         config.without("speed").unwrap();
         assert_eq!(config.first_unit(0.7), 1.0, "nothing measured enters");
         config.validate().unwrap();
-        for motion in [ViewMotion::Distance, ViewMotion::Vehicle] {
+        for motion in [ViewMotion::Distance, ViewMotion::Vehicle, ViewMotion::Auto] {
             config.view_motion = motion;
             let error = config.validate().unwrap_err();
             let Error::Config { field, found, .. } = &error else {

@@ -13,7 +13,7 @@ use super::inputs::{Inputs, Outcome, gradient, outcome, values};
 use crate::losses::{DepthTruth, affine_invariant, depth};
 use crate::{
     Adam, BilinearResize, DepthLossConfig, Model, Motion, NamedGradients, Preset, Schedule,
-    SnippetBatch, TrainConfig,
+    SnippetBatch, TrainConfig, ViewMotion,
 };
 
 /// One operation.
@@ -127,7 +127,7 @@ pub(super) fn all() -> Vec<Case> {
         case("pose network", NeededBy::Learning, pose_net),
         case("optimiser", NeededBy::Learning, optimiser),
         case("losses of three steps", NeededBy::Views, |on| {
-            steps(Preset::Tiny.config(), on)
+            steps(with_pose_net(Preset::Tiny.config()), on)
         }),
         case(
             "losses of three steps, optical flow",
@@ -136,10 +136,18 @@ pub(super) fn all() -> Vec<Case> {
                 let mut config = Preset::Tiny.config();
                 config.loss = config.loss.with_every_term();
                 config.loss.affine = 0.0;
-                steps(config, on)
+                steps(with_pose_net(config), on)
             },
         ),
     ]
+}
+
+/// The views' gradient passes through PoseNet, too.
+fn with_pose_net(config: TrainConfig) -> TrainConfig {
+    TrainConfig {
+        view_motion: ViewMotion::Distance,
+        ..config
+    }
 }
 
 fn padded(padding: usize) -> ConvOptions {
@@ -412,6 +420,7 @@ fn snippets(on: &Inputs) -> SnippetBatch {
         distance_m: vec![Tensor::full([2], 0.8, &on.device)],
         distance_weight: vec![None],
         measured: vec![Motion::new(Tensor::zeros([2, 3], &on.device), ahead)],
+        turns_known: None,
         offsets: vec![1],
         names: vec![String::new(); 2],
         factors: None,

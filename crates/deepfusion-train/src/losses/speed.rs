@@ -19,7 +19,7 @@ pub fn distance_weight(distance_m: f64, sigma_m: Option<f64>) -> f64 {
 }
 
 /// The speed loss (Eq. 32–39): mean over pairs of w·|‖t̂‖ − d| + β_R·angle(R̂ᵀ·R), d and R from the
-/// vehicle's sensors, w as [`distance_weight`]. It fixes the metric scale.
+/// vehicle's sensors, w as [`distance_weight`] or 0 for a pair that does not count. It fixes the metric scale.
 ///
 /// # Shapes
 /// - `motion`: N predicted motions
@@ -43,20 +43,17 @@ pub fn speed(
     if rotation_weight == 0.0 {
         return translation;
     }
-    // ‖R̂ − R‖_F = 2√2·sin(angle/2): for the small angles between two frames the angle is
-    // ‖R̂ − R‖_F/√2 to third order, and the square root is kept away from zero.
-    let [n, _, _] = rotation.dims();
-    let angle = motion
-        .rotation
-        .clone()
-        .sub(rotation.clone())
-        .powi_scalar(2)
-        .reshape([n, 9])
-        .sum_dim(1)
-        .mul_scalar(0.5)
-        .add_scalar(1e-12)
-        .sqrt();
+    let angle = angle(&motion.rotation, rotation);
     translation + angle.mean().mul_scalar(rotation_weight)
+}
+
+/// The angles between rotations, N. ‖R̂ − R‖_F = 2√2·sin(angle/2): for the small angles between two frames the angle is
+/// ‖R̂ − R‖_F/√2 to third order, and the square root is kept away from zero.
+fn angle(predicted: &Tensor<3>, measured: &Tensor<3>) -> Tensor<1> {
+    let [n, _, _] = measured.dims();
+    let squares = predicted.clone().sub(measured.clone()).powi_scalar(2);
+    let sum = squares.reshape([n, 9]).sum_dim(1).reshape([n]);
+    sum.mul_scalar(0.5).add_scalar(1e-12).sqrt()
 }
 
 /// Weight of a radian in [`motion`], in metres: the distance that it moves a point ten metres away.
@@ -67,10 +64,10 @@ const METRES_PER_RADIAN: f64 = 10.0;
 ///
 /// # Shapes
 /// - `predicted`, `measured`: N motions in the same direction
+/// - `weight`: `[N]`, 1 for the pairs that count and 0 for the others, which stay in the mean; `None`: all count
 /// - output: one value, in metres
 #[must_use]
-pub fn motion(predicted: &Motion, measured: &Motion) -> Tensor<1> {
-    let [n, _] = measured.translation.dims();
+pub fn motion(predicted: &Motion, measured: &Motion, weight: Option<Tensor<1>>) -> Tensor<1> {
     // Its length is then the distance between the two translations.
     let apart = Motion {
         rotation: predicted.rotation.clone(),
@@ -79,8 +76,12 @@ pub fn motion(predicted: &Motion, measured: &Motion) -> Tensor<1> {
             .clone()
             .sub(measured.translation.clone()),
     };
-    let nothing = Tensor::zeros([n], &measured.translation.device());
-    speed(&apart, nothing, None, &measured.rotation, METRES_PER_RADIAN)
+    let angle = angle(&predicted.rotation, &measured.rotation);
+    let off = apart.distance() + angle.mul_scalar(METRES_PER_RADIAN);
+    match weight {
+        Some(weight) => off.mul(weight).mean(),
+        None => off.mean(),
+    }
 }
 
 /// λ_v at a step (counted from 0): it rises linearly over one epoch or `warmup_steps`, whichever is
@@ -147,10 +148,15 @@ mod tests {
         };
         let measured = of([0.0, 0.01, 0.0], [0.0, 0.0, -1.0]);
         let predicted = of([0.0, 0.03, 0.0], [0.3, 0.0, -1.4]);
-        let loss = motion(&predicted, &measured).into_scalar::<f32>();
+        let loss = motion(&predicted, &measured, None).into_scalar::<f32>();
         assert!((loss - 0.7).abs() < 1e-4, "{loss}");
         // The norm's ε is 1e-4 m.
-        assert!(motion(&measured, &measured).into_scalar::<f32>() < 2e-4);
+        assert!(motion(&measured, &measured, None).into_scalar::<f32>() < 2e-4);
+        let two = |a: &Motion, b: &Motion| Motion::cat(vec![a.clone(), b.clone()]);
+        let pairs = (two(&predicted, &predicted), two(&measured, &measured));
+        let first = Tensor::<1>::from_data([1.0, 0.0], &device);
+        let half = motion(&pairs.0, &pairs.1, Some(first)).into_scalar::<f32>();
+        assert!((half - 0.35).abs() < 1e-4, "{half}");
     }
 
     #[test]
@@ -213,7 +219,13 @@ mod tests {
             speed(motion, distance(), Some(weight), &measured.rotation, 0.3)
         });
         // Neither the same translation nor the same rotation.
-        check_gradient("motion", point, &|predicted| motion(predicted, &measured));
+        check_gradient("motion", point, &|predicted| {
+            motion(predicted, &measured, None)
+        });
+        check_gradient("weighted motion", point, &|predicted| {
+            let weight = Tensor::<1>::from_data([0.4], &device);
+            motion(predicted, &measured, Some(weight))
+        });
         // As the views see it: a weighted sum, so that every component has a gradient of its own.
         let weights = Tensor::<2>::from_data([[0.9, -1.3, 0.4]], &device);
         check_gradient("with_distance", point, &|motion| {
