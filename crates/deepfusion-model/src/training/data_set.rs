@@ -62,6 +62,12 @@ pub struct SimulatedConfig {
     pub views_per_world: usize,
     /// Share of the worlds that are as `simulate` draws them: not varied, in clear weather, by a camera without noise.
     pub plain: f64,
+    /// Whether a camera's image formation (exposure, noise, blur, JPEG and so on) is applied.
+    pub formation: bool,
+    /// What is left out of the varied views, so that a table can show what it is worth: `camera-height`, `camera-tilt`, `lenses`,
+    /// `squeeze`, `weather`, `variety`, `traffic`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
 }
 
 impl Default for SimulatedConfig {
@@ -72,6 +78,8 @@ impl Default for SimulatedConfig {
             validation_views: 64,
             views_per_world: 24,
             plain: 0.0,
+            formation: true,
+            without: Vec::new(),
         }
     }
 }

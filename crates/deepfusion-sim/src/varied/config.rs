@@ -1,5 +1,6 @@
 //! Settings of an endless stream of views.
 
+use super::ingredient::Ingredient;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,9 @@ pub struct EndlessConfig {
     /// Share of the worlds, and of the views, that are as in [`crate::Simulation`]: varied only in the camera, in
     /// plain weather, without image formation.
     pub plain: f64,
+    /// What is left out of the varied views.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<Ingredient>,
 }
 
 impl Default for EndlessConfig {
@@ -41,6 +45,7 @@ impl Default for EndlessConfig {
             daylight: 0.8,
             formation: true,
             plain: 0.0,
+            without: Vec::new(),
         }
     }
 }

@@ -9,6 +9,7 @@ mod camera;
 mod config;
 mod draw;
 mod formation;
+mod ingredient;
 mod schedule;
 mod weather;
 mod wet;
@@ -23,6 +24,8 @@ use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use draw::generator;
 use formation::{Brightness, Formation};
 use image::RgbImage;
+pub use ingredient::Ingredient;
+use ingredient::Without;
 use rand::Rng;
 use schedule::Schedule;
 pub use weather::Weather;
@@ -97,6 +100,7 @@ impl Endless {
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;
+        let without = Without(&config.without);
         let world_number = self.schedule.view_at(index).world;
         let place = self
             .worlds
@@ -110,9 +114,11 @@ impl Endless {
         let mut moving = traffic.solids(world, 0.0);
         let mut cars = traffic.objects(world, 0.0);
         let indoors = !world.rooms.is_empty();
-        let intrinsics = camera::intrinsics(&mut rng, size, indoors);
-        let viewpoint = camera::viewpoint(&mut rng, &place, (&moving, anchor), &intrinsics);
-        if viewpoint.alone {
+        let lens = without.lens(camera::lens(&mut rng, size, indoors));
+        let intrinsics = lens.intrinsics(size);
+        let near = (moving.as_slice(), anchor);
+        let viewpoint = camera::viewpoint(&mut rng, &place, near, &intrinsics, without);
+        if viewpoint.alone || !without.moves() {
             moving.clear();
             cars.clear();
         }
@@ -121,7 +127,7 @@ impl Endless {
         let (weather, air) = if place.plain {
             (weather::plain(world), Air::of(world))
         } else {
-            weather::draw(&mut rng, world)
+            without.weather(weather::draw(&mut rng, world), world)
         };
         let input = RenderInput {
             world,
