@@ -391,3 +391,35 @@ fn an_ingredient_is_left_out_alone() {
     let still = |view: &View| !view.moving.contains(&true);
     assert_eq!(share(&pairs, |a, b| still(a) && a.depth != b.depth), 0.0);
 }
+
+/// Hills are where they are asked for, and leave the other views alone.
+#[test]
+fn a_share_of_the_views_in_the_open_has_hills() {
+    let stream = |hills| {
+        endless(EndlessConfig {
+            width: 64,
+            height: 48,
+            worlds_at_once: 8,
+            plain: 0.2,
+            hills,
+            ..small()
+        })
+    };
+    let (flat, some, all) = (stream(0.0), stream(0.4), stream(1.0));
+    let (mut open, mut hilly) = (0, 0);
+    for index in 0..96 {
+        let (a, b, c) = (flat.view(index), some.view(index), all.view(index));
+        assert!(!a.hills);
+        assert_same(if b.hills { &c } else { &a }, &b);
+        if b.hills {
+            assert_ne!(a.depth, b.depth);
+            assert_eq!(a.world_from_cam, b.world_from_cam);
+        }
+        assert!(!c.hills || !matches!(c.scene, Scene::Garage | Scene::Indoor));
+        open += usize::from(c.hills);
+        hilly += usize::from(b.hills);
+    }
+    println!("{hilly} of {open} views in the open have hills");
+    assert!(open > 40, "{open}");
+    assert!((0.25..0.55).contains(&(f64::from(hilly as u32) / f64::from(open as u32))));
+}

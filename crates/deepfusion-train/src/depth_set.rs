@@ -282,6 +282,7 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
                 height: config.size.height as u32,
                 views_per_world: simulated.views_per_world,
                 plain: simulated.plain,
+                hills: simulated.hills,
                 formation: simulated.formation,
                 without: without.clone(),
                 ..EndlessConfig::default()

@@ -81,6 +81,11 @@ impl BuiltWorld {
         }
     }
 
+    /// Whether its views may have hills: in the open, where the world is varied.
+    pub(super) fn has_hills(&self) -> bool {
+        !self.plain && !matches!(self.world.scene, Scene::Garage | Scene::Indoor)
+    }
+
     /// The traffic around a place on the street, metres along it. `nearest`: how far ahead of it the lane is free.
     pub(super) fn traffic(&self, rng: &mut ChaCha8Rng, s: f64, nearest: f64) -> Traffic {
         let speed = 9.0 * self.world.scene.pace();

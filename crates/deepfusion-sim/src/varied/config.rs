@@ -28,6 +28,8 @@ pub struct EndlessConfig {
     /// Share of the worlds, and of the views, that are as in [`crate::Simulation`]: varied only in the camera, in
     /// plain weather, without image formation.
     pub plain: f64,
+    /// Share of the varied views in the open whose road rises and falls ahead of the camera.
+    pub hills: f64,
     /// What is left out of the varied views.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<Ingredient>,
@@ -45,6 +47,7 @@ impl Default for EndlessConfig {
             daylight: 0.8,
             formation: true,
             plain: 0.0,
+            hills: 0.0,
             without: Vec::new(),
         }
     }
@@ -96,6 +99,7 @@ impl EndlessConfig {
             ("grey", self.grey),
             ("daylight", self.daylight),
             ("plain", self.plain),
+            ("hills", self.hills),
         ] {
             check(
                 (0.0..=1.0).contains(&share),
@@ -158,6 +162,13 @@ mod tests {
                     ..base()
                 },
                 "plain",
+            ),
+            (
+                EndlessConfig {
+                    hills: 2.0,
+                    ..base()
+                },
+                "hills",
             ),
         ];
         for (config, name) in bad {

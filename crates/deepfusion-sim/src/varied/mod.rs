@@ -9,6 +9,7 @@ mod camera;
 mod config;
 mod draw;
 mod formation;
+mod hills;
 mod ingredient;
 mod schedule;
 mod weather;
@@ -56,6 +57,9 @@ pub struct View {
     pub height_m: f64,
     /// Whether the camera is grey.
     pub grey: bool,
+    /// Whether the road rises or falls ahead of the camera. The ground below the camera is level, and the only one at the
+    /// world's z = 0.
+    pub hills: bool,
 }
 
 /// An endless stream of views.
@@ -129,6 +133,7 @@ impl Endless {
         } else {
             without.weather(weather::draw(&mut rng, world), world)
         };
+        let folds = hills::of_view(config, index, &place, &viewpoint.world_from_cam);
         let input = RenderInput {
             world,
             light: &place.light,
@@ -136,6 +141,7 @@ impl Endless {
             cars: &cars,
             world_from_cam: &viewpoint.world_from_cam,
             intrinsics: &intrinsics,
+            folds: &folds,
         };
         let standing = world.primitives.iter().chain(&world.far);
         let solids = standing.chain(&moving).copied().collect();
@@ -166,6 +172,7 @@ impl Endless {
             weather,
             height_m: viewpoint.height,
             grey: formed && formation.is_grey(),
+            hills: !folds.creases.is_empty(),
         }
     }
 }
