@@ -14,6 +14,9 @@ pub(crate) const FACE_ROUND: u8 = 6;
 /// The shells of a crown are this face and those after it; no hull has so many.
 pub(crate) const FACE_LEAVES: u8 = 100;
 
+/// No solid is thicker, metres.
+const THICKEST: f32 = 1000.0;
+
 /// A convex solid bounded by planes n·p ≤ d in its own axes.
 #[derive(Debug, Clone)]
 pub(crate) struct Hull {
@@ -331,6 +334,63 @@ fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -
     found(ball(half).min(ball(-half)))
 }
 
+/// As [`enter`], of a ray that begins at t = `from`. Where that is within the solid, it is cut there, and the cut shows the
+/// face that the ray would have entered by.
+#[inline]
+pub(crate) fn enter_beyond(
+    shape: &Shape,
+    hulls: &[Hull],
+    (o, d): (&V3, &V3),
+    (from, limit): (f32, f32),
+) -> Option<Entry> {
+    let begin = o + d * from;
+    let (near, back) = if contains(shape, hulls, &begin) {
+        // Far enough behind to be outside.
+        let back = THICKEST / d.norm();
+        (begin - d * back, back)
+    } else {
+        (begin, 0.0)
+    };
+    let entry = enter(shape, hulls, &near, d, limit - from + back)?;
+    Some(Entry {
+        t: from + (entry.t - back).max(0.0),
+        face: entry.face,
+    })
+}
+
+/// Whether a point (the solid's axes) is within a solid; never of a crown, which is mostly air.
+#[inline]
+fn contains(shape: &Shape, hulls: &[Hull], p: &V3) -> bool {
+    match *shape {
+        Shape::Box {
+            half_x,
+            half_y,
+            height,
+        } => p.x.abs() < half_x && p.y.abs() < half_y && p.z > 0.0 && p.z < height,
+        Shape::Cylinder { radius, height } => {
+            p.z > 0.0 && p.z < height && p.x * p.x + p.y * p.y < radius * radius
+        }
+        Shape::Wheel { radius, half_width } => {
+            p.y.abs() < half_width && p.x * p.x + p.z * p.z < radius * radius
+        }
+        Shape::Ellipsoid { radii: [a, b, c] } => {
+            V3::new(p.x / a, p.y / b, p.z / c).norm_squared() < 1.0
+        }
+        Shape::Hull(index) => {
+            let planes = &hulls[index as usize].planes;
+            planes
+                .iter()
+                .all(|(normal, distance)| normal.dot(p) < *distance)
+        }
+        Shape::Capsule { half_axis, radius } => {
+            let half = V3::from(half_axis);
+            let along = (half.dot(p) / half.norm_squared()).clamp(-1.0, 1.0);
+            (p - half * along).norm_squared() < radius * radius
+        }
+        Shape::Crown(_) => false,
+    }
+}
+
 /// Outward normal of the surface at a point (the solid's axes).
 #[inline]
 pub(crate) fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
@@ -446,6 +506,15 @@ mod tests {
                 prop_assert!(outside(&shape, &hulls, &p).abs() < 1e-3);
                 prop_assert!(normal_at(&shape, &hulls, &p, e.face).dot(&d) < 1e-3);
                 prop_assert!(enter(&shape, &hulls, &o, &d, e.t * 0.999).is_none());
+                // Begun before the entry it is the same; begun just within the solid it is cut there, with the same face.
+                let beyond = |from: f32| enter_beyond(&shape, &hulls, (&o, &d), (from, 2.0));
+                let before = beyond(0.5 * e.t);
+                prop_assert!(before.is_some_and(|b| (b.t - e.t).abs() < 1e-3 && b.face == e.face));
+                let from = e.t + 2e-3;
+                if contains(&shape, &hulls, &(o + d * from)) {
+                    let cut = beyond(from);
+                    prop_assert!(cut.is_some_and(|c| (c.t - from).abs() < 1e-4 && c.face == e.face));
+                }
             }
         }
     }

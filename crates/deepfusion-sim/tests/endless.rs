@@ -7,7 +7,8 @@
     reason = "a test's panic is its message"
 )]
 
-use deepfusion_sim::{Endless, EndlessConfig, Scene, View, Weather};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_sim::{Endless, EndlessConfig, Ingredient, Scene, View, Weather};
 use nalgebra::Vector3;
 use std::collections::HashSet;
 
@@ -306,4 +307,119 @@ fn a_bad_setting_is_named() {
     .err();
     let error = error.expect("three rows are too few").to_string();
     assert!(error.contains("`height`") && error.contains('3'), "{error}");
+}
+
+/// The first views of a stream, without some ingredients.
+fn views_without(ingredients: &[Ingredient]) -> Vec<View> {
+    let stream = endless(EndlessConfig {
+        formation: false,
+        worlds_at_once: 12,
+        without: ingredients.to_vec(),
+        ..small()
+    });
+    (0..24).map(|i| stream.view(i)).collect()
+}
+
+/// Share of pairs that `same` holds for.
+fn share(pairs: &[(&View, View)], same: impl Fn(&View, &View) -> bool) -> f64 {
+    let count = pairs.iter().filter(|(a, b)| same(a, b)).count();
+    count as f64 / pairs.len() as f64
+}
+
+/// Each ingredient that is left out leaves the others as they were.
+#[test]
+fn an_ingredient_is_left_out_alone() {
+    let heading = |view: &View| {
+        let ahead = view.world_from_cam.rotate(&Vector3::z());
+        ahead.y.atan2(ahead.x)
+    };
+    let place = |view: &View| view.world_from_cam.translation().xy();
+    let pitch = |view: &View| view.world_from_cam.rotate(&Vector3::z()).z;
+    let lens = |view: &View| view.intrinsics;
+    let with = views_without(&[]);
+    let without = |one: Ingredient| -> Vec<(&View, View)> {
+        with.iter().zip(views_without(&[one])).collect()
+    };
+    // Where a place is free depends on height, tilt and lens: some cameras go elsewhere.
+    let mostly = 0.7;
+
+    let pairs = without(Ingredient::CameraHeight);
+    assert!(pairs.iter().all(|(_, b)| b.height_m == 1.65));
+    assert!(share(&pairs, |a, b| place(a) == place(b)) > mostly);
+    assert_eq!(share(&pairs, |a, b| lens(a) == lens(b)), 1.0);
+
+    let pairs = without(Ingredient::CameraTilt);
+    assert!(pairs.iter().all(|(_, b)| pitch(b).abs() < 1e-12));
+    assert!(share(&pairs, |a, b| (heading(a) - heading(b)).abs() < 1e-9) > mostly);
+    assert_eq!(share(&pairs, |a, b| a.height_m == b.height_m), 1.0);
+
+    let pairs = without(Ingredient::Lenses);
+    let field = |k: Intrinsics| 2.0 * (80.0 / k.fx).atan().to_degrees();
+    assert!(
+        pairs
+            .iter()
+            .all(|(_, b)| (field(lens(b)) - 81.4).abs() < 0.1)
+    );
+    assert!(share(&pairs, |a, b| place(a) == place(b)) > mostly);
+    let squeezed = |view: &View| (lens(view).fy / lens(view).fx - 1.0).abs() > 0.031;
+    assert!(share(&pairs, |_, b| squeezed(b)) > 0.3);
+
+    let pairs = without(Ingredient::Squeeze);
+    assert!(!pairs.iter().any(|(_, b)| squeezed(b)));
+    assert_eq!(share(&pairs, |a, b| lens(a).fx == lens(b).fx), 1.0);
+
+    let pairs = without(Ingredient::Weather);
+    assert_eq!(share(&pairs, |a, b| a.depth == b.depth), 1.0);
+    assert_eq!(share(&pairs, |a, b| a.rgb == b.rgb), 0.0);
+    assert!(
+        !pairs
+            .iter()
+            .any(|(_, b)| matches!(b.weather, Weather::Fog | Weather::Overcast))
+    );
+
+    let pairs = without(Ingredient::Variety);
+    assert!(pairs.iter().all(|(_, b)| Scene::ALL.contains(&b.scene)));
+    // Other lanes have other traffic, and what is drawn after it is other, too.
+    assert!(share(&pairs, |a, b| lens(a).cy == lens(b).cy) > 0.5);
+    assert!(share(&pairs, |a, b| a.depth == b.depth) < 0.5);
+
+    let pairs = without(Ingredient::Traffic);
+    assert!(!pairs.iter().any(|(_, b)| b.moving.contains(&true)));
+    let pose = |view: &View| view.world_from_cam;
+    assert_eq!(share(&pairs, |a, b| pose(a) == pose(b)), 1.0);
+    // What nothing moves in is the same.
+    let still = |view: &View| !view.moving.contains(&true);
+    assert_eq!(share(&pairs, |a, b| still(a) && a.depth != b.depth), 0.0);
+}
+
+/// Hills are where they are asked for, and leave the other views alone.
+#[test]
+fn a_share_of_the_views_in_the_open_has_hills() {
+    let stream = |hills| {
+        endless(EndlessConfig {
+            width: 64,
+            height: 48,
+            worlds_at_once: 8,
+            plain: 0.2,
+            hills,
+            ..small()
+        })
+    };
+    let (flat, some, all) = (stream(0.0), stream(0.4), stream(1.0));
+    let (mut open, mut hilly) = (0, 0);
+    for index in 0..96 {
+        let (a, b, c) = (flat.view(index), some.view(index), all.view(index));
+        assert!(!a.hills);
+        assert_same(if b.hills { &c } else { &a }, &b);
+        if b.hills {
+            assert_ne!(a.depth, b.depth);
+            assert_eq!(a.world_from_cam, b.world_from_cam);
+        }
+        assert!(!c.hills || !matches!(c.scene, Scene::Garage | Scene::Indoor));
+        open += usize::from(c.hills);
+        hilly += usize::from(b.hills);
+    }
+    println!("{hilly} of {open} views in the open have hills");
+    assert!(open > 40, "{open}");
+    assert!((0.25..0.55).contains(&(f64::from(hilly as u32) / f64::from(open as u32))));
 }

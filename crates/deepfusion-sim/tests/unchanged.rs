@@ -1,4 +1,5 @@
-//! Drives of a configuration are what they were in every version: pictures, depths and boxes, byte for byte.
+//! Drives of a configuration are what they were in every version: pictures, depths and boxes, byte for byte. So are
+//! the endless mode's views where nothing newer is asked for.
 
 #![allow(
     clippy::unwrap_used,
@@ -6,7 +7,7 @@
     reason = "a test's panic is its message"
 )]
 
-use deepfusion_sim::{Scene, Sensors, SimConfig, Simulation};
+use deepfusion_sim::{Endless, EndlessConfig, Scene, Sensors, SimConfig, Simulation};
 
 /// FNV-1a, 64 bits.
 fn fold(hash: u64, bytes: impl IntoIterator<Item = u8>) -> u64 {
@@ -56,4 +57,26 @@ fn the_five_scenes_are_what_they_always_were() {
         let found = digest(&config);
         assert_eq!(found, expected, "{} {seed}: {found:#018x}", scene.name());
     }
+}
+
+/// The figure was computed before views could have hills, and before an ingredient could be left out.
+#[test]
+fn views_are_what_they_were_before_there_were_hills() {
+    let stream = Endless::new(EndlessConfig {
+        width: 160,
+        height: 96,
+        views_per_world: 2,
+        plain: 0.2,
+        ..EndlessConfig::default()
+    })
+    .expect("a valid configuration");
+    let mut hash = 0xcbf2_9ce4_8422_2325;
+    for index in 0..64 {
+        let view = stream.view(index);
+        hash = fold(hash, view.rgb.as_raw().iter().copied());
+        hash = fold(hash, view.depth.data.iter().flat_map(|d| d.to_le_bytes()));
+        hash = fold(hash, view.moving.iter().map(|m| u8::from(*m)));
+        hash = fold(hash, view.intrinsics.fy.to_le_bytes());
+    }
+    assert_eq!(hash, 0xf620_d1b1_f587_d575, "{hash:#018x}");
 }

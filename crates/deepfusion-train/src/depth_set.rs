@@ -6,7 +6,7 @@ use crate::{Error, Sampler, TrainConfig};
 use deepfusion_data::{Dataset, GtKind, RgbImage};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::InputSize;
-use deepfusion_sim::{Endless, EndlessConfig};
+use deepfusion_sim::{Endless, EndlessConfig, Ingredient};
 use rand::Rng;
 use std::sync::Arc;
 
@@ -271,6 +271,10 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
         let Some(simulated) = &of.simulated else {
             continue;
         };
+        let names = simulated.without.iter();
+        let without = names
+            .map(|name| name.parse())
+            .collect::<Result<Vec<Ingredient>, deepfusion_sim::Error>>()?;
         let views = |seed, views| -> Result<SimulatedViews, Error> {
             let endless = Endless::new(EndlessConfig {
                 seed,
@@ -278,6 +282,9 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
                 height: config.size.height as u32,
                 views_per_world: simulated.views_per_world,
                 plain: simulated.plain,
+                hills: simulated.hills,
+                formation: simulated.formation,
+                without: without.clone(),
                 ..EndlessConfig::default()
             })?;
             Ok(SimulatedViews {

@@ -42,6 +42,7 @@ fn streets(steps: usize) -> TrainConfig {
             validation_views: 6,
             views_per_world: 8,
             plain: 0.25,
+            ..SimulatedConfig::default()
         }),
         ..DataSetConfig::default()
     }];

@@ -62,6 +62,14 @@ pub struct SimulatedConfig {
     pub views_per_world: usize,
     /// Share of the worlds that are as `simulate` draws them: not varied, in clear weather, by a camera without noise.
     pub plain: f64,
+    /// Share of the varied views in the open whose road rises and falls ahead of the camera.
+    pub hills: f64,
+    /// Whether a camera's image formation (exposure, noise, blur, JPEG and so on) is applied.
+    pub formation: bool,
+    /// What is left out of the varied views, so that a table can show what it is worth: `camera-height`, `camera-tilt`, `lenses`,
+    /// `squeeze`, `weather`, `variety`, `traffic`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
 }
 
 impl Default for SimulatedConfig {
@@ -72,6 +80,9 @@ impl Default for SimulatedConfig {
             validation_views: 64,
             views_per_world: 24,
             plain: 0.0,
+            hills: 0.0,
+            formation: true,
+            without: Vec::new(),
         }
     }
 }
@@ -249,9 +260,13 @@ impl TrainConfig {
                     let field = "data.sets.simulated.views_per_world";
                     return fail(field, "at least 1", "0".into());
                 }
-                if !(0.0..=1.0).contains(&simulated.plain) {
-                    let found = simulated.plain.to_string();
-                    return fail("data.sets.simulated.plain", "0 to 1", found);
+                for (field, share) in [
+                    ("data.sets.simulated.plain", simulated.plain),
+                    ("data.sets.simulated.hills", simulated.hills),
+                ] {
+                    if !(0.0..=1.0).contains(&share) {
+                        return fail(field, "0 to 1", share.to_string());
+                    }
                 }
             }
             if set.paths.is_empty() && set.simulated.is_none() {
@@ -343,6 +358,32 @@ mod tests {
         assert_eq!(config.factors(0), (config.depth_net.range, 0.7));
         assert_eq!(config.clone().for_set(None).unwrap(), config);
         assert!(config.for_set(Some("road")).is_err());
+    }
+
+    #[test]
+    fn simulated_views_are_chosen_in_a_line() {
+        let text = r#"
+            [[sets]]
+            name = "streets"
+            learn = "depth"
+            simulated = { seed = 1, views = 4000, hills = 0.3, without = ["weather"] }
+        "#;
+        let mut config = Preset::Tiny.config();
+        config.data = toml::from_str(text).unwrap();
+        config.validate().unwrap();
+        let of = |config: &TrainConfig| config.data.sets[0].simulated.clone().unwrap();
+        assert_eq!((of(&config).hills, of(&config).formation), (0.3, true));
+        assert_eq!(of(&config).without, ["weather"]);
+        let kept = config.to_toml().unwrap();
+        assert_eq!(toml::from_str::<TrainConfig>(&kept).unwrap(), config);
+        config.data.sets[0].simulated = Some(SimulatedConfig::default());
+        assert!(!config.to_toml().unwrap().contains("without"));
+        config.data.sets[0].simulated = Some(SimulatedConfig {
+            hills: 1.5,
+            ..SimulatedConfig::default()
+        });
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains("`data.sets.simulated.hills`"), "{error}");
     }
 
     #[test]

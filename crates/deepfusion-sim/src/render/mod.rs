@@ -1,23 +1,26 @@
 //! The camera: rays through a frame's solids and the ground, shaded and antialiased.
 
 mod air;
+mod folds;
 mod shade;
 mod tiles;
 
 use crate::light::{Foot, GroundLight};
-use crate::primitive::{FACE_LEAVES, Primitive, Shape, V3, enter};
+use crate::primitive::{FACE_LEAVES, Primitive, Shape, V3, enter, enter_beyond};
 use crate::road::StreetPoint;
 use crate::scene::SceneObject;
 use crate::scene::World;
 use crate::texture::Rgb;
 pub(crate) use air::{Air, Fog, Glow};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use folds::Folded;
+pub(crate) use folds::{Crease, Folds};
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 pub(crate) use shade::Shader;
 use shade::encode_srgb;
-use tiles::{TILE, Tiles};
+use tiles::TILE;
 
 /// Solids farther along the street than this are not drawn, metres: ahead and behind.
 const AHEAD: f32 = 420.0;
@@ -61,6 +64,24 @@ pub(crate) struct Hit {
     pub t: f32,
     /// The surface it hit.
     pub surface: Surface,
+    /// The segment of a folded world that it is in; the solids are numbered in each.
+    pub segment: u8,
+}
+
+impl Hit {
+    /// No surface, in any direction.
+    pub(crate) const SKY: Self = Self {
+        t: f32::INFINITY,
+        surface: Surface::Sky,
+        segment: 0,
+    };
+
+    /// Whether it is of the same surface.
+    #[inline]
+    fn is_like(&self, other: &Self) -> bool {
+        self.surface.is_like(&other.surface)
+            && (self.segment == other.segment || !matches!(self.surface, Surface::Solid(..)))
+    }
 }
 
 /// A solid seen from one eye.
@@ -100,10 +121,14 @@ impl Eye<'_> {
     /// First solid among `candidates` (indices, nearest first) along `d`, or the ground, or the sky.
     #[inline]
     pub(crate) fn trace(&self, candidates: &[u32], d: &V3) -> Hit {
-        let mut hit = Hit {
-            t: f32::INFINITY,
-            surface: Surface::Sky,
-        };
+        self.trace_between(candidates, d, (0.0, f32::INFINITY))
+    }
+
+    /// As [`Eye::trace`], but only of what the ray meets between two values of t; in the first segment. A solid that
+    /// reaches out of them is cut.
+    #[inline]
+    pub(crate) fn trace_between(&self, candidates: &[u32], d: &V3, (from, to): (f32, f32)) -> Hit {
+        let mut hit = Hit { t: to, ..Hit::SKY };
         for index in candidates {
             let solid = &self.solids[*index as usize];
             if solid.nearest > hit.t {
@@ -111,18 +136,29 @@ impl Eye<'_> {
             }
             let local = solid.primitive.local_of(d);
             let shape: &Shape = &solid.primitive.shape;
-            if let Some(entry) = enter(shape, &self.world.hulls, &solid.eye, &local, hit.t) {
-                hit = Hit {
-                    t: entry.t,
-                    surface: Surface::Solid(*index, entry.face),
-                };
+            let hulls = &self.world.hulls;
+            let entry = if from > 0.0 {
+                enter_beyond(shape, hulls, (&solid.eye, &local), (from, hit.t))
+            } else {
+                enter(shape, hulls, &solid.eye, &local, hit.t)
+            };
+            if let Some(entry) = entry {
+                hit.t = entry.t;
+                hit.surface = Surface::Solid(*index, entry.face);
             }
         }
         if d.z < -1e-5 {
-            let (t, surface) = self.ground(d, hit.t);
+            let (t, surface) = self.ground(d, (from, hit.t));
             if t < hit.t {
-                return Hit { t, surface };
+                return Hit {
+                    t,
+                    surface,
+                    ..Hit::SKY
+                };
             }
+        }
+        if hit.surface == Surface::Sky {
+            return Hit::SKY;
         }
         hit
     }
@@ -136,12 +172,12 @@ impl Eye<'_> {
     }
 
     /// The ground is a road at height 0 and everything else at the kerb's height, with upright
-    /// kerbs between them.
+    /// kerbs between them. It is solid: a ray that begins in it, at t = `from`, ends there.
     #[inline]
-    fn ground(&self, d: &V3, limit: f32) -> (f32, Surface) {
+    fn ground(&self, d: &V3, (from, limit): (f32, f32)) -> (f32, Surface) {
         let road = &self.world.road;
         let height = self.position.z as f32;
-        let t_upper = (road.kerb - height) / d.z;
+        let t_upper = ((road.kerb - height) / d.z).max(from);
         if t_upper >= limit || t_upper <= 0.0 || t_upper > FARTHEST_GROUND {
             return (f32::INFINITY, Surface::Sky);
         }
@@ -149,7 +185,7 @@ impl Eye<'_> {
         if upper >= 0.0 {
             return (t_upper, Surface::Beside);
         }
-        let t_lower = -height / d.z;
+        let t_lower = (-height / d.z).max(from);
         let lower = road.kerb_distance(&self.street_point(d, t_lower));
         if lower < 0.0 {
             return (t_lower, Surface::Road);
@@ -189,6 +225,8 @@ pub(crate) struct Exposure {
     pub depth: DepthMap,
     /// Pixels of dynamic objects.
     pub moving: Vec<bool>,
+    /// World from the camera, in the axes of each segment that hits are in.
+    pub segments: Vec<Se3>,
 }
 
 /// The input of a rendering.
@@ -206,6 +244,8 @@ pub(crate) struct RenderInput<'a> {
     pub world_from_cam: &'a Se3,
     /// The camera.
     pub intrinsics: &'a Intrinsics,
+    /// The hills before the camera.
+    pub folds: &'a Folds,
 }
 
 /// Renders what a camera sees; `moving` are the solids of the moving `cars`.
@@ -225,6 +265,7 @@ pub(crate) fn render(
         cars,
         world_from_cam,
         intrinsics: k,
+        folds: &Folds::default(),
     };
     let solids = gather(world, moving, &world_from_cam.translation());
     let exposure = expose(&input, solids, Cores::All, Edges::EachRay);
@@ -290,51 +331,38 @@ pub(crate) fn expose(
     edges: Edges,
 ) -> Exposure {
     let (world, k) = (input.world, input.intrinsics);
-    let (tiles, solids) = Tiles::bin(world, solids, input.world_from_cam, k);
-    let eye = Eye {
-        world,
-        position: input.world_from_cam.translation(),
-        solids,
-    };
-    let camera = Camera::new(input.world_from_cam, k);
+    let folded = Folded::new(input, solids);
     let (width, height) = (k.width as usize, k.height as usize);
-    let mut hits = vec![
-        Hit {
-            t: 0.0,
-            surface: Surface::Sky
-        };
-        width * height
-    ];
+    let mut hits = vec![Hit::SKY; width * height];
     cores.split(&mut hits, width * TILE, |band, hits| {
         for (row, hits) in hits.chunks_mut(width).enumerate() {
             let v = band * TILE + row;
             for (u, hit) in hits.iter_mut().enumerate() {
-                let d = camera.ray(u as f32, v as f32);
-                *hit = eye.trace(tiles.at(u, v), &d);
+                *hit = folded.trace((u, v), (u as f32, v as f32));
             }
         }
     });
     let feet: Vec<Foot> = input.cars.iter().map(|car| Foot::of(world, car)).collect();
-    let shader = Shader {
-        eye: &eye,
-        light: input.light,
-        air: input.air,
-        pixel: camera.pixel,
-        samples: 3.0,
-        moving: &feet,
+    let shaders = |share: f32, samples: f32| -> Vec<Shader> {
+        let segments = folded.segments.iter();
+        let shader = segments.map(|segment| Shader {
+            eye: &segment.eye,
+            light: input.light,
+            air: input.air,
+            pixel: share * segment.camera.pixel,
+            samples,
+            moving: &feet,
+        });
+        shader.collect()
     };
     // Where four rays share a pixel, each stands for a part of it.
-    let part = Shader {
-        pixel: 0.6 * camera.pixel,
-        samples: 2.0,
-        ..shader
-    };
+    let (whole, part) = (shaders(1.0, 3.0), shaders(0.6, 2.0));
     let mut colours = vec![Rgb::zeros(); width * height];
     cores.split(&mut colours, width, |v, row| {
         for (u, colour) in row.iter_mut().enumerate() {
             let hit = &hits[v * width + u];
             *colour = if !on_edge(&hits, width, height, u, v) {
-                shader.colour(hit, &camera.ray(u as f32, v as f32))
+                colour_of(&whole, hit, &folded.ray(hit, (u as f32, v as f32)))
             } else {
                 // Four rays on a rotated grid; the depth stays that of the centre.
                 let rays = [
@@ -344,12 +372,13 @@ pub(crate) fn expose(
                     (-0.375, 0.125),
                 ]
                 .map(|(du, dv)| {
-                    let d = camera.ray(u as f32 + du, v as f32 + dv);
-                    (eye.trace(tiles.at(u, v), &d), d)
+                    let at = (u as f32 + du, v as f32 + dv);
+                    let hit = folded.trace((u, v), at);
+                    (hit, folded.ray(&hit, at))
                 });
                 match edges {
                     Edges::EachRay => {
-                        let sum: V3 = rays.iter().map(|(hit, d)| part.colour(hit, d)).sum();
+                        let sum: V3 = rays.iter().map(|(hit, d)| colour_of(&part, hit, d)).sum();
                         sum * 0.25
                     }
                     Edges::EachSurface => by_surface(&part, &rays),
@@ -361,7 +390,10 @@ pub(crate) fn expose(
         .iter()
         .map(|hit| if hit.t.is_finite() { hit.t } else { 0.0 });
     let is_moving = |hit: &Hit| match hit.surface {
-        Surface::Solid(index, _) => eye.solids[index as usize].primitive.moving,
+        Surface::Solid(index, _) => {
+            let solids = &folded.segments[usize::from(hit.segment)].eye.solids;
+            solids[index as usize].primitive.moving
+        }
         _ => false,
     };
     Exposure {
@@ -373,17 +405,24 @@ pub(crate) fn expose(
         moving: hits.iter().map(is_moving).collect(),
         light: colours,
         hits,
+        segments: folded.segments.iter().map(|s| s.world_from_cam).collect(),
     }
 }
 
+/// The colour of a hit, by the shader of its segment.
+#[inline]
+fn colour_of(shaders: &[Shader], hit: &Hit, d: &V3) -> Rgb {
+    shaders[usize::from(hit.segment)].colour(hit, d)
+}
+
 /// The mean of rays of one pixel, each surface shaded once, where the first ray meets it.
-fn by_surface(shader: &Shader, rays: &[(Hit, V3); 4]) -> Rgb {
+fn by_surface(shaders: &[Shader], rays: &[(Hit, V3); 4]) -> Rgb {
     let mut sum = Rgb::zeros();
     for (i, (hit, d)) in rays.iter().enumerate() {
-        let same = |other: &&(Hit, V3)| other.0.surface.is_like(&hit.surface);
+        let same = |other: &&(Hit, V3)| other.0.is_like(hit);
         if !rays[..i].iter().any(|other| same(&other)) {
             let share = 0.25 * rays[i..].iter().filter(same).count() as f32;
-            sum += shader.colour(hit, d) * share;
+            sum += colour_of(shaders, hit, d) * share;
         }
     }
     sum
@@ -394,7 +433,7 @@ fn by_surface(shader: &Shader, rays: &[(Hit, V3); 4]) -> Rgb {
 fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> bool {
     let here = hits[v * width + u];
     let differs = |other: &Hit| {
-        !other.surface.is_like(&here.surface)
+        !other.is_like(&here)
             // A solid can hide itself, as an ellipsoid does not but a hull's edge would.
             || (here.t.is_finite() && (other.t - here.t).abs() > 0.2 * here.t.min(other.t)
                 && matches!(here.surface, Surface::Solid(..)))

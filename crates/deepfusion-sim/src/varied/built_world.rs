@@ -2,6 +2,7 @@
 
 use super::EndlessConfig;
 use super::draw::{generator, weighted};
+use super::ingredient::Without;
 use crate::config::Scene;
 use crate::light::GroundLight;
 use crate::motion::Drive;
@@ -46,7 +47,9 @@ impl BuiltWorld {
         let plain_scene = Scene::ALL[rng.random_range(0..Scene::ALL.len())];
         let mut rng = generator(config.seed, number, 0x90D);
         let varied_scene = scene(&mut rng, config.daylight);
-        let scene = if plain { plain_scene } else { varied_scene };
+        let drawn_scene = if plain { plain_scene } else { varied_scene };
+        let without = Without(&config.without);
+        let scene = without.scene(drawn_scene);
         let seed: u64 = rng.random();
         let longest = 14.0 * (DURATION_S + 3.0);
         let mut road = match scene {
@@ -58,14 +61,15 @@ impl BuiltWorld {
         let length = drive.progress(DURATION_S).0;
         road.truncate(length + AHEAD);
         // Some worlds are the plain ones of `simulate`, where there is one of this kind.
-        let variety = if plain || (Scene::ALL.contains(&scene) && rng.random_bool(UNVARIED)) {
+        let unvaried = plain || (Scene::ALL.contains(&drawn_scene) && rng.random_bool(UNVARIED));
+        let variety = if unvaried {
             Variety::none()
         } else {
-            Variety::draw(&mut rng)
+            without.variety(Variety::draw(&mut rng))
         };
         let mut world = World::furnish_varied(road, seed, scene, &variety);
         if !plain {
-            world.sun = sun(&mut rng);
+            world.sun = without.sun(sun(&mut rng), world.sun);
         }
         let light = GroundLight::bake(&world, Cores::One);
         Self {
@@ -75,6 +79,11 @@ impl BuiltWorld {
             plain,
             length,
         }
+    }
+
+    /// Whether its views may have hills: in the open, where the world is varied.
+    pub(super) fn has_hills(&self) -> bool {
+        !self.plain && !matches!(self.world.scene, Scene::Garage | Scene::Indoor)
     }
 
     /// The traffic around a place on the street, metres along it. `nearest`: how far ahead of it the lane is free.

@@ -2,6 +2,7 @@
 
 use super::built_world::BuiltWorld;
 use super::draw::{normal, weighted};
+use super::ingredient::Without;
 use crate::config::Scene;
 use crate::motion::rotation;
 use crate::primitive::{Primitive, V3, enter};
@@ -37,6 +38,37 @@ pub(super) struct Viewpoint {
     pub alone: bool,
 }
 
+/// A lens, and what was done to its picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lens {
+    /// Horizontal field of view, radians.
+    pub field: f64,
+    /// How much larger fy is than fx, as a share of it, before the squeeze.
+    pub unequal: f64,
+    /// Multiplies fy.
+    pub squeeze: f64,
+    /// The principal point from the middle, as a share of the width.
+    pub column: f64,
+    /// The principal point from the middle, as a share of the height.
+    pub row: f64,
+}
+
+impl Lens {
+    /// In pixels of a picture (width, height).
+    pub(super) fn intrinsics(&self, (width, height): (u32, u32)) -> Intrinsics {
+        let (w, h) = (f64::from(width), f64::from(height));
+        let fx = 0.5 * w / (0.5 * self.field).tan();
+        Intrinsics {
+            fx,
+            fy: fx * self.squeeze * (1.0 + self.unequal),
+            cx: 0.5 * (w - 1.0) + w * self.column,
+            cy: 0.5 * (h - 1.0) + h * self.row,
+            width,
+            height,
+        }
+    }
+}
+
 /// Draws a lens, and the crop or squeeze of its picture to the requested size.
 ///
 /// Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), in rooms around 64°; the rest uniform
@@ -45,11 +77,7 @@ pub(super) struct Viewpoint {
 /// and within 3 % in the others. The principal point is off the middle by normal draws of 1.5 % of the width and 5 % of
 /// the height; in one of five of the pictures that were not squeezed by up to 20 % of the height, as where a picture
 /// was cut from a taller one.
-pub(super) fn intrinsics(
-    rng: &mut ChaCha8Rng,
-    (width, height): (u32, u32),
-    indoors: bool,
-) -> Intrinsics {
+pub(super) fn lens(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: bool) -> Lens {
     let field = match rng.random_range(0..20) {
         0..=13 => normal(rng, if indoors { 64.0 } else { 78.0 }, 8.0, 1.78),
         14..=16 => rng.random_range(35.0..60.0),
@@ -57,27 +85,28 @@ pub(super) fn intrinsics(
     }
     .to_radians()
     .clamp(FIELDS.0, FIELDS.1);
-    let (w, h) = (f64::from(width), f64::from(height));
-    let fx = 0.5 * w / (0.5 * field).tan();
     let unequal = if rng.random_bool(0.67) {
         normal(rng, 0.0, 0.004, 2.5)
     } else {
         rng.random_range(-0.03..0.03)
     };
     let squeezed = rng.random_bool(if indoors { 0.9 } else { 0.5 });
-    let squeeze = if squeezed { squeeze(rng, w / h) } else { 1.0 };
+    let squeeze = if squeezed {
+        squeeze(rng, f64::from(width) / f64::from(height))
+    } else {
+        1.0
+    };
     let row = if !squeezed && rng.random_bool(0.2) {
         rng.random_range(-0.2..0.2)
     } else {
         normal(rng, 0.0, 0.05, 3.0)
     };
-    Intrinsics {
-        fx,
-        fy: fx * squeeze * (1.0 + unequal),
-        cx: 0.5 * (w - 1.0) + w * normal(rng, 0.0, 0.015, 3.0),
-        cy: 0.5 * (h - 1.0) + h * row,
-        width,
-        height,
+    Lens {
+        field,
+        unequal,
+        squeeze,
+        column: normal(rng, 0.0, 0.015, 3.0),
+        row,
     }
 }
 
@@ -200,6 +229,7 @@ pub(super) fn viewpoint(
     place: &BuiltWorld,
     (moving, anchor): (&[Primitive], f64),
     k: &Intrinsics,
+    without: Without,
 ) -> Viewpoint {
     let height = height(rng);
     let (mut pitch, roll) = tilt(rng, height);
@@ -207,6 +237,8 @@ pub(super) fn viewpoint(
         // Held by hand, or by a robot that looks at its floor.
         pitch += normal(rng, 0.12, 0.2, 1.8);
     }
+    let height = without.height(height);
+    let (pitch, roll) = without.tilt((pitch, roll));
     for _ in 0..TRIES {
         let (spot, ahead) = spot(rng, place, anchor);
         let viewpoint = pose(place, spot, (height, pitch, roll));
@@ -318,7 +350,7 @@ mod tests {
         let mut rng = generator(1, 1, 1);
         let (mut usual, mut square, mut like_kitti) = (0, 0, 0);
         for _ in 0..5000 {
-            let k = intrinsics(&mut rng, (640, 192), false);
+            let k = lens(&mut rng, (640, 192), false).intrinsics((640, 192));
             assert_eq!(k.implausible(), None);
             let field = 2.0 * (320.0 / k.fx).atan();
             assert!(field > FIELDS.0 - 1e-9 && field < FIELDS.1 + 1e-9);
@@ -339,7 +371,7 @@ mod tests {
         assert!((2350..2650).contains(&square), "{square}");
         assert!(like_kitti > 190, "{like_kitti}");
         // Asked for a picture of 4:3, nothing is squeezed by more than a telephone's 5:4.
-        let tall = intrinsics(&mut rng, (320, 240), true);
+        let tall = lens(&mut rng, (320, 240), true).intrinsics((320, 240));
         assert!(tall.fy / tall.fx > 0.9, "{tall:?}");
     }
 

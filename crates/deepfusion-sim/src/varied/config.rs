@@ -1,5 +1,6 @@
 //! Settings of an endless stream of views.
 
+use super::ingredient::Ingredient;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,11 @@ pub struct EndlessConfig {
     /// Share of the worlds, and of the views, that are as in [`crate::Simulation`]: varied only in the camera, in
     /// plain weather, without image formation.
     pub plain: f64,
+    /// Share of the varied views in the open whose road rises and falls ahead of the camera.
+    pub hills: f64,
+    /// What is left out of the varied views.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<Ingredient>,
 }
 
 impl Default for EndlessConfig {
@@ -41,6 +47,8 @@ impl Default for EndlessConfig {
             daylight: 0.8,
             formation: true,
             plain: 0.0,
+            hills: 0.0,
+            without: Vec::new(),
         }
     }
 }
@@ -91,6 +99,7 @@ impl EndlessConfig {
             ("grey", self.grey),
             ("daylight", self.daylight),
             ("plain", self.plain),
+            ("hills", self.hills),
         ] {
             check(
                 (0.0..=1.0).contains(&share),
@@ -153,6 +162,13 @@ mod tests {
                     ..base()
                 },
                 "plain",
+            ),
+            (
+                EndlessConfig {
+                    hills: 2.0,
+                    ..base()
+                },
+                "hills",
             ),
         ];
         for (config, name) in bad {

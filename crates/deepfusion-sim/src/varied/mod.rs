@@ -9,6 +9,8 @@ mod camera;
 mod config;
 mod draw;
 mod formation;
+mod hills;
+mod ingredient;
 mod schedule;
 mod weather;
 mod wet;
@@ -23,6 +25,8 @@ use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use draw::generator;
 use formation::{Brightness, Formation};
 use image::RgbImage;
+pub use ingredient::Ingredient;
+use ingredient::Without;
 use rand::Rng;
 use schedule::Schedule;
 pub use weather::Weather;
@@ -53,6 +57,9 @@ pub struct View {
     pub height_m: f64,
     /// Whether the camera is grey.
     pub grey: bool,
+    /// Whether the road rises or falls ahead of the camera. The ground below the camera is level, and the only one at the
+    /// world's z = 0.
+    pub hills: bool,
 }
 
 /// An endless stream of views.
@@ -97,6 +104,7 @@ impl Endless {
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;
+        let without = Without(&config.without);
         let world_number = self.schedule.view_at(index).world;
         let place = self
             .worlds
@@ -110,9 +118,11 @@ impl Endless {
         let mut moving = traffic.solids(world, 0.0);
         let mut cars = traffic.objects(world, 0.0);
         let indoors = !world.rooms.is_empty();
-        let intrinsics = camera::intrinsics(&mut rng, size, indoors);
-        let viewpoint = camera::viewpoint(&mut rng, &place, (&moving, anchor), &intrinsics);
-        if viewpoint.alone {
+        let lens = without.lens(camera::lens(&mut rng, size, indoors));
+        let intrinsics = lens.intrinsics(size);
+        let near = (moving.as_slice(), anchor);
+        let viewpoint = camera::viewpoint(&mut rng, &place, near, &intrinsics, without);
+        if viewpoint.alone || !without.moves() {
             moving.clear();
             cars.clear();
         }
@@ -121,8 +131,9 @@ impl Endless {
         let (weather, air) = if place.plain {
             (weather::plain(world), Air::of(world))
         } else {
-            weather::draw(&mut rng, world)
+            without.weather(weather::draw(&mut rng, world), world)
         };
+        let folds = hills::of_view(config, index, &place, &viewpoint.world_from_cam);
         let input = RenderInput {
             world,
             light: &place.light,
@@ -130,6 +141,7 @@ impl Endless {
             cars: &cars,
             world_from_cam: &viewpoint.world_from_cam,
             intrinsics: &intrinsics,
+            folds: &folds,
         };
         let standing = world.primitives.iter().chain(&world.far);
         let solids = standing.chain(&moving).copied().collect();
@@ -160,6 +172,7 @@ impl Endless {
             weather,
             height_m: viewpoint.height,
             grey: formed && formation.is_grey(),
+            hills: !folds.creases.is_empty(),
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::primitive::V3;
 use crate::render::{Camera, Exposure, RenderInput, Surface};
 use crate::texture::Rgb;
 use crate::texture::noise::smoothstep;
+use deepfusion_geometry::Se3;
 
 /// Reflectance of water at a right angle.
 const STRAIGHT: f32 = 0.02;
@@ -20,13 +21,16 @@ pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
     }
     let k = input.intrinsics;
     let (width, height) = (k.width as usize, k.height as usize);
-    let camera = Camera::new(input.world_from_cam, k);
-    let cam_from_world = input
-        .world_from_cam
-        .rotation()
-        .transpose()
-        .map(|x| x as f32);
-    let eye = input.world_from_cam.translation();
+    let rotation = |pose: &Se3| pose.rotation().map(|x| x as f32);
+    let world_from_cam = rotation(input.world_from_cam);
+    let views: Vec<_> = exposure
+        .segments
+        .iter()
+        .map(|pose| {
+            let camera = Camera::new(pose, k);
+            (camera, rotation(pose).transpose(), pose.translation())
+        })
+        .collect();
     let source = exposure.light.clone();
     for v in 0..height {
         for u in 0..width {
@@ -35,6 +39,7 @@ pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
             if !matches!(hit.surface, Surface::Road | Surface::Beside) {
                 continue;
             }
+            let (camera, cam_from_world, eye) = &views[usize::from(hit.segment)];
             let d = camera.ray(u as f32, v as f32);
             let place = (eye.x as f32 + d.x * hit.t, eye.y as f32 + d.y * hit.t);
             // Puddles and films: where water stands, in the ground's own coordinates.
@@ -48,14 +53,17 @@ pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
             let steep = (-d.z / length).clamp(0.0, 1.0);
             let mirror = STRAIGHT + (GRAZING - STRAIGHT) * (1.0 - steep).powi(5);
             let up = V3::new(d.x, d.y, -d.z);
-            let seen = mirrored(
-                &source,
-                &exposure.hits,
-                (width, height),
-                &(cam_from_world * up),
-                k,
-            )
-            .unwrap_or_else(|| input.air.radiance(&input.world.noise, &up));
+            let in_cam = cam_from_world * up;
+            let seen = mirrored(&source, &exposure.hits, (width, height), &in_cam, k)
+                .unwrap_or_else(|| {
+                    // The sky does not lean with a hill.
+                    let up = if hit.segment == 0 {
+                        up
+                    } else {
+                        world_from_cam * in_cam
+                    };
+                    input.air.radiance(&input.world.noise, &up)
+                });
             let kept = input
                 .air
                 .fog

@@ -127,6 +127,7 @@ fn simulated(config: &TrainConfig) -> DataSetConfig {
             validation_views: 16,
             views_per_world: 12,
             plain: PLAIN,
+            ..SimulatedConfig::default()
         }),
         metres_per_unit: 1.0,
         ..DataSetConfig::default()

@@ -1,0 +1,211 @@
+//! Hills: the flat world, folded at creases across the view.
+//!
+//! A crease is a level line on the ground. All that is beyond it, up to the next one, turns about it by a small angle;
+//! the two sides meet in the plane through the crease that bisects them. Between two creases the world is the flat one
+//! after a rigid motion. So a ray is followed from segment to segment, and within each it is traced in the flat world,
+//! from where the camera is in that segment's axes. A rigid motion keeps the ray's parameter, which is the depth: it stays
+//! exact.
+
+use super::tiles::Tiles;
+use super::{Camera, Eye, Hit, RenderInput, Surface};
+use crate::primitive::{Primitive, V3};
+use crate::scene::World;
+use deepfusion_geometry::Se3;
+use nalgebra::Vector3;
+
+/// A line on the ground that the world beyond is turned about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Crease {
+    /// How far it is from the camera's foot, along the ground, metres; positive.
+    pub distance: f64,
+    /// Radians; where positive, the ground beyond rises more than before it.
+    pub angle: f64,
+}
+
+/// The ground ahead of a camera, which itself stands on level ground.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Folds {
+    /// The direction at a right angle to all creases, against the world's x axis, radians.
+    pub heading: f64,
+    /// Nearest first; none where all is flat.
+    pub creases: Vec<Crease>,
+}
+
+/// Where a segment is in the folded world.
+struct Fold {
+    /// Its axes are those of the flat world.
+    folded_from_flat: Se3,
+    /// A point of the plane where it begins, folded.
+    point: Vector3<f64>,
+    /// That plane's normal, which points into it.
+    normal: Vector3<f64>,
+}
+
+impl Folds {
+    /// The segments before a camera, the one that it stands in first.
+    fn segments(&self, foot: &Vector3<f64>) -> Vec<Fold> {
+        let ahead = Vector3::new(self.heading.cos(), self.heading.sin(), 0.0);
+        let right = Vector3::new(ahead.y, -ahead.x, 0.0);
+        let foot = Vector3::new(foot.x, foot.y, 0.0);
+        let mut folded_from_flat = Se3::identity();
+        let mut all = vec![Fold {
+            folded_from_flat,
+            point: foot,
+            normal: ahead,
+        }];
+        for Crease { distance, angle } in &self.creases {
+            let crease = foot + ahead * *distance;
+            let half = 0.5 * angle;
+            let normal = ahead * half.cos() + Vector3::z() * half.sin();
+            let (point, normal) = (
+                folded_from_flat.transform(&crease),
+                folded_from_flat.rotate(&normal),
+            );
+            let turn = Se3::from_axis_angle(right * *angle, Vector3::zeros());
+            let shift = Se3::from_axis_angle(Vector3::zeros(), crease - turn.rotate(&crease));
+            folded_from_flat = folded_from_flat * shift * turn;
+            all.push(Fold {
+                folded_from_flat,
+                point,
+                normal,
+            });
+        }
+        all
+    }
+
+    /// Whether any part of a solid may be in a segment.
+    fn reaches(
+        &self,
+        segment: usize,
+        world: &World,
+        solid: &Primitive,
+        foot: &Vector3<f64>,
+    ) -> bool {
+        let (half_x, half_y, low, high) = solid.bounds(&world.hulls);
+        let z = solid.position[2];
+        let highest = (z + f64::from(low)).abs().max((z + f64::from(high)).abs());
+        let (x, y) = (solid.position[0] - foot.x, solid.position[1] - foot.y);
+        let along = x * self.heading.cos() + y * self.heading.sin();
+        // The planes between the segments lean by half the angle of their crease.
+        let reach = |crease: &Crease| {
+            f64::from(half_x.hypot(half_y)) + highest * (0.5 * crease.angle).tan().abs() + 0.01
+        };
+        let begin = segment.checked_sub(1).map(|before| &self.creases[before]);
+        let end = self.creases.get(segment);
+        begin.is_none_or(|crease| along + reach(crease) > crease.distance)
+            && end.is_none_or(|crease| along - reach(crease) < crease.distance)
+    }
+}
+
+/// A part of the world between two creases.
+pub(super) struct Segment<'a> {
+    /// The camera in the segment's axes: its pose.
+    pub world_from_cam: Se3,
+    /// Its rays.
+    pub camera: Camera,
+    /// What it sees in the flat world.
+    pub eye: Eye<'a>,
+    tiles: Tiles,
+    /// The plane where the segment begins: its normal in the first segment's axes, and how far ahead of the camera it is
+    /// along that, metres.
+    begin: (V3, f32),
+}
+
+/// The world as a camera sees it.
+pub(super) struct Folded<'a> {
+    /// The nearest first; the camera is in it.
+    pub segments: Vec<Segment<'a>>,
+}
+
+impl<'a> Segment<'a> {
+    fn new(
+        input: &RenderInput<'a>,
+        solids: Vec<Primitive>,
+        world_from_cam: Se3,
+        begin: (V3, f32),
+    ) -> Self {
+        let (world, k) = (input.world, input.intrinsics);
+        let (tiles, solids) = Tiles::bin(world, solids, &world_from_cam, k);
+        Self {
+            camera: Camera::new(&world_from_cam, k),
+            eye: Eye {
+                world,
+                position: world_from_cam.translation(),
+                solids,
+            },
+            tiles,
+            begin,
+            world_from_cam,
+        }
+    }
+}
+
+impl<'a> Folded<'a> {
+    /// The segments of a world with these solids.
+    pub(super) fn new(input: &RenderInput<'a>, solids: Vec<Primitive>) -> Self {
+        let (folds, pose) = (input.folds, *input.world_from_cam);
+        if folds.creases.is_empty() {
+            let all = Segment::new(input, solids, pose, (V3::zeros(), 0.0));
+            return Self {
+                segments: vec![all],
+            };
+        }
+        let eye = pose.translation();
+        let segment = |(number, fold): (usize, Fold)| {
+            let within = |solid: &&Primitive| folds.reaches(number, input.world, solid, &eye);
+            let own = solids.iter().filter(within).copied().collect();
+            let ahead = fold.normal.dot(&(fold.point - eye));
+            let begin = (fold.normal.map(|x| x as f32), ahead as f32);
+            Segment::new(input, own, fold.folded_from_flat.inverse() * pose, begin)
+        };
+        Self {
+            segments: folds
+                .segments(&eye)
+                .into_iter()
+                .enumerate()
+                .map(segment)
+                .collect(),
+        }
+    }
+
+    /// The end of the ray through (`x`, `y`), which is within the pixel (`u`, `v`).
+    #[inline]
+    pub(super) fn trace(&self, (u, v): (usize, usize), (x, y): (f32, f32)) -> Hit {
+        let first = &self.segments[0];
+        let d = first.camera.ray(x, y);
+        if self.segments.len() == 1 {
+            return first.eye.trace(first.tiles.at(u, v), &d);
+        }
+        let mut from = 0.0;
+        for (number, segment) in self.segments.iter().enumerate() {
+            let to = self.segments.get(number + 1).map_or(f32::INFINITY, |next| {
+                let rate = next.begin.0.dot(&d);
+                if rate > 1e-6 {
+                    (next.begin.1 / rate).max(from)
+                } else {
+                    f32::INFINITY
+                }
+            });
+            let own = segment.camera.ray(x, y);
+            let candidates = segment.tiles.at(u, v);
+            let hit = segment.eye.trace_between(candidates, &own, (from, to));
+            if hit.surface != Surface::Sky {
+                return Hit {
+                    segment: number as u8,
+                    ..hit
+                };
+            }
+            if to == f32::INFINITY {
+                break;
+            }
+            from = to;
+        }
+        Hit::SKY
+    }
+
+    /// The ray through (`x`, `y`), in the axes of the segment that it ends in; the sky is in the first one's.
+    #[inline]
+    pub(super) fn ray(&self, hit: &Hit, (x, y): (f32, f32)) -> V3 {
+        self.segments[usize::from(hit.segment)].camera.ray(x, y)
+    }
+}

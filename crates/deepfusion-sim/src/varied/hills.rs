@@ -1,0 +1,88 @@
+//! The hills of a view: how the road rises and falls ahead of the camera.
+
+use super::EndlessConfig;
+use super::built_world::BuiltWorld;
+use super::draw::{generator, log_uniform, normal, weighted};
+use crate::render::{Crease, Folds};
+use crate::scene::World;
+use deepfusion_geometry::Se3;
+use nalgebra::Vector3;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::PI;
+
+/// No crease turns the ground by more, radians.
+const SHARPEST: f64 = 1.5 * PI / 180.0;
+
+/// Beyond this distance no further slope begins, metres.
+const FARTHEST: f64 = 220.0;
+
+/// The hills of view `index`: none in most views, nor in rooms, garages and worlds that are not varied. The views that have
+/// some have the same whatever their share is.
+pub(super) fn of_view(
+    config: &EndlessConfig,
+    index: u64,
+    place: &BuiltWorld,
+    world_from_cam: &Se3,
+) -> Folds {
+    let mut rng = generator(config.seed, index, 0x4111);
+    if place.has_hills() && rng.random::<f64>() < config.hills {
+        draw(&mut rng, &place.world, world_from_cam)
+    } else {
+        Folds::default()
+    }
+}
+
+/// Draws one to three slopes, with crests and dips between them as curves of creases 8 to 20 m apart, the first one 6 to
+/// 40 m ahead; in the end the ground is about level again, so that it reaches the horizon. Slopes follow the road's
+/// direction, the way that the camera looks.
+fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
+    let eye = world_from_cam.translation();
+    let index = world.road.locate(eye.x, eye.y).index;
+    let road = world.road.sample(index).heading;
+    let looks = world_from_cam.rotate(&Vector3::z());
+    let along = looks.x * road.cos() + looks.y * road.sin();
+    let way = if along < 0.0 { PI } else { 0.0 };
+    let heading = road + way + normal(rng, 0.0, 0.06, 2.5);
+    let mut creases = Vec::new();
+    let mut distance = log_uniform(rng, 6.0, 40.0);
+    let mut slope = 0.0;
+    let mut up = rng.random_bool(0.5);
+    let slopes = weighted(rng, &[(0.5, 1), (0.35, 2), (0.15, 3)]);
+    for number in 0..=slopes {
+        let next = if number == slopes {
+            normal(rng, 0.0, 0.006, 2.0)
+        } else {
+            let steep = grade(rng).atan();
+            if up { steep } else { -steep }
+        };
+        up ^= rng.random_bool(0.65);
+        if distance > FARTHEST && number < slopes {
+            continue;
+        }
+        let turn: f64 = next - slope;
+        let count = (turn.abs() / SHARPEST).ceil().max(1.0);
+        for _ in 0..count as usize {
+            creases.push(Crease {
+                distance,
+                angle: turn / count,
+            });
+            distance += rng.random_range(8.0..20.0);
+        }
+        slope = next;
+        distance += log_uniform(rng, 8.0, 120.0);
+    }
+    Folds { heading, creases }
+}
+
+/// The tangent of a slope: 9 in 10 between 1.5 % and 9 %, the others up to 15 %.
+fn grade(rng: &mut ChaCha8Rng) -> f64 {
+    if rng.random_bool(0.9) {
+        rng.random_range(0.015..0.09)
+    } else {
+        rng.random_range(0.09..0.15)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,198 @@
+//! What makes the views varied, part by part, so that a table can show what each of them is worth.
+
+use super::camera::Lens;
+use super::weather::{self, Weather};
+use crate::config::Scene;
+use crate::primitive::V3;
+use crate::render::Air;
+use crate::rig::{CAMERA_HEIGHT, kitti_like_intrinsics};
+use crate::scene::{Variety, World};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// One ingredient of the varied views. Left out ([`crate::EndlessConfig::without`]), its part of a view is as in
+/// [`crate::Simulation`]; what else is drawn for the view stays the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Ingredient {
+    /// Cameras at any height; else all are 1.65 m above the ground.
+    CameraHeight,
+    /// Cameras that pitch and roll; else all look level.
+    CameraTilt,
+    /// Lenses of any field of view, a principal point off the middle, pixels that are not quite square; else the
+    /// horizontal field of view is KITTI's, 81°, around the middle of the picture.
+    Lenses,
+    /// Pictures of another aspect ratio that were squeezed to the requested size; else none is.
+    Squeeze,
+    /// The weather, and the sun's place; else a clear sky by day, and the plain light of night, garage and room.
+    Weather,
+    /// Worlds whose materials, plants, people and layout are random; else those of [`Variety::none`]. Country roads
+    /// become parks, motorways streets, and rooms garages, since there are no plain ones.
+    Variety,
+    /// Dynamic objects; else none.
+    Traffic,
+}
+
+impl Ingredient {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::CameraHeight,
+        Self::CameraTilt,
+        Self::Lenses,
+        Self::Squeeze,
+        Self::Weather,
+        Self::Variety,
+        Self::Traffic,
+    ];
+
+    /// Its name, as configuration files have it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CameraHeight => "camera-height",
+            Self::CameraTilt => "camera-tilt",
+            Self::Lenses => "lenses",
+            Self::Squeeze => "squeeze",
+            Self::Weather => "weather",
+            Self::Variety => "variety",
+            Self::Traffic => "traffic",
+        }
+    }
+}
+
+impl std::str::FromStr for Ingredient {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|one| one.name() == name);
+        found.ok_or_else(|| Error::Config {
+            field: "without",
+            value: name.to_owned(),
+            expected: "camera-height, camera-tilt, lenses, squeeze, weather, variety or traffic",
+        })
+    }
+}
+
+/// Puts the simulator's own parts in place of those that were drawn, for each ingredient that is left out. Everything is
+/// drawn all the same, so that the rest of a view does not change.
+#[derive(Clone, Copy)]
+pub(super) struct Without<'a>(pub &'a [Ingredient]);
+
+impl Without<'_> {
+    fn has(self, ingredient: Ingredient) -> bool {
+        !self.0.contains(&ingredient)
+    }
+
+    /// The camera's height above its ground, metres.
+    pub(super) fn height(self, drawn: f64) -> f64 {
+        if self.has(Ingredient::CameraHeight) {
+            drawn
+        } else {
+            CAMERA_HEIGHT
+        }
+    }
+
+    /// The camera's pitch and roll, radians.
+    pub(super) fn tilt(self, drawn: (f64, f64)) -> (f64, f64) {
+        if self.has(Ingredient::CameraTilt) {
+            drawn
+        } else {
+            (0.0, 0.0)
+        }
+    }
+
+    /// The camera's lens, and the squeeze of its picture.
+    pub(super) fn lens(self, drawn: Lens) -> Lens {
+        let squeeze = if self.has(Ingredient::Squeeze) {
+            drawn.squeeze
+        } else {
+            1.0
+        };
+        if self.has(Ingredient::Lenses) {
+            return Lens { squeeze, ..drawn };
+        }
+        let kitti = kitti_like_intrinsics(1000, 300);
+        Lens {
+            field: 2.0 * (500.0 / kitti.fx).atan(),
+            unequal: 0.0,
+            squeeze,
+            column: 0.0,
+            row: 0.0,
+        }
+    }
+
+    /// The hour and the weather.
+    pub(super) fn weather(self, drawn: (Weather, Air), world: &World) -> (Weather, Air) {
+        if self.has(Ingredient::Weather) {
+            drawn
+        } else {
+            (weather::plain(world), Air::of(world))
+        }
+    }
+
+    /// Towards the sun; `plain`: where the world has it.
+    pub(super) fn sun(self, drawn: V3, plain: V3) -> V3 {
+        if self.has(Ingredient::Weather) {
+            drawn
+        } else {
+            plain
+        }
+    }
+
+    /// The kind of scene.
+    pub(super) fn scene(self, drawn: Scene) -> Scene {
+        match drawn {
+            _ if self.has(Ingredient::Variety) => drawn,
+            Scene::Country => Scene::Park,
+            Scene::Motorway => Scene::Urban,
+            Scene::Indoor => Scene::Garage,
+            plain => plain,
+        }
+    }
+
+    /// How a world is varied.
+    pub(super) fn variety(self, drawn: Variety) -> Variety {
+        if self.has(Ingredient::Variety) {
+            drawn
+        } else {
+            Variety::none()
+        }
+    }
+
+    /// Whether anything moves.
+    pub(super) fn moves(self) -> bool {
+        self.has(Ingredient::Traffic)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_files() {
+        for one in Ingredient::ALL {
+            assert_eq!(one.name().parse::<Ingredient>().ok(), Some(one));
+            let error = "salt".parse::<Ingredient>().unwrap_err().to_string();
+            assert!(error.contains(one.name()) && error.contains("salt"));
+        }
+    }
+
+    #[test]
+    fn a_kitti_lens_is_as_wide_at_any_size() {
+        let lens = Lens {
+            field: 1.0,
+            unequal: 0.01,
+            squeeze: 0.7,
+            column: 0.01,
+            row: 0.1,
+        };
+        let without = [Ingredient::Lenses];
+        let kept = Without(&without).lens(lens);
+        assert!((kept.field.to_degrees() - 81.4).abs() < 0.1 && kept.squeeze == 0.7);
+        let without = [Ingredient::Lenses, Ingredient::Squeeze];
+        let k = Without(&without).lens(lens).intrinsics((320, 96));
+        assert!(k.fx == k.fy && k.cx == 159.5 && k.cy == 47.5);
+    }
+}
