@@ -25,9 +25,9 @@ PRESETS = [
     "sfmlearner", "monodepth2", "monodepth2-50", "r-msfm3", "r-msfm6", "lite-mono-tiny", "lite-mono-small", "lite-mono", "lite-mono-8m",
     "tiny", "light", "resnet50", "paper",
 ]
-# The same for all: views warped by the vehicle's measured motion, which needs speeds and yaw rates and makes every row metric; a learning rate that falls
-# by a cosine.
-SETTINGS = """view_motion = "vehicle"
+# The same for all: views warped by as much of the measured motion as a drive's sensors know, which makes every row metric; a learning rate that falls by a
+# cosine.
+SETTINGS = """view_motion = "auto"
 learning_rate = 3e-4
 learning_rate_schedule = "cosine"
 learning_rate_warmup_steps = 20

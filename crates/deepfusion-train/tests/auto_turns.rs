@@ -20,11 +20,16 @@ use support::{drive, folder_without_camera, small_without_data, street};
 
 /// The street as a folder with speeds alone.
 fn without_yaw_rate(folder: &Path, frames: usize) {
-    folder_without_camera(&street(frames), folder);
+    let simulation = street(frames);
+    folder_without_camera(&simulation, folder);
     let speeds = fs::read_to_string(folder.join("speed.csv")).unwrap();
     let two_columns = |line: &str| line.rsplit_once(',').unwrap().0.to_owned() + "\n";
     let speeds: String = speeds.lines().map(two_columns).collect();
     fs::write(folder.join("speed.csv"), speeds).unwrap();
+    let k = simulation.intrinsics();
+    let mount = fs::read_to_string(folder.join("dataset.toml")).unwrap();
+    let camera = format!("intrinsics = [{}, {}, {}, {}]\n", k.fx, k.fy, k.cx, k.cy);
+    fs::write(folder.join("dataset.toml"), camera + &mount).unwrap();
 }
 
 /// A drive whose turns are known and one whose are not, two samples a step.
@@ -81,11 +86,8 @@ fn each_pair_counts_as_its_drive_does() {
     let same = |what: &str, a: &[LossTerms], b: &[LossTerms]| {
         let sum =
             |terms: &[LossTerms], of: fn(&LossTerms) -> f64| -> f64 { terms.iter().map(of).sum() };
-        for of in [
-            |t: &LossTerms| t.reprojection,
-            |t| t.speed,
-            |t| t.smoothness,
-        ] {
+        let terms: [fn(&LossTerms) -> f64; 3] = [|t| t.reprojection, |t| t.speed, |t| t.smoothness];
+        for of in terms {
             let (a, b) = (sum(a, of), sum(b, of));
             assert!((a - b).abs() < 1e-6 * b.abs().max(0.1), "{what}: {a}, {b}");
         }
