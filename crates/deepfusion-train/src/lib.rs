@@ -16,6 +16,7 @@ mod event;
 mod factors;
 mod fit_depth;
 mod focal_spread;
+mod freeze;
 mod inspector;
 mod learned_focal;
 mod level;

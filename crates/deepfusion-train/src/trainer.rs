@@ -10,6 +10,7 @@ mod validation;
 
 pub use validation::validation_loss;
 
+use crate::freeze::freeze;
 use crate::learned_focal::{self, check_camera};
 use crate::unmeasured_turns;
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
@@ -105,7 +106,7 @@ impl Trainer {
         let findings = findings(&settings, &train);
         let config = findings.complete(settings.clone());
         let device = device.clone().autodiff();
-        let model = init(Model::new(&config, &device)?)?;
+        let model = freeze(init(Model::new(&config, &device)?)?, &config.freeze)?;
         if workers.leads() {
             folder.write_config(&settings, &findings)?;
         }
@@ -158,6 +159,7 @@ impl Trainer {
         check_camera(&config, [&train, &validation])?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
+        let model = freeze(model, &config.freeze)?;
         let adam = adam.ok_or_else(|| ModelError::NotResumable {
             path: folder.checkpoint_path(CheckpointKind::Last),
             reason: "it has no optimiser state to go on with",

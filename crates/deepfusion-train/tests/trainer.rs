@@ -10,12 +10,16 @@ mod support;
 
 use burn::tensor::Device;
 use deepfusion_hint::Hint;
+use deepfusion_nn::weights::{WeightTensor, collect};
 use deepfusion_train::{
     BatchLoader, Control, Error, Model, RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent,
     TrainSummary, Trainer, ViewMotion, losses, validation_loss,
 };
+use std::collections::BTreeMap;
 use std::path::Path;
 use support::{drive, small};
+
+type Tensors = BTreeMap<String, WeightTensor>;
 
 fn started(at: &Path, config: TrainConfig, sets: (SampleSet, SampleSet)) -> Result<Trainer, Error> {
     let folder = RunFolder::create(&at.join("run")).unwrap();
@@ -192,5 +196,56 @@ fn best_is_chosen_by_what_depth_can_change() {
         }
         assert_eq!(validations, 4);
         assert_eq!(summary.best_validation, Some(lowest));
+    }
+}
+
+#[test]
+fn frozen_weights_stay_and_the_others_learn() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut config, train, validation) = small(&drive(&folder.path().join("street"), 8), 2);
+    config.freeze = vec!["depth.encoder".into(), "depth.decoder.heads".into()];
+    // Momentum of a decay would move them, too.
+    config.weight_decay = 0.1;
+    let sets = || (train.clone(), validation.clone());
+    let mut trainer = started(folder.path(), config.clone(), sets()).unwrap();
+    let learned = |model: &Model| collect(&model.depth_net).tensors;
+    let before = learned(trainer.model());
+    trainer.run(&mut |_| Control::Continue).unwrap();
+    let mut kept = 0;
+    let stays = |before: &Tensors, after: &Tensors, kept: &mut usize| {
+        for (name, tensor) in before {
+            // Running statistics follow the batches, frozen or not.
+            if name.contains("running") {
+                continue;
+            }
+            let frozen = name.starts_with("encoder") || name.starts_with("decoder.heads");
+            assert_eq!(after[name].values == tensor.values, frozen, "{name}");
+            *kept += usize::from(frozen);
+        }
+    };
+    let after = learned(trainer.model());
+    stays(&before, &after, &mut kept);
+    assert!(kept > 40, "{kept}");
+
+    // So they do in a run that goes on.
+    config.steps = Some(3);
+    let run = RunFolder::open(trainer.folder()).unwrap().0;
+    let mut resumed = Trainer::resume(config.clone(), run, sets(), &Device::flex()).unwrap();
+    resumed.run(&mut |_| Control::Continue).unwrap();
+    stays(&after, &learned(resumed.model()), &mut kept);
+
+    for (number, (names, part)) in [
+        (vec!["depth.encode"], "found depth.encode"),
+        (vec!["depth", "pose"], "weights left to learn"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        config.freeze = names.into_iter().map(String::from).collect();
+        let at = folder.path().join(number.to_string());
+        std::fs::create_dir(&at).unwrap();
+        let error = started(&at, config.clone(), sets()).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("`freeze`") && text.contains(part), "{text}");
     }
 }

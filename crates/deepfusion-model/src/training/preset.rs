@@ -155,6 +155,7 @@ impl Preset {
             view_motion: ViewMotion::PoseNet,
             canonical_focal_px: None,
             assumed_camera: None,
+            freeze: Vec::new(),
             data: DataConfig::default(),
             loss: LossConfig {
                 ssim_weight: 0.85,

@@ -214,6 +214,10 @@ pub struct TrainConfig {
     /// the depth of the camera it is trained with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
+    /// Weights that do not learn, by the beginning of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's
+    /// statistics are none of them (`frozen_statistics`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub freeze: Vec<String>,
     /// The camera of recordings that do not say theirs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed_camera: Option<AssumedCamera>,

@@ -1,0 +1,90 @@
+//! Weights that do not learn.
+
+use burn::module::{Module, ModuleMapper, Param};
+use burn::tensor::Tensor;
+use deepfusion_model::Error as ModelError;
+
+use crate::{Error, Model};
+
+/// Takes the weights of these names out of learning: their gradients are not computed. A name is a weight's own
+/// (`depth.encoder.conv1.weight`) or that of what it is part of (`depth.encoder`), as among the moments of [`crate::Adam`].
+///
+/// # Errors
+/// [`ModelError::Config`] for a name that no weight has, or if nothing is left to learn.
+pub(crate) fn freeze(model: Model, names: &[String]) -> Result<Model, Error> {
+    if names.is_empty() {
+        return Ok(model);
+    }
+    let mut freeze = Freeze {
+        path: Vec::new(),
+        names: names.iter().map(|name| (name.as_str(), false)).collect(),
+        learning: 0,
+    };
+    let model = Model {
+        depth_net: freeze.under("depth", model.depth_net),
+        pose_net: freeze.under("pose", model.pose_net),
+        flow_decoder: model.flow_decoder.map(|net| freeze.under("flow", net)),
+        ..model
+    };
+    let wrong = |expected: &str, found: String| {
+        Error::from(ModelError::Config {
+            field: "freeze",
+            expected: expected.into(),
+            found,
+        })
+    };
+    if let Some((name, _)) = freeze.names.iter().find(|(_, found)| !found) {
+        let expected = "weights by their names, or by the beginning of them, as depth.encoder or depth.encoder.layer1";
+        return Err(wrong(expected, (*name).to_owned()));
+    }
+    if freeze.learning == 0 {
+        return Err(wrong("weights left to learn", names.join(", ")));
+    }
+    Ok(model)
+}
+
+struct Freeze<'a> {
+    path: Vec<String>,
+    /// Whether a weight of the name was there.
+    names: Vec<(&'a str, bool)>,
+    /// Weights that still learn.
+    learning: usize,
+}
+
+impl Freeze<'_> {
+    fn under<M: Module>(&mut self, prefix: &str, module: M) -> M {
+        self.path = vec![prefix.to_owned()];
+        module.map(self)
+    }
+}
+
+impl ModuleMapper for Freeze<'_> {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.push(name.to_owned());
+    }
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.pop();
+    }
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        if !param.is_require_grad() {
+            // Running statistics.
+            return param;
+        }
+        let weight = self.path.join(".");
+        let of = |name: &str| {
+            let rest = weight.strip_prefix(name);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let mut frozen = false;
+        for (name, found) in &mut self.names {
+            if of(name) {
+                (*found, frozen) = (true, true);
+            }
+        }
+        if frozen {
+            return param.set_require_grad(false);
+        }
+        self.learning += 1;
+        param
+    }
+}
