@@ -34,7 +34,7 @@ presets="light resnet50 paper"
 for preset in $presets; do
     "$program" bench --preset "$preset" --size "$size" --engine burn --device "$device" --repeats "$repeats" --json \
         >"$out/bench-$preset.json" 2>"$out/bench-$preset.log" || true
-    "$program" train --data "$out/drive" --preset "$preset" --size "$size" --batch "$batch" --set accumulate=1 --init none --steps "$steps" \
+    "$program" train --data "$out/drive" --preset "$preset" --size "$size" --batch "$batch" --set accumulate=1 --set view_motion=distance --init none --steps "$steps" \
         --device "$device" --out "$out/$preset" >"$out/train-$preset.log" 2>&1 || true
 done
 
