@@ -373,7 +373,7 @@ mod tests {
             (&["--seed", "0"], |_| {}),
             (&["--learn", "self"], |_| {}),
             (&["--camera", "2"], |_| {}),
-            (&["--view-motion", "distance"], |_| {}),
+            (&["--view-motion", "auto"], |_| {}),
             (&["--with", "smoothness"], |_| {}),
             (&["--without", "flow"], |_| {}),
             (&["--set", "batch=4"], |_| {}),
@@ -407,7 +407,7 @@ mod tests {
             (&["--learn", "both"], "both", "self"),
             (&["--camera", "both"], "both", "2"),
             (&["--stereo"], "on", "has it off"),
-            (&["--view-motion", "vehicle"], "vehicle", "distance"),
+            (&["--view-motion", "vehicle"], "vehicle", "auto"),
             (&["--with", "hce"], "hce", "learned without it"),
             (
                 &["--without", "smoothness"],
