@@ -81,7 +81,7 @@ pub(crate) fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
 
 impl Crown {
     /// Where a ray (the lobe's axes) first meets a leaf, at t in (0, `limit`).
-    #[inline]
+    #[inline(always)]
     pub(crate) fn enter(&self, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
         let inverse = V3::new(
             1.0 / self.radii[0],

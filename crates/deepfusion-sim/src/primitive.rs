@@ -150,7 +150,7 @@ impl Primitive {
 }
 
 /// Where a ray from `o` along `d` (the solid's axes) enters the shape, if at t in (0, `limit`).
-#[inline]
+#[inline(always)]
 pub(crate) fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     match *shape {
         Shape::Box {
@@ -167,7 +167,7 @@ pub(crate) fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -
     }
 }
 
-#[inline]
+#[inline(always)]
 fn enter_box(hx: f32, hy: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     // Slabs; a zero component gives infinities of the right sign (a NaN only on the slab's own
     // plane, which min and max ignore).
@@ -191,7 +191,7 @@ fn enter_box(hx: f32, hy: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Optio
     Some(Entry { t: near, face })
 }
 
-#[inline]
+#[inline(always)]
 fn enter_cylinder(radius: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     let a = d.x * d.x + d.y * d.y;
     let b = o.x * d.x + o.y * d.y;
@@ -219,7 +219,7 @@ fn enter_cylinder(radius: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Optio
     None
 }
 
-#[inline]
+#[inline(always)]
 fn enter_wheel(radius: f32, half_width: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     let side = if d.y > 0.0 { -half_width } else { half_width };
     let t = (side - o.y) / d.y;
@@ -247,7 +247,7 @@ fn enter_wheel(radius: f32, half_width: f32, o: &V3, d: &V3, limit: f32) -> Opti
     })
 }
 
-#[inline]
+#[inline(always)]
 fn enter_ellipsoid(radii: [f32; 3], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     let inverse = V3::new(1.0 / radii[0], 1.0 / radii[1], 1.0 / radii[2]);
     let (o, d) = (o.component_mul(&inverse), d.component_mul(&inverse));
@@ -264,7 +264,7 @@ fn enter_ellipsoid(radii: [f32; 3], o: &V3, d: &V3, limit: f32) -> Option<Entry>
     })
 }
 
-#[inline]
+#[inline(always)]
 fn enter_hull(hull: &Hull, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     let (mut near, mut far, mut face) = (0.0f32, limit, u8::MAX);
     for (index, (normal, distance)) in hull.planes.iter().enumerate() {
@@ -287,7 +287,7 @@ fn enter_hull(hull: &Hull, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     (face != u8::MAX && near < limit).then_some(Entry { t: near, face })
 }
 
-#[inline]
+#[inline(always)]
 fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     // Seen from the ray's point nearest to the middle, where nothing large cancels.
     let square = d.norm_squared();

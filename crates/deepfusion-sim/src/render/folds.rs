@@ -168,17 +168,24 @@ impl<'a> Folded<'a> {
         }
     }
 
-    /// The end of the ray through (`x`, `y`), which is within the pixel (`u`, `v`).
+    /// The end of the ray through (`x`, `y`), which is within the pixel (`u`, `v`), and that [`Folded::ray`].
     #[inline]
-    pub(super) fn trace(&self, (u, v): (usize, usize), (x, y): (f32, f32)) -> Hit {
+    pub(super) fn trace(&self, (u, v): (usize, usize), (x, y): (f32, f32)) -> (Hit, V3) {
         let first = &self.segments[0];
         let d = first.camera.ray(x, y);
-        if self.segments.len() == 1 {
-            return first.eye.trace(first.tiles.at(u, v), &d);
+        if self.segments.len() > 1 {
+            return self.walk((u, v), (x, y), d);
         }
+        (first.eye.trace(first.tiles.at(u, v), &d), d)
+    }
+
+    /// Follows a ray from segment to segment; `d`: in the first one's axes.
+    #[inline(never)]
+    fn walk(&self, (u, v): (usize, usize), (x, y): (f32, f32), d: V3) -> (Hit, V3) {
         let mut from = 0.0;
         for (number, segment) in self.segments.iter().enumerate() {
-            let to = self.segments.get(number + 1).map_or(f32::INFINITY, |next| {
+            let next = self.segments.get(number + 1);
+            let to = next.map_or(f32::INFINITY, |next| {
                 let rate = next.begin.0.dot(&d);
                 if rate > 1e-6 {
                     (next.begin.1 / rate).max(from)
@@ -190,17 +197,15 @@ impl<'a> Folded<'a> {
             let candidates = segment.tiles.at(u, v);
             let hit = segment.eye.trace_between(candidates, &own, (from, to));
             if hit.surface != Surface::Sky {
-                return Hit {
-                    segment: number as u8,
-                    ..hit
-                };
+                let segment = number as u8;
+                return (Hit { segment, ..hit }, own);
             }
             if to == f32::INFINITY {
                 break;
             }
             from = to;
         }
-        Hit::SKY
+        (Hit::SKY, d)
     }
 
     /// The ray through (`x`, `y`), in the axes of the segment that it ends in; the sky is in the first one's.

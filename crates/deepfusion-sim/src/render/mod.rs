@@ -6,7 +6,7 @@ mod shade;
 mod tiles;
 
 use crate::light::{Foot, GroundLight};
-use crate::primitive::{FACE_LEAVES, Primitive, Shape, V3, enter, enter_beyond};
+use crate::primitive::{Entry, FACE_LEAVES, Primitive, V3, enter, enter_beyond};
 use crate::road::StreetPoint;
 use crate::scene::SceneObject;
 use crate::scene::World;
@@ -76,11 +76,14 @@ impl Hit {
         segment: 0,
     };
 
-    /// Whether it is of the same surface.
+    /// Whether it is of the same surface. Ground goes on from one segment to the next, but not behind a crest.
     #[inline]
     fn is_like(&self, other: &Self) -> bool {
-        self.surface.is_like(&other.surface)
-            && (self.segment == other.segment || !matches!(self.surface, Surface::Solid(..)))
+        let goes_on = || {
+            let apart = (self.t - other.t).abs();
+            !matches!(self.surface, Surface::Solid(..)) && apart < 0.2 * self.t.min(other.t)
+        };
+        self.surface.is_like(&other.surface) && (self.segment == other.segment || goes_on())
     }
 }
 
@@ -121,13 +124,43 @@ impl Eye<'_> {
     /// First solid among `candidates` (indices, nearest first) along `d`, or the ground, or the sky.
     #[inline]
     pub(crate) fn trace(&self, candidates: &[u32], d: &V3) -> Hit {
-        self.trace_between(candidates, d, (0.0, f32::INFINITY))
+        self.first(
+            candidates,
+            d,
+            (0.0, f32::INFINITY),
+            |solid, local, limit| {
+                let (shape, hulls) = (&solid.primitive.shape, &self.world.hulls);
+                enter(shape, hulls, &solid.eye, local, limit)
+            },
+        )
     }
 
-    /// As [`Eye::trace`], but only of what the ray meets between two values of t; in the first segment. A solid that
-    /// reaches out of them is cut.
-    #[inline]
+    /// As [`Eye::trace`], but only what the ray meets between two values of t. A solid that it begins in is cut there.
+    #[inline(never)]
     pub(crate) fn trace_between(&self, candidates: &[u32], d: &V3, (from, to): (f32, f32)) -> Hit {
+        if from <= 0.0 {
+            // The camera is in no solid.
+            return self.first(candidates, d, (0.0, to), |solid, local, limit| {
+                let (shape, hulls) = (&solid.primitive.shape, &self.world.hulls);
+                enter(shape, hulls, &solid.eye, local, limit)
+            });
+        }
+        self.first(candidates, d, (from, to), |solid, local, limit| {
+            let (shape, hulls) = (&solid.primitive.shape, &self.world.hulls);
+            enter_beyond(shape, hulls, (&solid.eye, local), (from, limit))
+        })
+    }
+
+    /// The first of the solids, by where the ray (in the solid's axes) enters each before a limit, or the ground, or the
+    /// sky.
+    #[inline(always)]
+    fn first(
+        &self,
+        candidates: &[u32],
+        d: &V3,
+        (from, to): (f32, f32),
+        enter: impl Fn(&FrameSolid, &V3, f32) -> Option<Entry>,
+    ) -> Hit {
         let mut hit = Hit { t: to, ..Hit::SKY };
         for index in candidates {
             let solid = &self.solids[*index as usize];
@@ -135,14 +168,7 @@ impl Eye<'_> {
                 break;
             }
             let local = solid.primitive.local_of(d);
-            let shape: &Shape = &solid.primitive.shape;
-            let hulls = &self.world.hulls;
-            let entry = if from > 0.0 {
-                enter_beyond(shape, hulls, (&solid.eye, &local), (from, hit.t))
-            } else {
-                enter(shape, hulls, &solid.eye, &local, hit.t)
-            };
-            if let Some(entry) = entry {
+            if let Some(entry) = enter(solid, &local, hit.t) {
                 hit.t = entry.t;
                 hit.surface = Surface::Solid(*index, entry.face);
             }
@@ -173,7 +199,7 @@ impl Eye<'_> {
 
     /// The ground is a road at height 0 and everything else at the kerb's height, with upright
     /// kerbs between them. It is solid: a ray that begins in it, at t = `from`, ends there.
-    #[inline]
+    #[inline(always)]
     fn ground(&self, d: &V3, (from, limit): (f32, f32)) -> (f32, Surface) {
         let road = &self.world.road;
         let height = self.position.z as f32;
@@ -338,7 +364,7 @@ pub(crate) fn expose(
         for (row, hits) in hits.chunks_mut(width).enumerate() {
             let v = band * TILE + row;
             for (u, hit) in hits.iter_mut().enumerate() {
-                *hit = folded.trace((u, v), (u as f32, v as f32));
+                *hit = folded.trace((u, v), (u as f32, v as f32)).0;
             }
         }
     });
@@ -371,11 +397,7 @@ pub(crate) fn expose(
                     (0.125, 0.375),
                     (-0.375, 0.125),
                 ]
-                .map(|(du, dv)| {
-                    let at = (u as f32 + du, v as f32 + dv);
-                    let hit = folded.trace((u, v), at);
-                    (hit, folded.ray(&hit, at))
-                });
+                .map(|(du, dv)| folded.trace((u, v), (u as f32 + du, v as f32 + dv)));
                 match edges {
                     Edges::EachRay => {
                         let sum: V3 = rays.iter().map(|(hit, d)| colour_of(&part, hit, d)).sum();

@@ -72,6 +72,7 @@ pub(crate) enum Paving {
 }
 
 /// The carriageway.
+#[inline(never)]
 pub(crate) fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32) -> Rgb {
     if let Some(style) = &stretch.style {
         return style.carriageway(noise, p, seed);
@@ -238,6 +239,7 @@ pub(crate) fn kerb(noise: &Noise, p: &GroundPatch, height: f32) -> Rgb {
 
 /// Beside the road: kerb stone, verge, pavement, and what lies beyond them. `verge` and `pavement`
 /// are their widths.
+#[inline(never)]
 pub(crate) fn beside(
     noise: &Noise,
     p: &GroundPatch,
