@@ -3,6 +3,7 @@
 use super::EndlessConfig;
 use super::built_world::BuiltWorld;
 use super::draw::{generator, log_uniform, normal, weighted};
+use crate::primitive::{Primitive, Shape};
 use crate::render::{Crease, Folds};
 use crate::scene::World;
 use deepfusion_geometry::Se3;
@@ -33,8 +34,49 @@ pub(super) fn of_view(
     }
 }
 
+/// A pole or a trunk.
+#[derive(Debug, Clone, Copy)]
+struct Pole {
+    /// Its place, metres ahead of the camera.
+    along: f64,
+    /// What a crease takes away on both sides of itself, where the pole is highest, and the pole's radius, metres.
+    reach: f64,
+}
+
+impl Pole {
+    fn is_at(&self, crease: f64) -> bool {
+        (self.along - crease).abs() < self.reach
+    }
+}
+
+/// The poles and trunks near enough for a missing piece of them to be seen.
+fn poles(world: &World, eye: &Vector3<f64>, heading: f64) -> Vec<Pole> {
+    let (sin, cos) = heading.sin_cos();
+    let lean = (0.5 * SHARPEST).tan();
+    let pole = |solid: &Primitive| {
+        let upright = match solid.shape {
+            Shape::Cylinder { .. } => true,
+            Shape::Capsule {
+                half_axis: [x, y, z],
+                ..
+            } => x.hypot(y) < 0.3 * z.abs(),
+            _ => false,
+        };
+        let (half_x, half_y, _, high) = solid.bounds(&world.hulls);
+        let (radius, top) = (half_x.hypot(half_y), solid.position[2] + f64::from(high));
+        let (x, y) = (solid.position[0] - eye.x, solid.position[1] - eye.y);
+        let (along, lateral) = (cos * x + sin * y, cos * y - sin * x);
+        let near = (0.0..120.0).contains(&along) && lateral.abs() < 40.0;
+        (upright && near && radius < 0.6 && top > 1.5).then(|| Pole {
+            along,
+            reach: f64::from(radius) + lean * top,
+        })
+    };
+    world.primitives.iter().filter_map(pole).collect()
+}
+
 /// Draws one to three slopes, with crests and dips between them as curves of creases 8 to 20 m apart, the first one 6 to
-/// 40 m ahead; in the end the ground is about level again, so that it reaches the horizon. Slopes follow the road's
+/// 40 m ahead, each put a little on where it would cut a pole; in the end the ground is about level again, so that it reaches the horizon. Slopes follow the road's
 /// direction, the way that the camera looks.
 fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
     let eye = world_from_cam.translation();
@@ -44,6 +86,7 @@ fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
     let along = looks.x * road.cos() + looks.y * road.sin();
     let way = if along < 0.0 { PI } else { 0.0 };
     let heading = road + way + normal(rng, 0.0, 0.06, 2.5);
+    let poles = poles(world, &eye, heading);
     let mut creases = Vec::new();
     let mut distance = log_uniform(rng, 6.0, 40.0);
     let mut slope = 0.0;
@@ -63,6 +106,11 @@ fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
         let turn: f64 = next - slope;
         let count = (turn.abs() / SHARPEST).ceil().max(1.0);
         for _ in 0..count as usize {
+            let places = (0..30).map(|step| distance + 0.13 * f64::from(step));
+            distance = places
+                .into_iter()
+                .find(|place| !poles.iter().any(|pole| pole.is_at(*place)))
+                .unwrap_or(distance);
             creases.push(Crease {
                 distance,
                 angle: turn / count,
