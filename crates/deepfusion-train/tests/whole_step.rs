@@ -1,4 +1,4 @@
-//! Each network's whole training step, and up to twenty of them, beside PyTorch's (`reference/whole_step.py`): three frames, the presets'
+//! Each network's whole training step, and twenty of them, beside PyTorch's (`reference/whole_step.py`): three frames, the presets'
 //! losses but for the speed's, their scales, weight decay and clipping.
 //!
 //! The reference is in double precision, so the difference is float32 rounding. Where two choices are as good as each other (automask,
@@ -28,8 +28,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const BATCH: usize = 2;
-const HEIGHT: usize = 64;
-const WIDTH: usize = 96;
 const OFFSETS: [i32; 2] = [-1, 1];
 const SCHEDULE: Schedule = Schedule {
     speed_weight: 0.0,
@@ -44,9 +42,11 @@ fn reference(of: &str, file: &str) -> PathBuf {
         .join(file)
 }
 
-/// A network, and the optimiser's settings of the reference.
+/// A network, and the images' size and the optimiser's settings of the reference.
 struct Training {
     preset: Preset,
+    width: usize,
+    height: usize,
     learning_rate: f64,
     clip_norm: f64,
     weight_decay: f64,
@@ -59,11 +59,18 @@ impl Training {
             Preset::LiteMono => (5e-7, 0.0, 2000.0),
             Preset::RMsfm3 | Preset::RMsfm6 => (5e-7, 1.0, 2000.0),
             Preset::Sfmlearner => (2e-6, 0.0, 0.0),
-            Preset::Monodepth2R50 => (2e-7, 0.0, 0.0),
+            Preset::Monodepth2R50 => (5e-8, 0.0, 0.0),
             _ => (5e-7, 0.0, 0.0),
+        };
+        let (width, height) = match preset {
+            Preset::Monodepth2R50 | Preset::Sfmlearner => (64, 64),
+            Preset::RMsfm6 => (64, 32),
+            _ => (96, 64),
         };
         Self {
             preset,
+            width,
+            height,
             learning_rate,
             clip_norm,
             weight_decay,
@@ -87,7 +94,7 @@ impl Training {
             },
             preset => preset.config(),
         };
-        (config.size.width, config.size.height) = (WIDTH, HEIGHT);
+        (config.size.width, config.size.height) = (self.width, self.height);
         config.batch = BATCH;
         config.loss.speed = 0.0;
         config.pose_net.metres_per_unit = 0.01;
@@ -157,12 +164,12 @@ fn reshape(listing: &mut Listing, name: &str, channels_in: usize) {
 }
 
 /// The frame at an offset in time: waves that move about as the new pose networks say.
-fn picture(offset: i32, device: &Device) -> Tensor<4> {
+fn picture(offset: i32, [height, width]: [usize; 2], device: &Device) -> Tensor<4> {
     let at = |index: usize| {
-        let (u, v) = ((index % WIDTH) as f64, (index / WIDTH % HEIGHT) as f64);
+        let (u, v) = ((index % width) as f64, (index / width % height) as f64);
         let (c, n) = (
-            (index / (WIDTH * HEIGHT) % 3) as f64,
-            (index / (WIDTH * HEIGHT * 3)) as f64,
+            (index / (width * height) % 3) as f64,
+            (index / (width * height * 3)) as f64,
         );
         let moved = f64::from(offset) * (1.0 + 0.3 * n);
         let (x, y) = (u + 0.8 * moved, v - 1.5 * moved);
@@ -170,16 +177,17 @@ fn picture(offset: i32, device: &Device) -> Tensor<4> {
         let second = 0.2 * (0.13 * x - 0.23 * y + 2.0 * c + 0.7 * n).cos();
         (0.5 + first + second) as f32
     };
-    let values: Vec<f32> = (0..BATCH * 3 * HEIGHT * WIDTH).map(at).collect();
-    Tensor::from_data(TensorData::new(values, [BATCH, 3, HEIGHT, WIDTH]), device)
+    let values: Vec<f32> = (0..BATCH * 3 * height * width).map(at).collect();
+    Tensor::from_data(TensorData::new(values, [BATCH, 3, height, width]), device)
 }
 
-fn batch(device: &Device) -> SnippetBatch {
+fn batch(size: [usize; 2], device: &Device) -> SnippetBatch {
     let images: Vec<_> = [0, OFFSETS[0], OFFSETS[1]]
-        .map(|offset| picture(offset, device))
+        .map(|offset| picture(offset, size, device))
         .into();
-    let (fx, fy) = (0.58 * WIDTH as f32, 0.87 * HEIGHT as f32);
-    let (cx, cy) = (0.5 * WIDTH as f32, 0.5 * HEIGHT as f32);
+    let [height, width] = size.map(|side| side as f32);
+    let (fx, fy) = (0.58 * width, 0.87 * height);
+    let (cx, cy) = (0.5 * width, 0.5 * height);
     let matrix = |rows: [[f32; 3]; 3]| Tensor::<3>::from_data([rows, rows], device);
     let still = Motion::new(
         Tensor::zeros([BATCH, 3], device),
@@ -198,6 +206,7 @@ fn batch(device: &Device) -> SnippetBatch {
         distance_m: vec![Tensor::ones([BATCH], device); 2],
         distance_weight: vec![None; 2],
         measured: vec![still.clone(), still],
+        turns_known: None,
         offsets: OFFSETS.into(),
         names: vec!["first".into(), "second".into()],
         factors: None,
@@ -262,9 +271,9 @@ impl Comparison {
     }
 
     /// Rounding through up to a hundred layers, and batch norms of a dozen values: measured 2e-6 of disparities, 2e-5 of poses.
-    fn outputs(&mut self, pass: &ForwardPass) {
+    fn outputs(&mut self, pass: &ForwardPass, width: usize) {
         for (scale, disparity) in pass.disparities.iter().enumerate() {
-            let step = if disparity.dims()[3] == WIDTH { 31 } else { 11 };
+            let step = if disparity.dims()[3] == width { 31 } else { 11 };
             let name = format!("disparity{scale}");
             self.close("disparity", &name, &values(disparity.clone()), step);
         }
@@ -298,17 +307,30 @@ impl Comparison {
         f32::max(1e-3, 3.0 * self.expected(&format!("{name}/float32"))[0])
     }
 
+    /// What is allowed of half of a gradient's values, and of all: [`Self::allowed`] and twice as much, since the worst of 23 differs
+    /// more from one float32 to another (measured 1.6e-3 where PyTorch's is 4e-4).
+    ///
+    /// More is allowed of the pose network's first convolution on the larger images. A value that rounding puts on the other side of
+    /// its ReLU moves what lies before it and hardly a norm: one in `layer1` (in double precision they come as near to 0 as 8e-7 of
+    /// their root mean square) moves that convolution's by 1.1e-2, half of them by 2.6e-3, its norm by 4e-4. PyTorch's float32 leaves
+    /// that value where it is.
+    fn allowed_of_values(&self, name: &str, width: usize) -> (f32, f32) {
+        let allowed = self.allowed(name);
+        if name == "pose.encoder.conv1.weight" && width == 96 {
+            (allowed.max(5e-3), allowed.max(2e-2))
+        } else {
+            (allowed, 2.0 * allowed)
+        }
+    }
+
     fn norm(&mut self, name: &str, norm: f64) {
         let expected = f64::from(self.expected(&format!("{name}/norm"))[0]);
         let error = (norm / expected - 1.0).abs() as f32;
         self.note("norm", name, error, self.allowed(name));
     }
 
-    /// Norms as near as [`Self::allowed`]; of 23 values, half to 5e-3 and all to 2e-2, or as much as that where it is more. For a value that
-    /// rounding puts on the other side of its ReLU moves what lies before it and hardly a norm: one in `layer1` (in double precision
-    /// they come as near to 0 as 8e-7 of their root mean square) the first convolution's by 6e-3, half of them by 2e-3, its norm by
-    /// 3e-4. Measured: 1.1e-2, 2.5e-3, 4e-4.
-    fn gradients(&mut self, gradients: &Weights) {
+    /// Norms and 23 values of each.
+    fn gradients(&mut self, gradients: &Weights, width: usize) {
         for (name, gradient) in &gradients.tensors {
             if !self.expected.tensors.contains_key(&format!("{name}/norm")) {
                 continue;
@@ -318,11 +340,9 @@ impl Comparison {
             self.norm(name, squares.sum::<f64>().sqrt());
             let step = (gradient.len() / 23).max(1) | 1;
             let errors = self.errors(&format!("{name}/gradient"), gradient, step);
-            let allowed = self.allowed(name);
-            let half = errors[errors.len() / 2];
-            self.note("half of a gradient", name, half, allowed.max(5e-3));
-            let worst = errors[errors.len() - 1];
-            self.note("a gradient", name, worst, allowed.max(2e-2));
+            let (half, all) = self.allowed_of_values(name, width);
+            self.note("half of a gradient", name, errors[errors.len() / 2], half);
+            self.note("a gradient", name, errors[errors.len() - 1], all);
             self.compared += 1;
         }
         let norms = self
@@ -349,12 +369,12 @@ fn check(preset: Preset) {
     let training = Training::of(preset);
     let mut comparison = Comparison::of(preset);
     let device = Device::flex().autodiff();
-    let (mut model, batch) = (training.model(&device), batch(&device));
+    let size = [training.height, training.width];
+    let (mut model, batch) = (training.model(&device), batch(size, &device));
     let mut adam = Adam::default();
     let losses = comparison.expected("losses").to_vec();
-    let in_float32 = comparison.expected("losses_float32").to_vec();
-    let mut rounding = 0.0;
-    for (step, (exact, float32)) in losses.iter().zip(&in_float32).enumerate() {
+    assert_eq!(losses.len(), 20);
+    for (step, exact) in losses.iter().enumerate() {
         let pass = model.forward(&batch);
         let loss = model.loss(&pass, &batch, SCHEDULE);
         let mut gradients = NamedGradients::default();
@@ -362,19 +382,17 @@ fn check(preset: Preset) {
         let (rate, decay) = (training.learning_rate, training.weight_decay);
         let (outcome, update) = adam.begin(&gradients, rate, training.clip_norm, decay);
         if step == 0 {
-            comparison.outputs(&pass);
+            comparison.outputs(&pass, training.width);
             comparison.terms(&loss.terms);
-            comparison.gradients(&named(&gradients, &model));
+            comparison.gradients(&named(&gradients, &model), training.width);
             let StepOutcome::Done { gradient_norm } = outcome else {
                 panic!("{outcome:?}");
             };
             comparison.norm("all", gradient_norm);
         }
-        // To 1e-3, or three times as far off as PyTorch's own float32 was until that step.
-        rounding = f32::max(rounding, (float32 / exact - 1.0).abs());
         let off = (loss.terms.total / f64::from(*exact) - 1.0).abs() as f32;
-        let allowed = f32::max(1e-3, 3.0 * rounding);
-        comparison.note("loss", &format!("loss {step}"), off, allowed);
+        // PyTorch's own float32 is off by less than a third of that.
+        comparison.note("loss", &format!("loss {step}"), off, 1e-3);
         model = model.updated(&mut adam, &update.unwrap(), &gradients);
     }
     for (kind, (_, worst)) in &comparison.worst {
@@ -398,8 +416,12 @@ fn lite_mono() {
 }
 
 #[test]
-fn r_msfm() {
+fn r_msfm3() {
     check(Preset::RMsfm3);
+}
+
+#[test]
+fn r_msfm6() {
     check(Preset::RMsfm6);
 }
 
