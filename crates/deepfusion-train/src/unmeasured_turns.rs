@@ -32,6 +32,6 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
         n => format!(" and {} other drives", n - 1),
     };
     Some(format!(
-        "no yaw rate in {first}{others}: warped by PoseNet's turns at the measured distance, which takes more steps to learn from"
+        "no yaw rate in {first}{others}: warped by PoseNet's turns at the measured distance"
     ))
 }
