@@ -1,12 +1,6 @@
 //! Cameras of all kinds from exact corners: the beginnings must lead to the one minimum, from a telephoto lens to a fisheye.
 //! Corners are projected by `deepfusion-geometry`, not by this crate.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_calibrate::{Board, LensModel, View, calibrate};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use nalgebra::{Rotation3, Vector2, Vector3};

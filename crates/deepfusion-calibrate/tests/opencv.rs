@@ -1,11 +1,5 @@
 //! Beside OpenCV's corners and calibrations of the same pictures, and beside the truth (`reference/boards.py`).
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_calibrate::{
     Board, BoardDetection, Calibration, Error, LensModel, View, calibrate, find_board,
 };

@@ -1,11 +1,9 @@
 //! The on/off table through the program alone: made, gone on with, and refused.
 
-mod support;
-
 use std::fs;
 
+use crate::support::{ok, run};
 use serde_json::Value;
-use support::{ok, run};
 
 #[test]
 fn the_table_grows_by_seeds_and_keeps_what_is_done() {

@@ -1,19 +1,12 @@
 //! `adapt`: what is kept, what is refused, what is gone on with and undone.
 
 #![cfg(feature = "train")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::{fails, json, ok, run};
 use serde_json::Value;
-use support::{fails, json, ok, run};
 
 /// Some 60 metres along a street that no network saw, and a network that is quick to learn.
 const DRIVE: &str = "simulate --frames 60 --seed 90110 --size 320x96 --scan-every 0 --out drive";

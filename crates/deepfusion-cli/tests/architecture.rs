@@ -1,12 +1,6 @@
 //! The crates and their arrows, as ARCHITECTURE.md and its drawing say them; what libraries may say, and what documents may name.
 //! `UPDATE_REFERENCE=1` draws anew.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -66,7 +60,7 @@ fn the_drawing_is_of_todays_crates() {
     let page = root().join("docs/reference/crates.md");
     let expected = format!(
         "# The crates\n\nWhat each crate uses, without the arrows that follow from others. Drawn from the crates' manifests by\n\n\
-         ```\nUPDATE_REFERENCE=1 cargo test --workspace --test architecture\n```\n\n```mermaid\n{}```\n",
+         ```\nUPDATE_REFERENCE=1 cargo test --workspace --test cli architecture\n```\n\n```mermaid\n{}```\n",
         drawing(&arrows())
     );
     if std::env::var_os("UPDATE_REFERENCE").is_some() {
@@ -93,6 +87,27 @@ fn every_crate_is_described_above_what_it_uses() {
         }
         let readme = root().join("crates").join(name).join("README.md");
         assert!(readme.exists(), "{}", readme.display());
+    }
+}
+
+/// A crate's tests are one binary, and a file that its `main.rs` forgot would never run.
+#[test]
+fn every_file_of_tests_is_part_of_a_binary() {
+    for name in arrows().into_keys() {
+        let folder = root().join("crates").join(name).join("tests");
+        let Ok(main) = fs::read_to_string(folder.join("main.rs")) else {
+            continue;
+        };
+        let manifest = fs::read_to_string(folder.join("../Cargo.toml")).unwrap();
+        for file in fs::read_dir(&folder).unwrap() {
+            let path = file.unwrap().path();
+            let stem = path.file_stem().unwrap().to_str().unwrap();
+            if path.extension().is_some_and(|ending| ending == "rs") && stem != "main" {
+                let own = manifest.contains(&format!("[[test]]\nname = \"{stem}\""));
+                let part = main.contains(&format!("mod {stem};"));
+                assert!(own || part, "{}", path.display());
+            }
+        }
     }
 }
 

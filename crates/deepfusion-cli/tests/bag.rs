@@ -1,22 +1,14 @@
 //! Bags through the program alone: written, looked into, converted, trained on, measured.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::path::Path;
 
+use crate::support::{fails, json, ok, run};
 use deepfusion_rosbag::msg::{
     Header, Imu, Odometry, Pose, PoseWithCovariance, Quaternion, Twist, TwistWithCovariance,
     Vector3,
 };
 use deepfusion_rosbag::{BagWriter, Time, WriterOptions};
 use serde_json::Value;
-use support::{fails, json, ok, run};
 
 #[test]
 fn bags_are_trained_on_and_measured_by_scenario() {

@@ -4,27 +4,19 @@
 //! JPEGs of ffmpeg's second best quality, both with half the colours): 30 dB is what is lost on these 96×64 pixels at worst, with
 //! some room; a neighbouring picture of the drive is several dB farther away.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::support::{fails, json, ok};
 use deepfusion_data::{Dataset, OpenOptions, RgbImage};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::{
     CompressedImage, CompressedVideo, FfmpegPacket, Header, OldFfmpegPacket,
 };
 use deepfusion_rosbag::{Bag, BagWriter, RosMessage, Selection, WriterOptions};
-use support::{fails, json, ok};
 
 const FRAMES: usize = 24;
 /// Packets from one key frame to the next.

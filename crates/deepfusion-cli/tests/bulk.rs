@@ -1,21 +1,13 @@
 //! Prediction in bulk: shards, runs that were stopped, images that cannot be read.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use crate::support::{fails, ok};
 use serde_json::Value;
-use support::{fails, ok};
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data";
 const SAVE: &str = "--calib sim/2026_01_01 --save depth-png,npy,ply";

@@ -1,20 +1,12 @@
 //! A camera from pictures of a board, through the program alone, and what reads the file that it writes. The pictures are those of
 //! `deepfusion-calibrate` (`tests/reference/boards.py`), whose camera is known.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::support::{fails, json, ok, run};
 use serde_json::Value;
-use support::{fails, json, ok, run};
 
 fn boards() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../deepfusion-calibrate/tests/reference")

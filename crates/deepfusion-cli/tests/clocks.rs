@@ -1,18 +1,10 @@
 //! `--clock-offset auto`: a simulated drive whose camera runs ahead of its log by a time that is known.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use support::{fails, ok, run};
+use crate::support::{fails, ok, run};
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0005_sync";
 /// 2026-01-01 00:00 UTC.

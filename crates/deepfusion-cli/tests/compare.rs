@@ -1,18 +1,10 @@
 //! A run's report, its kept evaluations and their comparison, through the program alone.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{self, fails, run};
 use serde_json::Value;
-use support::{fails, run};
 
 /// What a run that must succeed prints.
 fn ok(folder: &Path, args: &str) -> String {

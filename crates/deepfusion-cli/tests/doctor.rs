@@ -1,16 +1,8 @@
 //! What `doctor` prints: a line for each check, whatever came of it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 
-use support::{fails, json, ok, run};
+use crate::support::{fails, json, ok, run};
 
 const CHECKS: [&str; 18] = [
     "opening",

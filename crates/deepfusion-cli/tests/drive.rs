@@ -1,19 +1,11 @@
 //! From a simulated drive to numbers, through the program alone.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::path::Path;
 
+use crate::support::{in_folder, json, ok};
 use deepfusion_data::{Dataset, GtKind, OpenOptions};
 use ndarray::{Array2, Array3};
 use ndarray_npy::{NpzReader, NpzWriter, write_npy};
-use support::{in_folder, json, ok};
 
 /// Reads an .npz, changes every array, writes it under another name.
 fn derive(folder: &Path, from: &str, to: &str, change: impl Fn(&Array2<f32>) -> Array2<f32>) {

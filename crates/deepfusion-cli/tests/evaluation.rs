@@ -1,14 +1,12 @@
 //! What a trained model sees of moving things, and the path its pose network takes, through the program alone.
 
-mod support;
-
 use std::fs;
 
+use crate::support::{fails, json, ok, run};
 use deepfusion_eval::odometry::PoseFile;
 use deepfusion_geometry::DepthRange;
 use deepfusion_train::{DataConfig, DataSetConfig, RunFolder, TrainConfig};
 use serde_json::Value;
-use support::{fails, json, ok, run};
 
 #[test]
 fn a_model_is_measured_on_traffic_and_along_the_road() {

@@ -1,13 +1,11 @@
 //! `deepfusion export`: what it writes, checks and refuses.
 
-mod support;
-
 use std::fs;
 
+use crate::support::run;
 use deepfusion_onnx::runtime::find;
 use deepfusion_onnx::{OPSET, read};
 use serde_json::Value;
-use support::run;
 
 #[test]
 fn a_run_becomes_a_file_that_is_its_network() {

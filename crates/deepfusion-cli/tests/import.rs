@@ -1,18 +1,10 @@
 //! A drive whose speeds an app has logged: through `data import`, and read where it lies.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{fails, json, ok};
 use serde_json::Value;
-use support::{fails, json, ok};
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync";
 

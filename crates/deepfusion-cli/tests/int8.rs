@@ -1,17 +1,9 @@
 //! Int8: calibrated on the user's images, refused where that is missing or stale, near f32 where it is there.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 
+use crate::support::{fails, json, ok, run};
 use deepfusion_infer::Engine;
-use support::{fails, json, ok, run};
 
 const CALIBRATE: &str = "weights calibrate --images 4";
 

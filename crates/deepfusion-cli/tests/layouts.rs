@@ -1,18 +1,10 @@
 //! KITTI's odometry benchmark through the program: what the other layouts share is tested in `deepfusion-data`.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use support::{json, ok};
+use crate::support::{json, ok};
 
 /// The simulator's drive below `sim` as sequence 09 below `odometry`.
 fn as_sequence(at: &Path, frames: usize) {

@@ -1,19 +1,11 @@
 //! A drive of which nobody knows the camera: learned from, and the network used on it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use crate::support::{self, fails, json, ok};
 use serde_json::Value;
-use support::{fails, json, ok};
 
 /// The drive of a simulated KITTI folder as images with speeds and yaw rates, and nothing of the camera.
 fn without_camera(kitti: &Path, folder: &Path) {

@@ -1,24 +1,14 @@
 //! Live sources through the program alone: streams on standard input and of a server in this test. What needs ffmpeg is
 //! skipped, and says so, where there is none.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-#[path = "support/streams.rs"]
-mod streams;
-mod support;
-
 use std::io::Write;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::Command;
 
+use crate::support::streams::{brightness, piped, serve, stream, with_path};
+use crate::support::{Run, run};
 use serde_json::Value;
-use streams::{brightness, piped, serve, stream, with_path};
-use support::{Run, run};
 
 const CAMERA: &str = "--intrinsics 186,186,157,44";
 

@@ -1,18 +1,10 @@
 //! The paper's network from configuration to file: training, resuming, prediction in both engines, features, export.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 
+use crate::support::ok;
 use deepfusion_onnx::read;
 use serde_json::Value;
-use support::ok;
 
 /// The preset `tiny` with every part of the paper's network.
 fn with_parts(config: &str) -> String {

@@ -1,17 +1,9 @@
 //! Targets through the program alone.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::path::Path;
 
+use crate::support::{fails, ok, run};
 use serde_json::Value;
-use support::{fails, ok, run};
 
 const DRIVE: &str = "street/2026_01_01/2026_01_01_drive_0005_sync";
 

@@ -1,10 +1,8 @@
 //! The recipes for KITTI's tables start: two steps each, on a simulated drive, smaller than they say.
 
-mod support;
-
 use std::path::Path;
 
-use support::ok;
+use crate::support::ok;
 
 #[test]
 fn each_row_of_kittis_tables_starts() {

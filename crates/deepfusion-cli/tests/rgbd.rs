@@ -1,18 +1,10 @@
 //! RGB-D folders through the program: the colour images are looked at, by the folder's own camera.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::path::Path;
 
+use crate::support::{fails, json, ok};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::Value;
-use support::{fails, json, ok};
 
 /// Three frames as 7-Scenes has them, 96x64, and the camera they share.
 fn write_folder(folder: &Path) {

@@ -1,19 +1,11 @@
 //! The watch over a drive's metres, through the program alone.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{fails, ok};
 use image::imageops::{FilterType, crop_imm, resize};
 use serde_json::Value;
-use support::{fails, ok};
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0081_sync";
 /// Frames of the drive, and from which on its images are zoomed by 10 %.

@@ -1,18 +1,10 @@
 //! Networks without a run: packed from one, embedded in the program, or neither.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{fails, json, ok, run};
 use serde_json::Value;
-use support::{fails, json, ok, run};
 
 /// A run, and what a packed file of it is to `predict`, `eval`, `export`, `bench` and `train`.
 #[test]

@@ -1,17 +1,9 @@
 //! Splits: how much of one was used, and that nothing is both learned from and validated on.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
-use support::{fails, json, ok, run};
+use crate::support::{fails, json, ok, run};
 
 const DRIVE: &str = "2026_01_01/2026_01_01_drive_0003_sync";
 const SMALL: &str = "--size 96x64 --batch 2 --steps 1 --init none";

@@ -1,10 +1,8 @@
 //! The texts people meet: help and errors, as they come out of the program.
 
-mod support;
-
 use std::path::Path;
 
-use support::{Run, in_folder};
+use crate::support::{Run, in_folder};
 
 fn deepfusion(args: &[&str]) -> Run {
     in_folder(Path::new("."), args)

@@ -1,14 +1,12 @@
 //! Training, evaluation and prediction through the program alone, on good input and bad.
 
-mod support;
-
 use std::fs;
 
+use crate::support::{fails, ok, run};
 use burn::tensor::Device;
 use deepfusion_nn::weights;
 use deepfusion_nn::{ResNet, ResNetConfig, ResNetDepth, WeightRng};
 use serde_json::Value;
-use support::{fails, ok, run};
 
 const SMALL: &str = "--size 96x64 --batch 2 --init none";
 

@@ -1,18 +1,10 @@
 //! A network that says how sure it is: learned, calibrated, packed, written.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{self, fails, json, ok};
 use serde_json::Value;
-use support::{fails, json, ok};
 
 /// A run that knows depth alone, and one that goes on from it with the head for uncertainty.
 fn train(at: &Path) {

@@ -1,18 +1,10 @@
 //! What `eval` says of depth without ground truth, held against the simulator's truth.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{self, json, ok};
 use serde_json::Value;
-use support::{json, ok};
 
 /// A drive of some 70 metres along a street that no network saw.
 const DRIVE: &str = "simulate --frames 80 --seed 90100 --moving-cars 2";
@@ -97,7 +89,7 @@ fn a_drive_without_ground_truth_has_a_verdict() {
     ok(at, &format!("{DRIVE} --scan-every 0 --out drive"));
     let found = json(
         at,
-        "eval --data drive --assume-unseen --report page.html --json",
+        "eval --model tiny --data drive --assume-unseen --report page.html --json",
     );
     assert_eq!(found["certificate"], found["scale_certificate"]);
     assert!(found["certificate"]["ci95"].is_array(), "{found}");
@@ -129,7 +121,10 @@ fn a_drive_without_ground_truth_has_a_verdict() {
             fs::write(&path, words.join(" ")).unwrap();
         }
     }
-    let uneven = road(&json(at, "eval --data drive --assume-unseen --json"));
+    let uneven = road(&json(
+        at,
+        "eval --model tiny --data drive --assume-unseen --json",
+    ));
     let at_speed = |from: f64| uneven.iter().find(|(mps, _)| *mps == from).unwrap().1;
     let ratio = at_speed(8.0) / at_speed(15.0);
     assert!((1.7..2.3).contains(&ratio), "{uneven:?}");
@@ -138,7 +133,7 @@ fn a_drive_without_ground_truth_has_a_verdict() {
         at,
         "simulate --frames 20 --seed 90102 --scan-every 0 --out short",
     );
-    let text = ok(at, "eval --data short --assume-unseen").stdout;
+    let text = ok(at, "eval --model tiny --data short --assume-unseen").stdout;
     for part in [
         "scale  ",
         "too little road",
@@ -149,13 +144,13 @@ fn a_drive_without_ground_truth_has_a_verdict() {
         assert!(text.contains(part), "{part}: {text}");
     }
     // Whether a simulated drive is among what a packed network learned from is not known.
-    let unknown = json(at, "eval --data short --json");
+    let unknown = json(at, "eval --model tiny --data short --json");
     assert_eq!(unknown["scale_certificate"], Value::Null);
     assert_eq!(unknown["no_certificate"], "seen_not_known");
     assert_eq!(unknown["without_truth"]["held_out"], Value::Null);
     assert!(unknown.get("unscaled").is_none() && unknown.get("certificate").is_none());
     // Nothing is left to say then.
-    let none = support::run(at, "eval --data short --no-verdict");
+    let none = support::run(at, "eval --model tiny --data short --no-verdict");
     assert_eq!(none.code, 1, "{}", none.stdout);
 }
 

@@ -1,14 +1,12 @@
 //! `deepfusion view`, from its first line to Ctrl-C.
 #![cfg(unix)]
 
-mod support;
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Command, Stdio};
 
+use crate::support::in_folder;
 use deepfusion_geometry::DepthMap;
-use support::in_folder;
 
 #[test]
 fn it_prints_its_address_answers_and_ends() {

@@ -1,15 +1,6 @@
 //! Which of a bag's sources drives, and the files beside a bag.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-#[path = "common/bag.rs"]
-mod bag;
-
-use bag::{CAMERA, TinyBag};
+use crate::common::bag::{CAMERA, TinyBag};
 use deepfusion_data::{Dataset, Error, OpenOptions, inspect};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::Frame;

@@ -1,11 +1,5 @@
 //! Where a recording's camera comes from when nobody calibrated it: a field of view, or what the photographs say.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, Error, OpenOptions, load_photo};
 use deepfusion_hint::Hint;
 use exif::experimental::Writer;

@@ -1,19 +1,8 @@
 //! A clock that is off and a speed that reads too fast, said once and taken out once, in every layout.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-#[path = "common/bag.rs"]
-mod bag;
-mod common;
-#[path = "common/folder.rs"]
-mod folder;
-
-use bag::{CAMERA, TinyBag};
-use common::{TinyDrive, packet};
+use crate::common::bag::{CAMERA, TinyBag};
+use crate::common::folder;
+use crate::common::{TinyDrive, packet};
 use deepfusion_data::{Dataset, OpenOptions, convert_to_bag, convert_to_kitti, inspect};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::Compression;

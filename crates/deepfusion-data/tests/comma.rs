@@ -1,13 +1,6 @@
 //! comma2k19 segments.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
+use crate::common;
 use deepfusion_data::{Dataset, DatasetKind, Error, OpenOptions, inspect};
 use deepfusion_hint::Hint;
 use ndarray::{Array1, Array2};

@@ -1,14 +1,6 @@
 //! Opening recordings: every layout, and every reason not to.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::TinyDrive;
+use crate::common::{self, TinyDrive};
 use deepfusion_data::kitti::{Calibration, find_drives};
 use deepfusion_data::{Camera, Cameras, Dataset, Error, OpenOptions, inspect};
 use deepfusion_hint::Hint;

@@ -1,22 +1,12 @@
 //! Folders of images with tables beside them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-#[path = "common/folder.rs"]
-mod folder;
-
-use common::TinyDrive;
+use crate::common::folder::{picture, write_drive, write_images};
+use crate::common::{self, TinyDrive};
 use deepfusion_data::{
     Cameras, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, VehicleMotion, inspect,
 };
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
-use folder::{picture, write_drive, write_images};
 use image::{ImageBuffer, Luma};
 use nalgebra::Vector3;
 use std::fs;

@@ -1,14 +1,6 @@
 //! Velodyne ground truth against NumPy (`tests/reference/velodyne_numpy.py`), and its array file.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::TinyDrive;
+use crate::common::{self, TinyDrive};
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{
     Camera, Cameras, Dataset, Error, GtKind, OpenOptions, export_gt, overlay, read_depth_png,

@@ -1,14 +1,7 @@
 //! Sequences of KITTI's odometry benchmark, written from a simulated street.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::street::{
+use crate::common;
+use crate::common::street::{
     check_intrinsics, check_motion, check_path, check_truth, numbers, open, rows, street, write,
     write_picture, write_scan,
 };

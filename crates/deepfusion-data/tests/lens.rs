@@ -1,11 +1,5 @@
 //! Correction of a lens against OpenCV and SciPy, by `reference/lens_opencv.py`.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Lens, load_rgb};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::path::Path;

@@ -1,14 +1,6 @@
 //! Snippets and ego-motion, on drives written here and on KITTI's.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::{TinyDrive, packet};
+use crate::common::{self, TinyDrive, packet};
 use deepfusion_data::{Cameras, Dataset, Error, OpenOptions, Snippet, Split, hold_out};
 use deepfusion_hint::Hint;
 use nalgebra::Vector3;

@@ -1,14 +1,6 @@
 //! Dynamic pixels: KITTI's tracklets beside the car's own motion, and the simulator's masks.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::{TinyDrive, real_data, wall};
+use crate::common::{TinyDrive, real_data, wall};
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{Camera, Dataset, Error, GtKind, MovingSource, OpenOptions};
 use deepfusion_geometry::cloud::PointCloud;

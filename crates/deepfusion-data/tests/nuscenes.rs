@@ -1,14 +1,6 @@
 //! Scenes of nuScenes, written from a simulated street.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::street::{
+use crate::common::street::{
     check_intrinsics, check_motion, check_mount, check_path, check_truth, open, street, write,
 };
 use deepfusion_data::{Cameras, Dataset, DatasetKind, Error, GtKind, OpenOptions, Split, inspect};

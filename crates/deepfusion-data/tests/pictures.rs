@@ -1,11 +1,5 @@
 //! Images: resized as PIL does, truncated ones refused.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Error, image_size, load_rgb, resize_rgb, to_chw, to_network_input};
 use deepfusion_hint::Hint;
 use image::{Rgb, RgbImage};

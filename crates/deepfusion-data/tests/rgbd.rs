@@ -1,13 +1,6 @@
 //! Folders of colour, depth and pose files.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
+use crate::common;
 use deepfusion_data::{Dataset, DatasetKind, GtKind, OpenOptions, inspect};
 use deepfusion_hint::Hint;
 use image::{ImageBuffer, Luma, RgbImage};

@@ -1,16 +1,7 @@
 //! Bags as ROS vehicles record them: the sensors' places by `/tf_static` and `/tf`, speeds by satellite positions, several cameras,
 //! and no file beside them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-#[path = "common/bag.rs"]
-mod bag;
-
-use bag::{CAMERA, TinyBag};
+use crate::common::bag::{CAMERA, TinyBag};
 use deepfusion_data::{Dataset, Error, GtKind, NamedTopic, OpenOptions, inspect, write_bag_config};
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;

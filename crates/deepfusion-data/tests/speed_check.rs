@@ -1,7 +1,6 @@
 //! Speeds against images: a rendered road whose camera height is known, and real drives.
 
-mod common;
-
+use crate::common;
 use deepfusion_data::{Dataset, OpenOptions, SpeedWarning, speed_unit_warning};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_motion::{GreyImage, GroundPair, RoadTexture, implied_camera_height};

@@ -1,15 +1,5 @@
 //! Videos, read by the machine's ffmpeg where it has one.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-#[path = "common/folder.rs"]
-mod folder;
-
 use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
 use deepfusion_hint::Hint;
 use deepfusion_video::{VideoPicture, shown_for};

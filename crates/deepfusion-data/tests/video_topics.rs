@@ -2,12 +2,6 @@
 //! ffmpeg where it has one.
 
 #![cfg(feature = "ros2")]
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, Error, OpenOptions};
 use deepfusion_hint::Hint;
 use std::fs;

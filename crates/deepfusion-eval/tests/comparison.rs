@@ -1,11 +1,5 @@
 //! Run folders and files of evaluations, as tables in every form.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::compare::{

@@ -1,11 +1,5 @@
 //! Array files, their errors, and the two forms of a report.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::path::Path;
 
 use deepfusion_eval::{

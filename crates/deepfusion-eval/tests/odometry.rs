@@ -1,12 +1,6 @@
 //! Odometry errors against other people's code: evo for pairs and snippets, KITTI's definition in NumPy
 //! (`tests/reference/odometry.py`); and the texts of a report.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::path::Path;
 
 use deepfusion_eval::odometry::{OdometryReport, PoseFile, TrackPair, kitti_text};

@@ -3,12 +3,6 @@
 //! Tolerance: 1e-9 relative. Both sides compute in `f64`; NumPy multiplies by an inverted K where this crate divides by
 //! the focal length, and adds pairwise: together below 1e-12 for these sizes.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::path::Path;
 
 use deepfusion_eval::{Evaluator, Grid, PointErrors, Points, Prediction, Protocol, Sample};

@@ -1,11 +1,5 @@
 //! What must hold whatever the numbers are.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_eval::{
     Crop, Error, Evaluator, Grid, Holes, Metrics, Prediction, Protocol, Report, Sample,
 };

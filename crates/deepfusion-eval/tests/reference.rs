@@ -4,12 +4,6 @@
 //! (NumPy adds pairwise), which stays below 1e-12 for these sizes. Thresholded shares (a1…a3) must be equal to the last
 //! pixel, which the same tolerance asks for: one pixel of 4,000 is 2.5e-4.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::{

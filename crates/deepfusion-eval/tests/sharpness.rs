@@ -4,12 +4,6 @@
 //! Tolerance: 1e-9 relative. Both sides compute in `f64` from the same file values. The mean distances are sums over the
 //! same edge pixels only where every pixel of both edge maps agrees: one that differs moves them by 1e-3 and more.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::fs::File;
 use std::path::Path;
 

@@ -1,11 +1,5 @@
 //! Against what detectors' own programs make of the same numbers (tests/reference/generate.py).
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_instances::{
     Colours, Kind, Layout, Letterbox, Prototypes, decode, in_size, suppress,
 };

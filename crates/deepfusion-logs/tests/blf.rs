@@ -1,11 +1,5 @@
 //! Vector's binary log as python-can writes it (`reference/make_blf.py`), against the same frames as text; and damaged files.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, Result, read};
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,5 @@
 //! One log of each kind, of one drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_logs::{Clock, DriveLog, Format, GoproLens, ReadOptions, SpeedUnit, read};
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,5 @@
 //! GPS tracks: GPX and NMEA, good and damaged.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_hint::Hint;
 use deepfusion_logs::{DriveLog, Error, ReadOptions};
 use std::fs;

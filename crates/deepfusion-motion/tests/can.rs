@@ -1,11 +1,5 @@
 //! Signals decoded from CAN frames, against cantools (`tests/reference/dbc.py`).
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_hint::Hint;
 use deepfusion_motion::Error;
 use deepfusion_motion::can::{CanId, Dbc};

@@ -1,12 +1,6 @@
 //! Wheelbase and steering ratio from the simulator's streams: CAN speed at 50 Hz, wheel angle at 80 Hz, a 6-axis unit at 100 Hz, each quantised or noisy
 //! in its own way, the gyro with a bias that nothing tells. The truth is the road's geometry, not the model that is fitted.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_motion::{
     Estimate, Identified, IdentifyConfig, ImuConfig, ImuSample, ImuTrack, Signal, Unidentifiable,
     UnidentifiableReason, identify,

@@ -1,16 +1,8 @@
 //! Distance and heading on real drives, against positions from satellites.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{self, errors, halves, kitti, real_data, rows, speed_scale, windows};
 use deepfusion_motion::comma::CommaSegment;
 use deepfusion_motion::{FusedTrack, IdentifyConfig, MotionConfig, UnidentifiableReason, identify};
-use support::{errors, halves, kitti, real_data, rows, speed_scale, windows};
 
 fn rav4() -> MotionConfig {
     toml::from_str(include_str!("../examples/rav4_2017.toml")).unwrap()

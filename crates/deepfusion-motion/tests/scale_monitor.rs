@@ -1,11 +1,5 @@
 //! The monitor on simulated drives whose images are zoomed on the way.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_geometry::Se3;
 use deepfusion_motion::{
     GreyImage, GroundPair, RoadTexture, ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState,

@@ -1,11 +1,5 @@
 //! The scale of a depth image from the scene's movement, on simulated streets whose depth is known.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_motion::{DepthImage, GreyImage, GreyPyramid, View, align, scene_points};
 use deepfusion_sim::{SimConfig, Simulation};

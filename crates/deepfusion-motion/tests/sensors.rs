@@ -1,11 +1,5 @@
 //! The inertial unit and the fusion on a drive whose motion is known: slopes, a crooked mount, biases.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
 use deepfusion_motion::{

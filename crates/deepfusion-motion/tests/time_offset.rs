@@ -1,13 +1,6 @@
 //! The clocks' offset on simulated drives, where it is known, and on KITTI, where it should be none.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{kitti, real_data};
 use deepfusion_hint::Hint;
 use deepfusion_motion::{
     FusedTrack, GreyFrame, ImageMotion, MotionConfig, NoTimeOffset, OffsetConfig, Signal,
@@ -15,7 +8,6 @@ use deepfusion_motion::{
 };
 use deepfusion_sim::{SimConfig, Simulation};
 use image::imageops;
-use support::{kitti, real_data};
 
 /// The simulator's sensors run at 100 Hz; every fourth instant is a picture.
 const SENSOR_HZ: f64 = 100.0;

@@ -1,11 +1,5 @@
 //! What a network costs, counted from its configuration, against its weights and its graph.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use burn::tensor::Device;
 use deepfusion_infer::Op;
 use deepfusion_model::weights::Weights;

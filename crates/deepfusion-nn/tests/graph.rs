@@ -1,11 +1,5 @@
 //! A network as a graph, batch normalisation folded, gives what the network itself gives.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_infer::{Engine, Precision};
 use deepfusion_model::{depth_graph, depth_graph_with_uncertainty};

@@ -1,20 +1,12 @@
 //! What is written is what is read, and nothing else is read.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::collections::HashSet;
 
+use crate::support::model;
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 use deepfusion_onnx::check::{deviation, pictures, relative};
 use deepfusion_onnx::{DepthMaps, DepthModel, Error, read, reference, write};
 use proptest::prelude::*;
-use support::model;
 
 proptest! {
     #[test]

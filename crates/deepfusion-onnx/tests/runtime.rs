@@ -1,23 +1,16 @@
 //! Files in ONNX Runtime, if this machine has one; the messages if it has none.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
 #![cfg(feature = "runtime")]
-
-mod support;
 
 use std::path::Path;
 
+use crate::support::model;
 use deepfusion_geometry::DepthRange;
 use deepfusion_hint::Hint;
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 use deepfusion_onnx::check::{deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, Error, reference, write};
-use support::model;
 
 /// The library, or the message without one.
 fn library_is_here() -> bool {

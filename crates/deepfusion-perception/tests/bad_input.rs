@@ -1,11 +1,5 @@
 //! Invalid depth images.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_hint::Hint;
 use deepfusion_perception::{Error, Perception, PerceptionConfig, Stamp};

@@ -1,7 +1,6 @@
 //! Simulated drives, whose boxes are known exactly: the bounds that the project holds itself to.
 
-mod common;
-
+use crate::common;
 use deepfusion_perception::{Perception, PerceptionConfig, Rays, Stamp, detect};
 use deepfusion_sim::{Scene, SimConfig, Simulation};
 

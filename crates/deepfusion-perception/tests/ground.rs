@@ -1,11 +1,5 @@
 //! Roads that are not level.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{Ground, PerceptionConfig, Rays};
 

@@ -1,9 +1,6 @@
 //! Masks of a segmentation model with depth: touching objects are separated and keep their classes.
 
-#[path = "common/blocks.rs"]
-mod blocks;
-
-use blocks::{CARS, SIZE, camera, scene};
+use crate::common::blocks::{CARS, SIZE, camera, scene};
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
 use deepfusion_perception::{Error, Instance, Perception, PerceptionConfig, Run, Stamp, Target};

@@ -1,9 +1,6 @@
 //! The standard deviation of depth, in targets and in the tracker's gate.
 
-#[path = "common/blocks.rs"]
-mod blocks;
-
-use blocks::{camera, scene};
+use crate::common::blocks::{camera, scene};
 use deepfusion_geometry::{DepthMap, Se3};
 use deepfusion_perception::{Error, Perception, PerceptionConfig, Stamp, Surroundings, Target};
 

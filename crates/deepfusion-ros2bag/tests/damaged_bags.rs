@@ -1,15 +1,6 @@
 //! Bags that were cut off, hurt or never finished: what is whole is read, what is not is said.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-#[path = "../../deepfusion-rosbag/tests/common/mod.rs"]
-mod common;
-
-use common::{reference, sha256};
+use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
 use deepfusion_ros2bag::Ros2Bag;
 use deepfusion_rosbag::{Error, MessageSource, Selection};

@@ -1,11 +1,5 @@
 //! A simulated drive as a bag of ROS 1 and, by `reference/drive_to_ros2.py`, as bags of ROS 2: the same data set.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, DatasetKind, Error, GtKind, OpenOptions, Split};
 use deepfusion_ros2bag::Ros2Bag;
 use std::path::{Path, PathBuf};

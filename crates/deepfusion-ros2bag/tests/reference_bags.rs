@@ -1,10 +1,7 @@
 //! Bags that PyPI's `rosbags` and `mcap` wrote, read to the values that `rosbags` reads
 //! (`reference/ros2_reference.py`); exactly.
 
-#[path = "../../deepfusion-rosbag/tests/common/mod.rs"]
-mod common;
-
-use common::{lines, read_json, real_bags, reference, sha256};
+use crate::common::{lines, read_json, real_bags, reference, sha256};
 use deepfusion_ros2bag::{Ros2Bag, is_ros2_bag};
 use deepfusion_rosbag::{Message, MessageSource, Selection, Serialization, Time};
 use serde::Deserialize;

@@ -1,14 +1,6 @@
 //! Several bags as one stream.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::sha256;
+use crate::common::{self, sha256};
 use deepfusion_rosbag::msg::{Float32, Float64};
 use deepfusion_rosbag::{
     Bag, BagSet, BagWriter, Compression, Error, Selection, Time, WriterOptions,

@@ -1,14 +1,6 @@
 //! Bags that were cut, changed, or never finished: no panic, and what lies before the break is there.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::{reference, sha256};
+use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::{Header, Imu, PointCloud2, RosMessage};
 use deepfusion_rosbag::{

@@ -1,15 +1,7 @@
 //! Messages of frames, and of a velocity with a covariance, against what PyPI's `rosbags` writes (`reference/frames_reference.py`);
 //! exactly, in each way of writing them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::{Lines, lines_of, read_json};
+use crate::common::{Lines, lines_of, read_json};
 use deepfusion_rosbag::RosMessage;
 use deepfusion_rosbag::msg::{OldTFMessage, TFMessage, TwistWithCovarianceStamped};
 use serde::Deserialize;

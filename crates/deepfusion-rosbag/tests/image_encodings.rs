@@ -1,14 +1,6 @@
 //! Pixels of Bayer patterns, YUV and 16 bits against OpenCV (`reference/opencv_images.py`), as a message of a bag carries them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::read_json;
+use crate::common::read_json;
 use deepfusion_rosbag::msg::{Header, Image};
 use serde::Deserialize;
 use std::borrow::Cow;

@@ -1,14 +1,6 @@
 //! Bags that PyPI's `rosbags` wrote, read to the values that it reads (`reference/rosbags_reference.py`); exactly.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::{lines, number, read_json, real_bags, reference, sha256};
+use crate::common::{lines, number, read_json, real_bags, reference, sha256};
 use deepfusion_rosbag::msg::*;
 use deepfusion_rosbag::{Bag, BagOptions, Message, Selection, Time};
 use serde::Deserialize;

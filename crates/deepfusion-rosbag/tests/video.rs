@@ -1,15 +1,7 @@
 //! Messages of video streams against what PyPI's `rosbags` writes (`reference/video_reference.py`); exactly, in each way of writing
 //! them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-
-use common::{Lines, lines_of, read_json};
+use crate::common::{Lines, lines_of, read_json};
 use deepfusion_rosbag::msg::{CompressedVideo, FfmpegPacket, OldFfmpegPacket};
 use deepfusion_rosbag::{Connection, Message, RosMessage, Serialization, Time};
 use serde::Deserialize;

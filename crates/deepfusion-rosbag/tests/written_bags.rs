@@ -1,17 +1,8 @@
 //! Bags that we write: the bytes that `reference/check_written.py` saw PyPI's `rosbags` accept, value by value, and
 //! read back by ourselves.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod common;
-#[path = "common/written.rs"]
-mod written;
-
-use common::{Lines, lines, read_json, sha256};
+use crate::common::{Lines, lines, read_json, sha256};
+use crate::written;
 use deepfusion_rosbag::msg::{Float32, Imu};
 use deepfusion_rosbag::{Bag, BagWriter, Compression, Error, Selection, Time, WriterOptions};
 use std::collections::BTreeMap;

@@ -1,12 +1,6 @@
 //! The promises a photometric learner relies on: warping a frame by the true depth and pose gives
 //! the other frame, drives repeat byte for byte, and every sensor sees the same world.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_sim::{ObjectClass, SimConfig, SimFrame, Simulation};
 use nalgebra::Vector3;
 

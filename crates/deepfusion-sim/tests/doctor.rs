@@ -1,17 +1,9 @@
 //! The doctor is silent on clean drives, and names every fault that is planted into one.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod doctor_faults;
-
+use crate::doctor_faults::{Drive, oxts};
 use deepfusion_data::OpenOptions;
 use deepfusion_doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
-use doctor_faults::{Drive, oxts};
 use nalgebra::{Rotation3, Vector3};
 use std::path::{Path, PathBuf};
 

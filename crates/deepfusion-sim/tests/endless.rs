@@ -1,12 +1,6 @@
 //! The guarantees of the endless mode: a view depends on the settings and its index alone, and its depth is
 //! exact whatever the weather and the camera do to its colours.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_geometry::Intrinsics;
 use deepfusion_sim::{Endless, EndlessConfig, Ingredient, Scene, View, Weather};
 use nalgebra::Vector3;

@@ -1,11 +1,5 @@
 //! What is written is a KITTI drive: the project's own reader opens it and finds the same truth.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, GtKind, OpenOptions, load_rgb, read_depth_png};
 use deepfusion_hint::Hint;
 use deepfusion_sim::{Error, SimConfig, Simulation, write_kitti};

@@ -1,11 +1,5 @@
 //! A drive written as a bag: what is in it, and that it is the drive.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_rosbag::msg::{CameraInfo, CompressedImage, Imu, PointCloud2, TwistStamped};
 use deepfusion_rosbag::{Bag, Selection};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, topic, write_bag};

@@ -1,11 +1,5 @@
 //! A simulated drive read back as a data set: through a bag, KITTI's layout, and a folder with a table.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{
     Dataset, GtKind, MovingSource, OpenOptions, convert_to_bag, convert_to_kitti, ego_velocity,
     ground_radial,

@@ -1,11 +1,5 @@
 //! The motion that a bag's speed, steering and inertial unit give, against where the camera was.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_geometry::Se3;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag};

@@ -1,11 +1,5 @@
 //! Dynamic points of a bag: velocities at pixels, and the topic of dynamic points.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, GtKind, MovingSource, OpenOptions};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::Compression;

@@ -1,11 +1,5 @@
 //! The FMCW LiDAR, the 6-axis unit and the CAN bus against the exact motion.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_sim::{SceneObject, Sensors, SimConfig, Simulation, WHEELBASE_M};
 use nalgebra::Vector3;
 

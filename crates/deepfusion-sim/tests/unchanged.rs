@@ -1,12 +1,6 @@
 //! Drives of a configuration are what they were in every version: pictures, depths and boxes, byte for byte. So are
 //! the endless mode's views where nothing newer is asked for.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_sim::{Endless, EndlessConfig, Scene, Sensors, SimConfig, Simulation};
 
 /// FNV-1a, 64 bits.

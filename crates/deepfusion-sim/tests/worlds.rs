@@ -1,11 +1,5 @@
 //! Varied worlds: they repeat, they differ, their depth is exact, and their sensors agree.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_sim::{ObjectClass, Scene, SimConfig, Simulation, Variety};
 use nalgebra::Vector3;
 use rand::SeedableRng;

@@ -4,21 +4,29 @@ use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
 use deepfusion_model::Error as ModelError;
 
-use crate::{Error, Model};
+use crate::{Error, Model, SampleSet, TrainConfig};
 
-/// Takes the weights of these names out of learning: their gradients are not computed. A name is a weight's own
+/// Takes the weights that `config.freeze` names out of learning: their gradients are not computed. A name is a weight's own
 /// (`depth.encoder.conv1.weight`) or that of what it is part of (`depth.encoder`), as among the moments of [`crate::Adam`].
 ///
 /// # Errors
-/// [`ModelError::Config`] for a name that no weight has, or if nothing is left to learn.
-pub(crate) fn freeze(model: Model, names: &[String]) -> Result<Model, Error> {
+/// [`ModelError::Config`] for a name that no weight has, or if nothing is left to learn from the videos or from the images with
+/// known depth in `train`.
+pub(crate) fn freeze(
+    model: Model,
+    config: &TrainConfig,
+    train: &SampleSet,
+) -> Result<Model, Error> {
+    let names = &config.freeze;
     if names.is_empty() {
         return Ok(model);
     }
     let mut freeze = Freeze {
+        config,
         path: Vec::new(),
         names: names.iter().map(|name| (name.as_str(), false)).collect(),
-        learning: 0,
+        from_video: 0,
+        from_depth: 0,
     };
     let model = Model {
         depth_net: freeze.under("depth", model.depth_net),
@@ -37,24 +45,44 @@ pub(crate) fn freeze(model: Model, names: &[String]) -> Result<Model, Error> {
         let expected = "weights by their names, or by the beginning of them, as depth.encoder or depth.encoder.layer1";
         return Err(wrong(expected, (*name).to_owned()));
     }
-    if freeze.learning == 0 {
-        return Err(wrong("weights left to learn", names.join(", ")));
+    if !train.samples.is_empty() && freeze.from_video == 0 {
+        return Err(wrong("weights left to learn from video", names.join(", ")));
+    }
+    if !train.depth.is_empty() && freeze.from_depth == 0 {
+        let expected = "weights left to learn from known depth";
+        return Err(wrong(expected, names.join(", ")));
     }
     Ok(model)
 }
 
 struct Freeze<'a> {
+    config: &'a TrainConfig,
     path: Vec<String>,
     /// Whether a weight of the name was there.
     names: Vec<(&'a str, bool)>,
-    /// Weights that still learn.
-    learning: usize,
+    /// Weights that still learn from video, and from known depth.
+    from_video: usize,
+    from_depth: usize,
 }
 
 impl Freeze<'_> {
     fn under<M: Module>(&mut self, prefix: &str, module: M) -> M {
         self.path = vec![prefix.to_owned()];
         module.map(self)
+    }
+
+    fn is_uncertainty(&self) -> bool {
+        self.path[0] == "depth" && self.path.get(1).is_some_and(|part| part == "uncertainty")
+    }
+
+    /// PoseNet, too: where the views are not warped by its poses, it has a loss of its own (`loss.speed`).
+    fn learns_from_video(&self) -> bool {
+        !self.is_uncertainty()
+    }
+
+    fn learns_from_depth(&self) -> bool {
+        // At weight 0 the head for uncertainty learns alone: `Model::learn_depth`.
+        self.path[0] == "depth" && (self.config.loss.depth.weight > 0.0 || self.is_uncertainty())
     }
 }
 
@@ -84,7 +112,8 @@ impl ModuleMapper for Freeze<'_> {
         if frozen {
             return param.set_require_grad(false);
         }
-        self.learning += 1;
+        self.from_video += usize::from(self.learns_from_video());
+        self.from_depth += usize::from(self.learns_from_depth());
         param
     }
 }

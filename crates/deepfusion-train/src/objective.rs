@@ -311,8 +311,8 @@ impl Model {
         // The other camera's view is nothing that PoseNet could know.
         let views = views.take(batch.offsets.len());
         match self.config.view_motion {
-            ViewMotion::Vehicle => mean_of(views, |pair| losses::motion(pair.0, pair.1, None)),
-            ViewMotion::Auto => {
+            ViewMotion::Vehicle | ViewMotion::Auto => {
+                // None where every drive's turns are known, as they have to be for `Vehicle`.
                 let known = batch.turns_known.clone().map(|known| self.both_ways(known));
                 mean_of(views.enumerate(), |(view, (motion, measured))| {
                     let whole = losses::motion(motion, measured, known.clone());
@@ -358,9 +358,8 @@ impl Model {
     fn warp_poses(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
         match self.config.view_motion {
             ViewMotion::PoseNet => pass.motions.clone(),
-            ViewMotion::Vehicle => pass.measured.clone(),
             ViewMotion::Distance => self.at_measured_distance(pass, batch),
-            ViewMotion::Auto => {
+            ViewMotion::Vehicle | ViewMotion::Auto => {
                 let Some(known) = &batch.turns_known else {
                     return pass.measured.clone();
                 };

@@ -106,7 +106,7 @@ impl Trainer {
         let findings = findings(&settings, &train);
         let config = findings.complete(settings.clone());
         let device = device.clone().autodiff();
-        let model = freeze(init(Model::new(&config, &device)?)?, &config.freeze)?;
+        let model = freeze(init(Model::new(&config, &device)?)?, &config, &train)?;
         if workers.leads() {
             folder.write_config(&settings, &findings)?;
         }
@@ -159,7 +159,7 @@ impl Trainer {
         check_camera(&config, [&train, &validation])?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
-        let model = freeze(model, &config.freeze)?;
+        let model = freeze(model, &config, &train)?;
         let adam = adam.ok_or_else(|| ModelError::NotResumable {
             path: folder.checkpoint_path(CheckpointKind::Last),
             reason: "it has no optimiser state to go on with",

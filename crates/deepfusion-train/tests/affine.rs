@@ -1,18 +1,10 @@
 //! The affine invariant loss inside the whole: it neither sees nor moves the scale of depth or motion.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{drive, small};
 use burn::tensor::{Device, Tensor};
 use deepfusion_train::{
     BatchLoader, ForwardPass, Model, Schedule, SnippetBatch, TrainConfig, ViewMotion,
 };
-use support::{drive, small};
 
 /// A pair of frames at 96×64, and a configuration whose views follow PoseNet.
 fn pair() -> (TrainConfig, SnippetBatch) {

@@ -1,13 +1,6 @@
 //! `view_motion = "auto"`: the measured motion where a drive's turns are known, PoseNet's at the measured distance elsewhere.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{drive, folder_without_camera, small_without_data, street};
 use burn::tensor::{Device, Tensor};
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_train::{
@@ -16,7 +9,6 @@ use deepfusion_train::{
 };
 use std::fs;
 use std::path::Path;
-use support::{drive, folder_without_camera, small_without_data, street};
 
 /// The street as a folder with speeds alone.
 fn without_yaw_rate(folder: &Path, frames: usize) {

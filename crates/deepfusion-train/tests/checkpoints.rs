@@ -1,13 +1,6 @@
 //! Resuming a run, and starting another one from it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{drive, small};
 use burn::tensor::Device;
 use deepfusion_hint::Hint;
 use deepfusion_model::Error as ModelError;
@@ -18,7 +11,6 @@ use deepfusion_train::{
     TrainFindings, Trainer,
 };
 use std::path::Path;
-use support::{drive, small};
 
 /// A run of two steps with a flow decoder or without, in `name` beside a drive.
 fn trained(at: &Path, name: &str, flow: bool) -> (Trainer, RunFolder) {

@@ -1,13 +1,6 @@
 //! Learning from known depth: of simulated views, of recordings, and beside a video's own motion.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::drive;
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_hint::Hint;
@@ -16,10 +9,10 @@ use deepfusion_nn::{InputSize, weights};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, LossTerms, Preset, RunFolder,
-    SampleSet, SimulatedConfig, Supervision, TrainConfig, TrainEvent, Trainer, validation_loss,
+    SampleSet, SimulatedConfig, Supervision, TrainConfig, TrainEvent, Trainer, ViewMotion,
+    validation_loss,
 };
 use std::path::{Path, PathBuf};
-use support::drive;
 
 /// A small network that learns from simulated views.
 fn streets(steps: usize) -> TrainConfig {
@@ -291,6 +284,66 @@ fn depth_and_motion_are_learned_in_one_step() {
     for losses in steps {
         assert!(losses.depth > 0.0 && losses.reprojection > 0.0 && losses.speed > 0.0);
         assert!(losses.total > losses.depth);
+    }
+}
+
+/// Weights that stay leave something to learn from each kind of sample that a run has.
+#[test]
+fn frozen_weights_leave_every_source_something_to_teach() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(&folder.path().join("street"), 8);
+    let mixed = |config: &mut TrainConfig| {
+        config.depth_batch = 1;
+        with_recording(config, vec![drive.clone()], Learn::OwnMotion);
+    };
+    let uncertainty = |config: &mut TrainConfig| {
+        config.depth_net.uncertainty = true;
+        config.loss.depth.weight = 0.0;
+    };
+    let video = |config: &mut TrainConfig| {
+        config.data.sets.clear();
+        with_recording(config, vec![drive.clone()], Learn::OwnMotion);
+    };
+    type Change<'a> = &'a dyn Fn(&mut TrainConfig);
+    let cases: [(&str, &[&str], Change, Option<&str>); 8] = [
+        ("depth alone", &["depth"], &|_| {}, Some("known depth")),
+        ("its encoder", &["depth.encoder"], &|_| {}, None),
+        ("both", &["depth"], &mixed, Some("known depth")),
+        ("both, a part", &["depth.decoder", "pose"], &mixed, None),
+        (
+            "the head",
+            &["depth.uncertainty"],
+            &uncertainty,
+            Some("known depth"),
+        ),
+        (
+            "all but the head",
+            &["depth.encoder", "depth.decoder"],
+            &uncertainty,
+            None,
+        ),
+        ("video", &["depth", "pose"], &video, Some("from video")),
+        ("PoseNet alone", &["depth"], &video, None),
+    ];
+    for (name, freeze, change, refused) in cases {
+        let mut config = streets(1);
+        change(&mut config);
+        config.freeze = freeze.iter().map(|&part| part.into()).collect();
+        let run_folder = RunFolder::create(&folder.path().join(name)).unwrap();
+        let sets = samples(&config).unwrap();
+        let created = Trainer::create(config, run_folder, sets, &Device::flex(), Ok);
+        match refused {
+            None => {
+                run(&mut created.unwrap(), None);
+            }
+            Some(part) => {
+                let text = created.unwrap_err().to_string();
+                assert!(
+                    text.contains("`freeze`") && text.contains(part),
+                    "{name}: {text}"
+                );
+            }
+        }
     }
 }
 

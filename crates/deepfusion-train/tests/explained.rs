@@ -1,13 +1,6 @@
 //! Explainability masks: which frame they are of, what they weigh, and what keeps them up.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{drive, small_without_data};
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{Dataset, OpenOptions};
@@ -16,7 +9,6 @@ use deepfusion_train::{
     BatchLoader, BatchLoss, ForwardPass, Model, Preset, Reprojection, SampleSet, Schedule,
     SnippetBatch, TrainConfig, ViewMotion,
 };
-use support::{drive, small_without_data};
 
 /// Three frames at 96×64, and a small network that explains them.
 fn settings() -> TrainConfig {

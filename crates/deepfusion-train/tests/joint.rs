@@ -1,11 +1,5 @@
 //! Two data sets in one run: another camera, another speed, another range, each with its own metres.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use burn::tensor::{Device, Tensor};
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, load_rgb, save_png};
 use deepfusion_geometry::DepthRange;

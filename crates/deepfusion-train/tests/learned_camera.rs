@@ -1,15 +1,8 @@
 //! The focal length of a camera that nobody gave, learned with the networks. The simulator knows the truth.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::path::Path;
 
+use crate::support::{folder_without_camera, small_without_data};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{Dataset, OpenOptions, to_chw};
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -22,7 +15,6 @@ use deepfusion_train::{
     TrainEvent, Trainer, ViewMotion, synthesise,
 };
 use nalgebra::Vector3;
-use support::{folder_without_camera, small_without_data};
 
 /// Five pictures a second, so that the bends turn the view by some pixels a frame.
 fn simulated(seed: u64, frames: usize) -> Simulation {

@@ -1,11 +1,5 @@
 //! The terms of the loss against PyTorch (`reference/losses.py`, `reference/depth.py`) and against finite differences.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_train::losses::{

@@ -1,11 +1,5 @@
 //! A recording without a yaw rate: what may be trained on it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_data::{Dataset, OpenOptions, RgbImage};
 use deepfusion_hint::Hint;
 use deepfusion_train::{Error, Preset, SampleSet, TrainConfig, ViewMotion};

@@ -1,11 +1,5 @@
 //! Every preset learns from known depth, from its own motion, and from both.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_nn::weights;

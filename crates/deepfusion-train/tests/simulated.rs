@@ -1,13 +1,6 @@
 //! Against the simulator, which knows the truth.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{drive, small, street};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::to_chw;
 use deepfusion_geometry::Se3;
@@ -18,7 +11,6 @@ use deepfusion_train::{
     Reprojection, RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent, Trainer, ViewMotion,
     synthesise, validation_loss,
 };
-use support::{drive, small, street};
 
 fn matrix(m: &nalgebra::Matrix3<f64>, device: &Device) -> Tensor<3> {
     let values: Vec<f32> = (0..9).map(|i| m[(i / 3, i % 3)] as f32).collect();

@@ -1,11 +1,5 @@
 //! The other camera's view: where it is, what it shows, and what is refused.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};

@@ -1,13 +1,6 @@
 //! The trainer's events, and the ends of a run.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
+use crate::support::{drive, small};
 use burn::tensor::Device;
 use deepfusion_hint::Hint;
 use deepfusion_nn::weights::{WeightTensor, collect};
@@ -17,7 +10,6 @@ use deepfusion_train::{
 };
 use std::collections::BTreeMap;
 use std::path::Path;
-use support::{drive, small};
 
 type Tensors = BTreeMap<String, WeightTensor>;
 

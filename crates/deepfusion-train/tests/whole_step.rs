@@ -5,12 +5,6 @@
 //! the nearer source, a cell of the warp, a ReLU's kink) rounding decides for a pixel, and the gradient jumps; what that does to
 //! PyTorch's own float32 is in the reference, too.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 #[path = "../../deepfusion-nn/tests/networks/formula.rs"]
 mod formula;
 

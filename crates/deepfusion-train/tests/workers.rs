@@ -1,23 +1,15 @@
 //! Workers that learn together learn what one learns alone.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::error::Error as StdError;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Barrier, Mutex};
 
+use crate::support::{drive, small};
 use burn::tensor::Device;
 use deepfusion_train::{
     CheckpointKind, Checkpoints, Control, Error, LossTerms, RunFolder, SampleSet, TrainConfig,
     TrainEvent, Trainer, Workers,
 };
-use support::{drive, small};
 
 /// Workers in the threads of one process. One that is gone is noticed by the others at their next sum.
 #[derive(Clone)]

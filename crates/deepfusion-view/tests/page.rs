@@ -1,23 +1,14 @@
 //! The page in a real browser: what it shows is what the files hold. Without a Chromium this says so and passes.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
 #![cfg(unix)]
-
-#[path = "support/browser.rs"]
-mod browser;
-mod support;
 
 use std::time::{Duration, Instant};
 
-use browser::Browser;
+use crate::support::browser::Browser;
+use crate::support::{CAMERA, Running, SIZE, results, steps, target, write_frame};
 use deepfusion_geometry::Intrinsics;
 use nalgebra::{Rotation3, Vector3};
 use serde_json::{Value, json};
-use support::{CAMERA, Running, SIZE, results, steps, target, write_frame};
 
 const FRAMES: usize = 12;
 

@@ -1,19 +1,13 @@
 //! Files for the rerun viewer, read back with its SDK's own reader.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
 #![cfg(feature = "rerun")]
-
-mod support;
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::BufReader;
 use std::path::Path;
 
+use crate::support::{CAMERA, SIZE, results, steps, write_sidecar};
 use deepfusion_view::{Error, Folder, RerunReport, write_rerun};
 use re_chunk::{Chunk, TimeInt};
 use re_log_encoding::DecoderApp;
@@ -26,7 +20,6 @@ use re_sdk_types::components::{
 use re_sdk_types::datatypes::{ChannelDatatype, Quaternion};
 use re_sdk_types::{Component, archetypes as a};
 use serde_json::json;
-use support::{CAMERA, SIZE, results, steps, write_sidecar};
 
 /// What a file holds: for each entity its rows, in the order they were written.
 struct Read {

@@ -1,20 +1,14 @@
 //! What the server answers, to a plain client.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-mod support;
-
 use std::io::{Read, Write};
 use std::net::TcpStream;
 
+use crate::support::{
+    self, CAMERA, Running, SIZE, any_port, results, steps, write_frame, write_sidecar,
+};
 use deepfusion_hint::Hint;
 use deepfusion_view::{Error, Folder, Server, Settings};
 use serde_json::{Value, json};
-use support::{CAMERA, Running, SIZE, any_port, results, steps, write_frame, write_sidecar};
 
 fn problems(frame: &Value) -> String {
     let list = frame["problems"].as_array().unwrap().iter();

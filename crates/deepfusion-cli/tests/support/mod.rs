@@ -1,11 +1,6 @@
 //! Runs the program as its users do.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code, reason = "each test takes what it needs")]
+pub(crate) mod streams;
 
 use std::path::Path;
 use std::process::Command;

@@ -1,11 +1,5 @@
 //! Streams of frames that know their numbers, and ways to send them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::ffi::OsStr;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -13,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::thread::JoinHandle;
 
-use super::support::Run;
+use super::Run;
 
 const SIZE: (usize, usize) = (320, 96);
 

@@ -1,12 +1,5 @@
 //! A small bag: grey pictures, and whatever a test's vehicle says.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code, reason = "each test binary uses a part of it")]
-
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, Float32, Frame, Header, Image, Imu, NavSatFix, NavSatStatus,
     Odometry, PointCloud2, Pose, PoseWithCovariance, Quaternion, RegionOfInterest, TFMessage,

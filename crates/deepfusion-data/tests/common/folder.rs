@@ -1,12 +1,5 @@
 //! The tiny drive of `TinyDrive` as a folder of images with tables.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code, reason = "each test binary uses a part of it")]
-
 use image::{Rgb, RgbImage};
 use std::fs;
 use std::path::Path;

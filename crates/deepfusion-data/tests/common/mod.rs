@@ -1,12 +1,7 @@
 //! Drives for the tests: tiny ones written here, and real ones where they are on the machine.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code, reason = "each test binary uses a part of it")]
-
+pub(crate) mod bag;
+pub(crate) mod folder;
 pub(crate) mod street;
 
 use deepfusion_geometry::cloud::PointCloud;

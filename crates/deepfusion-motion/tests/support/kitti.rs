@@ -1,11 +1,5 @@
 //! A KITTI raw drive, as far as motion needs it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_motion::{
     GreyFrame, ImageMotion, ImuSample, Signal, VehicleSensors, VehicleTrack, image_motions,
 };

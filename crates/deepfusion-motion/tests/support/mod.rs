@@ -2,11 +2,11 @@
 //! reference.
 
 #![allow(
+    dead_code,
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a test's panic is its message"
+    reason = "the example has a part of it, too"
 )]
-#![allow(dead_code)] // Each test uses its part.
 
 pub(crate) mod kitti;
 

@@ -5,7 +5,7 @@
 //! Measured: disparities 2.3e-6 (ResNet-18; PyTorch's own float32: 3.5e-6) and 4.2e-7 (ResNet-50), poses
 //! 5e-7. The repeating weights of the `.pth` files cancel more, and so round more.
 
-use crate::common::{images, largest_error, manifest, unpack, values, write_listed};
+use crate::networks::common::{images, largest_error, manifest, unpack, values, write_listed};
 use burn::tensor::Device;
 use deepfusion_nn::weights::{
     self, Monodepth2Files, Weights, load_monodepth2, load_torchvision_resnet,
@@ -24,10 +24,13 @@ fn check_disparities(expected: &Weights, model: &str, disparities: Vec<burn::ten
     assert_eq!(disparities.len(), 4);
     for (scale, disparity) in disparities.into_iter().enumerate() {
         let (height, width) = (
-            crate::common::HEIGHT >> scale,
-            crate::common::WIDTH >> scale,
+            crate::networks::common::HEIGHT >> scale,
+            crate::networks::common::WIDTH >> scale,
         );
-        assert_eq!(disparity.dims(), [crate::common::BATCH, 1, height, width]);
+        assert_eq!(
+            disparity.dims(),
+            [crate::networks::common::BATCH, 1, height, width]
+        );
         let step = if scale == 0 { 31 } else { 11 };
         check(
             expected,
@@ -54,7 +57,7 @@ fn monodepth2_resnet18_from_its_four_pth_files() {
     };
     assert_eq!(model.input_size, Some(published));
 
-    let expected = crate::common::expected();
+    let expected = crate::networks::common::expected();
     let disparities = model.depth_net.forward(images("images", 3, &device));
     check_disparities(&expected, "monodepth2_18", disparities);
 
@@ -90,11 +93,15 @@ fn monodepth2_resnet50_from_safetensors() {
     let model = load_monodepth2(&files, &device).unwrap();
     assert_eq!(model.depth_config.encoder.depth, ResNetDepth::ResNet50);
     let disparities = model.depth_net.forward(images("images", 3, &device));
-    check_disparities(&crate::common::expected(), "monodepth2_50", disparities);
+    check_disparities(
+        &crate::networks::common::expected(),
+        "monodepth2_50",
+        disparities,
+    );
 }
 
 fn check_features(model: &str, features: [burn::tensor::Tensor<4>; 5]) {
-    let expected = crate::common::expected();
+    let expected = crate::networks::common::expected();
     for (level, (feature, step)) in features
         .into_iter()
         .zip([997, 499, 251, 127, 61])
@@ -152,7 +159,11 @@ fn the_pth_files_hold_the_formula_to_the_last_bit() {
         for (name, shape, _) in floats {
             let tensor = &read.tensors[name];
             assert_eq!(&tensor.shape, shape, "{file}: {name}");
-            let formula = crate::common::formula(name, shape, Some(crate::common::PERIOD));
+            let formula = crate::networks::common::formula(
+                name,
+                shape,
+                Some(crate::networks::common::PERIOD),
+            );
             assert!(tensor.values == formula, "{file}: {name}");
         }
     }

@@ -16,7 +16,7 @@ use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
 use flate2::read::GzDecoder;
 
-pub(crate) use crate::formula::{Listing, filled, formula, uniform, write_listed};
+pub(crate) use crate::networks::formula::{Listing, filled, formula, uniform, write_listed};
 
 /// Batch, height and width of the reference images.
 pub(crate) const BATCH: usize = 2;

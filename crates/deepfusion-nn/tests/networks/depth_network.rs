@@ -20,7 +20,9 @@ use deepfusion_nn::{
     WeightRng,
 };
 
-use crate::common::{filled, largest_difference, reference, take_gradients, uniform, values};
+use crate::networks::common::{
+    filled, largest_difference, reference, take_gradients, uniform, values,
+};
 
 /// Of a tensor's root mean square.
 const TOLERANCE: f32 = 1e-4;
@@ -193,7 +195,7 @@ fn inspection_shows_what_forward_uses() {
     let device = Device::flex();
     let config = small_paper(ResNetDepth::ResNet18, 8, AttentionForm::Product);
     let net = filled(DepthNet::new(&config, &device).unwrap());
-    let x = crate::common::images("images", 3, &device);
+    let x = crate::networks::common::images("images", 3, &device);
     let seen = net.inspect(x.clone());
     assert_eq!(seen.masks.len(), 4);
     for (level, masks) in seen.masks.iter().enumerate() {

@@ -16,7 +16,7 @@ use burn::tensor::Device;
 use deepfusion_nn::weights::{self, WeightTensor, Weights, collect, load_disp_net};
 use deepfusion_nn::{DepthNet, DepthNetConfig, InputNormalisation};
 
-use crate::common::{
+use crate::networks::common::{
     BATCH, HEIGHT, Listing, WIDTH, check_gradients, gradients, images, largest_difference,
     pattern_loss, reference, values, write_listed,
 };

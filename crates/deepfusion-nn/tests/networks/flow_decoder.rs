@@ -10,7 +10,7 @@
     reason = "a test's panic is its message"
 )]
 
-use crate::common::{formula, largest_difference, reference, uniform};
+use crate::networks::common::{formula, largest_difference, reference, uniform};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use deepfusion_nn::{FlowDecoder, FlowDecoderConfig, FlowOutput, WeightRng};

@@ -18,7 +18,7 @@ use deepfusion_nn::weights::{
 };
 use deepfusion_nn::{DepthNet, DepthNetConfig, Error, LiteMonoSize};
 
-use crate::common::{
+use crate::networks::common::{
     BATCH, HEIGHT, Listing, WIDTH, check_gradients, gradients, images, largest_difference,
     pattern_loss, reference, unpack, values, write_listed,
 };

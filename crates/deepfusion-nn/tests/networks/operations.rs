@@ -9,7 +9,7 @@
     reason = "a test's panic is its message"
 )]
 
-use crate::common::{largest_difference, reference, uniform};
+use crate::networks::common::{largest_difference, reference, uniform};
 use burn::tensor::{Device, Tensor};
 use deepfusion_nn::ops::{self, ConvOptions};
 use deepfusion_nn::weights;

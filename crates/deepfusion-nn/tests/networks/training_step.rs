@@ -6,7 +6,7 @@
     reason = "a test's panic is its message"
 )]
 
-use crate::common::{images, manifest, values, write_listed};
+use crate::networks::common::{images, manifest, values, write_listed};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::layers::freeze_statistics;
@@ -34,7 +34,7 @@ fn pattern_loss(disparities: Vec<Tensor<4>>) -> Tensor<1> {
         .enumerate()
         .map(|(scale, disparity)| {
             let shape = disparity.dims();
-            let pattern = crate::common::uniform(
+            let pattern = crate::networks::common::uniform(
                 &format!("pattern{scale}"),
                 shape.iter().product::<usize>(),
                 None,
@@ -71,7 +71,7 @@ fn gradients_and_running_statistics_are_pytorchs() {
     let device = Device::flex().autodiff();
     let net = reference_network(&device);
     let loss = pattern_loss(net.forward(images("images", 3, &device)));
-    let expected = crate::common::expected();
+    let expected = crate::networks::common::expected();
     let loss_error = values(loss.clone())[0] - expected.tensors["training/loss"].values[0];
     println!("loss: {loss_error:.2e}");
     assert!(loss_error.abs() < 1e-6);
@@ -102,7 +102,7 @@ fn gradients_and_running_statistics_are_pytorchs() {
         }
         compared += 1;
     };
-    for (name, gradient) in crate::common::gradients(&net, loss) {
+    for (name, gradient) in crate::networks::common::gradients(&net, loss) {
         compare(&name, gradient);
     }
     println!("{compared} gradients, worst {:.2e} in {}", worst.0, worst.1);
@@ -119,7 +119,7 @@ fn gradients_and_running_statistics_are_pytorchs() {
     for (name, tensor) in &statistics.tensors {
         if name.contains("running") {
             let reference = format!("training/{}", pytorch_name(name));
-            worst = worst.max(crate::common::largest_error(
+            worst = worst.max(crate::networks::common::largest_error(
                 &expected,
                 &reference,
                 &tensor.values,

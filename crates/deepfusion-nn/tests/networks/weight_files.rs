@@ -8,7 +8,7 @@
 
 use std::fs;
 
-use crate::common::{images, manifest, unpack, values};
+use crate::networks::common::{images, manifest, unpack, values};
 use burn::module::Module;
 use burn::tensor::Device;
 use deepfusion_hint::Hint;

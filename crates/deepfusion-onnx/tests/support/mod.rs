@@ -1,12 +1,5 @@
 //! Small random networks.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code)] // Not every test uses all of it.
-
 use deepfusion_geometry::DepthRange;
 use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId};
 use deepfusion_onnx::{DepthModel, FocalLength};

@@ -1,5 +1,4 @@
 //! A level road with boxes on it, seen by an exact camera.
-#![allow(dead_code)]
 
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use nalgebra::Vector3;

@@ -1,10 +1,6 @@
 //! A simulated drive with exact depth, poses and boxes.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
+pub(crate) mod blocks;
 
 use deepfusion_perception::{
     Label, Perception, PerceptionConfig, Scorer, ScoringRules, Stamp, TargetScore,

@@ -1,11 +1,5 @@
 //! A clean simulated drive in KITTI's layout, and faults planted into copies of it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use deepfusion_doctor::{Diagnosis, doctor};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use image::RgbImage;

@@ -1,12 +1,5 @@
 //! A short simulated drive, and a network small enough to learn from it in seconds.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code, reason = "each test takes what it needs")]
-
 use deepfusion_data::{Dataset, OpenOptions, save_png};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{Preset, SampleSet, TrainConfig};

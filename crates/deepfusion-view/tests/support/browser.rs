@@ -1,11 +1,5 @@
 //! Chromium, driven through its DevTools protocol over a pair of pipes: no port, and it ends with the test.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};

@@ -1,11 +1,7 @@
 //! A small folder of results, a server on it, and a plain client.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-#![allow(dead_code)]
+#[cfg(unix)]
+pub(crate) mod browser;
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};

@@ -1,12 +1,6 @@
 //! A recording with every message type, made of formulas: what the writer's tests write.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    reason = "a test's panic is its message"
-)]
-
-use super::Lines;
+use crate::common::Lines;
 use deepfusion_rosbag::msg::*;
 use deepfusion_rosbag::{BagWriter, Compression, ConnectionId, Time, WriterOptions};
 use serde::Serialize;

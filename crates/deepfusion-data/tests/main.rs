@@ -1,0 +1,30 @@
+//! Recordings in every layout, as they are and damaged.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod bag_sidecar;
+mod camera;
+mod clock_and_scale;
+mod comma;
+mod common;
+mod drives;
+mod folders;
+mod ground_truth;
+mod kitti360;
+mod kitti_odometry;
+mod lens;
+mod motion;
+mod moving;
+mod nuscenes;
+mod pictures;
+mod recording;
+mod rgbd;
+mod ros2;
+mod ros_frames;
+mod speed_check;
+mod video;
+mod video_topics;

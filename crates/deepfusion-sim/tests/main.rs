@@ -1,0 +1,20 @@
+//! The simulator: exact against itself, and against what reads its files.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod consistency;
+mod doctor;
+mod doctor_faults;
+mod endless;
+mod kitti_layout;
+mod umad_bag;
+mod umad_dataset;
+mod umad_motion;
+mod umad_moving;
+mod umad_sensors;
+mod unchanged;
+mod worlds;

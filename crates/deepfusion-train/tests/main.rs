@@ -1,0 +1,26 @@
+//! Training: losses, samples, runs.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod affine;
+mod auto_turns;
+mod checkpoints;
+mod configuration_page;
+mod depth;
+mod explained;
+mod joint;
+mod learned_camera;
+mod losses;
+mod no_yaw_rate;
+mod presets;
+mod recipes;
+mod simulated;
+mod stereo;
+mod support;
+mod trainer;
+mod whole_step;
+mod workers;

@@ -1,0 +1,12 @@
+//! The viewer: its server, its page, Rerun.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod page;
+mod rerun;
+mod server;
+mod support;
