@@ -9,8 +9,7 @@ use deepfusion_nn::{InputSize, weights};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, LossTerms, Preset, RunFolder,
-    SampleSet, SimulatedConfig, Supervision, TrainConfig, TrainEvent, Trainer, ViewMotion,
-    validation_loss,
+    SampleSet, SimulatedConfig, Supervision, TrainConfig, TrainEvent, Trainer, validation_loss,
 };
 use std::path::{Path, PathBuf};
 
