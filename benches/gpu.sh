@@ -28,7 +28,8 @@ out=$(cd "$out" && pwd)
 
 # Before any figure: is it right? What differs is written down and does not end the script.
 "$program" doctor --device "$device" --json >"$out/doctor.json" || true
-"$program" simulate --out "$out/drive" --frames 60 --seed 5 --size "$size" --scan-every 0 >"$out/simulate.log" 2>&1
+# Enough frames for all steps: between epochs a run validates and saves.
+"$program" simulate --out "$out/drive" --frames $((steps * batch * 6 / 5 + 40)) --seed 5 --size "$size" --scan-every 0 >"$out/simulate.log" 2>&1
 
 presets="light resnet50 paper"
 for preset in $presets; do

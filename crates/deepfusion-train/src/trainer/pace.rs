@@ -1,9 +1,10 @@
 //! How fast a run goes.
 
+use std::collections::VecDeque;
 use std::time::Instant;
 
-/// Number of steps over which the pace and the scale ratio are averaged.
-const SMOOTHING: f64 = 20.0;
+/// Number of steps over which the scale ratio is averaged, and the pace.
+const SMOOTHING: usize = 20;
 
 /// An exponential mean that starts at its first value.
 pub(super) struct Smoothed(Option<f64>);
@@ -15,7 +16,7 @@ impl Smoothed {
 
     pub(super) fn add(&mut self, value: f64) {
         let old = self.0.unwrap_or(value);
-        self.0 = Some(old + (value - old) / SMOOTHING);
+        self.0 = Some(old + (value - old) / SMOOTHING as f64);
     }
 
     pub(super) fn value(&self) -> f64 {
@@ -23,10 +24,10 @@ impl Smoothed {
     }
 }
 
-/// Time a step takes.
+/// Time a step takes: the mean of the last ones. The first, in which a GPU's kernels are compiled, is forgotten with the others.
 pub(super) struct Pace {
     last: Instant,
-    seconds: Smoothed,
+    seconds: VecDeque<f64>,
     images: f64,
 }
 
@@ -34,19 +35,22 @@ impl Pace {
     pub(super) fn new() -> Self {
         Self {
             last: Instant::now(),
-            seconds: Smoothed::new(),
+            seconds: VecDeque::with_capacity(SMOOTHING),
             images: 0.0,
         }
     }
 
     pub(super) fn step(&mut self, images: usize) {
-        self.seconds.add(self.last.elapsed().as_secs_f64());
+        if self.seconds.len() == SMOOTHING {
+            self.seconds.pop_front();
+        }
+        self.seconds.push_back(self.last.elapsed().as_secs_f64());
         self.last = Instant::now();
         self.images = images as f64;
     }
 
     pub(super) fn seconds_per_step(&self) -> f64 {
-        self.seconds.value()
+        self.seconds.iter().sum::<f64>() / self.seconds.len() as f64
     }
 
     pub(super) fn images_per_second(&self) -> f64 {
