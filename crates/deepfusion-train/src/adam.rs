@@ -5,7 +5,7 @@ use crate::{Error, Model};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Gradients, Tensor, TensorData};
 use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
-use deepfusion_nn::ops::is_cpu;
+use deepfusion_nn::ops::has_kernels;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -126,14 +126,18 @@ impl ModuleVisitor for Collect<'_> {
             return;
         };
         let count = gradient.shape().num_elements();
-        let found = if is_cpu(&gradient.device()) {
+        let found = if has_kernels(&gradient) {
             let mut values = to_vec(gradient);
             if self.scale != 1.0 {
                 values.iter_mut().for_each(|v| *v *= self.scale);
             }
             Values::Host(values)
         } else {
-            Values::Device(gradient.reshape([count]).mul_scalar(self.scale))
+            let gradient = gradient.reshape([count]);
+            Values::Device(match self.scale {
+                1.0 => gradient,
+                scale => gradient.mul_scalar(scale),
+            })
         };
         self.into.insert(self.path.join("."), found);
     }

@@ -1,13 +1,17 @@
 //! The operations composed of Burn's own: what the backends without kernels run, and what the
 //! kernels are tested against.
 
+#[cfg(feature = "gpu")]
+use super::gpu::mirror::MirrorOps;
 use super::{BatchNormOutput, ConvOptions};
+#[cfg(feature = "gpu")]
+use burn::backend::Dispatch;
 use burn::tensor::{
     Bool, Int, Tensor,
     module::avg_pool2d,
     ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, PadMode},
 };
-use deepfusion_kernels::{MIN_DEPTH_M, NOWHERE};
+use deepfusion_kernels::{AdamStep, MIN_DEPTH_M, NOWHERE};
 
 /// [`super::conv2d`].
 #[must_use]
@@ -28,6 +32,11 @@ pub fn conv2d(
 }
 
 fn mirror(x: Tensor<4>, padding: usize) -> Tensor<4> {
+    #[cfg(feature = "gpu")]
+    if super::on_gpu(&x) {
+        let out = <Dispatch as MirrorOps>::kernel_mirror(x.into_dispatch(), padding);
+        return Tensor::from_dispatch(out);
+    }
     x.pad((padding, padding, padding, padding), PadMode::Reflect)
 }
 
@@ -253,4 +262,25 @@ pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
         difference(normalised.clone()).mul(edge).mean()
     };
     along(3) + along(2)
+}
+
+/// [`super::adam`].
+#[must_use]
+pub fn adam(
+    step: &AdamStep,
+    values: Tensor<1>,
+    gradient: Tensor<1>,
+    [first, second]: [Tensor<1>; 2],
+) -> (Tensor<1>, [Tensor<1>; 2]) {
+    let gradient = gradient.mul_scalar(step.gradient_scale);
+    let squared = gradient.clone() * gradient.clone();
+    let first = first.mul_scalar(step.beta1) + gradient.mul_scalar(1.0 - step.beta1);
+    let second = second.mul_scalar(step.beta2) + squared.mul_scalar(1.0 - step.beta2);
+    let root = second.clone().div_scalar(step.correction2).sqrt();
+    let direction = first.clone().div_scalar(step.correction1) / root.add_scalar(step.epsilon);
+    let kept = values.mul_scalar(1.0 - step.learning_rate * step.weight_decay);
+    (
+        kept - direction.mul_scalar(step.learning_rate),
+        [first, second],
+    )
 }

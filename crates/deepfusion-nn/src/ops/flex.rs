@@ -2,7 +2,7 @@
 
 mod backward;
 
-use super::kernel::{ConvOptions, KernelOps};
+use super::kernel::{ConvOptions, FusedOps, KernelOps};
 use burn::backend::{Flex, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor};
 use burn::tensor::TensorData;
 use deepfusion_kernels::{
@@ -148,6 +148,40 @@ fn single(value: f64) -> f32 {
 }
 
 impl KernelOps for Flex {
+    fn kernel_depthwise(x: Float, weight: Float, dilation: usize) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let [_, _, kernel, _] = dims(&weight);
+        let shape = depthwise_shape(sizes, kernel, dilation);
+        let (x, weight) = (Values::of(x), Values::of(weight));
+        let mut out = zeros(&sizes);
+        kernels::depthwise(&shape, x.slice(), weight.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn kernel_gelu(x: Float) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let x = Values::of(x);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe { written(x.slice().len(), |out| kernels::gelu(x.slice(), out)) };
+        tensor(out, sizes)
+    }
+
+    fn kernel_upsample_concat(x: Float, skip: Float) -> Float {
+        let [batch, channels, height, width] = dims(&x);
+        let [_, skips, _, _] = dims(&skip);
+        let (x, skip) = (Values::of(x), Values::of(skip));
+        let sizes = [batch, channels + skips, 2 * height, 2 * width];
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(count(&sizes), |out| {
+                kernels::upsample_concat(x.slice(), skip.slice(), batch, channels, width, out);
+            })
+        };
+        tensor(out, sizes)
+    }
+}
+
+impl FusedOps for Flex {
     fn kernel_conv2d(
         x: Float,
         weight: Float,
@@ -204,43 +238,11 @@ impl KernelOps for Flex {
         )
     }
 
-    fn kernel_depthwise(x: Float, weight: Float, dilation: usize) -> Float {
-        let sizes: [usize; 4] = dims(&x);
-        let [_, _, kernel, _] = dims(&weight);
-        let shape = depthwise_shape(sizes, kernel, dilation);
-        let (x, weight) = (Values::of(x), Values::of(weight));
-        let mut out = zeros(&sizes);
-        kernels::depthwise(&shape, x.slice(), weight.slice(), &mut out);
-        tensor(out, sizes)
-    }
-
-    fn kernel_gelu(x: Float) -> Float {
-        let sizes: [usize; 4] = dims(&x);
-        let x = Values::of(x);
-        // SAFETY: a kernel that takes a `Slot` writes every value.
-        let (out, ()) = unsafe { written(x.slice().len(), |out| kernels::gelu(x.slice(), out)) };
-        tensor(out, sizes)
-    }
-
     fn kernel_elu(x: Float) -> Float {
         let sizes: [usize; 4] = dims(&x);
         let x = Values::of(x);
         // SAFETY: a kernel that takes a `Slot` writes every value.
         let (out, ()) = unsafe { written(x.slice().len(), |out| kernels::elu(x.slice(), out)) };
-        tensor(out, sizes)
-    }
-
-    fn kernel_upsample_concat(x: Float, skip: Float) -> Float {
-        let [batch, channels, height, width] = dims(&x);
-        let [_, skips, _, _] = dims(&skip);
-        let (x, skip) = (Values::of(x), Values::of(skip));
-        let sizes = [batch, channels + skips, 2 * height, 2 * width];
-        // SAFETY: a kernel that takes a `Slot` writes every value.
-        let (out, ()) = unsafe {
-            written(count(&sizes), |out| {
-                kernels::upsample_concat(x.slice(), skip.slice(), batch, channels, width, out);
-            })
-        };
         tensor(out, sizes)
     }
 

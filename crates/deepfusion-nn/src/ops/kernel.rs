@@ -34,6 +34,23 @@ impl Default for ConvOptions {
 /// The forward passes. Shapes are those of the functions in [`super`].
 #[backend_extension(Flex, Autodiff)]
 pub(super) trait KernelOps: Backend {
+    /// See [`super::depthwise`].
+    fn kernel_depthwise(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        dilation: usize,
+    ) -> FloatTensor<Self>;
+
+    /// See [`super::gelu`].
+    fn kernel_gelu(x: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// See [`super::upsample_concat`].
+    fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self>;
+}
+
+/// The forward passes that are kernels on a GPU, too.
+#[backend_extension(Flex, Cube: cfg(feature = "gpu"), Autodiff)]
+pub(super) trait FusedOps: Backend {
     /// See [`super::conv2d`]; `bias` is not read unless `has_bias`.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
@@ -52,21 +69,8 @@ pub(super) trait KernelOps: Backend {
         relu: bool,
     ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
 
-    /// See [`super::depthwise`].
-    fn kernel_depthwise(
-        x: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        dilation: usize,
-    ) -> FloatTensor<Self>;
-
-    /// See [`super::gelu`].
-    fn kernel_gelu(x: FloatTensor<Self>) -> FloatTensor<Self>;
-
     /// See [`super::elu`].
     fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self>;
-
-    /// See [`super::upsample_concat`].
-    fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self>;
 
     /// See [`super::warp`].
     fn kernel_warp(image: FloatTensor<Self>, coords: FloatTensor<Self>) -> FloatTensor<Self>;
@@ -105,6 +109,30 @@ pub(super) trait KernelOps: Backend {
 /// The backward passes, on the backend below autodiff. Each gives the gradient of its inputs; where
 /// an input needs none, its work can be left out.
 pub(super) trait KernelBackward: Backend {
+    /// Gradient of the input of [`KernelOps::kernel_depthwise`].
+    fn depthwise_grad_x(
+        weight: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        dilation: usize,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of its weights, whose shape is given.
+    fn depthwise_grad_weight(
+        x: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        shape: [usize; 4],
+        dilation: usize,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of [`KernelOps::kernel_gelu`] from its input.
+    fn gelu_grad(x: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// Gradients of x and skip of [`KernelOps::kernel_upsample_concat`]; `channels` are those of x.
+    fn upsample_concat_grad(grad: FloatTensor<Self>, channels: usize) -> [FloatTensor<Self>; 2];
+}
+
+/// The backward passes of [`FusedOps`].
+pub(super) trait FusedBackward: Backend {
     /// Gradient of the input of [`KernelOps::kernel_conv2d`].
     fn conv2d_grad_x(
         x: FloatTensor<Self>,
@@ -134,29 +162,8 @@ pub(super) trait KernelBackward: Backend {
         relu: bool,
     ) -> [FloatTensor<Self>; 3];
 
-    /// Gradient of the input of [`KernelOps::kernel_depthwise`].
-    fn depthwise_grad_x(
-        weight: FloatTensor<Self>,
-        grad: FloatTensor<Self>,
-        dilation: usize,
-    ) -> FloatTensor<Self>;
-
-    /// Gradient of its weights, whose shape is given.
-    fn depthwise_grad_weight(
-        x: FloatTensor<Self>,
-        grad: FloatTensor<Self>,
-        shape: [usize; 4],
-        dilation: usize,
-    ) -> FloatTensor<Self>;
-
-    /// Gradient of [`KernelOps::kernel_gelu`] from its input.
-    fn gelu_grad(x: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
-
     /// Gradient of [`KernelOps::kernel_elu`] from its output.
     fn elu_grad(output: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
-
-    /// Gradients of x and skip of [`KernelOps::kernel_upsample_concat`]; `channels` are those of x.
-    fn upsample_concat_grad(grad: FloatTensor<Self>, channels: usize) -> [FloatTensor<Self>; 2];
 
     /// Gradient of the image of [`KernelOps::kernel_warp`].
     fn warp_grad_image(

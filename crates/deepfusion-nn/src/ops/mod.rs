@@ -1,7 +1,7 @@
 //! The project's own differentiable operations.
 //!
-//! On the CPU (Burn's Flex backend) they run on the kernels of `deepfusion-kernels`, with backward
-//! passes of their own; on every other backend they are composed of Burn's operations and mean the
+//! On the CPU (Burn's Flex backend), in single precision, they run on the kernels of `deepfusion-kernels`,
+//! with backward passes of their own; elsewhere they are composed of Burn's operations and mean the
 //! same. `kernel` declares them to Burn's dispatch, `flex` runs them, `autodiff` derives them, and
 //! `composed` holds the other backends' form.
 
@@ -9,16 +9,20 @@ mod autocast;
 mod autodiff;
 mod composed;
 mod flex;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod kernel;
 
 use burn::backend::{Dispatch, DispatchDevice};
-use burn::tensor::{Bool, Device, Tensor, TensorData};
-use kernel::KernelOps;
+use burn::tensor::{Bool, DType, Device, Tensor, TensorData};
+use deepfusion_kernels::AdamStep;
+use kernel::{FusedOps, KernelOps};
 
 pub use autocast::{autocast, supports};
 pub use composed::{
-    batch_norm as composed_batch_norm, conv2d as composed_conv2d, depthwise as composed_depthwise,
-    elu as composed_elu, gelu as composed_gelu, local_correlation as composed_local_correlation,
+    adam as composed_adam, batch_norm as composed_batch_norm, conv2d as composed_conv2d,
+    depthwise as composed_depthwise, elu as composed_elu, gelu as composed_gelu,
+    local_correlation as composed_local_correlation,
     photometric_error as composed_photometric_error, project as composed_project,
     smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
     warp as composed_warp,
@@ -27,17 +31,37 @@ pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
 /// Whether it is the processor, on which the kernels run.
-#[must_use]
-pub fn is_cpu(device: &Device) -> bool {
+fn is_cpu(device: &Device) -> bool {
     matches!(
         device.clone().inner().as_dispatch(),
         DispatchDevice::Flex(_)
     )
 }
 
-/// Whether the tensor is on the device on which the kernels run.
-fn on_cpu<const D: usize>(tensor: &Tensor<D>) -> bool {
-    is_cpu(&tensor.device())
+/// Whether the kernels run for this tensor: on the CPU, in single precision.
+#[must_use]
+pub fn has_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
+    is_cpu(&tensor.device()) && tensor.dtype() == DType::F32
+}
+
+/// Whether the kernels for GPUs run for this tensor.
+#[cfg(feature = "gpu")]
+fn on_gpu<const D: usize>(tensor: &Tensor<D>) -> bool {
+    let is_cube = matches!(
+        tensor.device().inner().as_dispatch(),
+        DispatchDevice::Cube(_)
+    );
+    is_cube && tensor.dtype() == DType::F32
+}
+
+/// Whether what Burn composes of many operations is a kernel for this tensor: on the CPU or, with the feature `gpu`, on a GPU, in
+/// single precision.
+fn has_fused<const D: usize>(tensor: &Tensor<D>) -> bool {
+    #[cfg(feature = "gpu")]
+    if on_gpu(tensor) {
+        return true;
+    }
+    has_kernels(tensor)
 }
 
 /// Convolution, y = w ⋆ x + b.
@@ -57,7 +81,7 @@ pub fn conv2d(
     bias: Option<Tensor<1>>,
     options: ConvOptions,
 ) -> Tensor<4> {
-    if !on_cpu(&x) {
+    if !has_fused(&x) {
         return composed::conv2d(x, weight, bias, options);
     }
     let [_, channels, _, _] = x.dims();
@@ -66,7 +90,7 @@ pub fn conv2d(
     let has_bias = bias.is_some();
     // The kernel does not read the bias where there is none.
     let bias = bias.unwrap_or_else(|| Tensor::zeros([out], &x.device().inner()));
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_conv2d(
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_conv2d(
         x.into_dispatch(),
         weight.into_dispatch(),
         bias.into_dispatch(),
@@ -100,10 +124,10 @@ pub fn batch_norm(
     epsilon: f64,
     relu: bool,
 ) -> BatchNormOutput {
-    if !on_cpu(&x) {
+    if !has_fused(&x) {
         return composed::batch_norm(x, gamma, beta, epsilon, relu);
     }
-    let (output, mean, variance) = <Dispatch as KernelOps>::kernel_batch_norm(
+    let (output, mean, variance) = <Dispatch as FusedOps>::kernel_batch_norm(
         x.into_dispatch(),
         gamma.into_dispatch(),
         beta.into_dispatch(),
@@ -127,7 +151,7 @@ pub fn batch_norm(
 /// When the shapes do not fit each other, as Burn's own operations do.
 #[must_use]
 pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> {
-    if !on_cpu(&x) {
+    if !has_kernels(&x) {
         return composed::depthwise(x, weight, dilation);
     }
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_depthwise(
@@ -140,7 +164,7 @@ pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> 
 /// GELU, x·Φ(x), Φ the normal distribution.
 #[must_use]
 pub fn gelu(x: Tensor<4>) -> Tensor<4> {
-    if !on_cpu(&x) {
+    if !has_kernels(&x) {
         return composed::gelu(x);
     }
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_gelu(x.into_dispatch()))
@@ -149,10 +173,10 @@ pub fn gelu(x: Tensor<4>) -> Tensor<4> {
 /// ELU, x for x > 0 and eˣ − 1 below.
 #[must_use]
 pub fn elu(x: Tensor<4>) -> Tensor<4> {
-    if !on_cpu(&x) {
+    if !has_fused(&x) {
         return composed::elu(x);
     }
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_elu(x.into_dispatch()))
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_elu(x.into_dispatch()))
 }
 
 /// Every pixel repeated twice in both directions, then the skip feature behind it.
@@ -163,7 +187,7 @@ pub fn elu(x: Tensor<4>) -> Tensor<4> {
 /// - output: `[N, C + S, 2H, 2W]`
 #[must_use]
 pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
-    if !on_cpu(&x) {
+    if !has_kernels(&x) {
         return composed::upsample_concat(x, skip);
     }
     let [batch, _, height, width] = x.dims();
@@ -188,7 +212,7 @@ pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
 /// - output: `[N, C, H', W']`
 #[must_use]
 pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
-    if !on_cpu(&coords) {
+    if !has_fused(&coords) {
         return composed::warp(image, coords);
     }
     assert_eq!(
@@ -196,7 +220,7 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
         [image.dims()[0], 2],
         "two coordinates a pixel"
     );
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_warp(
         image.into_dispatch(),
         coords.into_dispatch(),
     ))
@@ -232,10 +256,10 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
         second.dims(),
         "both images have the same size"
     );
-    if !on_cpu(&first) {
+    if !has_fused(&first) {
         return composed::local_correlation(first, second, radius);
     }
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_local_correlation(
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_local_correlation(
         first.into_dispatch(),
         second.into_dispatch(),
         radius,
@@ -252,10 +276,10 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
 /// - output: `[N, 2, H, W]`, u and v in pixels
 #[must_use]
 pub fn project(disparity: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
-    if !on_cpu(&disparity) {
+    if !has_fused(&disparity) {
         return composed::project(disparity, homography, shift);
     }
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_project(
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_project(
         disparity.into_dispatch(),
         homography.into_dispatch(),
         shift.into_dispatch(),
@@ -270,10 +294,10 @@ pub fn project(disparity: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) ->
 #[must_use]
 pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool> {
     let coords = coords.detach();
-    if !on_cpu(&coords) {
+    if !has_fused(&coords) {
         return composed::in_view(coords, [height, width]);
     }
-    let inside = <Dispatch as KernelOps>::kernel_in_view(coords.into_dispatch(), height, width);
+    let inside = <Dispatch as FusedOps>::kernel_in_view(coords.into_dispatch(), height, width);
     Tensor::<4>::from_dispatch(inside).greater_elem(0.5)
 }
 
@@ -287,10 +311,10 @@ pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool
 #[must_use]
 pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
     let image = image.detach();
-    if !on_cpu(&disparity) {
+    if !has_fused(&disparity) {
         return composed::smoothness(disparity, image);
     }
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_smoothness(
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_smoothness(
         disparity.into_dispatch(),
         image.into_dispatch(),
     ))
@@ -305,12 +329,49 @@ pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
 #[must_use]
 pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
     assert_eq!(a.dims(), b.dims(), "both images have the same size");
-    if !on_cpu(&a) {
+    if !has_fused(&a) {
         return composed::photometric_error(a, b, alpha);
     }
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_photometric(
+    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_photometric(
         a.into_dispatch(),
         b.detach().into_dispatch(),
         alpha,
     ))
+}
+
+/// Adam's step of one parameter, as [`deepfusion_kernels::adam`], where the parameter is: its values and both moments after it.
+///
+/// # Shapes
+/// - all: `[count]`, without autodiff
+#[must_use]
+pub fn adam(
+    step: &AdamStep,
+    values: Tensor<1>,
+    gradient: Tensor<1>,
+    [first, second]: [Tensor<1>; 2],
+) -> (Tensor<1>, [Tensor<1>; 2]) {
+    #[cfg(feature = "gpu")]
+    if on_gpu(&values) {
+        let (values, first, second) = <Dispatch as gpu::adam::AdamOps>::kernel_adam(
+            values.into_dispatch(),
+            gradient.into_dispatch(),
+            first.into_dispatch(),
+            second.into_dispatch(),
+            *step,
+        );
+        let moments = [first, second].map(Tensor::from_dispatch);
+        return (Tensor::from_dispatch(values), moments);
+    }
+    composed::adam(step, values, gradient, [first, second])
+}
+
+/// The sum of the squares of flat values, without autodiff: one value, where they are.
+#[must_use]
+pub fn sum_of_squares(values: Tensor<1>) -> Tensor<1> {
+    #[cfg(feature = "gpu")]
+    if on_gpu(&values) {
+        let shares = <Dispatch as gpu::adam::AdamOps>::kernel_squares(values.into_dispatch());
+        return Tensor::<1>::from_dispatch(shares).sum();
+    }
+    (values.clone() * values).sum()
 }

@@ -11,7 +11,7 @@ use burn::tensor::Tensor;
 pub(super) enum Values {
     /// In main memory: the processor's kernels read it there.
     Host(Vec<f32>),
-    /// On a GPU, which it does not leave.
+    /// On a GPU, which it does not leave, or not in single precision.
     Device(Tensor<1>),
 }
 
@@ -71,9 +71,8 @@ impl Values {
     }
 }
 
-#[expect(clippy::expect_used, reason = "the type that the networks have")]
+#[expect(clippy::expect_used, reason = "it was converted")]
 pub(super) fn to_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    let data = tensor.into_data();
-    data.try_into_vec::<f32>()
-        .expect("the networks are built in single precision")
+    let data = tensor.into_data().convert::<f32>();
+    data.try_into_vec().expect("single precision")
 }

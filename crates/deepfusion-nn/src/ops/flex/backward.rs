@@ -1,6 +1,6 @@
 //! The backward passes on the CPU.
 
-use super::super::kernel::{ConvOptions, KernelBackward};
+use super::super::kernel::{ConvOptions, FusedBackward, KernelBackward};
 use super::{
     Float, Values, conv_shape, correlation_shape, count, depthwise_shape, dims, photometric_shape,
     single, smoothness_shape, tensor, warp_shape, written, zeros,
@@ -9,6 +9,61 @@ use burn::backend::Flex;
 use deepfusion_kernels::{self as kernels, BatchNormSaved};
 
 impl KernelBackward for Flex {
+    fn depthwise_grad_x(weight: Float, grad: Float, dilation: usize) -> Float {
+        let sizes: [usize; 4] = dims(&grad);
+        let [_, _, kernel, _] = dims(&weight);
+        let shape = depthwise_shape(sizes, kernel, dilation);
+        let (weight, grad) = (Values::of(weight), Values::of(grad));
+        let mut out = zeros(&sizes);
+        kernels::depthwise_backward_input(&shape, weight.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn depthwise_grad_weight(x: Float, grad: Float, sizes: [usize; 4], dilation: usize) -> Float {
+        let shape = depthwise_shape(dims(&x), sizes[2], dilation);
+        let (x, grad) = (Values::of(x), Values::of(grad));
+        let mut out = zeros(&sizes);
+        kernels::depthwise_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn gelu_grad(x: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let (x, grad) = (Values::of(x), Values::of(grad));
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(grad.slice().len(), |out| {
+                kernels::gelu_backward(x.slice(), grad.slice(), out);
+            })
+        };
+        tensor(out, sizes)
+    }
+
+    fn upsample_concat_grad(grad: Float, channels: usize) -> [Float; 2] {
+        let [batch, all, height, width] = dims(&grad);
+        let x_sizes = [batch, channels, height / 2, width / 2];
+        let skip_sizes = [batch, all - channels, height, width];
+        let grad = Values::of(grad);
+        // SAFETY: a kernel that takes a `Slot` writes every value, here of both.
+        let (grad_x, (grad_skip, ())) = unsafe {
+            written(count(&x_sizes), |grad_x| {
+                written(count(&skip_sizes), |grad_skip| {
+                    kernels::upsample_concat_backward(
+                        grad.slice(),
+                        batch,
+                        channels,
+                        width / 2,
+                        grad_x,
+                        grad_skip,
+                    );
+                })
+            })
+        };
+        [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
+    }
+}
+
+impl FusedBackward for Flex {
     fn conv2d_grad_x(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
         let sizes: [usize; 4] = dims(&x);
         let shape = conv_shape(sizes, dims(&weight), options);
@@ -78,36 +133,6 @@ impl KernelBackward for Flex {
         ]
     }
 
-    fn depthwise_grad_x(weight: Float, grad: Float, dilation: usize) -> Float {
-        let sizes: [usize; 4] = dims(&grad);
-        let [_, _, kernel, _] = dims(&weight);
-        let shape = depthwise_shape(sizes, kernel, dilation);
-        let (weight, grad) = (Values::of(weight), Values::of(grad));
-        let mut out = zeros(&sizes);
-        kernels::depthwise_backward_input(&shape, weight.slice(), grad.slice(), &mut out);
-        tensor(out, sizes)
-    }
-
-    fn depthwise_grad_weight(x: Float, grad: Float, sizes: [usize; 4], dilation: usize) -> Float {
-        let shape = depthwise_shape(dims(&x), sizes[2], dilation);
-        let (x, grad) = (Values::of(x), Values::of(grad));
-        let mut out = zeros(&sizes);
-        kernels::depthwise_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
-        tensor(out, sizes)
-    }
-
-    fn gelu_grad(x: Float, grad: Float) -> Float {
-        let sizes: [usize; 4] = dims(&x);
-        let (x, grad) = (Values::of(x), Values::of(grad));
-        // SAFETY: a kernel that takes a `Slot` writes every value.
-        let (out, ()) = unsafe {
-            written(grad.slice().len(), |out| {
-                kernels::gelu_backward(x.slice(), grad.slice(), out);
-            })
-        };
-        tensor(out, sizes)
-    }
-
     fn elu_grad(output: Float, grad: Float) -> Float {
         let sizes: [usize; 4] = dims(&output);
         let (output, grad) = (Values::of(output), Values::of(grad));
@@ -118,29 +143,6 @@ impl KernelBackward for Flex {
             })
         };
         tensor(out, sizes)
-    }
-
-    fn upsample_concat_grad(grad: Float, channels: usize) -> [Float; 2] {
-        let [batch, all, height, width] = dims(&grad);
-        let x_sizes = [batch, channels, height / 2, width / 2];
-        let skip_sizes = [batch, all - channels, height, width];
-        let grad = Values::of(grad);
-        // SAFETY: a kernel that takes a `Slot` writes every value, here of both.
-        let (grad_x, (grad_skip, ())) = unsafe {
-            written(count(&x_sizes), |grad_x| {
-                written(count(&skip_sizes), |grad_skip| {
-                    kernels::upsample_concat_backward(
-                        grad.slice(),
-                        batch,
-                        channels,
-                        width / 2,
-                        grad_x,
-                        grad_skip,
-                    );
-                })
-            })
-        };
-        [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
     }
 
     fn warp_grad_image(image: Float, coords: Float, grad: Float) -> Float {

@@ -1,0 +1,113 @@
+//! The operations on a GPU as kernels of their own, in CubeCL's language: one or two launches each, forward and backward, where Burn's
+//! operations need dozens. What they compute is `composed`'s.
+//!
+//! A kernel runs along the pixels of a plane, and a grid's second axis counts the planes. What is summed over a plane, or over a channel of
+//! all images, is summed by one group of threads, in shared memory.
+
+#![allow(
+    clippy::too_many_arguments,
+    reason = "a kernel's buffers and sizes are its arguments"
+)]
+
+pub(super) mod adam;
+mod backward;
+mod batch_norm;
+mod conv;
+mod correlation;
+mod elu;
+mod grid;
+pub(super) mod mirror;
+mod photometric;
+mod project;
+mod smoothness;
+mod sum;
+mod warp;
+
+use super::kernel::{ConvOptions, FusedOps};
+use burn::backend::TensorMetadata;
+use burn::tensor::{DType, Shape};
+use burn_cubecl::CubeBackend;
+use burn_cubecl::cubecl::prelude::*;
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
+use burn_cubecl::tensor::CubeTensor;
+use grid::{SUM_GROUPS, SUM_THREADS, along_pixels, summing, values};
+
+fn dims<const D: usize>(tensor: &CubeTensor) -> [usize; D] {
+    tensor.shape().dims()
+}
+
+/// A tensor as a kernel reads it: its values in order, copied where it is a view.
+fn input(tensor: CubeTensor) -> BufferArg {
+    into_contiguous(tensor).into_buffer_arg()
+}
+
+/// Room for a result beside a tensor.
+fn room<const D: usize>(beside: &CubeTensor, shape: [usize; D]) -> CubeTensor {
+    let (client, device) = (beside.client.clone(), beside.device.clone());
+    empty_device_contiguous_dtype(client, device, Shape::from(shape), DType::F32)
+}
+
+/// Room for a result as a kernel writes it.
+fn output(tensor: &CubeTensor) -> BufferArg {
+    tensor.clone().into_buffer_arg()
+}
+
+impl FusedOps for CubeBackend {
+    fn kernel_conv2d(
+        x: CubeTensor,
+        weight: CubeTensor,
+        bias: CubeTensor,
+        has_bias: bool,
+        options: ConvOptions,
+    ) -> CubeTensor {
+        let (x, options) = mirror::padded(x, options);
+        conv::forward(x, weight, bias, has_bias, options)
+    }
+
+    fn kernel_batch_norm(
+        x: CubeTensor,
+        gamma: CubeTensor,
+        beta: CubeTensor,
+        epsilon: f64,
+        relu: bool,
+    ) -> (CubeTensor, CubeTensor, CubeTensor) {
+        batch_norm::forward(x, gamma, beta, epsilon as f32, relu)
+    }
+
+    fn kernel_elu(x: CubeTensor) -> CubeTensor {
+        elu::forward(x)
+    }
+
+    fn kernel_warp(image: CubeTensor, coords: CubeTensor) -> CubeTensor {
+        warp::forward(image, coords)
+    }
+
+    fn kernel_local_correlation(
+        first: CubeTensor,
+        second: CubeTensor,
+        radius: usize,
+    ) -> CubeTensor {
+        correlation::forward(first, second, radius)
+    }
+
+    fn kernel_project(
+        disparity: CubeTensor,
+        homography: CubeTensor,
+        shift: CubeTensor,
+    ) -> CubeTensor {
+        project::forward(disparity, homography, shift)
+    }
+
+    fn kernel_in_view(coords: CubeTensor, height: usize, width: usize) -> CubeTensor {
+        project::in_view(coords, height, width)
+    }
+
+    fn kernel_smoothness(disparity: CubeTensor, image: CubeTensor) -> CubeTensor {
+        smoothness::forward(disparity, image)
+    }
+
+    fn kernel_photometric(a: CubeTensor, b: CubeTensor, alpha: f64) -> CubeTensor {
+        photometric::forward(a, b, alpha)
+    }
+}

@@ -1,0 +1,96 @@
+//! The backward passes on a GPU.
+
+use super::super::kernel::{ConvOptions, FusedBackward};
+use super::mirror::{self, MirrorBackward};
+use super::{batch_norm, conv, correlation, dims, elu, photometric, project, smoothness, warp};
+use burn_cubecl::CubeBackend;
+use burn_cubecl::tensor::CubeTensor;
+
+impl FusedBackward for CubeBackend {
+    fn conv2d_grad_x(
+        x: CubeTensor,
+        weight: CubeTensor,
+        grad: CubeTensor,
+        options: ConvOptions,
+    ) -> CubeTensor {
+        let [_, _, height, width] = dims(&x);
+        if !mirror::is_needed(options) {
+            return conv::grad_input(weight, grad, [height, width], options);
+        }
+        let margin = options.padding;
+        let size = [height + 2 * margin, width + 2 * margin];
+        let padded = conv::grad_input(weight, grad, size, mirror::without(options));
+        CubeBackend::mirror_grad(padded, margin)
+    }
+
+    fn conv2d_grad_weight(
+        x: CubeTensor,
+        weight: CubeTensor,
+        grad: CubeTensor,
+        options: ConvOptions,
+    ) -> CubeTensor {
+        let [_, _, height, width] = dims(&weight);
+        let (x, options) = mirror::padded(x, options);
+        conv::grad_weight(x, grad, [height, width], options)
+    }
+
+    fn conv2d_grad_bias(grad: CubeTensor) -> CubeTensor {
+        conv::grad_bias(grad)
+    }
+
+    fn batch_norm_grad(
+        x: CubeTensor,
+        parameters: [CubeTensor; 2],
+        statistics: [CubeTensor; 2],
+        grad: CubeTensor,
+        epsilon: f64,
+        relu: bool,
+    ) -> [CubeTensor; 3] {
+        batch_norm::backward(x, parameters, statistics, grad, epsilon as f32, relu)
+    }
+
+    fn elu_grad(output: CubeTensor, grad: CubeTensor) -> CubeTensor {
+        elu::backward(output, grad)
+    }
+
+    fn warp_grad_image(image: CubeTensor, coords: CubeTensor, grad: CubeTensor) -> CubeTensor {
+        warp::grad_image(image, coords, grad)
+    }
+
+    fn warp_grad_coords(image: CubeTensor, coords: CubeTensor, grad: CubeTensor) -> CubeTensor {
+        warp::grad_coords(image, coords, grad)
+    }
+
+    fn local_correlation_grad_first(
+        second: CubeTensor,
+        grad: CubeTensor,
+        radius: usize,
+    ) -> CubeTensor {
+        correlation::backward(second, grad, radius, true)
+    }
+
+    fn local_correlation_grad_second(
+        first: CubeTensor,
+        grad: CubeTensor,
+        radius: usize,
+    ) -> CubeTensor {
+        correlation::backward(first, grad, radius, false)
+    }
+
+    fn project_grad(
+        disparity: CubeTensor,
+        homography: CubeTensor,
+        shift: CubeTensor,
+        grad: CubeTensor,
+    ) -> [CubeTensor; 3] {
+        project::backward(disparity, homography, shift, grad)
+    }
+
+    fn smoothness_grad(disparity: CubeTensor, image: CubeTensor, grad: CubeTensor) -> CubeTensor {
+        smoothness::backward(disparity, image, grad)
+    }
+
+    fn photometric_grad(a: CubeTensor, b: CubeTensor, grad: CubeTensor, alpha: f64) -> CubeTensor {
+        photometric::backward(a, b, grad, alpha)
+    }
+}

@@ -1,0 +1,48 @@
+//! How threads are laid out.
+
+use burn::backend::TensorMetadata;
+use burn_cubecl::cubecl;
+use burn_cubecl::cubecl::calculate_cube_count_elemwise;
+use burn_cubecl::cubecl::prelude::*;
+use burn_cubecl::tensor::CubeTensor;
+
+/// Threads of a group that runs along pixels.
+const THREADS: u32 = 256;
+/// Threads of a group that sums: what WebGPU has at least.
+pub(super) const SUM_THREADS: u32 = 256;
+/// Groups that sum a plane together.
+pub(super) const SUM_GROUPS: u32 = 32;
+/// Groups along an axis that every GPU has.
+pub(super) const MOST_GROUPS: usize = 65_535;
+
+/// A thread for each pixel of each plane; [`plane_of_group`] is which.
+pub(super) fn along_pixels(pixels: usize, planes: usize) -> (CubeCount, CubeDim) {
+    let groups = (pixels as u32).div_ceil(THREADS);
+    // Few planes are too many for an axis, and most of those are even.
+    let fits = |layers: &usize| planes % layers == 0 && planes / layers <= MOST_GROUPS;
+    let layers = (1..=planes).find(fits).unwrap_or(1);
+    let count = CubeCount::Static(groups, (planes / layers) as u32, layers as u32);
+    (count, CubeDim::new_1d(THREADS))
+}
+
+/// The plane that a group of [`along_pixels`] computes.
+#[cube]
+pub(super) fn plane_of_group() -> usize {
+    (CUBE_POS_Z * CUBE_COUNT_Y + CUBE_POS_Y) as usize
+}
+
+/// A thread for each value.
+pub(super) fn values(tensor: &CubeTensor) -> (CubeCount, CubeDim) {
+    let dim = CubeDim::new_1d(THREADS);
+    let count = tensor.shape().num_elements();
+    (
+        calculate_cube_count_elemwise(&tensor.client, count, dim),
+        dim,
+    )
+}
+
+/// `groups` groups of threads for each of some planes, which sum over it.
+pub(super) fn summing(groups: u32, planes: usize) -> (CubeCount, CubeDim) {
+    let count = CubeCount::Static(groups, planes as u32, 1);
+    (count, CubeDim::new_1d(SUM_THREADS))
+}

@@ -1,0 +1,190 @@
+//! Padding that mirrors an image without repeating its edge.
+
+use super::super::kernel::ConvOptions;
+use super::grid::plane_of_group;
+use super::{along_pixels, dims, input, output, room};
+use burn::backend::autodiff::{
+    Autodiff,
+    checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
+    grads::Gradients,
+    ops::{Backward, Ops, OpsKind},
+};
+use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
+use burn_cubecl::CubeBackend;
+use burn_cubecl::cubecl;
+use burn_cubecl::cubecl::prelude::*;
+use burn_cubecl::tensor::CubeTensor;
+
+/// The forward pass.
+#[backend_extension(Cube, Autodiff)]
+pub(in super::super) trait MirrorOps: Backend {
+    /// `[N, C, H, W]` to `[N, C, H + 2·margin, W + 2·margin]`; the margin is below both sides.
+    fn kernel_mirror(x: FloatTensor<Self>, margin: usize) -> FloatTensor<Self>;
+}
+
+/// The backward pass.
+pub(super) trait MirrorBackward: Backend {
+    /// Gradient of the input of [`MirrorOps::kernel_mirror`].
+    fn mirror_grad(grad: FloatTensor<Self>, margin: usize) -> FloatTensor<Self>;
+}
+
+#[cube]
+fn source(at: i32, size: i32) -> i32 {
+    let last = size - 1;
+    let ahead = select(at < 0, 0 - at, at);
+    select(ahead > last, 2 * last - ahead, ahead)
+}
+
+#[cube(launch)]
+fn mirror(x: &[f32], out: &mut [f32], height: i32, width: i32, margin: i32) {
+    let (out_height, out_width) = (height + 2 * margin, width + 2 * margin);
+    let pixel = ABSOLUTE_POS_X as i32;
+    if pixel >= out_height * out_width {
+        terminate!();
+    }
+    let plane = plane_of_group();
+    let y = source(pixel / out_width - margin, height);
+    let v = source(pixel % out_width - margin, width);
+    let from = plane * (height * width) as usize + (y * width + v) as usize;
+    out[plane * (out_height * out_width) as usize + pixel as usize] = x[from];
+}
+
+/// The first, second and third place along an axis of the padded image that reads a pixel; −1 for none.
+#[cube]
+fn reader(at: i32, size: i32, margin: i32, #[comptime] which: u32) -> i32 {
+    let last = size - 1;
+    if comptime!(which == 0) {
+        at + margin
+    } else if comptime!(which == 1) {
+        select(at >= 1 && at <= margin, margin - at, -1)
+    } else {
+        let is_read = at <= last - 1 && at >= last - margin;
+        select(is_read, margin + 2 * last - at, -1)
+    }
+}
+
+#[cube(launch)]
+fn mirror_backward(grad: &[f32], out: &mut [f32], height: i32, width: i32, margin: i32) {
+    let pixel = ABSOLUTE_POS_X as i32;
+    if pixel >= height * width {
+        terminate!();
+    }
+    let plane = plane_of_group();
+    let (grad_height, grad_width) = (height + 2 * margin, width + 2 * margin);
+    let mut sum = 0.0f32;
+    #[unroll]
+    for i in 0..3u32 {
+        let y = reader(pixel / width, height, margin, i);
+        #[unroll]
+        for j in 0..3u32 {
+            let x = reader(pixel % width, width, margin, j);
+            if y >= 0 && x >= 0 {
+                let at = plane * (grad_height * grad_width) as usize;
+                sum += grad[at + (y * grad_width + x) as usize];
+            }
+        }
+    }
+    out[plane * (height * width) as usize + pixel as usize] = sum;
+}
+
+/// Whether a convolution's padding mirrors.
+pub(super) fn is_needed(options: ConvOptions) -> bool {
+    options.reflect && options.padding > 0
+}
+
+/// The same convolution of an image that is padded already.
+pub(super) fn without(options: ConvOptions) -> ConvOptions {
+    ConvOptions {
+        padding: 0,
+        reflect: false,
+        ..options
+    }
+}
+
+/// An image as a convolution without mirroring sees it.
+pub(super) fn padded(x: CubeTensor, options: ConvOptions) -> (CubeTensor, ConvOptions) {
+    if is_needed(options) {
+        let x = CubeBackend::kernel_mirror(x, options.padding);
+        (x, without(options))
+    } else {
+        (x, options)
+    }
+}
+
+impl MirrorOps for CubeBackend {
+    fn kernel_mirror(x: CubeTensor, margin: usize) -> CubeTensor {
+        let [batch, channels, height, width] = dims(&x);
+        let (out_height, out_width) = (height + 2 * margin, width + 2 * margin);
+        let out = room(&x, [batch, channels, out_height, out_width]);
+        let (count, dim) = along_pixels(out_height * out_width, batch * channels);
+        let [height, width, margin] = [height, width, margin].map(|size| size as i32);
+        let client = out.client.clone();
+        mirror::launch(
+            &client,
+            count,
+            dim,
+            input(x),
+            output(&out),
+            height,
+            width,
+            margin,
+        );
+        out
+    }
+}
+
+impl MirrorBackward for CubeBackend {
+    fn mirror_grad(grad: CubeTensor, margin: usize) -> CubeTensor {
+        let [batch, channels, height, width] = dims(&grad);
+        let (height, width) = (height - 2 * margin, width - 2 * margin);
+        let out = room(&grad, [batch, channels, height, width]);
+        let (count, dim) = along_pixels(height * width, batch * channels);
+        let [height, width, margin] = [height, width, margin].map(|size| size as i32);
+        let client = out.client.clone();
+        mirror_backward::launch(
+            &client,
+            count,
+            dim,
+            input(grad),
+            output(&out),
+            height,
+            width,
+            margin,
+        );
+        out
+    }
+}
+
+#[derive(Debug)]
+struct Mirror;
+
+impl<B: MirrorBackward> Backward<B, 1> for Mirror {
+    type State = usize;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 1>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let grad = grads.consume::<B>(&ops.node);
+        if let [Some(node)] = ops.parents {
+            grads.register::<B>(node.id, B::mirror_grad(grad, ops.state));
+        }
+    }
+}
+
+impl<B, C> MirrorOps for Autodiff<B, C>
+where
+    B: Backend + MirrorOps + MirrorBackward,
+    C: CheckpointStrategy,
+{
+    fn kernel_mirror(x: FloatTensor<Self>, margin: usize) -> FloatTensor<Self> {
+        let (x, node) = x.into_parts();
+        let output = B::kernel_mirror(x, margin);
+        match Mirror.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(margin, output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+}

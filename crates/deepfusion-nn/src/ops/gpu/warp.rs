@@ -1,0 +1,224 @@
+//! The bilinear warp.
+
+use super::grid::plane_of_group;
+use super::{along_pixels, dims, input, output, room};
+use burn::backend::ops::{FloatTensorOps, IntTensorOps};
+use burn::tensor::{DType, IndexingUpdateOp, IntDType};
+use burn_cubecl::CubeBackend;
+use burn_cubecl::cubecl;
+use burn_cubecl::cubecl::prelude::*;
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::tensor::CubeTensor;
+
+/// The lower neighbour of a coordinate along an axis: the last but one at the end, so that there is a higher one.
+#[cube]
+fn lower(p: f32, size: usize) -> f32 {
+    let last = (size as f32) - 1.0f32;
+    p.max(0.0f32)
+        .min(last)
+        .floor()
+        .min((last - 1.0f32).max(0.0f32))
+}
+
+/// How far a coordinate lies beyond its lower neighbour; outside the image its border counts.
+#[cube]
+fn beyond(p: f32, low: f32, size: usize) -> f32 {
+    p.max(0.0f32).min((size as f32) - 1.0f32) - low
+}
+
+#[cube(launch)]
+fn warp(
+    image: &[f32],
+    coords: &[f32],
+    out: &mut [f32],
+    channels: usize,
+    height: usize,
+    width: usize,
+    area: usize,
+) {
+    let pixel = ABSOLUTE_POS_X as usize;
+    if pixel >= area {
+        terminate!();
+    }
+    let n = plane_of_group();
+    let (u, v) = (
+        coords[2 * n * area + pixel],
+        coords[(2 * n + 1) * area + pixel],
+    );
+    let (low_x, low_y) = (lower(u, width), lower(v, height));
+    let (fx, fy) = (beyond(u, low_x, width), beyond(v, low_y, height));
+    let right = select(width > 1, 1usize, 0usize);
+    let down = select(height > 1, width, 0usize);
+    let corner = low_y as usize * width + low_x as usize;
+    for c in 0..channels {
+        let at = (n * channels + c) * height * width + corner;
+        let (a, b) = (image[at], image[at + right]);
+        let (d, e) = (image[at + down], image[at + down + right]);
+        let top = a + (b - a) * fx;
+        let bottom = d + (e - d) * fx;
+        out[(n * channels + c) * area + pixel] = top + (bottom - top) * fy;
+    }
+}
+
+/// The gradient of the coordinates: none where the border counts.
+#[cube(launch)]
+fn grad_of_coords(
+    image: &[f32],
+    coords: &[f32],
+    grad: &[f32],
+    out: &mut [f32],
+    channels: usize,
+    height: usize,
+    width: usize,
+    area: usize,
+) {
+    let pixel = ABSOLUTE_POS_X as usize;
+    if pixel >= area {
+        terminate!();
+    }
+    let n = plane_of_group();
+    let (u, v) = (
+        coords[2 * n * area + pixel],
+        coords[(2 * n + 1) * area + pixel],
+    );
+    let (low_x, low_y) = (lower(u, width), lower(v, height));
+    let (fx, fy) = (beyond(u, low_x, width), beyond(v, low_y, height));
+    let right = select(width > 1, 1usize, 0usize);
+    let down = select(height > 1, width, 0usize);
+    let corner = low_y as usize * width + low_x as usize;
+    let mut along_x = 0.0f32;
+    let mut along_y = 0.0f32;
+    for c in 0..channels {
+        let at = (n * channels + c) * height * width + corner;
+        let (a, b) = (image[at], image[at + right]);
+        let (d, e) = (image[at + down], image[at + down + right]);
+        let g = grad[(n * channels + c) * area + pixel];
+        along_x += g * ((b - a) * (1.0f32 - fy) + (e - d) * fy);
+        along_y += g * ((d - a) * (1.0f32 - fx) + (e - b) * fx);
+    }
+    let moves_x = u >= 0.0f32 && u <= (width as f32) - 1.0f32;
+    let moves_y = v >= 0.0f32 && v <= (height as f32) - 1.0f32;
+    out[2 * n * area + pixel] = select(moves_x, along_x, 0.0f32);
+    out[(2 * n + 1) * area + pixel] = select(moves_y, along_y, 0.0f32);
+}
+
+/// What each pixel of the output gives one of the four it reads, and where that is in its plane.
+#[cube(launch)]
+fn grad_of_corner(
+    coords: &[f32],
+    grad: &[f32],
+    values: &mut [f32],
+    places: &mut [i32],
+    channels: usize,
+    height: usize,
+    width: usize,
+    area: usize,
+    #[comptime] is_right: bool,
+    #[comptime] is_down: bool,
+) {
+    let pixel = ABSOLUTE_POS_X as usize;
+    if pixel >= area {
+        terminate!();
+    }
+    let n = plane_of_group();
+    let (u, v) = (
+        coords[2 * n * area + pixel],
+        coords[(2 * n + 1) * area + pixel],
+    );
+    let (low_x, low_y) = (lower(u, width), lower(v, height));
+    let mut x_share = beyond(u, low_x, width);
+    let mut y_share = beyond(v, low_y, height);
+    let mut place = low_y as usize * width + low_x as usize;
+    if comptime!(is_right) {
+        place += select(width > 1, 1usize, 0usize);
+    } else {
+        x_share = 1.0f32 - x_share;
+    }
+    if comptime!(is_down) {
+        place += select(height > 1, width, 0usize);
+    } else {
+        y_share = 1.0f32 - y_share;
+    }
+    for c in 0..channels {
+        let at = (n * channels + c) * area + pixel;
+        values[at] = grad[at] * x_share * y_share;
+        places[at] = place as i32;
+    }
+}
+
+pub(super) fn forward(image: CubeTensor, coords: CubeTensor) -> CubeTensor {
+    let [batch, channels, height, width] = dims(&image);
+    let [_, _, out_height, out_width] = dims(&coords);
+    let area = out_height * out_width;
+    let out = room(&image, [batch, channels, out_height, out_width]);
+    let (count, dim) = along_pixels(area, batch);
+    warp::launch(
+        &out.client,
+        count,
+        dim,
+        input(image),
+        input(coords),
+        output(&out),
+        channels,
+        height,
+        width,
+        area,
+    );
+    out
+}
+
+pub(super) fn grad_coords(image: CubeTensor, coords: CubeTensor, grad: CubeTensor) -> CubeTensor {
+    let [batch, channels, height, width] = dims(&image);
+    let sizes @ [_, _, out_height, out_width] = dims::<4>(&coords);
+    let area = out_height * out_width;
+    let out = room(&image, sizes);
+    let (count, dim) = along_pixels(area, batch);
+    grad_of_coords::launch(
+        &out.client,
+        count,
+        dim,
+        input(image),
+        input(coords),
+        input(grad),
+        output(&out),
+        channels,
+        height,
+        width,
+        area,
+    );
+    out
+}
+
+/// The gradient of the image, corner by corner: several pixels may read one, which Burn's scatter adds up.
+pub(super) fn grad_image(image: CubeTensor, coords: CubeTensor, grad: CubeTensor) -> CubeTensor {
+    let sizes @ [batch, channels, height, width] = dims::<4>(&image);
+    let [_, _, out_height, out_width] = dims(&coords);
+    let (planes, area) = (height * width, out_height * out_width);
+    let device = image.device.clone();
+    let [coords, grad] = [coords, grad].map(into_contiguous);
+    let flat = [batch, channels, planes].into();
+    let mut sum = CubeBackend::float_zeros(flat, &device, DType::F32.into());
+    for (is_right, is_down) in [(false, false), (true, false), (false, true), (true, true)] {
+        let values = room(&image, [batch, channels, area]);
+        let shape = [batch, channels, area].into();
+        let places = CubeBackend::int_empty(shape, &device, IntDType::I32);
+        let (count, dim) = along_pixels(area, batch);
+        grad_of_corner::launch(
+            &image.client,
+            count,
+            dim,
+            input(coords.clone()),
+            input(grad.clone()),
+            output(&values),
+            output(&places),
+            channels,
+            height,
+            width,
+            area,
+            is_right,
+            is_down,
+        );
+        sum = CubeBackend::float_scatter(2, sum, places, values, IndexingUpdateOp::Add);
+    }
+    CubeBackend::float_reshape(sum, sizes.into())
+}
