@@ -1,9 +1,10 @@
 //! The project's own differentiable operations.
 //!
 //! On the CPU (Burn's Flex backend), in single precision, they run on the kernels of `deepfusion-kernels`,
-//! with backward passes of their own; elsewhere they are composed of Burn's operations and mean the
-//! same. `kernel` declares them to Burn's dispatch, `flex` runs them, `autodiff` derives them, and
-//! `composed` holds the other backends' form.
+//! with backward passes of their own, and most of them on a GPU on kernels in CubeCL's language (feature
+//! `gpu`); elsewhere they are composed of Burn's operations and mean the same. `kernel` declares them to
+//! Burn's dispatch, `flex` and `gpu` run them, `autodiff` derives them, and `composed` holds the other
+//! form.
 
 mod autocast;
 mod autodiff;
