@@ -2,7 +2,7 @@
 
 pip install torch torchvision
 python benches/peers/torch_paper_step.py [--threads 2] [--size 640x192] [--batch 2] [--accumulate 6] [--steps 2] [--layout NCHW|channels-last]
-    [--device cpu] [--compile] [--json]
+    [--device cpu] [--autocast] [--compile] [--json]
 
 Prints the median time of a step on random images in one memory layout and the peak memory of the process (VmHWM, Linux).
 A step is `accumulate` batches of: depth of both frames (the paper's network, four scales; the module of
@@ -35,11 +35,14 @@ class PoseNet(LightPoseNet):
         super().__init__(50)
 
 
-def backward(depth_net, pose_net, views, first, second, k, inverse_k, distance, share):
-    """Forward and backward of one batch, its loss times `share`."""
-    disparities = depth_net(torch.cat([first, second]))
-    pairs = torch.cat([torch.cat([first, second], 1), torch.cat([second, first], 1)])
-    axis_angle, t = pose_net(pairs)
+def backward(depth_net, pose_net, views, first, second, k, inverse_k, distance, share, autocast):
+    """Forward and backward of one batch, its loss times `share`; with `autocast` the networks run in bf16 as torch.autocast chooses."""
+    with torch.autocast(first.device.type, torch.bfloat16, enabled=autocast):
+        disparities = depth_net(torch.cat([first, second]))
+        pairs = torch.cat([torch.cat([first, second], 1), torch.cat([second, first], 1)])
+        axis_angle, t = pose_net(pairs)
+    disparities = [disparity.float() for disparity in disparities]
+    axis_angle, t = axis_angle.float(), t.float()
     r = rotation(axis_angle)
     with torch.no_grad():
         targets, sources = torch.cat([first, second]), torch.cat([second, first])
@@ -71,6 +74,7 @@ def main():
     parser.add_argument("--steps", type=int, default=2)
     parser.add_argument("--layout", choices=["NCHW", "channels-last"], default="channels-last")
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--autocast", action="store_true")
     parser.add_argument("--compile", action="store_true")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
@@ -100,7 +104,7 @@ def main():
         optimiser.zero_grad()
         for _ in range(args.accumulate):
             work = depth_net, pose_net, views, first, second, k, k.inverse(), distance
-            backward(*work, 1 / args.accumulate)
+            backward(*work, 1 / args.accumulate, args.autocast)
         nn.utils.clip_grad_norm_(parameters, CLIP_NORM)
         optimiser.step()
 

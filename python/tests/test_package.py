@@ -129,6 +129,23 @@ def test_errors_say_what_to_do(drive, model, tmp_path):
         model.predict(tmp_path / "broken.png")
 
 
+@pytest.mark.parametrize(("precision", "most"), [("bf16", 0.005), ("int8", 0.015)])
+def test_lower_precision(drive, precision, most):
+    """Nearly the same depth on a processor that has it, and an error that says which would on another."""
+    frame = deepfusion.Dataset(drive)[0]
+    try:
+        lower = deepfusion.load("street", precision=precision)
+    except deepfusion.DeepFusionError as error:
+        assert f"{precision} needs a processor with" in str(error)
+        return
+    found = lower.predict(frame.image, frame.intrinsics).depth
+    expected = deepfusion.load("street").predict(frame.image, frame.intrinsics).depth
+    apart = np.abs(np.log(found / expected)).mean()
+    assert 0 < apart < most
+    with pytest.raises(ValueError, match="int4"):
+        deepfusion.load("street", precision="int4")
+
+
 def test_threads(drive, model):
     """Another estimator a thread gives the same; the interpreter is free while they work."""
     frames = list(deepfusion.Dataset(drive))

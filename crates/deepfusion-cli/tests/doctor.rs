@@ -79,7 +79,6 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
     );
 }
 
-/// A folder is as good as its good drives: one that stands and one of a single frame are left out and named.
 /// The processor beside itself: every operation is there, and right to the last bit.
 #[cfg(feature = "train")]
 #[test]
@@ -97,13 +96,20 @@ fn a_device_is_compared_with_the_processor() {
         assert_eq!(operation["right"], true, "{operation}");
         assert_eq!(operation["forward"], 0.0, "{operation}");
     }
-    let one = json(at, "doctor --device cpu --operation warp");
-    assert_eq!(
-        (&one["forward"], &one["backward"]),
-        (&0.0.into(), &0.0.into())
-    );
+    // What another process answers for a GPU: a line for each operation from one on.
+    let answers = ok(at, "doctor --device cpu --operations-from optimiser");
+    let answers: Vec<serde_json::Value> = answers
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(answers.len(), 3, "the optimiser, and steps of two kinds");
+    for answer in answers {
+        assert_eq!(answer["forward"], 0.0, "{answer}");
+        assert!(answer["failure"].is_null(), "{answer}");
+    }
     // This build has no GPU's backend: `auto` is the processor, and a GPU by name is answered with how to build it.
-    ok(at, "doctor --device auto --operation warp");
+    ok(at, "doctor --device auto --operations-from optimiser");
     fails(
         at,
         "doctor --device metal:1",
@@ -114,6 +120,7 @@ fn a_device_is_compared_with_the_processor() {
     assert!(unknown.stderr.contains("cpu, auto"), "{}", unknown.stderr);
 }
 
+/// A folder is as good as its good drives: one that stands and one of a single frame are left out and named.
 #[test]
 fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     let folder = tempfile::tempdir().unwrap();

@@ -279,23 +279,24 @@ impl BatchNorm2d {
         let result = ops::batch_norm(input, gamma, beta, Self::EPSILON, with_relu);
         let count = (batch * height * width) as f64;
         // A single value has no unbiased variance; its biased one, 0, is kept.
-        let unbiased = result.variance.mul_scalar(count / (count - 1.0).max(1.0));
-        move_towards(&self.running_mean, result.mean);
-        move_towards(&self.running_var, unbiased);
+        let unbiased = count / (count - 1.0).max(1.0);
+        let batch = [result.mean, result.variance];
+        self.move_statistics_towards(batch, unbiased);
         result.output
     }
-}
 
-/// running ← (1 − m)·running + m·batch, visible to the next reader at once.
-fn move_towards(running: &RunningState<Tensor<1>>, batch: Tensor<1>) {
-    let kept = running.value_sync().mul_scalar(1.0 - BatchNorm2d::MOMENTUM);
-    running.update(
-        kept.add(batch.detach().mul_scalar(BatchNorm2d::MOMENTUM))
-            .detach(),
-    );
-    // `update` alone stays pending until the next step, and a checkpoint written in between would
-    // hold the statistics of the step before.
-    running.value_sync();
+    /// running ← (1 − m)·running + m·batch, visible to the next reader at once.
+    fn move_statistics_towards(&self, batch: [Tensor<1>; 2], unbiased: f64) {
+        let both = [&self.running_mean, &self.running_var];
+        let old = both.map(RunningState::value_sync);
+        let new = ops::running_statistics(old, batch, Self::MOMENTUM, unbiased);
+        for (running, value) in both.into_iter().zip(new) {
+            running.update(value);
+            // `update` alone stays pending until the next step, and a checkpoint written in between would
+            // hold the statistics of the step before.
+            running.value_sync();
+        }
+    }
 }
 
 /// The module with every batch norm's statistics frozen (`true`) or following the batches again

@@ -4,6 +4,7 @@
 #[cfg(any(feature = "vulkan", feature = "wgpu", feature = "metal"))]
 use burn::tensor::DeviceKind;
 use burn::tensor::{Device, Distribution, Tensor};
+use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops::{self, ConvOptions};
 
 /// Differences of two ways of summing the same few hundred products in f32.
@@ -32,7 +33,24 @@ fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tensor<D> {
     Tensor::random(shape, Distribution::Uniform(-1.0, 1.0), device)
 }
 
+/// A copy on another device. What composed operations give is computed on the CPU, as Burn's own operations on a GPU are checked by nobody
+/// here: its gradient of a convolution's weights was wrong above 32,768 pixels (WGSL, lavapipe).
+fn on<const D: usize>(device: &Device, tensor: &Tensor<D>) -> Tensor<D> {
+    Tensor::from_data(tensor.to_data(), device)
+}
+
+/// Where the kernels run, or, for what they are compared with, the CPU.
+fn device_of(ours: bool) -> Device {
+    if ours {
+        device()
+    } else {
+        Device::flex().autodiff()
+    }
+}
+
 fn assert_close<const D: usize>(what: &str, a: Tensor<D>, b: Tensor<D>) {
+    let plain = Device::flex();
+    let (a, b) = (on(&plain, &a), on(&plain, &b));
     assert_eq!(a.dims(), b.dims(), "{what}");
     let scale = b.clone().abs().max().into_scalar::<f32>().max(1.0);
     let difference = a.sub(b).abs().max().into_scalar::<f32>();
@@ -69,7 +87,12 @@ fn convolution() {
         (3, 2, 1, false, [3, 40, 24, 31]),
         // Enough for the largest tiles, and a sum that is shared out.
         (1, 1, 0, false, [1, 66, 128, 260]),
-        (1, 1, 0, false, [1, 40, 256, 260]),
+        (1, 1, 0, false, [1, 48, 256, 260]),
+        // As many channels as lie together where weights are taken tap by tap.
+        (3, 1, 1, true, [2, 64, 9, 11]),
+        (3, 2, 1, false, [1, 128, 14, 19]),
+        (1, 1, 0, false, [1, 80, 128, 260]),
+        (3, 1, 1, false, [1, 16, 40, 50]),
         (3, 1, 1, true, [1, 130, 4, 5]),
         (3, 1, 2, true, [1, 2, 6, 8]),
     ];
@@ -96,13 +119,11 @@ fn convolution() {
                 random([out, size[1], kernel, kernel], &device),
             );
             let bias = random([out], &device);
-            // Burn's own on the CPU: on a GPU its gradient of the weights was wrong above 32,768 pixels (WGSL, lavapipe).
-            let cpu = Device::flex().autodiff();
             let run = |ours: bool| {
-                let device = if ours { &device } else { &cpu };
-                let x = leaf(&Tensor::<4>::from_data(x.to_data(), device));
-                let w = leaf(&Tensor::<4>::from_data(w.to_data(), device));
-                let b = leaf(&Tensor::<1>::from_data(bias.to_data(), device));
+                let device = device_of(ours);
+                let x = leaf(&on(&device, &x));
+                let w = leaf(&on(&device, &w));
+                let b = leaf(&on(&device, &bias));
                 let f = if ours {
                     ops::conv2d
                 } else {
@@ -110,22 +131,14 @@ fn convolution() {
                 };
                 let y = f(x.clone(), w.clone(), Some(b.clone()), options);
                 let gradients = weigh(y.clone()).backward();
-                let gx = x.grad(&gradients).unwrap();
                 (
                     y.inner(),
-                    gx,
+                    x.grad(&gradients).unwrap(),
                     w.grad(&gradients).unwrap(),
                     b.grad(&gradients).unwrap(),
                 )
             };
             let (a, b) = (run(true), run(false));
-            let back = |t: Tensor<4>| Tensor::from_data(t.into_data(), &cpu);
-            let a = (
-                back(a.0),
-                back(a.1),
-                back(a.2),
-                Tensor::<1>::from_data(a.3.into_data(), &cpu),
-            );
             let name = format!("{kernel}x{kernel} {options:?}");
             assert_close(&name, a.0, b.0);
             assert_close(&format!("{name} x"), a.1, b.1);
@@ -136,13 +149,31 @@ fn convolution() {
 }
 
 /// Within `autocast` a convolution and its gradients see their numbers rounded to bf16, and nothing else changes; after it,
-/// and on a processor without bf16, they do not.
+/// and on a processor without bf16, or a GPU without tensor cores for it, they do not.
 #[test]
 fn convolutions_within_autocast() {
-    let device = Device::flex().autodiff();
+    // Of a GPU's tensor cores: less than a tile; each size of tile, partly filled; sums in parts; the gradient of the weights tap by tap.
+    for (size, out, stride, kernel) in [
+        ([2, 32, 6, 9], 48, 1, 3),
+        ([1, 32, 128, 260], 64, 1, 3),
+        ([1, 48, 256, 260], 64, 1, 3),
+        ([1, 16, 256, 260], 80, 1, 1),
+        ([2, 48, 40, 66], 16, 1, 3),
+        ([1, 32, 34, 70], 32, 2, 3),
+        ([1, 144, 34, 70], 144, 2, 3),
+        ([2, 64, 20, 30], 64, 1, 3),
+        ([1, 128, 14, 19], 128, 1, 3),
+    ] {
+        convolutions_within_autocast_of(size, out, stride, kernel);
+    }
+}
+
+fn convolutions_within_autocast_of(size: [usize; 4], out: usize, stride: usize, kernel: usize) {
+    let device = device();
     let options = ConvOptions {
-        padding: 1,
-        reflect: true,
+        padding: kernel / 2,
+        stride,
+        reflect: stride == 1,
         ..ConvOptions::default()
     };
     let rounded = |t: &Tensor<4>| {
@@ -154,15 +185,15 @@ fn convolutions_within_autocast() {
         let values: Vec<f32> = values.collect();
         Tensor::<1>::from_data(values.as_slice(), &device).reshape(t.dims())
     };
-    let (x, w) = (
-        random([2, 32, 6, 9], &device),
-        random([48, 32, 3, 3], &device),
-    );
-    let weights = random([2, 48, 6, 9], &device);
+    let x = random(size, &device);
+    let w = random([out, size[1], kernel, kernel], &device);
+    let bias = random([out], &device);
+    let [height, width] = [size[2], size[3]].map(|side| (side - 1) / stride + 1);
+    let weights = random([size[0], out, height, width], &device);
     let run = |x: &Tensor<4>, w: &Tensor<4>, weights: &Tensor<4>, precision| {
         let (x, w) = (leaf(x), leaf(w));
         let y = ops::autocast(precision, || {
-            ops::conv2d(x.clone(), w.clone(), None, options)
+            ops::conv2d(x.clone(), w.clone(), Some(bias.clone()), options)
         });
         // The gradients are asked for outside.
         let gradients = y.clone().mul(weights.clone()).sum().backward();
@@ -189,19 +220,21 @@ fn convolutions_within_autocast() {
 
 #[test]
 fn depthwise_convolution() {
-    let device = Device::flex().autodiff();
+    let device = device();
     for (size, kernel, dilation) in [
         ([2, 5, 7, 9], 3, 1),
         ([1, 3, 12, 10], 3, 3),
         ([2, 4, 4, 6], 3, 6),
         ([1, 2, 9, 5], 5, 2),
+        ([2, 3, 130, 260], 3, 2),
     ] {
         let (x, w) = (
             random(size, &device),
             random([size[1], 1, kernel, kernel], &device),
         );
         let run = |ours: bool| {
-            let (x, w) = (leaf(&x), leaf(&w));
+            let device = device_of(ours);
+            let (x, w) = (leaf(&on(&device, &x)), leaf(&on(&device, &w)));
             let f = if ours {
                 ops::depthwise
             } else {
@@ -222,15 +255,15 @@ fn depthwise_convolution() {
 
 #[test]
 fn gelu() {
-    let device = Device::flex().autodiff();
-    let x = random([2, 3, 40, 50], &device).mul_scalar(6.0);
-    let run = |f: fn(Tensor<4>) -> Tensor<4>| {
-        let x = leaf(&x);
+    let x = random([2, 3, 40, 50], &device()).mul_scalar(6.0);
+    let run = |ours: bool| {
+        let x = leaf(&on(&device_of(ours), &x));
+        let f = if ours { ops::gelu } else { ops::composed_gelu };
         let y = f(x.clone());
         let gradients = weigh(y.clone()).backward();
         (y.inner(), x.grad(&gradients).unwrap())
     };
-    let (a, b) = (run(ops::gelu), run(ops::composed_gelu));
+    let (a, b) = (run(true), run(false));
     assert_close("gelu", a.0, b.0);
     assert_close("gelu x", a.1, b.1);
 }
@@ -276,6 +309,60 @@ fn batch_normalisation() {
         assert_close("mean", a.4, b.4);
         assert_close("variance", a.5, b.5);
     }
+}
+
+#[test]
+fn running_statistics() {
+    let device = device();
+    let [mean, variance, batch_mean, batch_variance] =
+        [(); 4].map(|()| random([300], &device).abs());
+    let run = |f: fn([Tensor<1>; 2], [Tensor<1>; 2], f64, f64) -> [Tensor<1>; 2]| {
+        let batch = [batch_mean.clone(), leaf(&batch_variance)];
+        f([mean.clone(), variance.clone()], batch, 0.1, 1.5)
+    };
+    let ours = run(ops::running_statistics);
+    let [mean, variance] = run(ops::composed_running_statistics);
+    let [our_mean, our_variance] = ours;
+    assert_close("mean", our_mean, mean);
+    assert_close("variance", our_variance, variance);
+}
+
+/// Two steps of a parameter, and the norm that clips its gradient.
+#[test]
+fn adam_and_the_sum_of_squares() {
+    let plain = device().inner();
+    let (values, gradient) = (random([70_001], &plain), random([70_001], &plain));
+    let sum = ops::sum_of_squares(gradient.clone()).into_scalar::<f32>();
+    let exact: f64 = gradient
+        .to_data()
+        .iter::<f32>()
+        .map(|v| f64::from(v).powi(2))
+        .sum();
+    assert!((f64::from(sum) / exact - 1.0).abs() < 1e-5, "{sum} {exact}");
+
+    let run = |f: fn(&AdamStep, Tensor<1>, Tensor<1>, [Tensor<1>; 2]) -> _| {
+        let moments = [values.zeros_like(), values.zeros_like()];
+        let (mut values, mut moments): (Tensor<1>, [Tensor<1>; 2]) = (values.clone(), moments);
+        for count in 1..=2 {
+            let step = AdamStep {
+                learning_rate: 0.01,
+                beta1: 0.9,
+                beta2: 0.999,
+                epsilon: 1e-8,
+                correction1: 1.0 - 0.9_f32.powi(count),
+                correction2: 1.0 - 0.999_f32.powi(count),
+                gradient_scale: 0.5,
+                weight_decay: 0.1,
+            };
+            (values, moments) = f(&step, values, gradient.clone(), moments);
+        }
+        (values, moments)
+    };
+    let (values, [first, second]) = run(ops::adam);
+    let (expected, [expected_first, expected_second]) = run(ops::composed_adam);
+    assert_close("values", values, expected);
+    assert_close("first moment", first, expected_first);
+    assert_close("second moment", second, expected_second);
 }
 
 #[test]

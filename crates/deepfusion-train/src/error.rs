@@ -83,7 +83,7 @@ pub enum Error {
     },
     /// A precision that the device, or this processor, does not have.
     #[error(
-        "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and it as the device), \
+        "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, or a GPU with tensor cores for it), \
          found {found}"
     )]
     Precision {

@@ -58,9 +58,9 @@ pub(crate) struct DoctorArgs {
     /// The exit code is 1 where they differ, with what to do without.
     #[arg(long, value_parser = device(), conflicts_with = "path")]
     pub device: Option<ComputeDevice>,
-    /// Of those operations one alone, as JSON: each has a process of its own.
+    /// Those operations from this one on, a line of JSON each: what the process does that a driver may end.
     #[arg(long, value_name = "NAME", requires = "device", hide = true)]
-    pub operation: Option<String>,
+    pub operations_from: Option<String>,
     /// Also write a page with plots over time and measured depth on images.
     #[arg(long, value_name = "FILE.html", requires = "path")]
     pub report: Option<PathBuf>,

@@ -369,7 +369,7 @@ impl Reportable for deepfusion_train::Error {
             Self::Data(error) => error.message(),
             Self::Model(error) => error.message(),
             Self::Precision { found } => format!(
-                "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and --device cpu), \
+                "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, or a GPU with tensor cores for it), \
                  found {found}"
             ),
             _ => self.to_string(),

@@ -34,12 +34,16 @@ pub(super) fn within(options: ConvOptions) -> ConvOptions {
     }
 }
 
-/// Whether a device supports this precision: bf16 needs this project's CPU kernels and a processor with bf16 instructions.
+/// Whether a device supports this precision: bf16 needs a processor with bf16 instructions, or a GPU with tensor cores for it.
 #[must_use]
 pub fn supports(device: &Device, precision: Precision) -> bool {
-    let on_cpu = matches!(
-        device.clone().inner().as_dispatch(),
-        DispatchDevice::Flex(_)
-    );
-    precision == Precision::F32 || (on_cpu && has_bf16())
+    precision == Precision::F32
+        || match device.clone().inner().as_dispatch() {
+            DispatchDevice::Flex(_) => has_bf16(),
+            #[cfg(feature = "gpu")]
+            DispatchDevice::Cube(device) => {
+                super::gpu::conv::tensor_cores::has_tensor_cores(device)
+            }
+            _ => false,
+        }
 }

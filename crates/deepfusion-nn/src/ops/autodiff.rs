@@ -1,7 +1,7 @@
 //! How the operations are derived: what each keeps from its forward pass, and which of its parents
 //! receive a gradient.
 
-use super::kernel::{ConvOptions, FusedBackward, FusedOps, KernelBackward, KernelOps};
+use super::kernel::{ConvOptions, KernelBackward, KernelOps};
 use burn::backend::autodiff::{
     Autodiff,
     checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
@@ -23,7 +23,7 @@ macro_rules! record {
 #[derive(Debug)]
 struct Conv2d;
 
-impl<B: FusedBackward> Backward<B, 3> for Conv2d {
+impl<B: KernelBackward> Backward<B, 3> for Conv2d {
     type State = (FloatTensor<B>, FloatTensor<B>, ConvOptions);
 
     fn backward(
@@ -51,7 +51,7 @@ impl<B: FusedBackward> Backward<B, 3> for Conv2d {
 #[derive(Debug)]
 struct BatchNorm;
 
-impl<B: FusedBackward> Backward<B, 3> for BatchNorm {
+impl<B: KernelBackward> Backward<B, 3> for BatchNorm {
     type State = (
         FloatTensor<B>,
         [FloatTensor<B>; 2],
@@ -125,7 +125,7 @@ impl<B: KernelBackward> Backward<B, 1> for Gelu {
 #[derive(Debug)]
 struct Elu;
 
-impl<B: FusedBackward> Backward<B, 1> for Elu {
+impl<B: KernelBackward> Backward<B, 1> for Elu {
     type State = FloatTensor<B>;
 
     fn backward(
@@ -166,7 +166,7 @@ impl<B: KernelBackward> Backward<B, 2> for UpsampleConcat {
 #[derive(Debug)]
 struct Warp;
 
-impl<B: FusedBackward> Backward<B, 2> for Warp {
+impl<B: KernelBackward> Backward<B, 2> for Warp {
     type State = (FloatTensor<B>, FloatTensor<B>);
 
     fn backward(
@@ -191,7 +191,7 @@ impl<B: FusedBackward> Backward<B, 2> for Warp {
 #[derive(Debug)]
 struct LocalCorrelation;
 
-impl<B: FusedBackward> Backward<B, 2> for LocalCorrelation {
+impl<B: KernelBackward> Backward<B, 2> for LocalCorrelation {
     type State = (FloatTensor<B>, FloatTensor<B>, usize);
 
     fn backward(
@@ -217,7 +217,7 @@ impl<B: FusedBackward> Backward<B, 2> for LocalCorrelation {
 #[derive(Debug)]
 struct Project;
 
-impl<B: FusedBackward> Backward<B, 3> for Project {
+impl<B: KernelBackward> Backward<B, 3> for Project {
     type State = [FloatTensor<B>; 3];
 
     fn backward(
@@ -240,7 +240,7 @@ impl<B: FusedBackward> Backward<B, 3> for Project {
 #[derive(Debug)]
 struct Smoothness;
 
-impl<B: FusedBackward> Backward<B, 1> for Smoothness {
+impl<B: KernelBackward> Backward<B, 1> for Smoothness {
     type State = (FloatTensor<B>, FloatTensor<B>);
 
     fn backward(
@@ -260,7 +260,7 @@ impl<B: FusedBackward> Backward<B, 1> for Smoothness {
 #[derive(Debug)]
 struct Photometric;
 
-impl<B: FusedBackward> Backward<B, 1> for Photometric {
+impl<B: KernelBackward> Backward<B, 1> for Photometric {
     type State = (FloatTensor<B>, FloatTensor<B>, f64);
 
     fn backward(
@@ -305,13 +305,7 @@ where
         let output = B::kernel_upsample_concat(x, skip);
         record!(UpsampleConcat, C, [x_node, skip_node], output, channels)
     }
-}
 
-impl<B, C> FusedOps for Autodiff<B, C>
-where
-    B: Backend + FusedOps + FusedBackward,
-    C: CheckpointStrategy,
-{
     fn kernel_conv2d(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
@@ -342,6 +336,27 @@ where
         let state = (x, [gamma, beta], statistics, epsilon, relu);
         let output = record!(BatchNorm, C, nodes, output, state);
         (output, Self::from_inner(mean), Self::from_inner(variance))
+    }
+
+    fn kernel_running_statistics(
+        mean: FloatTensor<Self>,
+        variance: FloatTensor<Self>,
+        batch_mean: FloatTensor<Self>,
+        batch_variance: FloatTensor<Self>,
+        momentum: f64,
+        unbiased: f64,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
+        let [mean, variance, batch_mean, batch_variance] =
+            [mean, variance, batch_mean, batch_variance].map(|t| t.into_primitive());
+        let (mean, variance) = B::kernel_running_statistics(
+            mean,
+            variance,
+            batch_mean,
+            batch_variance,
+            momentum,
+            unbiased,
+        );
+        (Self::from_inner(mean), Self::from_inner(variance))
     }
 
     fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self> {

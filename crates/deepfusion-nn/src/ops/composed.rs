@@ -1,11 +1,7 @@
 //! The operations composed of Burn's own: what the backends without kernels run, and what the
 //! kernels are tested against.
 
-#[cfg(feature = "gpu")]
-use super::gpu::mirror::MirrorOps;
 use super::{BatchNormOutput, ConvOptions};
-#[cfg(feature = "gpu")]
-use burn::backend::Dispatch;
 use burn::tensor::{
     Bool, Int, Tensor,
     module::avg_pool2d,
@@ -32,11 +28,6 @@ pub fn conv2d(
 }
 
 fn mirror(x: Tensor<4>, padding: usize) -> Tensor<4> {
-    #[cfg(feature = "gpu")]
-    if super::on_gpu(&x) {
-        let out = <Dispatch as MirrorOps>::kernel_mirror(x.into_dispatch(), padding);
-        return Tensor::from_dispatch(out);
-    }
     x.pad((padding, padding, padding, padding), PadMode::Reflect)
 }
 
@@ -72,6 +63,24 @@ pub fn batch_norm(
         mean: mean.detach(),
         variance: variance.detach(),
     }
+}
+
+/// [`super::running_statistics`].
+#[must_use]
+pub fn running_statistics(
+    [mean, variance]: [Tensor<1>; 2],
+    [batch_mean, batch_variance]: [Tensor<1>; 2],
+    momentum: f64,
+    unbiased: f64,
+) -> [Tensor<1>; 2] {
+    let towards = |running: Tensor<1>, batch: Tensor<1>| {
+        let kept = running.mul_scalar(1.0 - momentum);
+        kept.add(batch.mul_scalar(momentum)).detach()
+    };
+    [
+        towards(mean, batch_mean),
+        towards(variance, batch_variance.mul_scalar(unbiased)),
+    ]
 }
 
 /// [`super::depthwise`].

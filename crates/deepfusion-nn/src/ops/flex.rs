@@ -2,7 +2,7 @@
 
 mod backward;
 
-use super::kernel::{ConvOptions, FusedOps, KernelOps};
+use super::kernel::{ConvOptions, KernelOps};
 use burn::backend::{Flex, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor};
 use burn::tensor::TensorData;
 use deepfusion_kernels::{
@@ -179,9 +179,7 @@ impl KernelOps for Flex {
         };
         tensor(out, sizes)
     }
-}
 
-impl FusedOps for Flex {
     fn kernel_conv2d(
         x: Float,
         weight: Float,
@@ -235,6 +233,28 @@ impl FusedOps for Flex {
             tensor(out, sizes),
             tensor(saved.mean, channels),
             tensor(saved.variance, channels),
+        )
+    }
+
+    fn kernel_running_statistics(
+        mean: Float,
+        variance: Float,
+        batch_mean: Float,
+        batch_variance: Float,
+        momentum: f64,
+        unbiased: f64,
+    ) -> (Float, Float) {
+        let towards = |running: Float, batch: Float, scale: f32| {
+            let channels: [usize; 1] = dims(&running);
+            let (running, batch) = (Values::of(running), Values::of(batch));
+            let (kept, added) = (single(1.0 - momentum), single(momentum));
+            let both = running.slice().iter().zip(batch.slice());
+            let values = both.map(|(old, new)| old * kept + new * scale * added);
+            tensor(values.collect(), channels)
+        };
+        (
+            towards(mean, batch_mean, 1.0),
+            towards(variance, batch_variance, single(unbiased)),
         )
     }
 

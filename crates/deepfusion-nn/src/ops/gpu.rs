@@ -1,4 +1,4 @@
-//! The operations on a GPU as kernels of their own, in CubeCL's language: one or two launches each, forward and backward, where Burn's
+//! The operations on a GPU as kernels of their own, in CubeCL's language: a few launches each, forward and backward, where Burn's
 //! operations need dozens. What they compute is `composed`'s.
 //!
 //! A kernel runs along the pixels of a plane, and a grid's second axis counts the planes. What is summed over a plane, or over a channel of
@@ -12,18 +12,21 @@
 pub(super) mod adam;
 mod backward;
 mod batch_norm;
-mod conv;
+pub(super) mod conv;
 mod correlation;
+mod depthwise;
 mod elu;
+mod gelu;
 mod grid;
-pub(super) mod mirror;
+mod mirror;
 mod photometric;
 mod project;
 mod smoothness;
 mod sum;
+mod upsample;
 mod warp;
 
-use super::kernel::{ConvOptions, FusedOps};
+use super::kernel::{ConvOptions, KernelOps};
 use burn::backend::TensorMetadata;
 use burn::tensor::{DType, Shape};
 use burn_cubecl::CubeBackend;
@@ -53,7 +56,32 @@ fn output(tensor: &CubeTensor) -> BufferArg {
     tensor.clone().into_buffer_arg()
 }
 
-impl FusedOps for CubeBackend {
+impl KernelOps for CubeBackend {
+    fn kernel_depthwise(x: CubeTensor, weight: CubeTensor, dilation: usize) -> CubeTensor {
+        depthwise::forward(x, weight, dilation)
+    }
+
+    fn kernel_gelu(x: CubeTensor) -> CubeTensor {
+        gelu::forward(x)
+    }
+
+    fn kernel_upsample_concat(x: CubeTensor, skip: CubeTensor) -> CubeTensor {
+        upsample::forward(x, skip)
+    }
+
+    fn kernel_running_statistics(
+        mean: CubeTensor,
+        variance: CubeTensor,
+        batch_mean: CubeTensor,
+        batch_variance: CubeTensor,
+        momentum: f64,
+        unbiased: f64,
+    ) -> (CubeTensor, CubeTensor) {
+        let running = [mean, variance];
+        let batch = [batch_mean, batch_variance];
+        batch_norm::running(running, batch, momentum as f32, unbiased as f32)
+    }
+
     fn kernel_conv2d(
         x: CubeTensor,
         weight: CubeTensor,
@@ -62,7 +90,7 @@ impl FusedOps for CubeBackend {
         options: ConvOptions,
     ) -> CubeTensor {
         let (x, options) = mirror::padded(x, options);
-        conv::forward(x, weight, bias, has_bias, options)
+        conv::forward(x, weight, has_bias.then_some(bias), options)
     }
 
     fn kernel_batch_norm(

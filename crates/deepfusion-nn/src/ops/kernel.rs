@@ -14,7 +14,7 @@ pub struct ConvOptions {
     pub dilation: usize,
     /// Padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
-    /// Precision of the products in the CPU kernels; [`super::autocast`] overrides it.
+    /// Precision of the products in the kernels; [`super::autocast`] overrides it.
     pub precision: Precision,
 }
 
@@ -31,8 +31,8 @@ impl Default for ConvOptions {
     }
 }
 
-/// The forward passes. Shapes are those of the functions in [`super`].
-#[backend_extension(Flex, Autodiff)]
+/// The forward passes, on the processor and on a GPU. Shapes are those of the functions in [`super`].
+#[backend_extension(Flex, Cube: cfg(feature = "gpu"), Autodiff)]
 pub(super) trait KernelOps: Backend {
     /// See [`super::depthwise`].
     fn kernel_depthwise(
@@ -46,11 +46,7 @@ pub(super) trait KernelOps: Backend {
 
     /// See [`super::upsample_concat`].
     fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self>;
-}
 
-/// The forward passes that are kernels on a GPU, too.
-#[backend_extension(Flex, Cube: cfg(feature = "gpu"), Autodiff)]
-pub(super) trait FusedOps: Backend {
     /// See [`super::conv2d`]; `bias` is not read unless `has_bias`.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
@@ -68,6 +64,16 @@ pub(super) trait FusedOps: Backend {
         epsilon: f64,
         relu: bool,
     ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
+
+    /// See [`super::running_statistics`]: mean, variance.
+    fn kernel_running_statistics(
+        mean: FloatTensor<Self>,
+        variance: FloatTensor<Self>,
+        batch_mean: FloatTensor<Self>,
+        batch_variance: FloatTensor<Self>,
+        momentum: f64,
+        unbiased: f64,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>);
 
     /// See [`super::elu`].
     fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self>;
@@ -129,10 +135,7 @@ pub(super) trait KernelBackward: Backend {
 
     /// Gradients of x and skip of [`KernelOps::kernel_upsample_concat`]; `channels` are those of x.
     fn upsample_concat_grad(grad: FloatTensor<Self>, channels: usize) -> [FloatTensor<Self>; 2];
-}
 
-/// The backward passes of [`FusedOps`].
-pub(super) trait FusedBackward: Backend {
     /// Gradient of the input of [`KernelOps::kernel_conv2d`].
     fn conv2d_grad_x(
         x: FloatTensor<Self>,

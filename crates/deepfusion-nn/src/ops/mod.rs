@@ -1,10 +1,9 @@
 //! The project's own differentiable operations.
 //!
-//! On the CPU (Burn's Flex backend), in single precision, they run on the kernels of `deepfusion-kernels`,
-//! with backward passes of their own, and most of them on a GPU on kernels in CubeCL's language (feature
-//! `gpu`); elsewhere they are composed of Burn's operations and mean the same. `kernel` declares them to
-//! Burn's dispatch, `flex` and `gpu` run them, `autodiff` derives them, and `composed` holds the other
-//! form.
+//! In single precision they run on the kernels of `deepfusion-kernels` on the CPU (Burn's Flex backend), with
+//! backward passes of their own, and on kernels in CubeCL's language on a GPU (feature `gpu`); elsewhere they
+//! are composed of Burn's operations and mean the same. `kernel` declares them to Burn's dispatch, `flex` and
+//! `gpu` run them, `autodiff` derives them, and `composed` holds the other form.
 
 mod autocast;
 mod autodiff;
@@ -17,7 +16,7 @@ mod kernel;
 use burn::backend::{Dispatch, DispatchDevice};
 use burn::tensor::{Bool, DType, Device, Tensor, TensorData};
 use deepfusion_kernels::AdamStep;
-use kernel::{FusedOps, KernelOps};
+use kernel::KernelOps;
 
 pub use autocast::{autocast, supports};
 pub use composed::{
@@ -25,8 +24,8 @@ pub use composed::{
     depthwise as composed_depthwise, elu as composed_elu, gelu as composed_gelu,
     local_correlation as composed_local_correlation,
     photometric_error as composed_photometric_error, project as composed_project,
-    smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
-    warp as composed_warp,
+    running_statistics as composed_running_statistics, smoothness as composed_smoothness,
+    upsample_concat as composed_upsample_concat, warp as composed_warp,
 };
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
@@ -39,7 +38,7 @@ fn is_cpu(device: &Device) -> bool {
     )
 }
 
-/// Whether the kernels run for this tensor: on the CPU, in single precision.
+/// Whether the CPU's kernels run for this tensor, in single precision.
 #[must_use]
 pub fn has_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
     is_cpu(&tensor.device()) && tensor.dtype() == DType::F32
@@ -55,9 +54,8 @@ fn on_gpu<const D: usize>(tensor: &Tensor<D>) -> bool {
     is_cube && tensor.dtype() == DType::F32
 }
 
-/// Whether what Burn composes of many operations is a kernel for this tensor: on the CPU or, with the feature `gpu`, on a GPU, in
-/// single precision.
-fn has_fused<const D: usize>(tensor: &Tensor<D>) -> bool {
+/// Whether there are kernels for this tensor: on the CPU or, with the feature `gpu`, on a GPU, in single precision.
+fn runs_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
     #[cfg(feature = "gpu")]
     if on_gpu(tensor) {
         return true;
@@ -82,7 +80,7 @@ pub fn conv2d(
     bias: Option<Tensor<1>>,
     options: ConvOptions,
 ) -> Tensor<4> {
-    if !has_fused(&x) {
+    if !runs_kernels(&x) {
         return composed::conv2d(x, weight, bias, options);
     }
     let [_, channels, _, _] = x.dims();
@@ -91,7 +89,7 @@ pub fn conv2d(
     let has_bias = bias.is_some();
     // The kernel does not read the bias where there is none.
     let bias = bias.unwrap_or_else(|| Tensor::zeros([out], &x.device().inner()));
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_conv2d(
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_conv2d(
         x.into_dispatch(),
         weight.into_dispatch(),
         bias.into_dispatch(),
@@ -125,10 +123,10 @@ pub fn batch_norm(
     epsilon: f64,
     relu: bool,
 ) -> BatchNormOutput {
-    if !has_fused(&x) {
+    if !runs_kernels(&x) {
         return composed::batch_norm(x, gamma, beta, epsilon, relu);
     }
-    let (output, mean, variance) = <Dispatch as FusedOps>::kernel_batch_norm(
+    let (output, mean, variance) = <Dispatch as KernelOps>::kernel_batch_norm(
         x.into_dispatch(),
         gamma.into_dispatch(),
         beta.into_dispatch(),
@@ -142,6 +140,34 @@ pub fn batch_norm(
     }
 }
 
+/// Running statistics after a batch, (1 − m)·running + m·batch: mean and variance, without gradient. The batch's variance counts
+/// `unbiased` times, as [`BatchNormOutput::variance`] lacks Bessel's correction.
+///
+/// # Shapes
+/// - all: `[C]`
+#[must_use]
+pub fn running_statistics(
+    [mean, variance]: [Tensor<1>; 2],
+    batch: [Tensor<1>; 2],
+    momentum: f64,
+    unbiased: f64,
+) -> [Tensor<1>; 2] {
+    let [batch_mean, batch_variance] = batch.map(Tensor::detach);
+    if !runs_kernels(&mean) {
+        let batch = [batch_mean, batch_variance];
+        return composed::running_statistics([mean, variance], batch, momentum, unbiased);
+    }
+    let (mean, variance) = <Dispatch as KernelOps>::kernel_running_statistics(
+        mean.into_dispatch(),
+        variance.into_dispatch(),
+        batch_mean.into_dispatch(),
+        batch_variance.into_dispatch(),
+        momentum,
+        unbiased,
+    );
+    [mean, variance].map(Tensor::from_dispatch)
+}
+
 /// Depthwise convolution at stride 1 that keeps the size, with a border of zeros: every channel has a kernel of its own.
 ///
 /// # Shapes
@@ -152,7 +178,7 @@ pub fn batch_norm(
 /// When the shapes do not fit each other, as Burn's own operations do.
 #[must_use]
 pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> {
-    if !has_kernels(&x) {
+    if !runs_kernels(&x) {
         return composed::depthwise(x, weight, dilation);
     }
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_depthwise(
@@ -165,7 +191,7 @@ pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> 
 /// GELU, x·Φ(x), Φ the normal distribution.
 #[must_use]
 pub fn gelu(x: Tensor<4>) -> Tensor<4> {
-    if !has_kernels(&x) {
+    if !runs_kernels(&x) {
         return composed::gelu(x);
     }
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_gelu(x.into_dispatch()))
@@ -174,10 +200,10 @@ pub fn gelu(x: Tensor<4>) -> Tensor<4> {
 /// ELU, x for x > 0 and eˣ − 1 below.
 #[must_use]
 pub fn elu(x: Tensor<4>) -> Tensor<4> {
-    if !has_fused(&x) {
+    if !runs_kernels(&x) {
         return composed::elu(x);
     }
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_elu(x.into_dispatch()))
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_elu(x.into_dispatch()))
 }
 
 /// Every pixel repeated twice in both directions, then the skip feature behind it.
@@ -188,7 +214,7 @@ pub fn elu(x: Tensor<4>) -> Tensor<4> {
 /// - output: `[N, C + S, 2H, 2W]`
 #[must_use]
 pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
-    if !has_kernels(&x) {
+    if !runs_kernels(&x) {
         return composed::upsample_concat(x, skip);
     }
     let [batch, _, height, width] = x.dims();
@@ -213,7 +239,7 @@ pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
 /// - output: `[N, C, H', W']`
 #[must_use]
 pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
-    if !has_fused(&coords) {
+    if !runs_kernels(&coords) {
         return composed::warp(image, coords);
     }
     assert_eq!(
@@ -221,7 +247,7 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
         [image.dims()[0], 2],
         "two coordinates a pixel"
     );
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_warp(
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
         image.into_dispatch(),
         coords.into_dispatch(),
     ))
@@ -257,10 +283,10 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
         second.dims(),
         "both images have the same size"
     );
-    if !has_fused(&first) {
+    if !runs_kernels(&first) {
         return composed::local_correlation(first, second, radius);
     }
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_local_correlation(
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_local_correlation(
         first.into_dispatch(),
         second.into_dispatch(),
         radius,
@@ -277,10 +303,10 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
 /// - output: `[N, 2, H, W]`, u and v in pixels
 #[must_use]
 pub fn project(disparity: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
-    if !has_fused(&disparity) {
+    if !runs_kernels(&disparity) {
         return composed::project(disparity, homography, shift);
     }
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_project(
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_project(
         disparity.into_dispatch(),
         homography.into_dispatch(),
         shift.into_dispatch(),
@@ -295,10 +321,10 @@ pub fn project(disparity: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) ->
 #[must_use]
 pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool> {
     let coords = coords.detach();
-    if !has_fused(&coords) {
+    if !runs_kernels(&coords) {
         return composed::in_view(coords, [height, width]);
     }
-    let inside = <Dispatch as FusedOps>::kernel_in_view(coords.into_dispatch(), height, width);
+    let inside = <Dispatch as KernelOps>::kernel_in_view(coords.into_dispatch(), height, width);
     Tensor::<4>::from_dispatch(inside).greater_elem(0.5)
 }
 
@@ -312,10 +338,10 @@ pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool
 #[must_use]
 pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
     let image = image.detach();
-    if !has_fused(&disparity) {
+    if !runs_kernels(&disparity) {
         return composed::smoothness(disparity, image);
     }
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_smoothness(
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_smoothness(
         disparity.into_dispatch(),
         image.into_dispatch(),
     ))
@@ -330,10 +356,10 @@ pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
 #[must_use]
 pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
     assert_eq!(a.dims(), b.dims(), "both images have the same size");
-    if !has_fused(&a) {
+    if !runs_kernels(&a) {
         return composed::photometric_error(a, b, alpha);
     }
-    Tensor::from_dispatch(<Dispatch as FusedOps>::kernel_photometric(
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_photometric(
         a.into_dispatch(),
         b.detach().into_dispatch(),
         alpha,

@@ -3,7 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Gradients, Tensor};
-use deepfusion_nn::ops::{self, ConvOptions};
+use deepfusion_nn::ops::{self, ConvOptions, Precision};
 use deepfusion_nn::{
     DepthNet, DepthNetConfig, DispNetConfig, LiteMonoSize, PoseNet, PoseNetConfig, ResNetDepth,
 };
@@ -90,6 +90,11 @@ pub(super) fn all() -> Vec<Case> {
         case("convolution 1x1", NeededBy::Network, |on| {
             conv(1, padded(0), on)
         }),
+        case(
+            "convolution 3x3 of a larger image",
+            NeededBy::Network,
+            larger_conv,
+        ),
         case("batch normalisation", NeededBy::Network, batch_norm),
         case("ELU", NeededBy::Network, |on| pointwise(ops::elu, on)),
         case("sigmoid", NeededBy::Network, |on| pointwise(sigmoid, on)),
@@ -125,6 +130,11 @@ pub(super) fn all() -> Vec<Case> {
             depth_net(&config, on)
         }),
         case("pose network", NeededBy::Learning, pose_net),
+        case(
+            "convolution 3x3 in mixed precision",
+            NeededBy::MixedPrecision,
+            conv_in_bf16,
+        ),
         case("optimiser", NeededBy::Learning, optimiser),
         case("losses of three steps", NeededBy::Views, |on| {
             steps(with_pose_net(Preset::Tiny.config()), on)
@@ -169,6 +179,32 @@ fn conv(kernel: usize, options: ConvOptions, on: &Inputs) -> Outcome {
             gradient(&bias, raw),
         ]
     })
+}
+
+/// 40,960 pixels: above 32,768 a gradient of the weights was wrong (of Burn, by WGSL on lavapipe).
+fn larger_conv(on: &Inputs) -> Outcome {
+    let x = on.noise([1, 4, 128, 320], 60, SIGNED);
+    let weight = on.noise([8, 4, 3, 3], 61, SIGNED);
+    let result = ops::conv2d(x.clone(), weight.clone(), None, padded(1));
+    outcome(result, |raw| {
+        vec![gradient(&x, raw), gradient(&weight, raw)]
+    })
+}
+
+/// Numbers that bf16 has, so that only what comes after their rounding can differ; with many channels, as tensor cores want them.
+fn conv_in_bf16(on: &Inputs) -> Outcome {
+    let steps = |tensor: Tensor<4>| tensor.mul_scalar(128.0).round().div_scalar(128.0);
+    let x = steps(on.fixed([1, 80, 24, 40], 62, SIGNED)).require_grad();
+    let weight = steps(on.fixed([64, 80, 3, 3], 63, SIGNED)).require_grad();
+    let result = ops::autocast(Precision::Bf16, || {
+        ops::conv2d(x.clone(), weight.clone(), None, padded(1))
+    });
+    let weights = steps(on.fixed([1, 64, 24, 40], 64, SIGNED));
+    let raw = (result.clone() * weights).sum().backward();
+    Outcome {
+        forward: vec![values(result)],
+        backward: vec![gradient(&x, &raw), gradient(&weight, &raw)],
+    }
 }
 
 fn batch_norm(on: &Inputs) -> Outcome {

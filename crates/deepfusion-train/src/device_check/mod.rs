@@ -35,6 +35,8 @@ pub enum NeededBy {
     Affine,
     /// Learning anything.
     Learning,
+    /// Learning with `precision = "bf16"`.
+    MixedPrecision,
 }
 
 /// An operation on the device beside the same on the processor.
@@ -73,7 +75,7 @@ pub fn operations() -> impl Iterator<Item = (&'static str, NeededBy)> {
 }
 
 /// Computes an operation on a device and on the processor; `None` for a name that [`operations`] does not have. One that panics, as
-/// drivers' errors do, failed; a driver that ends the process is not survived: who wants to go on gives each operation a process.
+/// drivers' errors do, failed; a driver that ends the process is not survived: who wants to go on starts another process behind it.
 #[must_use]
 pub fn check_operation(operation: &str, device: &Device) -> Option<OperationCheck> {
     let mut cases = cases::all().into_iter();

@@ -1,5 +1,6 @@
 //! `deepfusion doctor --device`: whether a device computes what the processor does.
 
+use std::io::{self, BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
 use deepfusion_train::device_check::{
@@ -34,9 +35,10 @@ struct Row {
     failure: Option<String>,
 }
 
-/// One operation as its own process prints it.
+/// One operation as another process prints it.
 #[derive(Debug, Serialize, Deserialize)]
-struct Printed {
+struct Answer {
+    operation: String,
     forward: f64,
     backward: Option<f64>,
     failure: Option<String>,
@@ -53,17 +55,20 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
         ))?;
     }
     let mut checks = Vec::new();
-    for (operation, needed_by) in operations() {
-        // A driver may end its process, and with it all that was found so far.
-        let check = match chosen.backend {
-            Backend::Cpu => check_operation(operation, &device),
-            _ => Some(in_its_own_process(operation, needed_by, chosen)?),
-        };
-        let Some(check) = check else { continue };
+    let done = |check: OperationCheck| {
         if !json {
             output::print(&line(&check))?;
         }
         checks.push(check);
+        Ok(())
+    };
+    if chosen.backend == Backend::Cpu {
+        let names = operations().map(|(operation, _)| operation);
+        names
+            .filter_map(|operation| check_operation(operation, &device))
+            .try_for_each(done)?;
+    } else {
+        in_processes(chosen, done)?;
     }
     if json {
         output::print_json(&report(chosen, &checks))?;
@@ -81,50 +86,101 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
     .into())
 }
 
-/// What the process of one operation does.
-pub(super) fn one(chosen: ComputeDevice, operation: &str) -> Result<()> {
+/// What a process does that a driver may end: each operation from this one on, printed as soon as it is done. One that fails is the last,
+/// since it may have left the device unusable.
+pub(super) fn print_from(chosen: ComputeDevice, first: &str) -> Result<()> {
     let device = devices::open(chosen)?;
-    let check = check_operation(operation, &device);
-    // JSON knows no infinity.
-    output::print_json(&check.map(|check| Printed {
-        forward: check.forward.min(f64::MAX),
-        backward: check.backward.map(|error| error.min(f64::MAX)),
-        failure: check.failure,
-    }))
+    let rest = operations().skip_while(|(operation, _)| *operation != first);
+    for (operation, _) in rest {
+        let Some(check) = check_operation(operation, &device) else {
+            continue;
+        };
+        let failed = check.failure.is_some();
+        // JSON knows no infinity.
+        let answer = Answer {
+            operation: operation.into(),
+            forward: check.forward.min(f64::MAX),
+            backward: check.backward.map(|error| error.min(f64::MAX)),
+            failure: check.failure,
+        };
+        let text = serde_json::to_string(&answer).context("cannot write a line of JSON")?;
+        // Whoever asked may be gone.
+        if writeln!(io::stdout(), "{text}").is_err() || failed {
+            break;
+        }
+    }
+    Ok(())
 }
 
-/// Has this program check one operation.
-fn in_its_own_process(
-    operation: &'static str,
-    needed_by: NeededBy,
+/// Has a process of this program check the operations, so that a driver which ends its process does not take along what was found; another
+/// process continues with the next operation.
+fn in_processes(
     chosen: ComputeDevice,
-) -> Result<OperationCheck> {
+    mut done: impl FnMut(OperationCheck) -> Result<()>,
+) -> Result<()> {
     let program = std::env::current_exe().context("cannot find this program's file")?;
-    let done = Command::new(program)
-        .args(["doctor", "--device", &chosen.to_string()])
-        .args(["--operation", operation])
-        .stdin(Stdio::null())
-        .output()
-        .context("cannot start this program again")?;
-    let check = OperationCheck {
-        operation,
-        needed_by,
-        forward: f64::INFINITY,
-        backward: None,
-        failure: None,
-    };
-    Ok(match serde_json::from_slice::<Printed>(&done.stdout) {
-        Ok(printed) => OperationCheck {
-            forward: printed.forward,
-            backward: printed.backward,
-            failure: printed.failure,
-            ..check
-        },
-        Err(_) => OperationCheck {
-            failure: Some(format!("its process ended ({})", done.status)),
-            ..check
-        },
-    })
+    let all: Vec<_> = operations().collect();
+    let mut rest = &all[..];
+    while let Some((first, _)) = rest.first() {
+        let mut process = Command::new(&program)
+            .args(["doctor", "--device", &chosen.to_string()])
+            .args(["--operations-from", first])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .context("cannot start this program again")?;
+        let mut failed = false;
+        if let Some(printed) = process.stdout.take() {
+            rest = answered(BufReader::new(printed), rest, |check| {
+                failed = check.failure.is_some();
+                done(check)
+            })?;
+        }
+        let status = process.wait().context("cannot wait for this program")?;
+        if let ([(operation, needed_by), others @ ..], false) = (rest, failed) {
+            rest = others;
+            done(OperationCheck {
+                operation,
+                needed_by: *needed_by,
+                forward: f64::INFINITY,
+                backward: None,
+                failure: Some(format!("its process ended ({status})")),
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Passes on what a process answered of these operations, one after the other, and gives those of which it said nothing. What a driver
+/// prints is no answer.
+fn answered<'a>(
+    printed: impl BufRead,
+    asked: &'a [(&'static str, NeededBy)],
+    mut done: impl FnMut(OperationCheck) -> Result<()>,
+) -> Result<&'a [(&'static str, NeededBy)]> {
+    let mut rest = asked;
+    for line in printed.lines().map_while(io::Result::ok) {
+        let start = line.find("{\"operation\"").unwrap_or(line.len());
+        let Ok(answer) = serde_json::from_str::<Answer>(&line[start..]) else {
+            continue;
+        };
+        let [(operation, needed_by), others @ ..] = rest else {
+            break;
+        };
+        if answer.operation != *operation {
+            break;
+        }
+        rest = others;
+        done(OperationCheck {
+            operation,
+            needed_by: *needed_by,
+            forward: answer.forward,
+            backward: answer.backward,
+            failure: answer.failure,
+        })?;
+    }
+    Ok(rest)
 }
 
 fn line(check: &OperationCheck) -> String {
@@ -190,6 +246,7 @@ fn remedy(checks: &[OperationCheck]) -> String {
     let without = [
         (NeededBy::Flow, "`--without flow`"),
         (NeededBy::Affine, "`--without affine`"),
+        (NeededBy::MixedPrecision, "`--set precision=f32`"),
         (NeededBy::Depth, "no data set with `learn = \"depth\"`"),
         (NeededBy::LiteMono, "no lite-mono preset"),
         (NeededBy::RMsfm, "no r-msfm preset"),
@@ -217,6 +274,7 @@ mod tests {
             NeededBy::Flow,
             NeededBy::Affine,
             NeededBy::Learning,
+            NeededBy::MixedPrecision,
         ];
         let check = |needed_by| {
             let found = wrong.iter().find(|(needs, _)| *needs == needed_by);
@@ -236,6 +294,37 @@ mod tests {
     }
 
     #[test]
+    fn answers_belong_to_the_operations_they_name() {
+        let asked = ["a", "b", "c"].map(|name| (name, NeededBy::Network));
+        let answer = |name: &str| {
+            format!(
+                "{{\"operation\":\"{name}\",\"forward\":0.5,\"backward\":null,\"failure\":null}}"
+            )
+        };
+        let read = |printed: String| {
+            let mut found = Vec::new();
+            let rest = answered(printed.as_bytes(), &asked, |check| {
+                found.push(check.operation);
+                Ok(())
+            });
+            (found, rest.unwrap().len())
+        };
+        let lines = |names: &[&str]| {
+            let lines: Vec<_> = names.iter().map(|name| answer(name)).collect();
+            lines.join("\n")
+        };
+        assert_eq!(read(lines(&["a", "b", "c"])), (vec!["a", "b", "c"], 0));
+        assert_eq!(read(lines(&["a"])), (vec!["a"], 2));
+        // More than was asked for, and another order.
+        assert_eq!(read(lines(&["a", "b", "c", "d"])), (vec!["a", "b", "c"], 0));
+        assert_eq!(read(lines(&["a", "c"])), (vec!["a"], 2));
+        // A driver's words between them and before one.
+        let among = format!("driver 1\n{}\nloading… {}", answer("a"), answer("b"));
+        assert_eq!(read(among), (vec!["a", "b"], 1));
+        assert_eq!(read(answer("a")[..20].to_string()), (vec![], 3));
+    }
+
+    #[test]
     fn what_to_do_without_follows_from_what_differs() {
         let of = |wrong: &[(NeededBy, bool)]| remedy(&checks(wrong));
         assert!(of(&[(NeededBy::Network, true)]).contains("--device cpu"));
@@ -248,5 +337,7 @@ mod tests {
             parts,
             "train on it with `--without flow`, `--without affine`"
         );
+        let mixed = of(&[(NeededBy::MixedPrecision, true)]);
+        assert_eq!(mixed, "train on it with `--set precision=f32`");
     }
 }

@@ -63,8 +63,8 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
 
 #[cfg(feature = "train")]
 fn of_device(chosen: ComputeDevice, args: &DoctorArgs) -> Result<()> {
-    match &args.operation {
-        Some(operation) => device::one(chosen, operation),
+    match &args.operations_from {
+        Some(first) => device::print_from(chosen, first),
         None => device::run(chosen, args.json),
     }
 }

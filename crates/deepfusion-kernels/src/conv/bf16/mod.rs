@@ -36,9 +36,18 @@ pub enum Precision {
     #[default]
     F32,
     /// Images, gradients and weights rounded to bf16 where they are multiplied, sums and results in f32.
-    /// Of convolutions with a multiple of 16 input and output channels, on processors with AMX or AVX512-BF16; the others stay
-    /// in f32.
+    /// Of convolutions with a multiple of 16 input and output channels, on processors with AMX or AVX512-BF16 and on GPUs with
+    /// tensor cores for bf16; the others stay in f32.
     Bf16,
+}
+
+impl Precision {
+    /// Whether a convolution of so many channels multiplies in bf16.
+    #[must_use]
+    pub fn is_bf16_for(self, in_channels: usize, out_channels: usize) -> bool {
+        let fits = |channels: usize| channels > 0 && channels.is_multiple_of(ROWS);
+        self == Self::Bf16 && fits(in_channels) && fits(out_channels)
+    }
 }
 
 /// What multiplies pairs of bf16.
@@ -71,10 +80,9 @@ impl Unit {
 
     /// That for a convolution; `None`: f32.
     pub(super) fn of(shape: &ConvShape) -> Option<Self> {
-        let fits = |channels: usize| channels > 0 && channels.is_multiple_of(ROWS);
-        let pairs = shape.precision == Precision::Bf16
-            && fits(shape.in_channels)
-            && fits(shape.out_channels);
+        let pairs = shape
+            .precision
+            .is_bf16_for(shape.in_channels, shape.out_channels);
         if pairs { Self::found() } else { None }
     }
 }

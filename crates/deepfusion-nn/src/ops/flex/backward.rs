@@ -1,6 +1,6 @@
 //! The backward passes on the CPU.
 
-use super::super::kernel::{ConvOptions, FusedBackward, KernelBackward};
+use super::super::kernel::{ConvOptions, KernelBackward};
 use super::{
     Float, Values, conv_shape, correlation_shape, count, depthwise_shape, dims, photometric_shape,
     single, smoothness_shape, tensor, warp_shape, written, zeros,
@@ -61,9 +61,7 @@ impl KernelBackward for Flex {
         };
         [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
     }
-}
 
-impl FusedBackward for Flex {
     fn conv2d_grad_x(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
         let sizes: [usize; 4] = dims(&x);
         let shape = conv_shape(sizes, dims(&weight), options);

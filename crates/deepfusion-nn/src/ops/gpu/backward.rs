@@ -1,12 +1,35 @@
 //! The backward passes on a GPU.
 
-use super::super::kernel::{ConvOptions, FusedBackward};
-use super::mirror::{self, MirrorBackward};
-use super::{batch_norm, conv, correlation, dims, elu, photometric, project, smoothness, warp};
+use super::super::kernel::{ConvOptions, KernelBackward};
+use super::{
+    batch_norm, conv, correlation, depthwise, dims, elu, gelu, mirror, photometric, project,
+    smoothness, upsample, warp,
+};
 use burn_cubecl::CubeBackend;
 use burn_cubecl::tensor::CubeTensor;
 
-impl FusedBackward for CubeBackend {
+impl KernelBackward for CubeBackend {
+    fn depthwise_grad_x(weight: CubeTensor, grad: CubeTensor, dilation: usize) -> CubeTensor {
+        depthwise::grad_input(weight, grad, dilation)
+    }
+
+    fn depthwise_grad_weight(
+        x: CubeTensor,
+        grad: CubeTensor,
+        shape: [usize; 4],
+        dilation: usize,
+    ) -> CubeTensor {
+        depthwise::grad_weight(x, grad, shape, dilation)
+    }
+
+    fn gelu_grad(x: CubeTensor, grad: CubeTensor) -> CubeTensor {
+        gelu::backward(x, grad)
+    }
+
+    fn upsample_concat_grad(grad: CubeTensor, channels: usize) -> [CubeTensor; 2] {
+        upsample::backward(grad, channels)
+    }
+
     fn conv2d_grad_x(
         x: CubeTensor,
         weight: CubeTensor,
@@ -20,7 +43,7 @@ impl FusedBackward for CubeBackend {
         let margin = options.padding;
         let size = [height + 2 * margin, width + 2 * margin];
         let padded = conv::grad_input(weight, grad, size, mirror::without(options));
-        CubeBackend::mirror_grad(padded, margin)
+        mirror::backward(padded, margin)
     }
 
     fn conv2d_grad_weight(

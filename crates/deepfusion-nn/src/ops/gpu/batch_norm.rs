@@ -2,7 +2,7 @@
 
 use super::grid::plane_of_group;
 use super::sum::over_group;
-use super::{SUM_THREADS, along_pixels, dims, input, output, room, summing};
+use super::{SUM_THREADS, along_pixels, dims, input, output, room, summing, values};
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::tensor::CubeTensor;
@@ -156,6 +156,52 @@ fn input_gradient(
     }
     let moved = grad_beta[channel] / count + normal * grad_gamma[channel] / count;
     out[at] = gamma[channel] * per_deviation * (g - moved);
+}
+
+#[cube(launch)]
+fn running_statistics(
+    mean: &[f32],
+    variance: &[f32],
+    batch_mean: &[f32],
+    batch_variance: &[f32],
+    new_mean: &mut [f32],
+    new_variance: &mut [f32],
+    momentum: f32,
+    unbiased: f32,
+) {
+    let channel = ABSOLUTE_POS;
+    if channel >= mean.len() {
+        terminate!();
+    }
+    let kept = 1.0f32 - momentum;
+    let unbiased_variance = batch_variance[channel] * unbiased;
+    new_mean[channel] = mean[channel] * kept + batch_mean[channel] * momentum;
+    new_variance[channel] = variance[channel] * kept + unbiased_variance * momentum;
+}
+
+pub(super) fn running(
+    [mean, variance]: [CubeTensor; 2],
+    [batch_mean, batch_variance]: [CubeTensor; 2],
+    momentum: f32,
+    unbiased: f32,
+) -> (CubeTensor, CubeTensor) {
+    let channels: [usize; 1] = dims(&mean);
+    let (new_mean, new_variance) = (room(&mean, channels), room(&mean, channels));
+    let (count, dim) = values(&new_mean);
+    running_statistics::launch(
+        &new_mean.client,
+        count,
+        dim,
+        input(mean),
+        input(variance),
+        input(batch_mean),
+        input(batch_variance),
+        output(&new_mean),
+        output(&new_variance),
+        momentum,
+        unbiased,
+    );
+    (new_mean, new_variance)
 }
 
 pub(super) fn forward(

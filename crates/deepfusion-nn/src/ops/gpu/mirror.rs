@@ -3,30 +3,9 @@
 use super::super::kernel::ConvOptions;
 use super::grid::plane_of_group;
 use super::{along_pixels, dims, input, output, room};
-use burn::backend::autodiff::{
-    Autodiff,
-    checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
-    grads::Gradients,
-    ops::{Backward, Ops, OpsKind},
-};
-use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
-use burn_cubecl::CubeBackend;
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::tensor::CubeTensor;
-
-/// The forward pass.
-#[backend_extension(Cube, Autodiff)]
-pub(in super::super) trait MirrorOps: Backend {
-    /// `[N, C, H, W]` to `[N, C, H + 2·margin, W + 2·margin]`; the margin is below both sides.
-    fn kernel_mirror(x: FloatTensor<Self>, margin: usize) -> FloatTensor<Self>;
-}
-
-/// The backward pass.
-pub(super) trait MirrorBackward: Backend {
-    /// Gradient of the input of [`MirrorOps::kernel_mirror`].
-    fn mirror_grad(grad: FloatTensor<Self>, margin: usize) -> FloatTensor<Self>;
-}
 
 #[cube]
 fn source(at: i32, size: i32) -> i32 {
@@ -104,87 +83,50 @@ pub(super) fn without(options: ConvOptions) -> ConvOptions {
 /// An image as a convolution without mirroring sees it.
 pub(super) fn padded(x: CubeTensor, options: ConvOptions) -> (CubeTensor, ConvOptions) {
     if is_needed(options) {
-        let x = CubeBackend::kernel_mirror(x, options.padding);
-        (x, without(options))
+        (forward(x, options.padding), without(options))
     } else {
         (x, options)
     }
 }
 
-impl MirrorOps for CubeBackend {
-    fn kernel_mirror(x: CubeTensor, margin: usize) -> CubeTensor {
-        let [batch, channels, height, width] = dims(&x);
-        let (out_height, out_width) = (height + 2 * margin, width + 2 * margin);
-        let out = room(&x, [batch, channels, out_height, out_width]);
-        let (count, dim) = along_pixels(out_height * out_width, batch * channels);
-        let [height, width, margin] = [height, width, margin].map(|size| size as i32);
-        let client = out.client.clone();
-        mirror::launch(
-            &client,
-            count,
-            dim,
-            input(x),
-            output(&out),
-            height,
-            width,
-            margin,
-        );
-        out
-    }
+/// `[N, C, H, W]` to `[N, C, H + 2·margin, W + 2·margin]`; the margin is below both sides.
+fn forward(x: CubeTensor, margin: usize) -> CubeTensor {
+    let [batch, channels, height, width] = dims(&x);
+    let (out_height, out_width) = (height + 2 * margin, width + 2 * margin);
+    let out = room(&x, [batch, channels, out_height, out_width]);
+    let (count, dim) = along_pixels(out_height * out_width, batch * channels);
+    let [height, width, margin] = [height, width, margin].map(|size| size as i32);
+    let client = out.client.clone();
+    mirror::launch(
+        &client,
+        count,
+        dim,
+        input(x),
+        output(&out),
+        height,
+        width,
+        margin,
+    );
+    out
 }
 
-impl MirrorBackward for CubeBackend {
-    fn mirror_grad(grad: CubeTensor, margin: usize) -> CubeTensor {
-        let [batch, channels, height, width] = dims(&grad);
-        let (height, width) = (height - 2 * margin, width - 2 * margin);
-        let out = room(&grad, [batch, channels, height, width]);
-        let (count, dim) = along_pixels(height * width, batch * channels);
-        let [height, width, margin] = [height, width, margin].map(|size| size as i32);
-        let client = out.client.clone();
-        mirror_backward::launch(
-            &client,
-            count,
-            dim,
-            input(grad),
-            output(&out),
-            height,
-            width,
-            margin,
-        );
-        out
-    }
-}
-
-#[derive(Debug)]
-struct Mirror;
-
-impl<B: MirrorBackward> Backward<B, 1> for Mirror {
-    type State = usize;
-
-    fn backward(
-        self,
-        ops: Ops<Self::State, 1>,
-        grads: &mut Gradients,
-        _checkpointer: &mut Checkpointer,
-    ) {
-        let grad = grads.consume::<B>(&ops.node);
-        if let [Some(node)] = ops.parents {
-            grads.register::<B>(node.id, B::mirror_grad(grad, ops.state));
-        }
-    }
-}
-
-impl<B, C> MirrorOps for Autodiff<B, C>
-where
-    B: Backend + MirrorOps + MirrorBackward,
-    C: CheckpointStrategy,
-{
-    fn kernel_mirror(x: FloatTensor<Self>, margin: usize) -> FloatTensor<Self> {
-        let (x, node) = x.into_parts();
-        let output = B::kernel_mirror(x, margin);
-        match Mirror.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(margin, output),
-            OpsKind::UnTracked(prep) => prep.finish(output),
-        }
-    }
+/// The gradient of what was padded.
+pub(super) fn backward(grad: CubeTensor, margin: usize) -> CubeTensor {
+    let [batch, channels, height, width] = dims(&grad);
+    let (height, width) = (height - 2 * margin, width - 2 * margin);
+    let out = room(&grad, [batch, channels, height, width]);
+    let (count, dim) = along_pixels(height * width, batch * channels);
+    let [height, width, margin] = [height, width, margin].map(|size| size as i32);
+    let client = out.client.clone();
+    mirror_backward::launch(
+        &client,
+        count,
+        dim,
+        input(grad),
+        output(&out),
+        height,
+        width,
+        margin,
+    );
+    out
 }

@@ -51,6 +51,45 @@ fn window(
     sums
 }
 
+/// SSIM = a₁·a₂ / (b₁·b₂) of the window around a pixel.
+#[derive(CubeType)]
+struct Similarity {
+    mu_a: f32,
+    mu_b: f32,
+    a1: f32,
+    a2: f32,
+    b1: f32,
+    b2: f32,
+    ssim: f32,
+}
+
+#[cube]
+fn similarity(
+    a: &[f32],
+    b: &[f32],
+    plane: usize,
+    y: i32,
+    x: i32,
+    height: i32,
+    width: i32,
+) -> Similarity {
+    let sums = window(a, b, plane, y, x, height, width);
+    let (mu_a, mu_b) = (sums[0] / 9.0f32, sums[1] / 9.0f32);
+    let a1 = 2.0f32 * mu_a * mu_b + C1;
+    let a2 = 2.0f32 * (sums[4] / 9.0f32 - mu_a * mu_b) + C2;
+    let b1 = mu_a * mu_a + mu_b * mu_b + C1;
+    let b2 = (sums[2] / 9.0f32 - mu_a * mu_a) + (sums[3] / 9.0f32 - mu_b * mu_b) + C2;
+    Similarity {
+        mu_a,
+        mu_b,
+        a1,
+        a2,
+        b1,
+        b2,
+        ssim: (a1 * a2) / (b1 * b2),
+    }
+}
+
 #[cube(launch)]
 fn error(
     a: &[f32],
@@ -71,13 +110,7 @@ fn error(
     let mut sum = 0.0f32;
     for c in 0..channels {
         let plane = (n * channels + c) * area;
-        let sums = window(a, b, plane, y, x, height as i32, width as i32);
-        let (mu_a, mu_b) = (sums[0] / 9.0f32, sums[1] / 9.0f32);
-        let a1 = 2.0f32 * mu_a * mu_b + C1;
-        let a2 = 2.0f32 * (sums[4] / 9.0f32 - mu_a * mu_b) + C2;
-        let b1 = mu_a * mu_a + mu_b * mu_b + C1;
-        let b2 = (sums[2] / 9.0f32 - mu_a * mu_a) + (sums[3] / 9.0f32 - mu_b * mu_b) + C2;
-        let ssim = (a1 * a2) / (b1 * b2);
+        let ssim = similarity(a, b, plane, y, x, height as i32, width as i32).ssim;
         let dissimilar = ((1.0f32 - ssim) * 0.5f32).max(0.0f32).min(1.0f32);
         let difference = (a[plane + pixel] - b[plane + pixel]).abs();
         sum += alpha * dissimilar + (1.0f32 - alpha) * difference;
@@ -106,13 +139,8 @@ fn window_gradients(
     }
     let plane = plane_of_group();
     let (y, x) = ((pixel / width) as i32, (pixel % width) as i32);
-    let sums = window(a, b, plane * area, y, x, height as i32, width as i32);
-    let (mu_a, mu_b) = (sums[0] / 9.0f32, sums[1] / 9.0f32);
-    let a1 = 2.0f32 * mu_a * mu_b + C1;
-    let a2 = 2.0f32 * (sums[4] / 9.0f32 - mu_a * mu_b) + C2;
-    let b1 = mu_a * mu_a + mu_b * mu_b + C1;
-    let b2 = (sums[2] / 9.0f32 - mu_a * mu_a) + (sums[3] / 9.0f32 - mu_b * mu_b) + C2;
-    let ssim = (a1 * a2) / (b1 * b2);
+    let terms = similarity(a, b, plane * area, y, x, height as i32, width as i32);
+    let ssim = terms.ssim;
     // Outside the clamp the gradient is zero.
     let inside = ssim < 1.0f32 && ssim > -1.0f32;
     let scale = 0.0f32 - 0.5f32 * alpha / (channels as f32);
@@ -121,12 +149,13 @@ fn window_gradients(
         scale * grad[plane / channels * area + pixel],
         0.0f32,
     );
-    let through_mean =
-        2.0f32 * mu_b * (a2 - a1) / (b1 * b2) - ssim * 2.0f32 * mu_a * (1.0f32 / b1 - 1.0f32 / b2);
+    let (b1, b2) = (terms.b1, terms.b2);
+    let through_mean = 2.0f32 * terms.mu_b * (terms.a2 - terms.a1) / (b1 * b2)
+        - ssim * 2.0f32 * terms.mu_a * (1.0f32 / b1 - 1.0f32 / b2);
     let at = plane * area + pixel;
     of_mean[at] = g * through_mean;
     of_square[at] = 0.0f32 - g * ssim / b2;
-    of_product[at] = g * 2.0f32 * a1 / (b1 * b2);
+    of_product[at] = g * 2.0f32 * terms.a1 / (b1 * b2);
 }
 
 /// How often the window around `centre` reads the pixel `at`, one away at most: twice at the edge, where it is mirrored.

@@ -26,6 +26,42 @@ fn beyond(p: f32, low: f32, size: usize) -> f32 {
     p.max(0.0f32).min((size as f32) - 1.0f32) - low
 }
 
+/// What a pixel reads: a coordinate, the corner below it of a plane, how far the others are from it, and how far the coordinate lies
+/// beyond it.
+#[derive(CubeType)]
+struct Reading {
+    u: f32,
+    v: f32,
+    corner: usize,
+    right: usize,
+    down: usize,
+    fx: f32,
+    fy: f32,
+}
+
+#[cube]
+fn reading(
+    coords: &[f32],
+    n: usize,
+    pixel: usize,
+    area: usize,
+    height: usize,
+    width: usize,
+) -> Reading {
+    let u = coords[2 * n * area + pixel];
+    let v = coords[(2 * n + 1) * area + pixel];
+    let (low_x, low_y) = (lower(u, width), lower(v, height));
+    Reading {
+        u,
+        v,
+        corner: low_y as usize * width + low_x as usize,
+        right: select(width > 1, 1usize, 0usize),
+        down: select(height > 1, width, 0usize),
+        fx: beyond(u, low_x, width),
+        fy: beyond(v, low_y, height),
+    }
+}
+
 #[cube(launch)]
 fn warp(
     image: &[f32],
@@ -41,15 +77,9 @@ fn warp(
         terminate!();
     }
     let n = plane_of_group();
-    let (u, v) = (
-        coords[2 * n * area + pixel],
-        coords[(2 * n + 1) * area + pixel],
-    );
-    let (low_x, low_y) = (lower(u, width), lower(v, height));
-    let (fx, fy) = (beyond(u, low_x, width), beyond(v, low_y, height));
-    let right = select(width > 1, 1usize, 0usize);
-    let down = select(height > 1, width, 0usize);
-    let corner = low_y as usize * width + low_x as usize;
+    let read = reading(coords, n, pixel, area, height, width);
+    let (corner, right, down) = (read.corner, read.right, read.down);
+    let (fx, fy) = (read.fx, read.fy);
     for c in 0..channels {
         let at = (n * channels + c) * height * width + corner;
         let (a, b) = (image[at], image[at + right]);
@@ -77,15 +107,9 @@ fn grad_of_coords(
         terminate!();
     }
     let n = plane_of_group();
-    let (u, v) = (
-        coords[2 * n * area + pixel],
-        coords[(2 * n + 1) * area + pixel],
-    );
-    let (low_x, low_y) = (lower(u, width), lower(v, height));
-    let (fx, fy) = (beyond(u, low_x, width), beyond(v, low_y, height));
-    let right = select(width > 1, 1usize, 0usize);
-    let down = select(height > 1, width, 0usize);
-    let corner = low_y as usize * width + low_x as usize;
+    let read = reading(coords, n, pixel, area, height, width);
+    let (corner, right, down) = (read.corner, read.right, read.down);
+    let (fx, fy) = (read.fx, read.fy);
     let mut along_x = 0.0f32;
     let mut along_y = 0.0f32;
     for c in 0..channels {
@@ -96,6 +120,7 @@ fn grad_of_coords(
         along_x += g * ((b - a) * (1.0f32 - fy) + (e - d) * fy);
         along_y += g * ((d - a) * (1.0f32 - fx) + (e - b) * fx);
     }
+    let (u, v) = (read.u, read.v);
     let moves_x = u >= 0.0f32 && u <= (width as f32) - 1.0f32;
     let moves_y = v >= 0.0f32 && v <= (height as f32) - 1.0f32;
     out[2 * n * area + pixel] = select(moves_x, along_x, 0.0f32);
@@ -121,21 +146,15 @@ fn grad_of_corner(
         terminate!();
     }
     let n = plane_of_group();
-    let (u, v) = (
-        coords[2 * n * area + pixel],
-        coords[(2 * n + 1) * area + pixel],
-    );
-    let (low_x, low_y) = (lower(u, width), lower(v, height));
-    let mut x_share = beyond(u, low_x, width);
-    let mut y_share = beyond(v, low_y, height);
-    let mut place = low_y as usize * width + low_x as usize;
+    let read = reading(coords, n, pixel, area, height, width);
+    let (mut place, mut x_share, mut y_share) = (read.corner, read.fx, read.fy);
     if comptime!(is_right) {
-        place += select(width > 1, 1usize, 0usize);
+        place += read.right;
     } else {
         x_share = 1.0f32 - x_share;
     }
     if comptime!(is_down) {
-        place += select(height > 1, width, 0usize);
+        place += read.down;
     } else {
         y_share = 1.0f32 - y_share;
     }
