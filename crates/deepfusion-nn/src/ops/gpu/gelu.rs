@@ -9,7 +9,7 @@ use deepfusion_kernels::{GELU_END, GELU_SERIES};
 /// Φ(x).
 #[cube]
 fn below(x: f32) -> f32 {
-    let near = x.max(-GELU_END).min(GELU_END);
+    let near = x.clamp(-GELU_END, GELU_END);
     let u = near * near * comptime!(2.0 / (GELU_END * GELU_END)) - 1.0f32;
     let mut series = 0.0f32;
     #[unroll]

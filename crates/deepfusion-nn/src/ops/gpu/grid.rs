@@ -19,7 +19,7 @@ pub(super) const MOST_GROUPS: usize = 65_535;
 pub(super) fn along_pixels(pixels: usize, planes: usize) -> (CubeCount, CubeDim) {
     let groups = (pixels as u32).div_ceil(THREADS);
     // Few planes are too many for an axis, and most of those are even.
-    let fits = |layers: &usize| planes % layers == 0 && planes / layers <= MOST_GROUPS;
+    let fits = |layers: &usize| planes.is_multiple_of(*layers) && planes / layers <= MOST_GROUPS;
     let layers = (1..=planes).find(fits).unwrap_or(1);
     let count = CubeCount::Static(groups, (planes / layers) as u32, layers as u32);
     (count, CubeDim::new_1d(THREADS))

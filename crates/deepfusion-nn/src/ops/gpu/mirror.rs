@@ -37,7 +37,7 @@ fn reader(at: i32, size: i32, margin: i32, #[comptime] which: u32) -> i32 {
     } else if comptime!(which == 1) {
         select(at >= 1 && at <= margin, margin - at, -1)
     } else {
-        let is_read = at <= last - 1 && at >= last - margin;
+        let is_read = at < last && at >= last - margin;
         select(is_read, margin + 2 * last - at, -1)
     }
 }

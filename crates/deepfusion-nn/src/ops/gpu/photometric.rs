@@ -111,7 +111,7 @@ fn error(
     for c in 0..channels {
         let plane = (n * channels + c) * area;
         let ssim = similarity(a, b, plane, y, x, height as i32, width as i32).ssim;
-        let dissimilar = ((1.0f32 - ssim) * 0.5f32).max(0.0f32).min(1.0f32);
+        let dissimilar = ((1.0f32 - ssim) * 0.5f32).clamp(0.0f32, 1.0f32);
         let difference = (a[plane + pixel] - b[plane + pixel]).abs();
         sum += alpha * dissimilar + (1.0f32 - alpha) * difference;
     }
