@@ -57,6 +57,7 @@ def adapt(
     steps: int = 240,
     batch: int = 3,
     simulated: int = 2,
+    simulated_camera: str = "own",
     learning_rate: float = 5e-5,
     held_out: float = 0.25,
     speed_error: float = 0.03,
@@ -69,9 +70,10 @@ def adapt(
     how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the bias of the metre.
 
     `model` is a run, a checkpoint, or the name of an embedded network; `data_set` names one of those that a run learned. Each step has
-    `batch` samples of the drives and `simulated` ones of simulated depth, which keep what the network knows. `clock_offset_ms` is how far the
-    camera's clock is ahead of the vehicle's, where the recordings do not say. `speed_error` is one standard error of the speed, as a share of
-    it. `config` changes any key of the configuration, as in `train`.
+    `batch` samples of the drives and `simulated` ones of simulated depth, which keep what the network knows: seen by the drives' own cameras,
+    at their height above the road in the images (`simulated_camera="own"`), or by any (`"any"`). `clock_offset_ms` is how far the camera's clock
+    is ahead of the vehicle's, where the recordings do not say. `speed_error` is one standard error of the speed, as a share of it. `config`
+    changes any key of the configuration, as in `train`.
 
     The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, as in `train`; where it returns False or raises, or at Ctrl-C, what
     was learned is saved, and the same call goes on.
@@ -86,6 +88,7 @@ def adapt(
         "steps": steps,
         "batch": batch,
         "simulated": simulated,
+        "simulated_camera": simulated_camera,
         "learning_rate": learning_rate,
         "held_out": held_out,
         "speed_error": speed_error,

@@ -25,6 +25,7 @@ struct AdaptRequest {
     steps: usize,
     batch: usize,
     simulated: usize,
+    simulated_camera: String,
     learning_rate: f64,
     held_out: f64,
     speed_error: f64,
@@ -39,12 +40,23 @@ impl AdaptRequest {
             message: format!("camera: `{}`", self.camera),
             hint: Some("\"2\", \"3\" or \"both\"".into()),
         })?;
+        let own_camera = match self.simulated_camera.as_str() {
+            "own" => true,
+            "any" => false,
+            other => {
+                return Err(Failure {
+                    message: format!("simulated_camera: `{other}`"),
+                    hint: Some("\"own\" or \"any\"".into()),
+                });
+            }
+        };
         Ok(AdaptSettings {
             camera,
             camera_ahead_s: self.clock_offset_ms.map(|ms| ms / 1e3),
             steps: self.steps,
             batch: self.batch,
             simulated: self.simulated,
+            own_camera,
             learning_rate: self.learning_rate,
             held_out: self.held_out,
             speed_sd: self.speed_error,

@@ -51,3 +51,9 @@ def test_a_stopped_one_goes_on_with_the_same_call(street, tmp_path):
     assert deepfusion.adapt(street, **arguments).steps == 2
     with pytest.raises(deepfusion.DeepFusionError, match="already exists"):
         deepfusion.adapt(street, **arguments)
+
+
+def test_the_simulated_camera_is_their_own_or_any(street, tmp_path):
+    with pytest.raises(deepfusion.DeepFusionError, match="simulated_camera: `mine`") as refused:
+        deepfusion.adapt(street, out=tmp_path / "mine", **{**QUICK, "simulated_camera": "mine"})
+    assert "own" in refused.value.hint

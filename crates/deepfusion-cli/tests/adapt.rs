@@ -10,7 +10,8 @@ use serde_json::Value;
 
 /// Some 60 metres along a street that no network saw, and a network that is quick to learn.
 const DRIVE: &str = "simulate --frames 60 --seed 90110 --size 320x96 --scan-every 0 --out drive";
-const ADAPT: &str = "adapt --model tiny --data drive --steps 4 --batch 1 --held-out 0.4";
+const ADAPT: &str =
+    "adapt --model tiny --data drive --steps 4 --batch 1 --held-out 0.4 --set validate_every=4";
 
 fn depth_of(at: &Path, model: &str, out: &str) -> Vec<u8> {
     ok(
@@ -22,6 +23,16 @@ fn depth_of(at: &Path, model: &str, out: &str) -> Vec<u8> {
     arrays.sort();
     assert!(!arrays.is_empty());
     arrays.iter().flat_map(|path| of(path)).collect()
+}
+
+/// The camera's height above the road as an adaptation measured it, which its configuration holds.
+fn seen_height(at: &Path, run: &str) -> f64 {
+    let text = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("height_m"))
+        .unwrap();
+    line.split('=').nth(1).unwrap().trim().parse().unwrap()
 }
 
 /// The files below a folder with an extension.
@@ -57,6 +68,10 @@ fn what_gets_no_worse_is_kept_and_can_be_undone() {
     let (before, after) = (reprojection("before"), reprojection("after"));
     assert!((after / before - 1.0).abs() < 1e-3, "{before}, {after}");
     assert!(at.join("mine/adapt.json").exists() && !at.join("mine.adapting").exists());
+
+    // Simulated streets were seen by the drive's camera, which hangs 1.65 m above the road.
+    let height = seen_height(at, "mine");
+    assert!((height - 1.65).abs() < 0.15, "{height}");
 
     // The run is one like any other, without a word of its data sets.
     let given = depth_of(at, "tiny", "given");

@@ -4,11 +4,13 @@
 //! in the image; the images say where it is. A difference is an error of the mount's pitch and yaw, or of the principal
 //! point: both put the vehicle's motion in a wrong direction.
 
-use super::epipolar::{EpipolarPair, YawTrust, heading_error};
+use super::epipolar::{self, EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
+use deepfusion_data::{Dataset, Heading};
 use deepfusion_hint::count_of;
 use nalgebra::Vector2;
+use std::fmt;
 
 /// Straight enough, rad/s, and fast enough, m/s.
 const MOST_TURN: f64 = 0.06;
@@ -22,21 +24,49 @@ const PARTS: usize = 4;
 const SURE_DEG: f64 = 0.5;
 /// The vehicle's yaw is known to this, radians a pair.
 const YAW: YawTrust = YawTrust(0.001);
-/// Differences that matter, degrees.
-const WARN_DEG: f64 = 1.5;
+/// Differences that matter, degrees: of pitch this is some 7 % of the metres that are learned.
+const WARN_DEG: f64 = 0.6;
 const ERROR_DEG: f64 = 5.0;
 
-pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
+/// Frames and pairs that are read to find it alone.
+const SURVEY: (usize, usize) = (160, 80);
+
+/// Where the camera of a drive heads, against what its mount says, by its own images. Reads up to 160 of them.
+///
+/// # Errors
+/// [`NoHeading`] where too few of them were taken straight ahead.
+pub fn heading(dataset: &Dataset) -> Result<Heading, NoHeading> {
+    let survey = Survey::sized(dataset, SURVEY);
+    measure(&epipolar::pairs(&survey))
+}
+
+/// Why images do not show where a camera heads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoHeading {
+    /// Pairs of them that were taken driving straight ahead.
+    pub straight: usize,
+}
+
+impl fmt::Display for NoHeading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} straight ahead, {LEAST_PAIRS} are needed",
+            count_of(self.straight, "pair")
+        )
+    }
+}
+
+impl std::error::Error for NoHeading {}
+
+fn measure(pairs: &[EpipolarPair]) -> Result<Heading, NoHeading> {
     let straight: Vec<&EpipolarPair> = pairs
         .iter()
         .filter(|p| p.vehicle_yaw_rate().abs() < MOST_TURN && p.speed_mps > LEAST_MPS)
         .collect();
     if straight.len() < LEAST_PAIRS {
-        let why = format!(
-            "{} straight ahead, {LEAST_PAIRS} are needed",
-            count_of(straight.len(), "pair")
-        );
-        return Outcome::skipped("heading", why);
+        let straight = straight.len();
+        return Err(NoHeading { straight });
     }
     let thin = straight.len().div_ceil(MOST_PAIRS);
     let straight: Vec<&EpipolarPair> = straight.into_iter().step_by(thin).collect();
@@ -44,11 +74,22 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         .chunks(straight.len().div_ceil(PARTS))
         .map(|part| heading_error(part, YAW))
         .collect();
-    let whole = heading_error(&straight, YAW);
+    let off = heading_error(&straight, YAW);
     let n = parts.len() as f64;
     let spread = |axis: usize| {
-        let square: f64 = parts.iter().map(|p| (p[axis] - whole[axis]).powi(2)).sum();
-        (square / (n * (n - 1.0).max(1.0))).sqrt().to_degrees()
+        let square: f64 = parts.iter().map(|p| (p[axis] - off[axis]).powi(2)).sum();
+        (square / (n * (n - 1.0).max(1.0))).sqrt()
+    };
+    Ok(Heading {
+        off,
+        std_error: Vector2::new(spread(0), spread(1)),
+    })
+}
+
+pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
+    let found = match measure(pairs) {
+        Ok(found) => found,
+        Err(why) => return Outcome::skipped("heading", why.to_string()),
     };
     let k = &survey.dataset.intrinsics(0);
     let mut outcome = Outcome::new("heading");
@@ -58,7 +99,10 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     ];
     let mut unsure = Vec::new();
     for (quantity, axis, focal, name, side) in axes {
-        let (off, error) = (whole[axis].to_degrees(), spread(axis));
+        let (off, error) = (
+            found.off[axis].to_degrees(),
+            found.std_error[axis].to_degrees(),
+        );
         if error > SURE_DEG {
             unsure.push(format!("{quantity} {off:.1} ± {error:.1} degrees"));
             continue;
@@ -71,7 +115,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         };
         let figure = Figure::new(quantity, off, "degrees", Limit::Within(-limit, limit));
         outcome.judge(severity, figure, || {
-            let pixels = focal * whole[axis].tan();
+            let pixels = focal * found.off[axis].tan();
             // v grows downward, the angle upward.
             let pixels = if axis == 0 { -pixels } else { pixels };
             (

@@ -38,6 +38,7 @@ pub use camera_ahead::{
     NoCameraAhead, camera_ahead, common_camera_ahead,
 };
 pub use finding::{Figure, Finding, Limit, Outcome, Remedy, Severity, Status};
+pub use heading::{NoHeading, heading};
 pub use log::{doctor_log, is_log};
 pub use plots::{DrivePlots, Line};
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};

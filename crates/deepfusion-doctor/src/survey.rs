@@ -68,8 +68,13 @@ impl<'a> Survey<'a> {
 
     /// Reads one of up to so many times the usual size.
     pub(crate) fn times(dataset: &'a Dataset, factor: usize) -> Self {
+        Self::sized(dataset, (factor * MOST_FRAMES, factor * MOST_FLOWS))
+    }
+
+    /// Reads one of up to so many frames, and follows the points of up to so many pairs.
+    pub(crate) fn sized(dataset: &'a Dataset, (most_frames, most_flows): (usize, usize)) -> Self {
         let stride = stride(dataset);
-        let wanted = sample(dataset.frames().len(), stride, factor * MOST_FRAMES);
+        let wanted = sample(dataset.frames().len(), stride, most_frames);
         let k = dataset.intrinsics(0);
         let width = WIDTH.min(k.width).max(1);
         let height = (k.height * width).div_ceil(k.width).max(1);
@@ -92,7 +97,7 @@ impl<'a> Survey<'a> {
             intrinsics: k.resized(width, height),
             unreadable,
         };
-        survey.pairs = survey.compare(factor * MOST_FLOWS);
+        survey.pairs = survey.compare(most_flows);
         survey
     }
 

@@ -1,8 +1,6 @@
 //! Fits an image into a model's input, keeping its aspect ratio.
 
-use fast_image_resize::images::{TypedImage, TypedImageRef};
-use fast_image_resize::pixels::U8x3;
-use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
+use deepfusion_kernels::{Filter, Resizer};
 use image::RgbImage;
 
 /// The grey of what the image does not fill.
@@ -108,18 +106,11 @@ impl Letterbox {
     fn resized(&self, image: &RgbImage) -> Vec<u8> {
         let [width, height] = self.inner.map(|s| s as u32);
         let mut small = vec![0; 3 * width as usize * height as usize];
-        let options =
-            ResizeOptions::new().resize_alg(ResizeAlg::Interpolation(FilterType::Bilinear));
-        let from = TypedImageRef::<U8x3>::from_buffer(image.width(), image.height(), image);
-        let to = TypedImage::<U8x3>::from_buffer(width, height, &mut small);
-        // Not `resize`: that one compiles every pixel type there is, for a minute.
-        let done = match (from, to) {
-            (Ok(from), Ok(mut to)) => Resizer::new()
-                .resize_typed(&from, &mut to, &options)
-                .is_ok(),
-            _ => false,
-        };
-        debug_assert!(done, "an image of bytes can be resized");
+        let (w, h) = image.dimensions();
+        if w > 0 && h > 0 {
+            let from = (image.as_raw().as_slice(), (w, h), [0, 0, w, h]);
+            Resizer::default().resize(from, Filter::Bilinear, (&mut small, (width, height)));
+        }
         small
     }
 }

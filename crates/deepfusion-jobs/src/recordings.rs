@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Camera, Cameras, Dataset, NamedTopic, OpenOptions, Split};
+use deepfusion_data::{Camera, Cameras, Dataset, Heading, NamedTopic, OpenOptions, Split};
+use deepfusion_doctor::heading;
 use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig};
 
 use crate::Result;
@@ -15,6 +16,21 @@ pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
     let mut datasets = Vec::new();
     for path in paths {
         datasets.extend(Dataset::open(path, options)?);
+    }
+    Ok(datasets)
+}
+
+/// As [`open_recordings`], for what takes the vehicle's motion: a camera whose mount is not given is turned to where its images show that
+/// it looks ([`heading`]), where they do, and the drive's warnings then say so. Reads up to 160 images of such a drive.
+///
+/// # Errors
+/// As [`open_recordings`].
+pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let mut datasets = open_recordings(paths, options)?;
+    for dataset in datasets.iter_mut().filter(|d| d.mount_assumed()) {
+        if let Some(heading) = heading(dataset).ok().filter(Heading::is_sure) {
+            dataset.aim(&heading);
+        }
     }
     Ok(datasets)
 }
@@ -83,7 +99,7 @@ pub fn open_for(
             data.camera_ahead_s,
             &data.topics,
         )?;
-        let datasets = open_recordings(paths, &options)?;
+        let datasets = open_aimed(paths, &options)?;
         opened(&options, &datasets);
         return Ok(placed(0, datasets));
     }
@@ -101,7 +117,7 @@ pub fn open_for(
             _ => &set.topics,
         };
         let options = open_options(config, split, camera, ahead_s, topics)?;
-        let datasets = open_recordings(paths, &options)?;
+        let datasets = open_aimed(paths, &options)?;
         opened(&options, &datasets);
         all.extend(placed(i, datasets));
     }
@@ -172,4 +188,94 @@ fn open_options(
         assumed_camera: config.assumed_camera.map(|camera| camera.intrinsics()),
         ..OpenOptions::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+    use std::error::Error;
+    use std::fmt::Write as _;
+    use std::fs;
+
+    /// Pixels by which the folder's principal point is lower than the camera's: its way ahead is then so much above it, as if it looked
+    /// down by some degrees.
+    const TOO_LOW_PX: f64 = 13.0;
+
+    /// A simulated drive as a folder of images with speeds, whose mount nothing says.
+    fn folder(at: &Path) -> std::result::Result<PathBuf, Box<dyn Error>> {
+        let simulation = Simulation::new(&SimConfig {
+            seed: 5,
+            frames: 60,
+            width: 320,
+            height: 192,
+            scan_every: 0,
+            ..SimConfig::default()
+        })?;
+        let kitti = write_kitti(&simulation, &at.join("kitti"), &mut |_, _| ())?;
+        let drive = &Dataset::open(&kitti, &OpenOptions::default())?[0];
+        let track = drive.track().ok_or("no speeds")?;
+        let times: Vec<f64> = drive.frames().iter().filter_map(|f| f.time_s).collect();
+        let (mut frames, mut speeds) = (
+            "time_s,file\n".to_owned(),
+            "time_s,speed_mps,yaw_rate_radps\n".to_owned(),
+        );
+        for (i, time) in times.iter().enumerate() {
+            writeln!(frames, "{time:.6},{i:010}.png")?;
+        }
+        for pair in times.windows(2) {
+            let moved = track.motion(pair[0], pair[1]).ok_or("no motion")?;
+            let (middle, dt) = (0.5 * (pair[0] + pair[1]), pair[1] - pair[0]);
+            let (speed, rate) = (moved.distance_m / dt, moved.yaw_rad / dt);
+            writeln!(speeds, "{middle:.6},{speed},{rate}")?;
+        }
+        let folder = at.join("folder");
+        fs::create_dir(&folder)?;
+        fs::rename(drive.folder().join("image_02/data"), folder.join("images"))?;
+        fs::write(folder.join("frames.csv"), frames)?;
+        fs::write(folder.join("speed.csv"), speeds)?;
+        let k = drive.intrinsics(0);
+        let numbers = format!("{} {} {} {}", k.fx, k.fy, k.cx, k.cy + TOO_LOW_PX);
+        fs::write(folder.join("intrinsics.txt"), numbers)?;
+        Ok(folder)
+    }
+
+    fn ahead(drive: &Dataset) -> (f64, f64) {
+        let forward = nalgebra::Vector3::x();
+        let ahead = drive.cam_from_vehicle().map(|mount| mount.rotate(&forward));
+        let ahead = ahead.unwrap_or_default();
+        (ahead.x, ahead.y)
+    }
+
+    #[test]
+    fn a_camera_whose_mount_is_not_given_is_aimed() -> std::result::Result<(), Box<dyn Error>> {
+        let at = tempfile::tempdir()?;
+        let folder = folder(at.path())?;
+        let options = OpenOptions::default();
+        let taken = &open_recordings(std::slice::from_ref(&folder), &options)?[0];
+        assert!(taken.mount_assumed() && taken.warnings().iter().any(|w| w.contains("straight")));
+        assert_eq!(ahead(taken), (0.0, 0.0));
+
+        let aimed = &open_aimed(std::slice::from_ref(&folder), &options)?[0];
+        let k = aimed.intrinsics(0);
+        let ((right, down), off) = (ahead(aimed), (TOO_LOW_PX / k.fy).atan());
+        println!(
+            "{right:.4} to the right, {down:.4} down; {:.4} up",
+            off.sin()
+        );
+        assert!((down + off.sin()).abs() < 0.008 && right.abs() < 0.008);
+        assert!(!aimed.mount_assumed());
+        let said = aimed.warnings().join("\n");
+        assert!(
+            said.contains("degrees down") && !said.contains("straight ahead"),
+            "{said}"
+        );
+
+        // What is given is believed.
+        fs::write(folder.join("dataset.toml"), "[mount]\nup_m = 1.65\n")?;
+        let given = &open_aimed(&[folder], &options)?[0];
+        assert!(!given.mount_assumed());
+        assert_eq!(ahead(given), (0.0, 0.0));
+        Ok(())
+    }
 }

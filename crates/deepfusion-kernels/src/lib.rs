@@ -1,7 +1,8 @@
 //! Numeric kernels of the networks on plain slices, forward and backward: convolution, bilinear
-//! warp, local correlation, photometric error, batch normalisation, activations, depthwise convolution.
+//! warp, local correlation, photometric error, batch normalisation, activations, depthwise convolution;
+//! and resizing of an image's bytes.
 //!
-//! Nothing here knows Burn. Images are N×C×H×W, contiguous; work is distributed over rayon's
+//! Nothing here knows Burn. Networks' images are N×C×H×W, contiguous; work is distributed over rayon's
 //! threads, and every result is independent of their number.
 
 mod activation;
@@ -18,6 +19,7 @@ pub mod matrix_unit;
 mod photometric;
 mod position;
 mod project;
+mod resize;
 mod scratch;
 mod send_ptr;
 mod sizes;
@@ -46,6 +48,7 @@ pub use gelu::{GELU_END, GELU_SERIES, gelu, gelu_backward, gelu_exact};
 pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
 pub use position::position_code;
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
+pub use resize::{Filter, Resizer};
 pub use slot::Slot;
 pub use smoothness::{SmoothnessShape, smoothness, smoothness_backward};
 pub use upsample::{upsample_concat, upsample_concat_backward};

@@ -56,4 +56,4 @@ pub use rig::Rig;
 pub use scene::{ObjectClass, SceneObject, Variety};
 pub use simulation::{SimFrame, Simulation};
 pub use umad::{BagSettings, topic, write_bag};
-pub use varied::{Endless, EndlessConfig, Ingredient, View, Weather};
+pub use varied::{Endless, EndlessConfig, Ingredient, MountedCamera, View, Weather};

@@ -2,7 +2,7 @@
 //! exact whatever the weather and the camera do to its colours.
 
 use deepfusion_geometry::Intrinsics;
-use deepfusion_sim::{Endless, EndlessConfig, Ingredient, Scene, View, Weather};
+use deepfusion_sim::{Endless, EndlessConfig, Ingredient, MountedCamera, Scene, View, Weather};
 use nalgebra::Vector3;
 use std::collections::HashSet;
 
@@ -416,4 +416,47 @@ fn a_share_of_the_views_in_the_open_has_hills() {
     println!("{hilly} of {open} views in the open have hills");
     assert!(open > 40, "{open}");
     assert!((0.25..0.55).contains(&(f64::from(hilly as u32) / f64::from(open as u32))));
+}
+
+/// Two cars' cameras: every view is one's whole image, from where it hangs.
+#[test]
+fn known_cameras_take_all_views() {
+    let kitti = MountedCamera::level(
+        Intrinsics::from_numbers([721.5, 721.5, 609.6, 172.9], (1242, 375)),
+        Some(1.65),
+    );
+    let lorry = MountedCamera {
+        pitch_degrees: 5.0,
+        ..MountedCamera::level(Intrinsics::centred(900.0, (1280, 720)), Some(2.3))
+    };
+    let stream = endless(EndlessConfig {
+        daylight: 0.5,
+        worlds_at_once: 8,
+        cameras: vec![kitti, lorry],
+        ..small()
+    });
+    let (mut of_kitti, mut below) = (0, 0);
+    for index in 0..64 {
+        let view = stream.view(index);
+        assert_ne!(view.scene, Scene::Indoor, "cars drive through no rooms");
+        let camera = if view.height_m < 2.0 { &kitti } else { &lorry };
+        of_kitti += usize::from(view.height_m < 2.0);
+        assert_eq!(view.intrinsics, camera.intrinsics.resized(160, 48));
+        let off = view.height_m / camera.height_m.expect("given") - 1.0;
+        assert!(off.abs() < 0.031, "{off}");
+        let ahead = view.world_from_cam.rotate(&Vector3::z());
+        let pitch = (-ahead.z).asin().to_degrees() - camera.pitch_degrees;
+        assert!(pitch.abs() < 2.1, "{pitch}");
+        // What lies at the bottom of the picture is the road, or stands on it.
+        let at = 47 * 160 + 80;
+        let metres = f64::from(view.depth.data[at]);
+        if metres > 0.0 {
+            let point = view.intrinsics.back_project(80.0, 47.0, metres);
+            let world = view.world_from_cam.transform(&point);
+            assert!(world.z > -0.02 && world.z < 2.5, "{}", world.z);
+            below += usize::from(world.z < 0.2);
+        }
+    }
+    assert!((20..=44).contains(&of_kitti), "{of_kitti}");
+    assert!(below > 40, "{below}");
 }

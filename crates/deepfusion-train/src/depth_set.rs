@@ -2,11 +2,11 @@
 
 use crate::fit_depth::fit_depth;
 use crate::sampler::stream;
-use crate::{Error, Sampler, TrainConfig};
+use crate::{Error, Sampler, SimulatedCamera, TrainConfig};
 use deepfusion_data::{Dataset, GtKind, RgbImage};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::InputSize;
-use deepfusion_sim::{Endless, EndlessConfig, Ingredient};
+use deepfusion_sim::{Endless, EndlessConfig, Ingredient, MountedCamera};
 use rand::Rng;
 use std::sync::Arc;
 
@@ -215,7 +215,7 @@ impl DepthSet {
         })
     }
 
-    /// A camera of this set at the size of its images: the first recording's, else a typical one of the simulator.
+    /// A camera of this set at the size of its images: the first recording's, else the simulator's, or a typical one.
     #[must_use]
     pub fn camera(&self) -> Option<Intrinsics> {
         let recorded = self.frames.first();
@@ -242,10 +242,22 @@ impl DepthSet {
     }
 }
 
-/// A lens as most phones have it, 69° wide: assumed for an unknown camera.
+/// The camera that takes the views; where any does, a lens as most phones have it, 69° wide.
 fn typical_camera(config: &EndlessConfig) -> Intrinsics {
+    if let Some(camera) = config.cameras.first() {
+        return camera.intrinsics;
+    }
     let focal = TYPICAL_FOCAL * f64::from(config.width);
     Intrinsics::centred(focal, (config.width, config.height))
+}
+
+fn mounted(camera: &SimulatedCamera) -> MountedCamera {
+    MountedCamera {
+        intrinsics: camera.intrinsics(),
+        height_m: camera.height_m,
+        pitch_degrees: camera.pitch_degrees,
+        roll_degrees: camera.roll_degrees,
+    }
 }
 
 /// Name and number of a frame.
@@ -285,6 +297,7 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
                 hills: simulated.hills,
                 formation: simulated.formation,
                 without: without.clone(),
+                cameras: simulated.cameras.iter().map(mounted).collect(),
                 ..EndlessConfig::default()
             })?;
             Ok(SimulatedViews {

@@ -52,8 +52,8 @@ pub use deepfusion_model::{
     AssumedCamera, Augmentation, CHECKPOINT_VERSION, Checkpoint, CheckpointKind, CompareAt,
     Compute, ConfigKey, DataConfig, DataSetConfig, DepthLossConfig, FlowLossConfig, Learn,
     LearnedCamera, LearningRateSchedule, LossConfig, MovingConfig, Preset, Reprojection,
-    ReversedPose, RunFolder, SampleFactors, SetFindings, SimulatedConfig, StoredNetwork,
-    TrainConfig, TrainFindings, ViewMotion, config_keys,
+    ReversedPose, RunFolder, SampleFactors, SetFindings, SimulatedCamera, SimulatedConfig,
+    StoredNetwork, TrainConfig, TrainFindings, ViewMotion, config_keys,
 };
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use deepfusion_data::{Cameras, NamedTopic};
 
 use super::device::device;
@@ -44,6 +44,9 @@ pub(crate) struct AdaptArgs {
     /// Samples of simulated depth a step, which keep what the network knows already; 0: none, and no head for uncertainty.
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub simulated: usize,
+    /// The camera that sees the simulated streets: the drives' own, at its height above the road in their images, or any.
+    #[arg(long, value_name = "own|any", value_enum, default_value_t)]
+    pub simulated_camera: SimulatedView,
     /// The largest learning rate.
     #[arg(long, value_name = "RATE", default_value_t = 5e-5)]
     pub learning_rate: f64,
@@ -81,6 +84,16 @@ pub(crate) struct AdaptArgs {
     /// Print before and after as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Which camera sees the simulated streets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum SimulatedView {
+    /// The drives' own cameras.
+    #[default]
+    Own,
+    /// Any camera, as the embedded networks learned.
+    Any,
 }
 
 /// A share from 0.05 to 0.5.

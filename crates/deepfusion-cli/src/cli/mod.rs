@@ -35,7 +35,7 @@ use crate::devices::ComputeDevice;
 use device::device;
 
 pub(crate) use ablate::AblateArgs;
-pub(crate) use adapt::AdaptArgs;
+pub(crate) use adapt::{AdaptArgs, SimulatedView};
 pub(crate) use calibrate::CalibrateArgs;
 pub(crate) use compare::{CompareArgs, TableFormat};
 pub(crate) use completions::{CompletionsArgs, CompletionsKind};

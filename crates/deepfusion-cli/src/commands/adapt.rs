@@ -5,12 +5,13 @@ use std::path::Path;
 use deepfusion_jobs::training::adaptation::{
     AdaptSettings, Adaptation, Outcome, assumed_camera, require_new, undo,
 };
+use deepfusion_model::SimulatedCamera;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
 use super::recordings::{print_warnings, warn_of_sample};
 use super::time_estimate::TimeEstimate;
 use super::{clocks, train};
-use crate::cli::{AdaptArgs, EngineArgs};
+use crate::cli::{AdaptArgs, EngineArgs, SimulatedView};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::model;
@@ -39,6 +40,9 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
         &mut |done, total| progress.set(done, total),
     )?;
     drop(progress);
+    for camera in adaptation.simulated_cameras() {
+        say(&own_camera(camera));
+    }
     if adaptation.may_have_seen_held_out() {
         say(
             "the given network may have learned from the frames that are held out here: the figures before may be optimistic",
@@ -67,6 +71,21 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
     report(args, outcome)
 }
 
+/// A line about a camera that sees simulated streets.
+fn own_camera(camera: &SimulatedCamera) -> String {
+    let SimulatedCamera { width, height, .. } = camera;
+    let above = match camera.height_m {
+        Some(metres) => format!("{metres:.2} m above the road, by the road's motion in the images"),
+        None => {
+            "at any height that cars have it, as the images do not show the road's motion".into()
+        }
+    };
+    format!(
+        "simulated streets are seen by this camera ({width}x{height}, fx {:.0}), {above}",
+        camera.fx
+    )
+}
+
 fn judging() -> Progress {
     Progress::new("judging without ground truth")
 }
@@ -85,6 +104,7 @@ fn settings(args: &AdaptArgs, out: &Path, given: &DepthEstimator) -> Result<Adap
         steps: args.steps,
         batch: args.batch,
         simulated: args.simulated,
+        own_camera: args.simulated_camera == SimulatedView::Own,
         learning_rate: args.learning_rate,
         held_out: args.held_out,
         speed_sd: args.speed_error / 100.0,

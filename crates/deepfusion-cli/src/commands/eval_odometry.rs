@@ -11,7 +11,7 @@ use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
 
 use super::clocks;
-use super::recordings::open_recordings;
+use super::recordings::open_aimed;
 use crate::allocator;
 use crate::cli::EvalOdometryArgs;
 use crate::error::CliError;
@@ -61,7 +61,7 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
         ..OpenOptions::default()
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
-    let datasets = open_recordings(&args.data, &options)?;
+    let datasets = open_aimed(&args.data, &options)?;
     let mut progress = Progress::new("following");
     let found = tracks(&predictor, &datasets, &mut |done, total| {
         progress.set(done, total);

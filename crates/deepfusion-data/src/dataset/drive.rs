@@ -1,6 +1,7 @@
 use super::camera::Camera;
 use super::ego::Ego;
 use super::frame::Frame;
+use super::heading::{Heading, NO_MOUNT, NOT_GIVEN};
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use super::options::OpenOptions;
@@ -81,6 +82,7 @@ pub struct Dataset {
     recording: Arc<dyn Recording>,
     receiver: Receiver,
     camera_assumed: bool,
+    mount_assumed: bool,
     /// The recording's, and what was noticed about its neighbours.
     warnings: Vec<String>,
 }
@@ -100,6 +102,7 @@ impl Dataset {
             recording,
             receiver: Receiver::default(),
             camera_assumed: false,
+            mount_assumed: false,
         }
     }
 
@@ -114,6 +117,34 @@ impl Dataset {
     #[must_use]
     pub fn camera_assumed(&self) -> bool {
         self.camera_assumed
+    }
+
+    /// With a mount that nothing says, so that the camera is taken to look straight ahead, or one that something does.
+    #[must_use]
+    pub fn with_mount_assumed(mut self, assumed: bool) -> Self {
+        self.mount_assumed = assumed;
+        self
+    }
+
+    /// Whether nothing says where the camera looks from the vehicle, nor has it been [aimed](Self::aim).
+    #[must_use]
+    pub fn mount_assumed(&self) -> bool {
+        self.mount_assumed
+    }
+
+    /// Turns the camera on its vehicle to where its images show that it looks: motions between frames then have that direction.
+    /// Nothing happens where the mount is not [assumed](Self::mount_assumed).
+    pub fn aim(&mut self, heading: &Heading) {
+        if !self.mount_assumed {
+            return;
+        }
+        let mount = self.parts.cam_from_vehicle.as_mut();
+        if let Some(cam_from_vehicle) = mount {
+            *cam_from_vehicle = heading.turn() * *cam_from_vehicle;
+            self.mount_assumed = false;
+            self.warnings.retain(|warning| warning != NO_MOUNT);
+            self.warnings.push(format!("{NOT_GIVEN} {heading}"));
+        }
     }
 
     /// With what a satellite receiver says beside the speeds.

@@ -8,6 +8,7 @@ mod coverage;
 mod drive;
 mod ego;
 mod frame;
+pub(crate) mod heading;
 mod inspection;
 mod inspection_text;
 mod kind;
@@ -25,6 +26,7 @@ pub use coverage::SplitCoverage;
 pub use drive::{Dataset, DatasetParts};
 pub use ego::{Ego, EgoMotion, NoMotion};
 pub use frame::{Frame, FrameImage};
+pub use heading::Heading;
 pub use inspection::{
     ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, Mount, SpeedRange, Stream,
 };

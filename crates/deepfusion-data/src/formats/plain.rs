@@ -1,5 +1,6 @@
 //! What the layouts of frames in files or in a video have in common: one camera, times, speeds, poses, measured depth.
 
+pub(crate) use crate::dataset::heading::NO_MOUNT;
 use crate::dataset::selection::Selection;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::logs::frame_times::TimedImage;
@@ -17,10 +18,6 @@ use image::RgbImage;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// What is said where nothing tells where the camera is.
-pub(crate) const NO_MOUNT: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight \
-     ahead and to move as the vehicle does";
 
 /// Opens several recordings found at `path`, a data set each; those without a selected frame are left out.
 ///
@@ -164,6 +161,7 @@ impl PlainParts {
             scenario: None,
         };
         let assumed = self.calibration.assumed;
+        let mount_assumed = self.warnings.iter().any(|warning| warning == NO_MOUNT);
         let dataset = Dataset::new(
             parts,
             Arc::new(PlainRecording {
@@ -181,7 +179,8 @@ impl PlainParts {
             }),
         )
         .with_receiver(receiver)
-        .with_camera_assumed(assumed);
+        .with_camera_assumed(assumed)
+        .with_mount_assumed(mount_assumed);
         dataset.check_sizes()?;
         Ok(dataset)
     }

@@ -1,8 +1,6 @@
 //! Images of another size, as pixels and as a network's numbers.
 
-use fast_image_resize::images::{TypedCroppedImage, TypedImage, TypedImageRef};
-use fast_image_resize::pixels::U8x3;
-use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions};
+use deepfusion_kernels::Filter;
 use image::RgbImage;
 use std::cell::RefCell;
 
@@ -54,7 +52,7 @@ fn with_resizer<T>(work: impl FnOnce(&mut Resizer) -> T) -> T {
 /// A resizer with the buffers it reuses.
 #[derive(Default)]
 struct Resizer {
-    inner: fast_image_resize::Resizer,
+    inner: deepfusion_kernels::Resizer,
     narrowed: Vec<u8>,
     resized: Vec<u8>,
 }
@@ -73,45 +71,13 @@ impl Resizer {
         // other order differs by tens of levels beside high contrasts. A pass that changes nothing copies.
         self.narrowed.resize(3 * width as usize * h as usize, 0);
         let whole = (image.width(), image.height());
-        let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Lanczos3));
-        #[expect(
-            clippy::expect_used,
-            reason = "the buffers were made for these sizes, and none of them is empty"
-        )]
-        let mut pass = |from: &[u8], size, part, to: &mut [u8], height| {
-            let from = view(from, size, part);
-            let mut to = TypedImage::<U8x3>::from_buffer(width, height, to)
-                .expect("the buffer was made as large");
-            // Not `resize`: that one compiles every pixel type there is, for minutes.
-            self.inner
-                .resize_typed(&from, &mut to, &options)
-                .expect("neither image is empty, the only reason to refuse");
-        };
-        pass(image, whole, part, &mut self.narrowed, h);
-        pass(
-            &self.narrowed,
-            (width, h),
-            [0, 0, width, h],
-            &mut self.resized,
-            height,
-        );
+        let (inner, filter) = (&mut self.inner, Filter::Lanczos3);
+        let first = (image.as_raw().as_slice(), whole, part);
+        inner.resize(first, filter, (&mut self.narrowed, (width, h)));
+        let second = (self.narrowed.as_slice(), (width, h), [0, 0, width, h]);
+        inner.resize(second, filter, (&mut self.resized, (width, height)));
         &self.resized
     }
-}
-
-/// A part (x, y, width, height) of an image's RGB bytes.
-#[expect(
-    clippy::expect_used,
-    reason = "whole and part are of the caller's image"
-)]
-fn view(
-    bytes: &[u8],
-    (width, height): (u32, u32),
-    [x, y, w, h]: [u32; 4],
-) -> TypedCroppedImage<'_, TypedImageRef<'_, U8x3>> {
-    let whole = TypedImageRef::from_buffer(width, height, bytes)
-        .expect("the image holds width x height x 3 bytes");
-    TypedCroppedImage::new(whole, x, y, w, h).expect("the part lies in the image")
 }
 
 /// Interleaved RGB bytes as three planes of floats in [0, 1].

@@ -1,7 +1,7 @@
 //! Several data sets in one run, each with its own cameras, range of depths and unit of displacement.
 
 use crate::{Error, TrainConfig};
-use deepfusion_geometry::DepthRange;
+use deepfusion_geometry::{DepthRange, Intrinsics};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -70,6 +70,45 @@ pub struct SimulatedConfig {
     /// `squeeze`, `weather`, `variety`, `traffic`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
+    /// The cameras of one's own vehicles, which then take all views; none: any camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<SimulatedCamera>,
+}
+
+/// A camera as it is mounted on a vehicle, through which simulated views are seen. Its image may be of any size.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatedCamera {
+    /// Width of its image, in pixels.
+    pub width: u32,
+    /// Height of its image, in pixels.
+    pub height: u32,
+    /// Focal length along x, in pixels of that image.
+    pub fx: f64,
+    /// Focal length along y, in pixels.
+    pub fy: f64,
+    /// Principal point, x, in pixels.
+    pub cx: f64,
+    /// Principal point, y, in pixels.
+    pub cy: f64,
+    /// Its height above the ground, in metres; absent: any height that cameras on cars have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// How far it looks down, in degrees.
+    #[serde(default)]
+    pub pitch_degrees: f64,
+    /// How far it is turned about its axis, clockwise as it looks, in degrees.
+    #[serde(default)]
+    pub roll_degrees: f64,
+}
+
+impl SimulatedCamera {
+    /// Its lens.
+    #[must_use]
+    pub fn intrinsics(&self) -> Intrinsics {
+        let numbers = [self.fx, self.fy, self.cx, self.cy];
+        Intrinsics::from_numbers(numbers, (self.width, self.height))
+    }
 }
 
 impl Default for SimulatedConfig {
@@ -83,6 +122,7 @@ impl Default for SimulatedConfig {
             hills: 0.0,
             formation: true,
             without: Vec::new(),
+            cameras: Vec::new(),
         }
     }
 }
@@ -384,6 +424,25 @@ mod tests {
         });
         let error = config.validate().unwrap_err().to_string();
         assert!(error.contains("`data.sets.simulated.hills`"), "{error}");
+    }
+
+    #[test]
+    fn simulated_views_are_seen_by_ones_own_camera() {
+        let text = r#"
+            [[sets]]
+            name = "streets"
+            learn = "depth"
+            simulated = { cameras = [{ width = 1242, height = 375, fx = 721.5, fy = 720, cx = 609.6, cy = 172.9, height_m = 1.65 }] }
+        "#;
+        let mut config = Preset::Tiny.config();
+        config.data = toml::from_str(text).unwrap();
+        config.validate().unwrap();
+        let camera = config.data.sets[0].simulated.as_ref().unwrap().cameras[0];
+        assert_eq!((camera.height_m, camera.pitch_degrees), (Some(1.65), 0.0));
+        let k = Intrinsics::from_numbers([721.5, 720.0, 609.6, 172.9], (1242, 375));
+        assert_eq!(camera.intrinsics(), k);
+        let kept = config.to_toml().unwrap();
+        assert_eq!(toml::from_str::<TrainConfig>(&kept).unwrap(), config);
     }
 
     #[test]

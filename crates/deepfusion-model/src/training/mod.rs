@@ -14,7 +14,7 @@ mod validation;
 
 pub use assumed_camera::{AssumedCamera, LearnedCamera};
 pub use config_keys::{ConfigKey, config_keys};
-pub use data_set::{DataSetConfig, Learn, SimulatedConfig};
+pub use data_set::{DataSetConfig, Learn, SimulatedCamera, SimulatedConfig};
 pub use findings::{SetFindings, TrainFindings};
 pub use loss_config::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
 pub use preset::{Compute, Preset};

@@ -47,7 +47,10 @@ impl BuiltWorld {
         let plain_scene = Scene::ALL[rng.random_range(0..Scene::ALL.len())];
         let mut rng = generator(config.seed, number, 0x90D);
         let varied_scene = scene(&mut rng, config.daylight);
-        let drawn_scene = if plain { plain_scene } else { varied_scene };
+        let drawn_scene = match if plain { plain_scene } else { varied_scene } {
+            Scene::Indoor if config.on_cars() => Scene::Urban,
+            drawn => drawn,
+        };
         let without = Without(&config.without);
         let scene = without.scene(drawn_scene);
         let seed: u64 = rng.random();

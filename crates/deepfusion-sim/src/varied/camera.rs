@@ -3,6 +3,7 @@
 use super::built_world::BuiltWorld;
 use super::draw::{normal, weighted};
 use super::ingredient::Without;
+use super::mounted::MountedCamera;
 use crate::config::Scene;
 use crate::motion::rotation;
 use crate::primitive::{Primitive, V3, enter};
@@ -124,10 +125,15 @@ fn squeeze(rng: &mut ChaCha8Rng, wanted: f64) -> f64 {
 /// Height above the ground, metres: 65 % as on cars (normal, 1.6 ± 0.17), 20 % lower (robots), 15 % higher.
 fn height(rng: &mut ChaCha8Rng) -> f64 {
     match rng.random_range(0..20) {
-        0..=12 => normal(rng, 1.6, 0.17, 2.3),
+        0..=12 => on_a_car(rng),
         13..=16 => rng.random_range(HEIGHTS.0..1.2),
         _ => rng.random_range(1.8..HEIGHTS.1),
     }
+}
+
+/// Height above the ground as on cars, metres.
+fn on_a_car(rng: &mut ChaCha8Rng) -> f64 {
+    normal(rng, 1.6, 0.17, 2.3)
 }
 
 /// Pitch, positive downwards, and roll, radians. Mostly a vehicle's (2.2° and 0.9° of deviation); at times anything
@@ -162,16 +168,13 @@ enum Kind {
 
 /// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is where the traffic's own
 /// car drives.
-fn spot(rng: &mut ChaCha8Rng, place: &BuiltWorld, anchor: f64) -> ((f64, f64, f64), f32) {
-    let kind = weighted(
-        rng,
-        &[
-            (0.6, Kind::Driving),
-            (0.13, Kind::Turning),
-            (0.1, Kind::Sideways),
-            (0.17, Kind::Beside),
-        ],
-    );
+fn spot(
+    rng: &mut ChaCha8Rng,
+    place: &BuiltWorld,
+    anchor: f64,
+    kinds: &[(f64, Kind)],
+) -> ((f64, f64, f64), f32) {
+    let kind = weighted(rng, kinds);
     if !place.world.rooms.is_empty() {
         return (in_room(rng, place, anchor), 0.8);
     }
@@ -222,6 +225,46 @@ fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) 
     (x, y, rng.random_range(0.0..TAU))
 }
 
+/// How a view's camera is mounted.
+#[derive(Clone, Copy)]
+pub(super) struct Mount<'a> {
+    /// As on this vehicle; `None`: in any way.
+    pub mounted: Option<&'a MountedCamera>,
+    /// What is left out of the ways it may be mounted.
+    pub without: Without<'a>,
+}
+
+impl Mount<'_> {
+    /// Height above the ground, metres, pitch and roll, radians.
+    fn draw(self, rng: &mut ChaCha8Rng, indoors: bool) -> (f64, f64, f64) {
+        if let Some(camera) = self.mounted {
+            let usual = on_a_car(rng);
+            return camera.pose(rng, usual);
+        }
+        let height = height(rng);
+        let (mut pitch, roll) = tilt(rng, height);
+        if indoors {
+            // Held by hand, or by a robot that looks at its floor.
+            pitch += normal(rng, 0.12, 0.2, 1.8);
+        }
+        let (pitch, roll) = self.without.tilt((pitch, roll));
+        (self.without.height(height), pitch, roll)
+    }
+
+    /// How it relates to the street, by weight.
+    fn kinds(self) -> &'static [(f64, Kind)] {
+        match self.mounted {
+            Some(camera) if camera.is_on_a_car() => &[(0.85, Kind::Driving), (0.15, Kind::Turning)],
+            _ => &[
+                (0.6, Kind::Driving),
+                (0.13, Kind::Turning),
+                (0.1, Kind::Sideways),
+                (0.17, Kind::Beside),
+            ],
+        }
+    }
+}
+
 /// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid nor
 /// close to one, and not with most of its view within arm's length of one.
 pub(super) fn viewpoint(
@@ -229,18 +272,12 @@ pub(super) fn viewpoint(
     place: &BuiltWorld,
     (moving, anchor): (&[Primitive], f64),
     k: &Intrinsics,
-    without: Without,
+    mount: Mount,
 ) -> Viewpoint {
-    let height = height(rng);
-    let (mut pitch, roll) = tilt(rng, height);
-    if !place.world.rooms.is_empty() {
-        // Held by hand, or by a robot that looks at its floor.
-        pitch += normal(rng, 0.12, 0.2, 1.8);
-    }
-    let height = without.height(height);
-    let (pitch, roll) = without.tilt((pitch, roll));
+    let indoors = !place.world.rooms.is_empty();
+    let (height, pitch, roll) = mount.draw(rng, indoors);
     for _ in 0..TRIES {
-        let (spot, ahead) = spot(rng, place, anchor);
+        let (spot, ahead) = spot(rng, place, anchor, mount.kinds());
         let viewpoint = pose(place, spot, (height, pitch, roll));
         if is_free(place, moving, &viewpoint.world_from_cam, k, ahead) {
             return viewpoint;

@@ -1,6 +1,8 @@
 //! Settings of an endless stream of views.
 
+use super::draw::mix;
 use super::ingredient::Ingredient;
+use super::mounted::MountedCamera;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +35,10 @@ pub struct EndlessConfig {
     /// What is left out of the varied views.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<Ingredient>,
+    /// Cameras of known vehicles that take all views, each as often as the others; none: any camera. Pictures are these
+    /// cameras' whole images, brought to the requested size.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<MountedCamera>,
 }
 
 impl Default for EndlessConfig {
@@ -49,6 +55,7 @@ impl Default for EndlessConfig {
             plain: 0.0,
             hills: 0.0,
             without: Vec::new(),
+            cameras: Vec::new(),
         }
     }
 }
@@ -108,7 +115,18 @@ impl EndlessConfig {
                 "0 to 1",
             )?;
         }
-        Ok(())
+        self.cameras.iter().try_for_each(MountedCamera::validate)
+    }
+
+    /// The camera of a view, where they are known.
+    pub(super) fn camera_of(&self, index: u64) -> Option<&MountedCamera> {
+        let count = self.cameras.len() as u64;
+        (count > 0).then(|| &self.cameras[(mix(self.seed ^ mix(index)) % count) as usize])
+    }
+
+    /// Whether every camera is on a car, which drives through no rooms.
+    pub(super) fn on_cars(&self) -> bool {
+        !self.cameras.is_empty() && self.cameras.iter().all(MountedCamera::is_on_a_car)
     }
 }
 

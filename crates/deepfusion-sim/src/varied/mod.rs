@@ -11,6 +11,7 @@ mod draw;
 mod formation;
 mod hills;
 mod ingredient;
+mod mounted;
 mod schedule;
 mod weather;
 mod wet;
@@ -20,6 +21,7 @@ use crate::config::Scene;
 use crate::render::{self, Air, Cores, Edges, RenderInput};
 use built_world::BuiltWorld;
 use cache::Cache;
+use camera::Mount;
 pub use config::EndlessConfig;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use draw::generator;
@@ -27,6 +29,7 @@ use formation::{Brightness, Formation};
 use image::RgbImage;
 pub use ingredient::Ingredient;
 use ingredient::Without;
+pub use mounted::MountedCamera;
 use rand::Rng;
 use schedule::Schedule;
 pub use weather::Weather;
@@ -100,7 +103,7 @@ impl Endless {
     }
 
     /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and position are drawn
-    /// for that size.
+    /// for that size; of a camera that is known the whole image is brought to it.
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;
@@ -119,9 +122,14 @@ impl Endless {
         let mut cars = traffic.objects(world, 0.0);
         let indoors = !world.rooms.is_empty();
         let lens = without.lens(camera::lens(&mut rng, size, indoors));
-        let intrinsics = lens.intrinsics(size);
+        let mounted = config.camera_of(index);
+        let intrinsics = match mounted {
+            Some(camera) => camera.intrinsics.resized(size.0, size.1),
+            None => lens.intrinsics(size),
+        };
         let near = (moving.as_slice(), anchor);
-        let viewpoint = camera::viewpoint(&mut rng, &place, near, &intrinsics, without);
+        let mount = Mount { mounted, without };
+        let viewpoint = camera::viewpoint(&mut rng, &place, near, &intrinsics, mount);
         if viewpoint.alone || !without.moves() {
             moving.clear();
             cars.clear();

@@ -1,17 +1,22 @@
 //! `deepfusion doctor --device`: whether a device computes what the processor does.
 
-use std::io::{self, BufRead, BufReader, Write};
-use std::process::{Command, Stdio};
+use std::io::{self, Write};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use deepfusion_train::device_check::{
     NeededBy, OperationCheck, TOLERANCE, check_operation, operations,
 };
 use serde::{Deserialize, Serialize};
 
+use super::patient_lines::PatientLines;
 use crate::devices::{self, Backend, ComputeDevice};
 use crate::error::CliError;
 use crate::failure::{Context, Result};
 use crate::output;
+
+/// The longest that an operation may take, its kernels' compilation included. On cards that were tried none took half a minute.
+const LIMIT: Duration = Duration::from_secs(300);
 
 /// What was found.
 #[derive(Debug, Serialize)]
@@ -112,8 +117,8 @@ pub(super) fn print_from(chosen: ComputeDevice, first: &str) -> Result<()> {
     Ok(())
 }
 
-/// Has a process of this program check the operations, so that a driver which ends its process does not take along what was found; another
-/// process continues with the next operation.
+/// Has a process of this program check the operations, so that a driver which ends its process, or hangs, does not take along what was
+/// found; another process continues with the next operation.
 fn in_processes(
     chosen: ComputeDevice,
     mut done: impl FnMut(OperationCheck) -> Result<()>,
@@ -130,14 +135,16 @@ fn in_processes(
             .stderr(Stdio::null())
             .spawn()
             .context("cannot start this program again")?;
-        let mut failed = false;
+        let (mut failed, mut hangs) = (false, false);
         if let Some(printed) = process.stdout.take() {
-            rest = answered(BufReader::new(printed), rest, |check| {
+            let mut lines = PatientLines::of(printed, LIMIT);
+            rest = answered(&mut lines, rest, |check| {
                 failed = check.failure.is_some();
                 done(check)
             })?;
+            hangs = lines.gave_up();
         }
-        let status = process.wait().context("cannot wait for this program")?;
+        let why = ended(&mut process, hangs)?;
         if let ([(operation, needed_by), others @ ..], false) = (rest, failed) {
             rest = others;
             done(OperationCheck {
@@ -145,22 +152,36 @@ fn in_processes(
                 needed_by: *needed_by,
                 forward: f64::INFINITY,
                 backward: None,
-                failure: Some(format!("its process ended ({status})")),
+                failure: Some(why),
             })?;
         }
     }
     Ok(())
 }
 
+/// How a process ended; one that hangs is killed.
+fn ended(process: &mut Child, hangs: bool) -> Result<String> {
+    if hangs {
+        // It may have ended by itself just now.
+        let _ = process.kill();
+    }
+    let status = process.wait().context("cannot wait for this program")?;
+    Ok(if hangs {
+        format!("it did not answer within {} s", LIMIT.as_secs())
+    } else {
+        format!("its process ended ({status})")
+    })
+}
+
 /// Passes on what a process answered of these operations, one after the other, and gives those of which it said nothing. What a driver
 /// prints is no answer.
 fn answered<'a>(
-    printed: impl BufRead,
+    printed: impl Iterator<Item = String>,
     asked: &'a [(&'static str, NeededBy)],
     mut done: impl FnMut(OperationCheck) -> Result<()>,
 ) -> Result<&'a [(&'static str, NeededBy)]> {
     let mut rest = asked;
-    for line in printed.lines().map_while(io::Result::ok) {
+    for line in printed {
         let start = line.find("{\"operation\"").unwrap_or(line.len());
         let Ok(answer) = serde_json::from_str::<Answer>(&line[start..]) else {
             continue;
@@ -303,7 +324,7 @@ mod tests {
         };
         let read = |printed: String| {
             let mut found = Vec::new();
-            let rest = answered(printed.as_bytes(), &asked, |check| {
+            let rest = answered(printed.lines().map(str::to_owned), &asked, |check| {
                 found.push(check.operation);
                 Ok(())
             });

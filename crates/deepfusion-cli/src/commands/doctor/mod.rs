@@ -4,6 +4,8 @@
 mod device;
 mod lines;
 mod machine;
+#[cfg(feature = "train")]
+mod patient_lines;
 mod report;
 
 use std::fmt::Write as _;

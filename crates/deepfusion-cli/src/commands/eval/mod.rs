@@ -28,7 +28,7 @@ use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
 use super::clocks;
-use super::recordings::open_recordings;
+use super::recordings::{open_aimed, open_recordings};
 use super::run_report::{self, Choice};
 use super::used_checkpoint::UsedCheckpoint;
 use super::warnings;
@@ -135,7 +135,11 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
         ..OpenOptions::default()
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
-    let datasets = open_recordings(&args.data, &options)?;
+    let datasets = if args.no_verdict {
+        open_recordings(&args.data, &options)?
+    } else {
+        open_aimed(&args.data, &options)?
+    };
     let found = verdict::of_model(args, &model, &mut estimator, &datasets)?;
     // A figure that needs ground truth is an error where there is none.
     let needs_truth = args.gt_depth == GtKind::Annotated || args.points_out.is_some();

@@ -4,6 +4,7 @@
 //! [`Adaptation::trainer`], and [`Adaptation::end`] judges what was learned on the same frames: it becomes the run `out`, or is laid
 //! aside. [`undo`] takes a kept one back.
 
+mod cameras;
 mod folders;
 mod outcome;
 mod recipe;
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Cameras, Dataset, NamedTopic, OpenOptions};
 use deepfusion_eval::verdict::Verdict;
-use deepfusion_model::{AssumedCamera, Compute, RunFolder, TrainConfig};
+use deepfusion_model::{AssumedCamera, Compute, RunFolder, SimulatedCamera, TrainConfig};
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 use deepfusion_train::{Device, Trainer};
 
@@ -24,7 +25,7 @@ use self::folders::Folders;
 use super::{Began, Start};
 use crate::held_out::unseen_frames;
 use crate::model_facts::ModelFacts as _;
-use crate::recordings::open_recordings;
+use crate::recordings::open_aimed;
 use crate::samples::{SampleWarning, open_samples};
 use crate::verdict::{SPEED_SD, Unseen, VerdictOptions, plan, verdict};
 use crate::{Error, Result};
@@ -51,6 +52,9 @@ pub struct AdaptSettings {
     pub batch: usize,
     /// Samples of simulated depth a step, which keep what the network knows already; 0: none, and no head for uncertainty.
     pub simulated: usize,
+    /// Whether the simulated views are seen through the drives' own cameras, at the height of the road in their images; else through
+    /// any camera.
+    pub own_camera: bool,
     /// The largest learning rate.
     pub learning_rate: f64,
     /// Share of each drive's end to judge on.
@@ -78,6 +82,7 @@ impl AdaptSettings {
             steps: 240,
             batch: 3,
             simulated: 2,
+            own_camera: true,
             learning_rate: 5e-5,
             held_out: 0.25,
             speed_sd: SPEED_SD,
@@ -139,11 +144,14 @@ impl Adaptation {
     ) -> Result<Self> {
         let folders = Folders::of(&settings.out)?;
         let start = Start::from_source(&given);
-        let mut config = recipe::config(&settings, estimator, device)?;
+        let options = settings.open_options(assumed_camera(estimator).as_ref());
+        let drives = open_aimed(&settings.data, &options)?;
+        opened(&options, &drives);
+        let mut config = recipe::config(&settings, estimator, device, &drives)?;
         start.record_in(&mut config)?;
         config.make_absolute();
         config.validate()?;
-        let held_out = HeldOut::open(&settings, &config, opened)?;
+        let held_out = HeldOut::of(drives, &config);
         let before = held_out.judge(&settings, estimator, progress)?;
         let found = &before.without_truth;
         if found.reprojection.is_none() || found.frames < LEAST_FRAMES {
@@ -160,6 +168,14 @@ impl Adaptation {
             held_out,
             before,
         })
+    }
+
+    /// The cameras that simulated views are seen through; none: any.
+    #[must_use]
+    pub fn simulated_cameras(&self) -> &[SimulatedCamera] {
+        let sets = self.config.data.sets.iter();
+        let mut simulated = sets.filter_map(|set| set.simulated.as_ref());
+        simulated.next().map_or(&[], |views| &views.cameras)
     }
 
     /// Whether the given network may have learned from the frames that are held out: the figures before may then be optimistic.
@@ -231,10 +247,7 @@ struct HeldOut {
 impl HeldOut {
     /// The frames that neither the given network nor the new one learns from; where that leaves none or is not known, those that
     /// the new one does not.
-    fn open(settings: &AdaptSettings, config: &TrainConfig, opened: Opened) -> Result<Self> {
-        let options = settings.open_options(config.assumed_camera.as_ref());
-        let datasets = open_recordings(&settings.data, &options)?;
-        opened(&options, &datasets);
+    fn of(datasets: Vec<Dataset>, config: &TrainConfig) -> Self {
         let mut unseen = unseen_frames(config, &datasets);
         let most = VerdictOptions::default().blocks;
         let maybe_seen =
@@ -244,11 +257,11 @@ impl HeldOut {
             (alone.init, alone.init_sha256) = (None, None);
             unseen = unseen_frames(&alone, &datasets);
         }
-        Ok(Self {
+        Self {
             datasets,
             unseen,
             maybe_seen,
-        })
+        }
     }
 
     fn judge(

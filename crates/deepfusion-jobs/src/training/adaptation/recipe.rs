@@ -1,15 +1,15 @@
 //! With what settings a network learns on a new drive.
 
-use deepfusion_data::Cameras;
+use deepfusion_data::{Cameras, Dataset};
 use deepfusion_model::{
-    AssumedCamera, DataSetConfig, Learn, LearningRateSchedule, Preset, SimulatedConfig,
-    TrainConfig, ViewMotion,
+    AssumedCamera, DataSetConfig, Learn, LearningRateSchedule, Preset, SimulatedCamera,
+    SimulatedConfig, TrainConfig, ViewMotion,
 };
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_train::Device;
 
-use super::AdaptSettings;
+use super::{AdaptSettings, cameras};
 use crate::Result;
 use crate::recordings::camera_word;
 
@@ -26,6 +26,7 @@ pub(super) fn config(
     settings: &AdaptSettings,
     estimator: &DepthEstimator,
     device: &Device,
+    opened: &[Dataset],
 ) -> Result<TrainConfig> {
     let own = estimator.config();
     let learned_from_drives = if own.data.sets.is_empty() {
@@ -84,7 +85,12 @@ pub(super) fn config(
         // The head has nothing to learn from; what it knows would no longer fit.
         config.depth_net.uncertainty = false;
     } else {
-        config.data.sets = vec![drives(settings, &config), simulated(&config)];
+        let cameras = if settings.own_camera {
+            cameras::of_drives(opened)?
+        } else {
+            Vec::new()
+        };
+        config.data.sets = vec![drives(settings, &config), simulated(&config, cameras)];
         config.loss.depth.weight = 1.0;
         config.loss.depth.gradient = 0.5;
     }
@@ -117,7 +123,7 @@ fn drives(settings: &AdaptSettings, config: &TrainConfig) -> DataSetConfig {
     }
 }
 
-fn simulated(config: &TrainConfig) -> DataSetConfig {
+fn simulated(config: &TrainConfig, cameras: Vec<SimulatedCamera>) -> DataSetConfig {
     DataSetConfig {
         name: "streets".into(),
         learn: Learn::Depth,
@@ -127,6 +133,7 @@ fn simulated(config: &TrainConfig) -> DataSetConfig {
             validation_views: 16,
             views_per_world: 12,
             plain: PLAIN,
+            cameras,
             ..SimulatedConfig::default()
         }),
         metres_per_unit: 1.0,
