@@ -254,7 +254,8 @@ mod tests {
         let options = OpenOptions::default();
         let taken = &open_recordings(std::slice::from_ref(&folder), &options)?[0];
         assert!(taken.mount_assumed() && taken.warnings().iter().any(|w| w.contains("straight")));
-        assert_eq!(ahead(taken), (0.0, 0.0));
+        let straight = |(right, down): (f64, f64)| right.abs() < 1e-9 && down.abs() < 1e-9;
+        assert!(straight(ahead(taken)));
 
         let aimed = &open_aimed(std::slice::from_ref(&folder), &options)?[0];
         let k = aimed.intrinsics(0);
@@ -275,7 +276,7 @@ mod tests {
         fs::write(folder.join("dataset.toml"), "[mount]\nup_m = 1.65\n")?;
         let given = &open_aimed(&[folder], &options)?[0];
         assert!(!given.mount_assumed());
-        assert_eq!(ahead(given), (0.0, 0.0));
+        assert!(straight(ahead(given)));
         Ok(())
     }
 }
