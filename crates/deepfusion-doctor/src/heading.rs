@@ -24,8 +24,9 @@ const PARTS: usize = 4;
 const SURE_DEG: f64 = 0.5;
 /// The vehicle's yaw is known to this, radians a pair.
 const YAW: YawTrust = YawTrust(0.001);
-/// Differences that matter, degrees: of pitch this is some 7 % of the metres that are learned.
-const WARN_DEG: f64 = 0.6;
+/// Differences that are a mistake, degrees. Of pitch a degree is some 12 % of the metres that are learned; in dark and slow places as much is
+/// found where nothing is off.
+const WARN_DEG: f64 = 1.5;
 const ERROR_DEG: f64 = 5.0;
 
 /// Frames and pairs that are read to find it alone.
