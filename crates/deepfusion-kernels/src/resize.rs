@@ -1,4 +1,4 @@
-//! RGB bytes of another size. The filters are compiled here alone: they are a megabyte of code for each crate that calls them.
+//! RGB bytes of another size. The filters are compiled here alone: they are a megabyte of code in each crate that calls them.
 
 use fast_image_resize::images::{TypedCroppedImage, TypedImage, TypedImageRef};
 use fast_image_resize::pixels::U8x3;
