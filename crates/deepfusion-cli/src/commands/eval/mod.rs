@@ -135,7 +135,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
         ..OpenOptions::default()
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
-    let datasets = if args.no_verdict {
+    let datasets = if verdict::is_declined(args) {
         open_recordings(&args.data, &options)?
     } else {
         open_aimed(&args.data, &options)?

@@ -27,17 +27,20 @@ pub(super) fn has_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
     args.gt.is_some() || datasets.iter().any(known)
 }
 
-/// The verdict, where the recordings say how the camera moved and it was not declined; a split asks for its frames alone, and what is
-/// post-processed is no longer what the network says.
+/// Whether no verdict is wanted: it was declined, a split asks for its frames alone, or what is post-processed is no longer what the network
+/// says.
+pub(super) fn is_declined(args: &EvalArgs) -> bool {
+    args.no_verdict || args.split.is_some() || args.gt.is_some() || args.post_process.is_some()
+}
+
+/// The verdict, where the recordings say how the camera moved and it was not declined.
 pub(super) fn of_model(
     args: &EvalArgs,
     model: &ModelSource,
     estimator: &mut DepthEstimator,
     datasets: &[Dataset],
 ) -> Result<Option<Verdict>> {
-    let declined =
-        args.no_verdict || args.split.is_some() || args.gt.is_some() || args.post_process.is_some();
-    if declined || !datasets.iter().any(motion_known) {
+    if is_declined(args) || !datasets.iter().any(motion_known) {
         return Ok(None);
     }
     let unseen = if args.assume_unseen {
