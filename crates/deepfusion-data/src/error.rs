@@ -1,6 +1,6 @@
 //! What can go wrong with a recording.
 
-use crate::{CalibrationSource, DatasetKind, GtKind, NamedTopic};
+use crate::{CalibrationSource, DatasetKind, FoundInstead, GtKind, NamedTopic};
 use std::path::{Path, PathBuf};
 
 mod hint;
@@ -32,7 +32,7 @@ pub enum Error {
         /// The path given.
         path: PathBuf,
         /// What is there instead.
-        found: String,
+        found: FoundInstead,
     },
     /// A part of the recording that is needed is not there.
     #[error("{}: missing, it holds {what}", path.display())]
@@ -494,13 +494,6 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why a ROS 2 bag is no recording here.
-pub(crate) const WITHOUT_ROS2: &str = if cfg!(feature = "ros2") {
-    ""
-} else {
-    ", and this program was built without the feature `ros2` (`ros2-sqlite` for .db3)"
-};
-
 /// The layouts that are told apart, in the order in which they are looked for.
 const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
   KITTI odometry     sequences/00/ with image_2/000000.png, calib.txt and times.txt, or such a sequence
@@ -547,12 +540,8 @@ impl Error {
     /// Whether a bag of ROS 2 was given, and this program was built without its reader (the feature `ros2`).
     #[must_use]
     pub fn needs_ros2(&self) -> bool {
-        match self {
-            Self::UnknownLayout { found, .. } => {
-                cfg!(not(feature = "ros2")) && found.ends_with(WITHOUT_ROS2)
-            }
-            _ => false,
-        }
+        let unread = |found: &FoundInstead| cfg!(not(feature = "ros2")) && found.has_ros2_bags();
+        matches!(self, Self::UnknownLayout { found, .. } if unread(found))
     }
 }
 

@@ -34,7 +34,8 @@ pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use error::{Error, Result};
 pub use formats::kitti;
 pub use formats::{
-    DopplerEgo, ego_velocity, ground_radial, inspect, inspect_with, write_bag_config,
+    DopplerEgo, FileKind, FoundInstead, ego_velocity, ground_radial, inspect, inspect_with,
+    write_bag_config,
 };
 pub use image::RgbImage;
 pub use pictures::{

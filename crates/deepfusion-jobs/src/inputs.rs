@@ -88,7 +88,7 @@ fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Datase
         Ok(datasets) => Ok(datasets),
         // A folder of ROS 2 bags has a remedy of its own.
         Err(deepfusion_data::Error::UnknownLayout { found, .. })
-            if path.is_dir() && !found.contains("ROS 2") =>
+            if path.is_dir() && !found.has_ros2_bags() =>
         {
             let input = argument.to_owned();
             Err(Error::NoImages { input })

@@ -1,7 +1,7 @@
 //! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
 
 use super::files::name_of;
-use super::plain::{NO_MOUNT, PlainParts};
+use super::plain::PlainParts;
 use super::video::frames_of;
 use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
@@ -77,9 +77,6 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         path: video.file().to_owned(),
         ns: Some(*ns),
     };
-    if config.mount.is_none() {
-        warnings.push(NO_MOUNT.into());
-    }
     let mut streams = streams(folder)?;
     // That of the speeds comes with the speeds.
     streams.retain(|s| s.name != SPEED);
@@ -92,6 +89,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         video: Some(video),
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
+        mount_assumed: config.mount.is_none(),
         speeds: speeds(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
         camera: Camera::Left,

@@ -1,7 +1,7 @@
 //! A folder of images with tables and a calibration beside them.
 
 use super::files::{images_in, name_of};
-use super::plain::{NO_MOUNT, PlainParts};
+use super::plain::PlainParts;
 use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::timed_images;
@@ -51,10 +51,6 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         .filter_map(|i| Some((i.path.file_stem()?, i.number)));
     let depth = depth_images(folder, &config, stems.collect())?;
     let speeds = SpeedLog::read(folder, &config)?;
-    // The mount turns the vehicle's motion into the camera's: of no matter where there is none.
-    if config.mount.is_none() && speeds.is_some() {
-        warnings.push(NO_MOUNT.into());
-    }
     PlainParts {
         kind: DatasetKind::Folder,
         folder: folder.to_owned(),
@@ -64,6 +60,8 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: size,
+        // The mount turns the vehicle's motion into the camera's: of no matter where there is none.
+        mount_assumed: config.mount.is_none() && speeds.is_some(),
         speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
         camera: Camera::Left,

@@ -157,6 +157,7 @@ impl Drive {
             camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
             image_size: size,
             speeds,
+            mount_assumed: false,
             cam_from_vehicle: rig.cam_from_vehicle,
             camera,
             truth,

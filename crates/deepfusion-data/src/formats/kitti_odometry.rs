@@ -185,6 +185,7 @@ impl<'a> Sequence<'a> {
             image_size: size,
             warnings: speeds.iter().map(|_| MOUNT.to_owned()).collect(),
             speeds,
+            mount_assumed: false,
             cam_from_vehicle: cam_from_cam0 * cam0_from_vehicle,
             camera: self.camera,
             truth,

@@ -1,13 +1,11 @@
-//! Telling layouts apart, and saying what was looked for where none fits.
+//! Telling layouts apart.
 
-use super::files::folders;
+use super::found_instead::FoundInstead;
 use super::kitti::{self, Drive, drive_around, find_drives};
 use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
-use crate::error::WITHOUT_ROS2;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_rosbag::MessageSource;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -103,12 +101,11 @@ impl Layout {
             return if video::is_video(&real) {
                 Ok(Self::Video(real))
             } else {
-                Err(unknown(describe_file(&real)))
+                Err(unknown(FoundInstead::file(&real)))
             };
         }
         if let Some(drive) = drive_around(&real) {
-            let drive = drive.display();
-            return Err(unknown(format!("it lies within the drive {drive}")));
+            return Err(unknown(FoundInstead::PartOf { drive }));
         }
         if comma::is_segment(&real) {
             return Ok(Self::Comma(real));
@@ -132,7 +129,7 @@ impl Layout {
             }),
             (_, Some(_)) => Ok(Self::Video(real)),
             (true, None) => Ok(Self::Folder(real)),
-            (false, None) => Err(unknown(describe_folder(&real)?)),
+            (false, None) => Err(unknown(FoundInstead::folder(&real)?)),
         }
     }
 
@@ -197,65 +194,4 @@ fn named(path: &Path, real: &Path) -> PathBuf {
     given
         .filter(|given| given.file_name().is_some())
         .unwrap_or_else(|| real.to_owned())
-}
-
-fn describe_file(path: &Path) -> String {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    match extension.to_ascii_lowercase().as_str() {
-        "mcap" | "db3" => format!("it is a ROS 2 bag{WITHOUT_ROS2}"),
-        "png" | "jpg" | "jpeg" => "it is a single image".into(),
-        "mp4" | "mkv" | "avi" | "mov" | "hevc" => "it is a video".into(),
-        "zip" | "tar" | "gz" | "tgz" => "it is an archive that is still packed".into(),
-        _ => "it is a file".into(),
-    }
-}
-
-/// What a folder without drives looks like.
-fn describe_folder(folder: &Path) -> Result<String> {
-    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
-    let (mut files, mut first) = (0_usize, None);
-    let inner = folders(folder)?;
-    for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
-        for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
-            let path = entry.map_err(|e| Error::file(&place, e))?.path();
-            if path.is_dir() {
-                continue;
-            }
-            files += 1;
-            first.get_or_insert(path.clone());
-            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-            let kind = match extension.to_ascii_lowercase().as_str() {
-                "png" | "jpg" | "jpeg" => "images",
-                "mcap" | "db3" => "ROS 2 bags",
-                "bag" => "ROS bags",
-                "mp4" | "mkv" | "avi" | "mov" | "hevc" => "videos",
-                "zip" | "tar" | "gz" | "tgz" => "packed archives",
-                "bin" => ".bin files",
-                _ => continue,
-            };
-            *kinds.entry(kind).or_default() += 1;
-        }
-    }
-    if files == 0 && inner.is_empty() {
-        return Ok("it is empty".into());
-    }
-    if !kinds.is_empty() {
-        let list: Vec<String> = kinds.iter().map(|(k, n)| format!("{n} {k}")).collect();
-        let without = if kinds.contains_key("ROS 2 bags") {
-            WITHOUT_ROS2
-        } else {
-            ""
-        };
-        return Ok(format!(
-            "it holds {} and nothing that says how to read them{without}",
-            list.join(", ")
-        ));
-    }
-    let shown = first.or_else(|| inner.first().cloned()).unwrap_or_default();
-    let shown = shown.strip_prefix(folder).unwrap_or(&shown).to_owned();
-    Ok(format!(
-        "it holds {files} files and {} folders (such as {})",
-        inner.len(),
-        shown.display()
-    ))
 }

@@ -7,6 +7,7 @@ mod bag;
 mod comma;
 mod files;
 mod folder;
+mod found_instead;
 mod inspect;
 pub mod kitti;
 mod kitti360;
@@ -20,4 +21,5 @@ mod rgbd;
 mod video;
 
 pub use bag::{DopplerEgo, ego_velocity, ground_radial, write_bag_config};
+pub use found_instead::{FileKind, FoundInstead};
 pub use inspect::{inspect, inspect_with};

@@ -1,6 +1,6 @@
 //! What the layouts of frames in files or in a video have in common: one camera, times, speeds, poses, measured depth.
 
-pub(crate) use crate::dataset::heading::NO_MOUNT;
+use crate::dataset::heading::NO_MOUNT;
 use crate::dataset::selection::Selection;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::logs::frame_times::TimedImage;
@@ -76,6 +76,8 @@ pub(crate) struct PlainParts {
     pub(crate) image_size: (u32, u32),
     pub(crate) speeds: Option<SpeedLog>,
     pub(crate) cam_from_vehicle: Se3,
+    /// Whether nothing says where the camera is on the vehicle, though it matters.
+    pub(crate) mount_assumed: bool,
     /// Of the vehicle's cameras.
     pub(crate) camera: Camera,
     pub(crate) truth: Option<MeasuredDepth>,
@@ -94,6 +96,9 @@ impl PlainParts {
     /// [`Error::Clocks`] where frames and speeds have no time in common, [`Error::CameraFile`],
     /// [`Error::FrameSize`], [`Error::Image`], [`Error::Motion`].
     pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
+        if self.mount_assumed {
+            self.warnings.push(NO_MOUNT.into());
+        }
         for ns in self.images.iter_mut().filter_map(|i| i.ns.as_mut()) {
             *ns = on_the_vehicles_clock(*ns, self.camera_ahead_s);
         }
@@ -161,7 +166,6 @@ impl PlainParts {
             scenario: None,
         };
         let assumed = self.calibration.assumed;
-        let mount_assumed = self.warnings.iter().any(|warning| warning == NO_MOUNT);
         let dataset = Dataset::new(
             parts,
             Arc::new(PlainRecording {
@@ -180,7 +184,7 @@ impl PlainParts {
         )
         .with_receiver(receiver)
         .with_camera_assumed(assumed)
-        .with_mount_assumed(mount_assumed);
+        .with_mount_assumed(self.mount_assumed);
         dataset.check_sizes()?;
         Ok(dataset)
     }

@@ -92,6 +92,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: size,
         speeds: None,
+        mount_assumed: false,
         cam_from_vehicle: config.cam_from_vehicle(),
         camera: Camera::Left,
         truth: Some(MeasuredDepth::Images(DepthImages {

@@ -1,6 +1,6 @@
 //! A video file with tables and a calibration beside it.
 
-use super::plain::{NO_MOUNT, PlainParts};
+use super::plain::PlainParts;
 use crate::camera::{CameraCalibration, Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::{TimeUnit, seconds};
@@ -127,9 +127,6 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
                 .into(),
         );
     }
-    if config.mount.is_none() && speeds.is_some() {
-        warnings.push(NO_MOUNT.into());
-    }
     let image = |(number, ns): (u64, Option<i64>)| TimedImage {
         number,
         path: file.clone(),
@@ -143,6 +140,8 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: video.size(),
+        // The mount turns the vehicle's motion into the camera's: of no matter where there is none.
+        mount_assumed: config.mount.is_none() && speeds.is_some(),
         speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
         camera: Camera::Left,

@@ -15,6 +15,7 @@ mod people;
 mod plants;
 mod props;
 mod rooms;
+mod sections;
 mod site;
 mod street;
 mod sweep;

@@ -159,6 +159,7 @@ impl TableFolder {
             camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
             image_size: size,
             speeds: Some(speeds),
+            mount_assumed: false,
             cam_from_vehicle: vehicle_from_cam.inverse(),
             camera: Camera::Left,
             truth,

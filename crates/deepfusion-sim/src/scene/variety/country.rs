@@ -2,8 +2,8 @@
 
 use super::houses::Kind;
 use super::motorway::{between, verge};
+use super::sections::{Section, Side, apply_widths};
 use super::site::{Site, Spot};
-use super::street::{Section, Side, apply_widths};
 use crate::scene::ObjectClass;
 use crate::texture::ground::{Beyond, Paving, Stretch};
 use crate::texture::ground_style::Line;

@@ -1,7 +1,7 @@
 //! Motorways and wide main roads: several lanes, guard rails, gantries, bridges, banks with bushes.
 
+use super::sections::{Section, Side, apply_widths};
 use super::site::{Site, Spot};
-use super::street::{Section, Side, apply_widths};
 use crate::scene::{Lane, ObjectClass};
 use crate::texture::ground::{Beyond, Paving, Stretch};
 use crate::texture::ground_style::Line;
