@@ -76,6 +76,9 @@ pub(crate) enum CliError {
         /// Whether it is a log of speeds by itself.
         is_log: bool,
     },
+    /// A clock of its own for the camera, in a layout with one clock.
+    #[error("--clock-offset is for bags: a KITTI drive has one clock")]
+    OneClock,
     /// A log without anything that saw the drive.
     #[error("neither a video nor images are given for the log")]
     NoMedia,
@@ -182,8 +185,26 @@ pub(crate) enum CliError {
         total: usize,
         /// Whether the run was stopped before the others were done.
         interrupted: bool,
+        /// Whether the same command goes on with what is missing.
+        resumes: bool,
         /// The first remedy that one of the failures knows.
         hint: Option<String>,
+    },
+    /// Settings of the perception that cannot be read.
+    #[error("{}: {problem}", path.display())]
+    PerceptionFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+        /// The settings that there are.
+        keys: String,
+    },
+    /// Outputs were to go into a file.
+    #[error("{}: a file, and a folder is to be written there", path.display())]
+    NotAFolder {
+        /// The file.
+        path: PathBuf,
     },
     /// A run that was stopped.
     #[error("stopped: {done} of {total} images are done")]
@@ -192,6 +213,8 @@ pub(crate) enum CliError {
         done: usize,
         /// Images in all.
         total: usize,
+        /// Whether the same command goes on with what is missing.
+        resumes: bool,
     },
     /// Training that was stopped, and saved.
     #[error("stopped after {step} of {steps} steps; the run is saved")]
@@ -287,7 +310,7 @@ impl Reportable for CliError {
         match self {
             Self::Interrupted { .. } | Self::Stopped { .. } | Self::Ended { .. } => Exit::Stopped,
             // Clap could not see it: what is needed depends on what is embedded, what applies on what lies at the path.
-            Self::NoModelGiven | Self::OutOfPlace { .. } => Exit::WrongArguments,
+            Self::NoModelGiven | Self::OutOfPlace { .. } | Self::OneClock => Exit::WrongArguments,
             _ => Exit::Failed,
         }
     }
@@ -342,14 +365,14 @@ impl Reportable for CliError {
                  another folder"
                     .into(),
             ),
-            Self::SomeFailed { hint, .. } => Some(match hint {
-                Some(hint) => format!("{hint}; then run the same again: finished images are kept"),
-                None => "fix them and run the same again: finished images are kept".into(),
+            Self::SomeFailed { hint, resumes, .. } => Some(match hint {
+                Some(hint) => format!("{hint}; then {}", again(*resumes)),
+                None => format!("mend them, then {}", again(*resumes)),
             }),
             Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
-            Self::Interrupted { .. } => {
-                Some("run the same again: finished images are kept".into())
-            }
+            Self::PerceptionFile { keys, .. } => Some(format!("the settings are {keys}")),
+            Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
+            Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
             Self::Contradicts { .. } => {
                 Some("leave it out to go on with the run, or start a new one in another folder".into())
@@ -385,6 +408,7 @@ impl Reportable for CliError {
             Self::OutOfPlace { .. } => Some(
                 "leave it out; the columns of a recording's own log stand in its dataset.toml (time_column, speed_column, speed_unit, dbc)".into(),
             ),
+            Self::OneClock => Some("leave it out, or add --format bag".into()),
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
@@ -410,4 +434,12 @@ fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
         text += &format!("\n  and {more} more, in the manifest");
     }
     text
+}
+/// How a bulk run is gone on with.
+fn again(resumes: bool) -> &'static str {
+    if resumes {
+        "run the same again: finished images are kept"
+    } else {
+        "run it anew with --overwrite: targets are followed from the first image on"
+    }
 }

@@ -58,6 +58,16 @@ pub(crate) fn write_unsynced(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()>
     })?)
 }
 
+/// Makes a folder for outputs, where it is not there.
+pub(crate) fn make_folder(folder: &Path) -> Result<()> {
+    if folder.is_file() {
+        let path = folder.to_owned();
+        return Err(crate::error::CliError::NotAFolder { path }.into());
+    }
+    let failed = |e| deepfusion_data::Error::file(folder, e);
+    Ok(std::fs::create_dir_all(folder).map_err(failed)?)
+}
+
 /// The folder a command writes to: the one asked for, or a new `runs/<command>-<time>`. It is made; a folder that holds
 /// something already is refused.
 pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {

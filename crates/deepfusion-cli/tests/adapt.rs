@@ -111,9 +111,13 @@ fn what_gets_worse_is_refused() {
 fn an_interrupted_one_is_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    ok(at, DRIVE);
-    let command = format!("{ADAPT} --simulated 0 --learning-rate 1e-9 --out mine --json");
+    ok(at, &format!("{DRIVE} --stereo 0.5"));
+    let command =
+        format!("{ADAPT} --camera both --simulated 0 --learning-rate 1e-9 --out mine --json");
     let whole = json(at, &command);
+    // Of two cameras each is a view of the other, without a word of it.
+    let config = fs::read_to_string(at.join("mine/config.toml")).unwrap();
+    assert!(config.contains("stereo = true"), "{config}");
     // As it stood before the last judgement.
     fs::rename(at.join("mine"), at.join("mine.adapting")).unwrap();
     fs::remove_file(at.join("mine.adapting/adapt.json")).unwrap();

@@ -105,6 +105,35 @@ fn shards_started_at_once_make_what_one_run_makes() {
         "{}",
         again.stderr
     );
+    // Outputs among the images are no images: another run finds nothing new.
+    let among = format!("{predict} more --out more");
+    ok(at, &among);
+    let once = outputs(&at.join("more"));
+    ok(at, &among);
+    assert_same(&once, &outputs(&at.join("more")));
+}
+
+#[test]
+fn a_camera_that_may_be_wrong_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 1 --seed 3 --scan-every 0 --size 96x64",
+    );
+    let predict = format!("predict {DRIVE}/0000000000.png --model tiny");
+    // Nobody gave a camera, and KITTI's calibration lies some folders up.
+    let said = ok(at, &format!("{predict} --out a")).stderr;
+    let calibration = Path::new("2026_01_01").join("calib_cam_to_cam.txt");
+    assert!(
+        said.contains("--calib") && said.contains(calibration.to_str().unwrap()),
+        "{said}"
+    );
+    // Numbers of a picture twice the size.
+    let said = ok(at, &format!("{predict} --intrinsics 112,112,95,63 --out b")).stderr;
+    assert!(said.contains("images of another size"), "{said}");
+    let said = ok(at, &format!("{predict} --intrinsics 56,56,47,31 --out c")).stderr;
+    assert!(!said.contains("WARN"), "{said}");
 }
 
 #[test]

@@ -294,12 +294,34 @@ fn what_is_wrong_is_named() {
         assert!(run.stderr.contains(named), "{args}: {}", run.stderr);
         assert!(run.stderr.contains("hint:"), "{args}: {}", run.stderr);
     }
+    // Nothing was seen: nothing is in the way of the next attempt.
+    assert!(!at.join("a/targets.jsonl").exists());
+    // What another command wrote there stays.
+    let picture = format!("{DRIVE}/image_02/data/0000000003.png --intrinsics 186,186,157,44");
+    ok(at, &format!("predict --model run {picture} --out theirs"));
+    let depth = || std::fs::read(at.join("theirs/0000000003_depth.png")).unwrap();
+    let before = depth();
+    let perceive = format!("perceive --model run {picture} --out theirs");
+    fails(at, &perceive, &["0000000003", "already exists"]);
+    assert!(depth() == before);
+    fails(
+        at,
+        &format!("predict --model run {picture} --out theirs/0000000003_depth.png"),
+        &["a file, and a folder", "--out"],
+    );
     std::fs::write(at.join("wrong.toml"), "min_pixel = 3\n").unwrap();
     let args = format!("perceive --model run {DRIVE} --out c --config wrong.toml");
     let run_ = run(at, &args);
     assert_eq!(run_.code, 1);
     assert!(
-        run_.stderr.contains("wrong.toml") && run_.stderr.contains("min_pixel"),
+        [
+            "wrong.toml",
+            "unknown field `min_pixel`",
+            "hint: the settings are",
+            "max_depth_m"
+        ]
+        .iter()
+        .all(|part| run_.stderr.contains(part)),
         "{}",
         run_.stderr
     );
@@ -324,7 +346,9 @@ fn what_is_wrong_is_named() {
         &format!("perceive --model run {images} --intrinsics 186,186,157,44 --out d"),
     );
     assert_eq!(run_.code, 1);
-    assert!(run_.stderr.contains("0000000004.png"), "{}", run_.stderr);
+    for part in ["0000000004.png", "run it anew with --overwrite"] {
+        assert!(run_.stderr.contains(part), "{part}: {}", run_.stderr);
+    }
     let lines = std::fs::read_to_string(at.join("d/targets.jsonl")).unwrap();
     assert_eq!(lines.lines().count(), 11);
 }

@@ -19,7 +19,7 @@ mod logs;
 mod pictures;
 mod truth;
 
-pub use camera::{CalibrationSource, CameraCalibration, Lens, camera_info_yaml};
+pub use camera::{CalibrationSource, CameraCalibration, Lens, calibration_near, camera_info_yaml};
 pub use convert::{
     Converted, VELOCITY, convert_to_bag, convert_to_kitti, export_gt, ground_truth_names,
 };

@@ -113,7 +113,7 @@ fn angles_that_are_none_are_refused() {
     for (toml, why) in [
         (
             "hfov_deg = 170",
-            "hfov_deg is 170, it must be above 0 and below 170 degrees",
+            "hfov_deg is 170, it must be above 1 and below 170 degrees",
         ),
         ("hfov_deg = 0", "hfov_deg is 0"),
         ("hfov_deg = nan", "hfov_deg is NaN"),

@@ -167,7 +167,7 @@ fn what_is_there_instead_is_said() {
     fs::write(at("readme.md"), "x").unwrap();
     let text = refusal(dir.path());
     assert!(
-        text.contains("1 files and 1 folders (such as readme.md)"),
+        text.contains("1 file and 1 folder (such as readme.md)"),
         "{text}"
     );
 }

@@ -65,14 +65,10 @@ impl Report {
         // Where nothing moves, the static row would only repeat the first.
         if let Some(metrics) = &self.moving {
             if let Some(still) = &self.still {
-                row(f, "static", still)?;
+                row(f, "static (labelled)", still)?;
             }
-            let plural = if self.moving_images == 1 { "" } else { "s" };
-            row(
-                f,
-                &format!("moving, {} image{plural}", self.moving_images),
-                metrics,
-            )?;
+            let images = count_of(self.moving_images, "image");
+            row(f, &format!("moving, {images}"), metrics)?;
         }
         if let Some(mean_depth_baseline) = &self.mean_depth_baseline {
             row(f, "mean-depth baseline", &mean_depth_baseline.unscaled)?;

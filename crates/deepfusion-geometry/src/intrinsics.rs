@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 /// Horizontal fields of view that a camera can be given by, in degrees, both ends left out: beyond them no pinhole camera is
 /// usable, and a wider lens needs its distortion known.
-pub const HFOV_DEG: (f64, f64) = (0.0, 170.0);
+pub const HFOV_DEG: (f64, f64) = (1.0, 170.0);
 
 /// A pinhole camera without distortion, in pixels of the image it belongs to.
 ///

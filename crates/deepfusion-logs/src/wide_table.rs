@@ -3,7 +3,7 @@
 use crate::columns::{Column, TIMES};
 use crate::dates::{TimeStyle, clock_of, nanoseconds, style_of};
 use crate::error::{ColumnProblem, Error, Result};
-use crate::log::{Clock, DriveLog, Format, Speed};
+use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
 use crate::read_options::ReadOptions;
 use crate::rows::{enough, left_out};
 use crate::table::{Table, short};
@@ -152,10 +152,55 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         format: Format::Table,
         clock: times.clock,
         speeds,
-        yaw_rates: Vec::new(),
+        yaw_rates: yaw_rates(table, &times, &mut notes)?,
         course_rates: Vec::new(),
         notes,
     })
+}
+
+/// Names of a vehicle's yaw rate. A gyroscope's own axes are none: nobody knows how it is mounted.
+const YAW_RATE: [&str; 3] = ["yaw rate", "yawrate", "yaw velocity"];
+
+/// rad/s of one of a unit of turning, by the spellings that recorders use.
+fn radps_of(unit: &str) -> Option<f64> {
+    match unit {
+        "rad/s" | "radps" | "rad/sec" => Some(1.0),
+        "deg/s" | "dps" | "degps" | "deg/sec" | "°/s" | "degrees/s" => Some(1f64.to_radians()),
+        _ => None,
+    }
+}
+
+/// The yaw rates of the rows that have one. Where nothing says their unit, none and a note.
+fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<String>) -> Result<Vec<YawRate>> {
+    let Some(column) = table.named(&YAW_RATE) else {
+        return Ok(Vec::new());
+    };
+    let header = column.header.trim();
+    let Some(radps) = column.unit.as_deref().and_then(radps_of) else {
+        notes.push(format!(
+            "column '{header}' is left out, as nothing says its unit: name it yaw_rate_radps or yaw_rate_dps (positive to the left)"
+        ));
+        return Ok(Vec::new());
+    };
+    let mut found: Vec<YawRate> = Vec::new();
+    for row in 0..table.len() {
+        let Some(value) = table.number(row, column)? else {
+            continue;
+        };
+        if times_absent(table, times, row) {
+            continue;
+        }
+        let last = found.last().map(|turn| turn.ns);
+        let ns = times.ns(table, row, last)?;
+        if last != Some(ns) {
+            let radps = value * radps;
+            found.push(YawRate { ns, radps });
+        }
+    }
+    notes.push(format!(
+        "yaw rate from column '{header}', positive to the left"
+    ));
+    Ok(found)
 }
 
 fn times_absent(table: &Table, times: &Times, row: usize) -> bool {

@@ -59,6 +59,43 @@ fn a_track_without_speeds_is_smoothed() {
 }
 
 #[test]
+fn a_tables_yaw_rate_is_read_where_its_unit_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("speed.csv");
+    let read_with = |header: &str, factor: f64| {
+        let row = |i: i32| {
+            let t = 0.1 * f64::from(i);
+            let turn = if i == 3 {
+                String::new()
+            } else {
+                (factor * true_yaw_rate(t)).to_string()
+            };
+            format!("{t},{},{turn}\n", true_speed(t))
+        };
+        let rows: String = (0..30).map(row).collect();
+        std::fs::write(&file, format!("time_s,speed_mps,{header}\n{rows}")).unwrap();
+        read(&file, &ReadOptions::default()).unwrap()
+    };
+    for (header, factor) in [
+        ("yaw_rate_radps", 1.0),
+        ("yaw_rate_dps", 1f64.to_degrees()),
+        ("Yaw Rate (deg/s)", 1f64.to_degrees()),
+    ] {
+        let log = read_with(header, factor);
+        // One of the thirty was not measured.
+        assert_eq!((log.speeds.len(), log.yaw_rates.len()), (30, 29));
+        for turn in &log.yaw_rates {
+            let error = turn.radps - true_yaw_rate(seconds(turn.ns, 0));
+            assert!(error.abs() < 1e-9, "{header}: {error}");
+        }
+    }
+    let log = read_with("yaw_rate", 1.0);
+    let notes = log.notes.join("\n");
+    assert!(log.yaw_rates.is_empty());
+    assert!(notes.contains("nothing says its unit"), "{notes}");
+}
+
+#[test]
 fn torque_has_the_vehicles_speed_and_a_receivers() {
     let log = plain("torque.csv");
     assert_eq!((log.format, log.clock), (Format::Table, Clock::LocalDate));

@@ -33,7 +33,7 @@ pub(crate) struct InspectArgs {
     /// A recording: KITTI drive, date or root, KITTI odometry, KITTI-360, nuScenes, bag, image folder, video, comma2k19 or RGB-D folder.
     pub path: PathBuf,
     /// The camera, where the recording has no calibration, in pixels.
-    #[arg(long, value_name = "fx,fy,cx,cy")]
+    #[arg(long, allow_hyphen_values = true, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
@@ -84,7 +84,7 @@ pub(crate) struct ConvertArgs {
     #[arg(value_name = "OUT")]
     pub out: PathBuf,
     /// The camera of a recording without a calibration, in pixels of its images.
-    #[arg(long, value_name = "fx,fy,cx,cy")]
+    #[arg(long, allow_hyphen_values = true, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
@@ -168,7 +168,7 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "intrinsics")]
     pub calibration: Option<PathBuf>,
     /// The camera in pixels of its images.
-    #[arg(long, value_name = "fx,fy,cx,cy")]
+    #[arg(long, allow_hyphen_values = true, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calibration"])]

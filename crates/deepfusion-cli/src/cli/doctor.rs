@@ -23,7 +23,12 @@ pub(crate) struct DoctorArgs {
     /// segment. Or a log of speeds by itself, as `data import` reads it.
     pub path: Option<PathBuf>,
     /// The camera of a recording without a calibration, in pixels of its images.
-    #[arg(long, value_name = "fx,fy,cx,cy", requires = "path")]
+    #[arg(
+        long,
+        allow_hyphen_values = true,
+        value_name = "fx,fy,cx,cy",
+        requires = "path"
+    )]
     pub intrinsics: Option<CameraIntrinsics>,
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics", requires = "path")]

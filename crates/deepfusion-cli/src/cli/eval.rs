@@ -40,7 +40,12 @@ pub(crate) struct EvalArgs {
     )]
     pub camera: Cameras,
     /// The camera of recordings without a calibration, in pixels of their images.
-    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "pred")]
+    #[arg(
+        long,
+        allow_hyphen_values = true,
+        value_name = "fx,fy,cx,cy",
+        conflicts_with = "pred"
+    )]
     pub intrinsics: Option<CameraIntrinsics>,
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "pred"])]

@@ -181,7 +181,7 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
     /// Frames a second [default: 10; UMAD's 25 in a bag].
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, allow_negative_numbers = true, value_name = "HZ")]
     pub fps: Option<f64>,
     /// Sensors of the car [default: those of the layout's data set].
     #[arg(long, value_parser = names::sensors())]
@@ -212,7 +212,7 @@ pub(crate) struct SimulateArgs {
 }
 
 /// Layouts the simulator writes.
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum SimulateFormat {
     /// KITTI raw: images, oxts, velodyne scans, calibration, and exact depth beside them.
     #[default]

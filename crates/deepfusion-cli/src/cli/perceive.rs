@@ -28,7 +28,7 @@ pub(crate) struct PerceiveArgs {
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "overlay"])]
     pub save: Vec<PerceiveSave>,
     /// Farthest depth that is looked at, in metres [default: 60, or what --config says].
-    #[arg(long, value_name = "M", value_parser = positive)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = positive)]
     pub max_depth: Option<f64>,
     /// Settings of the perception (TOML); what is not in it keeps its default.
     #[arg(long, value_name = "FILE")]
@@ -37,7 +37,7 @@ pub(crate) struct PerceiveArgs {
     #[command(flatten)]
     pub masks: InstanceArgs,
     /// How fast the camera's vehicle drives straight on, m/s; 0 for a camera that stands. Targets are then followed.
-    #[arg(long, value_name = "M/S", help_heading = HEADING, value_parser = not_negative)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M/S", help_heading = HEADING, value_parser = not_negative)]
     pub speed: Option<f64>,
     /// Print one JSON object a frame on stdout, as it comes.
     #[arg(long)]

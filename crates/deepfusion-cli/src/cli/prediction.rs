@@ -19,7 +19,12 @@ pub(crate) struct PredictionArgs {
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images [default: the recording's, else EXIF's focal length, else the one trained with is
     /// assumed].
-    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
+    #[arg(
+        long,
+        allow_hyphen_values = true,
+        value_name = "fx,fy,cx,cy",
+        conflicts_with = "calib"
+    )]
     pub intrinsics: Option<CameraIntrinsics>,
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calib"])]

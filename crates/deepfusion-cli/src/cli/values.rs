@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn fields_of_view() {
         assert_eq!(hfov("69.5"), Ok(69.5));
-        for bad in ["0", "-60", "170", "nan", "69deg", ""] {
+        for bad in ["0", "0.01", "-60", "170", "nan", "69deg", ""] {
             assert!(hfov(bad).unwrap_err().contains("below 170"), "{bad}");
         }
     }

@@ -1,4 +1,5 @@
 use crate::cli::{SimulateArgs, SimulateFormat, Size};
+use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
@@ -7,6 +8,9 @@ use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag, wri
 
 /// `deepfusion simulate`.
 pub(super) fn run(args: &SimulateArgs) -> Result<()> {
+    if args.format == SimulateFormat::Kitti && args.clock_offset != 0.0 {
+        return Err(CliError::OneClock.into());
+    }
     let config = config(args);
     let simulation = Simulation::new(&config)?;
     let mut progress = Progress::new("simulating");

@@ -186,6 +186,9 @@ impl Reportable for deepfusion_eval::Error {
                 "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
                  they are left out and counted as missing_rate"
             )),
+            Self::NothingToEvaluate { skipped: 0, .. } => Some(
+                "this data has no ground truth, and no speeds to judge without it: give drives with one of them".into(),
+            ),
             Self::NothingToEvaluate { .. } => Some(
                 "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
                     .into(),
@@ -436,7 +439,7 @@ impl Reportable for deepfusion_view::Error {
                 Some("give the folder that `predict` or `perceive` wrote".into())
             }
             Self::NothingToShow { path } => Some(format!(
-                "make something to look at first: deepfusion predict --model RUN IMAGES --out {}",
+                "make something to look at first: deepfusion predict IMAGES --out {}",
                 path.display()
             )),
             Self::Picture(error) => error.remedy(),

@@ -232,7 +232,11 @@ mod tests {
         let stopped = [
             CliError::Stopped { step, steps, go_on },
             CliError::Ended { what: "the demo" },
-            CliError::Interrupted { done: 1, total: 2 },
+            CliError::Interrupted {
+                done: 1,
+                total: 2,
+                resumes: true,
+            },
         ];
         for error in stopped {
             assert_eq!(error.exit(), Exit::Stopped);

@@ -21,6 +21,22 @@ const NAMES: [&str; 8] = [
     "calibration.txt",
 ];
 
+/// KITTI raw's, which lies above its drives.
+const OF_A_DATE: &str = "calib_cam_to_cam.txt";
+
+/// A calibration that lies beside an image, in the folder above, or, as KITTI's, some folders further up. It is not read.
+#[must_use]
+pub fn calibration_near(image: &Path) -> Option<PathBuf> {
+    let image = std::path::absolute(image).ok()?;
+    let folders = image.ancestors().skip(1).take(5).enumerate();
+    let mut files = folders.flat_map(|(above, folder)| {
+        let beside = if above < 2 { &NAMES[..] } else { &[] };
+        let names = beside.iter().chain([&OF_A_DATE]);
+        names.map(|name| folder.join(name)).collect::<Vec<_>>()
+    });
+    files.find(|file| file.is_file())
+}
+
 /// What a camera made, and may have described itself in.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Pictures<'a> {

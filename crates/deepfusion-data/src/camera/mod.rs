@@ -9,6 +9,7 @@ mod write;
 mod yaml;
 
 pub use calibration::CameraCalibration;
+pub use find::calibration_near;
 pub(crate) use find::{Pictures, find_camera};
 pub use lens::Lens;
 pub use source::CalibrationSource;

@@ -1,7 +1,7 @@
 //! What to do about each error.
 
 use super::Error;
-use crate::DatasetKind;
+use crate::{DatasetKind, FoundInstead};
 use deepfusion_hint::Hint;
 
 impl Hint for Error {
@@ -17,6 +17,10 @@ impl Hint for Error {
             Self::UnknownLayout { .. } if self.needs_ros2() => {
                 "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }
+            Self::UnknownLayout {
+                found: FoundInstead::PartOf { drive },
+                ..
+            } => return Some(format!("give the drive: {}", drive.display())),
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }

@@ -2,6 +2,7 @@
 
 use super::files::folders;
 use crate::{Error, Result};
+use deepfusion_hint::count_of;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -75,12 +76,12 @@ impl FileKind {
 
     fn name(self) -> &'static str {
         match self {
-            Self::Bin => ".bin files",
-            Self::Ros2Bags => "ROS 2 bags",
-            Self::RosBags => "ROS bags",
-            Self::Images => "images",
-            Self::Archives => "packed archives",
-            Self::Videos => "videos",
+            Self::Bin => ".bin file",
+            Self::Ros2Bags => "ROS 2 bag",
+            Self::RosBags => "ROS bag",
+            Self::Images => "image",
+            Self::Archives => "packed archive",
+            Self::Videos => "video",
         }
     }
 }
@@ -152,7 +153,7 @@ impl fmt::Display for FoundInstead {
             Self::File => f.write_str("it is a file"),
             Self::Empty => f.write_str("it is empty"),
             Self::Files { kinds } => {
-                let list = kinds.iter().map(|(kind, n)| format!("{n} {}", kind.name()));
+                let list = kinds.iter().map(|(kind, n)| count_of(*n, kind.name()));
                 let list = list.collect::<Vec<_>>().join(", ");
                 write!(f, "it holds {list} and nothing that says how to read them")
             }
@@ -162,7 +163,9 @@ impl fmt::Display for FoundInstead {
                 such_as,
             } => write!(
                 f,
-                "it holds {files} files and {folders} folders (such as {})",
+                "it holds {} and {} (such as {})",
+                count_of(*files, "file"),
+                count_of(*folders, "folder"),
                 such_as.display()
             ),
         }?;

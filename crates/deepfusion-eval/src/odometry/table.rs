@@ -1,4 +1,5 @@
 use super::{OdometryReport, SHORT_LENGTHS_M};
+use deepfusion_hint::count_of;
 use std::fmt;
 
 const LABEL: usize = 30;
@@ -78,8 +79,11 @@ impl OdometryReport {
                 for row in &self.lengths {
                     writeln!(
                         f,
-                        "{:>9} m{:>7} stretches{:>10.3} %{:>12.5} °/m",
-                        row.length_m, row.n, row.t_rel_percent, row.r_rel_deg_per_m
+                        "{:>9} m{:>17}{:>10.3} %{:>12.5} °/m",
+                        row.length_m,
+                        count_of(row.n, "stretch"),
+                        row.t_rel_percent,
+                        row.r_rel_deg_per_m
                     )?;
                 }
                 writeln!(f)

@@ -222,8 +222,9 @@ impl TrainConfig {
         let Some(set) = self.set_meant(name).cloned() else {
             let expected = match names().as_slice() {
                 [] => "none: this run learned from one data set".to_owned(),
+                [only] => format!("{only}, the only one that this run learned from, or none"),
                 names => format!(
-                    "one of {}: this run learned several data sets, and metres are each one's own",
+                    "one of {}, as this run learned from several data sets and metres are each one's own",
                     names.join(", ")
                 ),
             };

@@ -23,7 +23,7 @@ use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::CliError;
 use crate::failure::{Context, Failure, Result};
 use crate::model;
-use crate::progress::say;
+use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
 
 /// `deepfusion perceive`.
@@ -50,17 +50,18 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         &estimator,
     )?;
     let processor = FrameProcessor::open(args, &model, &mut estimator, config)?;
-    std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
+    output::make_folder(out)?;
     if source.is_some() {
         sources::make_room(out, prediction.overwrite)?;
     }
-    refuse_what_is_there(prediction, &all)?;
+    refuse_what_is_there(args, &job, &all)?;
     interrupt::catch("stopping after the frames at work");
     let work = Work {
         args,
         job: &job,
         all: &all,
         lines: Mutex::new(RecordLines::begin(&out.join("targets.jsonl"))?),
+        progress: Mutex::new(Progress::new("perceiving")),
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
@@ -80,17 +81,34 @@ pub(super) fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result
     let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
     let named = || path.display().to_string();
     let mut table = toml::Table::try_from(&base).with_context(named)?;
-    table.extend(text.parse::<toml::Table>().with_context(named)?);
-    let config: PerceptionConfig = table.try_into().with_context(named)?;
+    let keys: Vec<String> = table.keys().cloned().collect();
+    let wrong = |error: toml::de::Error| CliError::PerceptionFile {
+        path: path.to_owned(),
+        problem: error.to_string().trim_end().to_owned(),
+        keys: keys.join(", "),
+    };
+    table.extend(text.parse::<toml::Table>().map_err(wrong)?);
+    let config: PerceptionConfig = table.try_into().map_err(wrong)?;
     config.validate().with_context(named)?;
     Ok(config)
 }
 
-/// Nothing is overwritten unless asked.
-fn refuse_what_is_there(args: &PredictionArgs, all: &[Input]) -> Result<()> {
-    let first = all.iter().map(|input| record_path(&args.out, &input.name));
-    let mut paths = first.chain([args.out.join("targets.jsonl")]);
-    match paths.find(|path| !args.overwrite && path.exists()) {
+/// Nothing is overwritten unless asked, whoever wrote it.
+fn refuse_what_is_there(args: &PerceiveArgs, job: &Job, all: &[Input]) -> Result<()> {
+    let PredictionArgs { out, overwrite, .. } = &args.prediction;
+    let of = |input: &Input| {
+        let name = &input.name;
+        let pictures = args
+            .save
+            .iter()
+            .map(|save| pictures::path(out, name, *save));
+        let mut paths = job.paths(input);
+        paths.extend(pictures);
+        paths.push(record_path(out, name));
+        paths
+    };
+    let mut paths = all.iter().flat_map(of).chain([out.join("targets.jsonl")]);
+    match paths.find(|path| !overwrite && path.exists()) {
         Some(path) => Err(CliError::Exists {
             path,
             remedy: "allow it with --overwrite, or choose another folder",
@@ -119,6 +137,7 @@ struct Work<'a> {
     job: &'a Job<'a>,
     all: &'a [Input],
     lines: Mutex<RecordLines>,
+    progress: Mutex<Progress>,
     outcome: Mutex<Outcome>,
 }
 
@@ -183,6 +202,10 @@ impl Work<'_> {
         }
         let mut outcome = self.outcome();
         outcome.done += 1;
+        if !live {
+            let mut progress = self.progress.lock().unwrap_or_else(|e| e.into_inner());
+            progress.set(outcome.done + outcome.unreadable.len(), self.all.len());
+        }
         outcome.targets += found.record.targets.len();
         if !live {
             outcome.latency_ms.extend(found.record.latency_ms);
@@ -191,14 +214,21 @@ impl Work<'_> {
     }
 
     fn finish(self) -> Result<()> {
-        // What is there stays: a stopped run's lines are of its frames.
-        self.lines
-            .into_inner()
-            .unwrap_or_else(|e| e.into_inner())
-            .finish()?;
+        // The bar is gone before anything else is printed.
+        drop(self.progress);
+        let lines = self.lines.into_inner().unwrap_or_else(|e| e.into_inner());
         let mut outcome = self.outcome.into_inner().unwrap_or_else(|e| e.into_inner());
+        // What is there stays: a stopped run's lines are of its frames.
+        match outcome.done {
+            0 => lines.discard(),
+            _ => lines.finish()?,
+        }
         if let Some(error) = outcome.fatal {
             return Err(error);
+        }
+        let total = self.all.len();
+        if outcome.done == 0 && total == 1 && outcome.unreadable.len() == 1 {
+            return Err(outcome.unreadable.remove(0));
         }
         outcome.latency_ms.sort_by(f64::total_cmp);
         let median = outcome.latency_ms.get(outcome.done / 2).copied();
@@ -211,19 +241,23 @@ impl Work<'_> {
                 ", {ms:.0} ms from file to targets (median)"
             ))
         ));
-        let total = self.all.len();
         if !outcome.unreadable.is_empty() {
             return Err(CliError::SomeFailed {
                 hint: outcome.unreadable.iter().find_map(Failure::hint),
                 failures: outcome.unreadable.iter().map(Failure::one_line).collect(),
                 total,
                 interrupted: interrupt::asked(),
+                resumes: false,
             }
             .into());
         }
         if outcome.done < total {
-            let done = outcome.done;
-            return Err(CliError::Interrupted { done, total }.into());
+            return Err(CliError::Interrupted {
+                done: outcome.done,
+                total,
+                resumes: false,
+            }
+            .into());
         }
         Ok(())
     }

@@ -7,10 +7,11 @@ mod made_with;
 mod outputs;
 
 use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-use deepfusion_data::{OpenOptions, RgbImage, load_photo};
+use clap::ValueEnum;
+use deepfusion_data::{OpenOptions, RgbImage, calibration_near, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
@@ -18,7 +19,7 @@ use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{
     BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, StartedJob, Summary, add_output,
-    commit, queue, write_unsynced, write_videos,
+    commit, queue, sidecar_path, write_unsynced, write_videos,
 };
 use deepfusion_jobs::scene::{DepthWatch, unwatched};
 use deepfusion_jobs::{Input, intervals};
@@ -37,6 +38,9 @@ use crate::failure::{Context, Result};
 use crate::model::{self, ModelFacts};
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, jobs, output};
+
+/// What the names of pictures end with that are written of targets alone.
+pub(super) const TARGET_PICTURES: [&str; 3] = ["_overlay.png", "_birds_eye.png", "_segments.png"];
 
 /// What is the same for all images of a run.
 pub(super) struct Job<'a> {
@@ -102,7 +106,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     if args.cloud() && !(camera_known || all.iter().all(|input| input.frame.is_some())) {
         return Err(CliError::NoCamera.into());
     }
-    std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
+    output::make_folder(out)?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(out, *shard)?;
     let begun = job.bulk(args).begin(&all, &mine, args.json);
@@ -121,16 +125,18 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     let (there, done) = (mine.len() - todo.len(), summary.done);
     // A full disk is reported once, as the reason for stopping.
     let outcome = outcome(summary)?;
-    say(&format!(
-        "{} written to {}{}",
-        count_of(done - there, "image"),
-        out.display(),
-        if there > 0 {
-            format!(", {there} were there already")
-        } else {
-            String::new()
-        }
-    ));
+    if outcome.is_ok() || done > there {
+        say(&format!(
+            "{} written to {}{}",
+            count_of(done - there, "image"),
+            out.display(),
+            if there > 0 {
+                format!(", {there} were there already")
+            } else {
+                String::new()
+            }
+        ));
+    }
     if args.json {
         output::print_json(&sidecars)?;
     }
@@ -165,11 +171,18 @@ fn outcome(summary: Summary<crate::failure::Failure>) -> Result<Result<()>> {
             failures: failures.iter().map(|(_, error)| error.one_line()).collect(),
             total,
             interrupted: interrupt::asked() && done + failed < total,
+            resumes: true,
         };
         return Ok(Err(error.into()));
     }
     if done < total {
-        return Ok(Err(CliError::Interrupted { done, total }.into()));
+        let resumes = true;
+        return Ok(Err(CliError::Interrupted {
+            done,
+            total,
+            resumes,
+        }
+        .into()));
     }
     manifest?;
     Ok(Ok(()))
@@ -181,11 +194,31 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
         assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
         ..args.open_options()
     };
-    Ok(deepfusion_jobs::find_inputs(
-        &args.inputs,
-        &options,
-        warnings::print,
-    )?)
+    let mut found = deepfusion_jobs::find_inputs(&args.inputs, &options, warnings::print)?;
+    // Where the outputs lie among the images: depth of a picture of depth means nothing.
+    found.retain(|input| input.frame.is_some() || !is_output(&args.out, &input.path));
+    Ok(found)
+}
+
+/// Whether a picture in the folder of the outputs is one of them: named as those of an image whose sidecar lies there.
+fn is_output(out: &Path, picture: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    let name = picture.file_name().and_then(|name| name.to_str());
+    let (Some(name), Some(out), Some(folder)) = (name, real(out), picture.parent().and_then(real))
+    else {
+        return false;
+    };
+    let of_an_image = |save: &Save| {
+        let image = name.strip_suffix(outputs::ending(*save));
+        image.is_some_and(|image| sidecar_path(&out, image).exists())
+    };
+    let of_targets = |ending: &&str| {
+        let image = name.strip_suffix(*ending);
+        image.is_some_and(|image| out.join(format!("{image}_targets.json")).exists())
+    };
+    out == folder
+        && (Save::value_variants().iter().any(of_an_image)
+            || TARGET_PICTURES.iter().any(|ending| of_targets(&ending)))
 }
 
 /// Whether an image is a file of its own, which whoever looks at its depth can open.
@@ -256,11 +289,34 @@ fn print_videos(videos: &[(PathBuf, usize)]) {
 }
 
 /// Warns of a camera that nobody gave.
-fn warn_of_assumed_camera() {
+fn warn_of_assumed_camera(image: &Path) {
+    let remedy = match calibration_near(image) {
+        Some(file) => format!("is this its calibration? --calib {}", file.display()),
+        None => "give --intrinsics, --hfov or --calib".into(),
+    };
     tracing::warn!(
         "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
-         only as right as that is (camera_known: false; give --intrinsics, --hfov or --calib)"
+         only as right as that is (camera_known: false; {remedy})"
     );
+}
+
+/// How far from the middle of the image a principal point may lie before it is warned of, as a share of its side.
+const MOST_OFF: f64 = 0.3;
+
+/// Warns of given numbers that are those of images of another size, as a rule.
+fn warn_of_another_size(image: &Path, k: &Intrinsics) {
+    let off = |c: f64, size: u32| (c / f64::from(size) - 0.5).abs();
+    if off(k.cx, k.width).max(off(k.cy, k.height)) > MOST_OFF {
+        tracing::warn!(
+            "{}: the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
+             The metres would be wrong by as much",
+            image.display(),
+            k.cx,
+            k.cy,
+            k.width,
+            k.height
+        );
+    }
 }
 
 /// Warns of a camera that nobody gave, and that training found.
@@ -377,6 +433,14 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// Everything that [`Self::write`] writes of an image of a file or a recording.
+    pub(super) fn paths(&self, input: &Input) -> Vec<PathBuf> {
+        let out = &self.args.out;
+        let saves = self.outputs.of_image(has_file(input)).into_iter();
+        let files = saves.map(|save| out.join(format!("{}{}", input.name, outputs::ending(save))));
+        files.chain([sidecar_path(out, &input.name)]).collect()
+    }
+
     /// Reads an image and makes it the network's input.
     pub(super) fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
         // Before it is read: a change in between is then noticed by the next run.
@@ -399,7 +463,15 @@ impl<'a> Job<'a> {
             }
         };
         match taken.from {
-            "assumed" => self.camera_warning.call_once(warn_of_assumed_camera),
+            "assumed" => {
+                let warn = || warn_of_assumed_camera(&input.path);
+                self.camera_warning.call_once(warn);
+            }
+            "given" => self.camera_warning.call_once(|| {
+                if let Some(k) = &taken.camera {
+                    warn_of_another_size(&input.path, k);
+                }
+            }),
             "learned" => self.camera_warning.call_once(warn_of_learned_camera),
             _ => {}
         }

@@ -55,8 +55,9 @@ pub(super) fn config(
         Some(camera.resized(width, height).fy)
     });
     config.assumed_camera = assumed_camera(estimator);
-    // The other camera's view takes both cameras of the new drives, too.
-    config.stereo &= settings.camera == Cameras::Both;
+    // Of two cameras each is a view of the other: their baseline is known better than any speed.
+    let both = settings.camera == Cameras::Both;
+    config.stereo = both && (config.stereo || !learned_from_drives);
     if !learned_from_drives {
         // A new PoseNet's unit is found from these drives.
         config.pose_net.metres_per_unit = 0.0;
