@@ -197,8 +197,12 @@ pub(crate) enum CliError {
         path: PathBuf,
         /// What is wrong with it.
         problem: String,
-        /// The settings that there are.
-        keys: String,
+    },
+    /// Nothing but what was written there before.
+    #[error("{input}: no image that is not an output of this program in the folder of the outputs")]
+    OutputsAlone {
+        /// What was given.
+        input: String,
     },
     /// Outputs were to go into a file.
     #[error("{}: a file, and a folder is to be written there", path.display())]
@@ -370,7 +374,8 @@ impl Reportable for CliError {
                 None => format!("mend them, then {}", again(*resumes)),
             }),
             Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
-            Self::PerceptionFile { keys, .. } => Some(format!("the settings are {keys}")),
+            Self::PerceptionFile { .. } => Some("mend what is named there, or leave the line out: each setting has a default".into()),
+            Self::OutputsAlone { .. } => Some("give the images themselves, or another folder for the outputs".into()),
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),

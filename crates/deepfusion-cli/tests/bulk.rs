@@ -111,6 +111,11 @@ fn shards_started_at_once_make_what_one_run_makes() {
     let once = outputs(&at.join("more"));
     ok(at, &among);
     assert_same(&once, &outputs(&at.join("more")));
+    fails(
+        at,
+        &format!("{predict} more/0000000000_depth.png --out more"),
+        &["0000000000_depth.png: no image", "hint: give the images"],
+    );
 }
 
 #[test]
@@ -129,11 +134,24 @@ fn a_camera_that_may_be_wrong_is_warned_of() {
         said.contains("--calib") && said.contains(calibration.to_str().unwrap()),
         "{said}"
     );
-    // Numbers of a picture twice the size.
-    let said = ok(at, &format!("{predict} --intrinsics 112,112,95,63 --out b")).stderr;
-    assert!(said.contains("images of another size"), "{said}");
-    let said = ok(at, &format!("{predict} --intrinsics 56,56,47,31 --out c")).stderr;
-    assert!(!said.contains("WARN"), "{said}");
+    // Numbers of a picture twice the size, and half the size.
+    for (intrinsics, out) in [("112,112,95,63", "b"), ("28,28,23.5,15.5", "c")] {
+        let said = ok(
+            at,
+            &format!("{predict} --intrinsics {intrinsics} --out {out}"),
+        )
+        .stderr;
+        assert!(said.contains("images of another size"), "{said}");
+    }
+    // Its own, and those of one that was cut at the top.
+    for (intrinsics, out) in [("56,56,47,31", "d"), ("56,56,47,8", "e")] {
+        let said = ok(
+            at,
+            &format!("{predict} --intrinsics {intrinsics} --out {out}"),
+        )
+        .stderr;
+        assert!(!said.contains("WARN"), "{said}");
+    }
 }
 
 #[test]

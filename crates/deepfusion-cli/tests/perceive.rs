@@ -317,7 +317,7 @@ fn what_is_wrong_is_named() {
         [
             "wrong.toml",
             "unknown field `min_pixel`",
-            "hint: the settings are",
+            "hint: mend what is named there",
             "max_depth_m"
         ]
         .iter()

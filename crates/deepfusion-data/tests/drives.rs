@@ -182,6 +182,9 @@ fn a_folder_within_a_drive_is_recognised() {
             text.contains("within the drive") && text.contains("drive_0007_sync"),
             "{text}"
         );
+        let drive = drive.canonicalize().unwrap();
+        let remedy = format!("hint: give the drive: {}", drive.display());
+        assert!(text.ends_with(&remedy), "{text}");
     }
 }
 

@@ -51,7 +51,7 @@ pub enum Error {
     /// No image had a single pixel to compare.
     #[error(
         "no image has a ground-truth depth inside the mask{}",
-        if *skipped == 0 { String::new() } else { format!(" ({skipped} skipped: {names})") }
+        if names.is_empty() { String::new() } else { format!(" ({skipped} skipped: {names})") }
     )]
     NothingToEvaluate {
         /// How many images were skipped.
@@ -125,7 +125,7 @@ impl Hint for Error {
             )),
             Self::Shape { .. } => Some("arrays are H×W, row by row".into()),
             Self::Protocol { field, expected, .. } => Some(format!("set {field} to {expected}")),
-            Self::NothingToEvaluate { skipped: 0, .. } => Some("this data has no ground truth".into()),
+            Self::NothingToEvaluate { skipped: 0, .. } => Some("no frame has ground truth of the kind asked for".into()),
             Self::NothingToEvaluate { .. } => Some(
                 "check that the ground truth is in metres and 0 where there is none, and that crop and cap leave pixels"
                     .into(),

@@ -177,8 +177,12 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<String>) -> Result<Ve
     };
     let header = column.header.trim();
     let Some(radps) = column.unit.as_deref().and_then(radps_of) else {
+        let why = match &column.unit {
+            Some(unit) => format!("its unit '{unit}' is not known"),
+            None => "nothing says its unit".into(),
+        };
         notes.push(format!(
-            "column '{header}' is left out, as nothing says its unit: name it yaw_rate_radps or yaw_rate_dps (positive to the left)"
+            "column '{header}' is left out, as {why}: name it yaw_rate_radps or yaw_rate_dps (positive to the left)"
         ));
         return Ok(Vec::new());
     };
@@ -197,9 +201,11 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<String>) -> Result<Ve
             found.push(YawRate { ns, radps });
         }
     }
-    notes.push(format!(
-        "yaw rate from column '{header}', positive to the left"
-    ));
+    if !found.is_empty() {
+        notes.push(format!(
+            "yaw rate from column '{header}', taken to be positive to the left: change its sign where it is not"
+        ));
+    }
     Ok(found)
 }
 
@@ -281,10 +287,12 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<Dri
         latitude.header.trim(),
         longitude.header.trim()
     ));
+    let yaw_rates = yaw_rates(table, times, &mut notes)?;
     let mut log = track::log_of_fixes(&table.path, Format::Table, &fixes)?;
     notes.append(&mut log.notes);
     Ok(DriveLog {
         clock: times.clock,
+        yaw_rates,
         notes,
         ..log
     })

@@ -53,8 +53,8 @@ pub(crate) struct AdaptArgs {
     /// Share of each drive's end to judge on.
     #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = held_out)]
     pub held_out: f64,
-    /// Which cameras. Of both, each is also the other's view of the same moment, as `train --stereo` has it, unless the given network
-    /// learned from drives without that.
+    /// Which cameras. Where rectified cameras are both taken, each is also a second view of the same moment (as `train --stereo`), unless
+    /// the given network learned from drives without it; `--set stereo=false` turns that off.
     #[arg(long, value_name = "2|3|both", default_value = "2")]
     pub camera: Cameras,
     /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,

@@ -15,7 +15,7 @@ pub struct OpenOptions {
     /// fx, fy, cx, cy in pixels of an undistorted image, instead of the recording's own. Not for KITTI
     /// raw, which brings its calibration and refuses it.
     pub intrinsics: Option<[f64; 4]>,
-    /// The images' field of view from left to right in degrees, above 0 and below 170: a pinhole camera with square pixels and
+    /// The images' field of view from left to right in degrees, above 1 and below 170: a pinhole camera with square pixels and
     /// the principal point in the middle ([`Intrinsics::from_hfov`]). Where [`Self::intrinsics`] is given too, that holds.
     pub hfov_deg: Option<f64>,
     /// The camera of recordings of which nothing says it, in place of an error ([`crate::Dataset::camera_assumed`]): this one at

@@ -81,7 +81,8 @@ impl SpeedLog {
                 (Samples { ns, values }, Some(table))
             }
             LogFile::Foreign(log) => {
-                yaw_rates_radps = turns(&log.yaw_rates);
+                yaw_rates_radps =
+                    turns(&log.yaw_rates).map(|turns| turns.bridged(config.max_gap_s, None));
                 course_rates_radps = turns(&log.course_rates);
                 sigmas_mps = sigmas(&log, config.speed_scale());
                 (speeds(&path, &log, config, &mut warnings), None)
@@ -115,7 +116,7 @@ impl SpeedLog {
                 let column = table.require(&YAW_RATES, "time_s,gyro_z_radps")?;
                 let factor = yaw_factor(&table, column, config)?;
                 let values = scaled(table.numbers(column)?, factor);
-                yaw_rates_radps = Some(Samples { ns, values });
+                yaw_rates_radps = Some(Samples { ns, values }.bridged(config.max_gap_s, None));
             }
         } else if let Some(turns) = &yaw_rates_radps {
             streams.push(stream(&path, "imu", &turns.ns));

@@ -172,7 +172,7 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
     // Where nothing moves, the static row would only repeat the first.
     if let Some(metrics) = &report.moving {
         if let Some(still) = &report.still {
-            rows.push(row("static", still));
+            rows.push(row("static (labelled)", still));
         }
         let plural = if report.moving_images == 1 { "" } else { "s" };
         let label = format!("moving, {} image{plural}", report.moving_images);

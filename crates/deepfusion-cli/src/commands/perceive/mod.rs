@@ -61,7 +61,7 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         job: &job,
         all: &all,
         lines: Mutex::new(RecordLines::begin(&out.join("targets.jsonl"))?),
-        progress: Mutex::new(Progress::new("perceiving")),
+        progress: Mutex::new(source.is_none().then(|| Progress::new("perceiving"))),
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
@@ -81,11 +81,9 @@ pub(super) fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result
     let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
     let named = || path.display().to_string();
     let mut table = toml::Table::try_from(&base).with_context(named)?;
-    let keys: Vec<String> = table.keys().cloned().collect();
     let wrong = |error: toml::de::Error| CliError::PerceptionFile {
         path: path.to_owned(),
         problem: error.to_string().trim_end().to_owned(),
-        keys: keys.join(", "),
     };
     table.extend(text.parse::<toml::Table>().map_err(wrong)?);
     let config: PerceptionConfig = table.try_into().map_err(wrong)?;
@@ -137,7 +135,8 @@ struct Work<'a> {
     job: &'a Job<'a>,
     all: &'a [Input],
     lines: Mutex<RecordLines>,
-    progress: Mutex<Progress>,
+    /// None of a live source, which has figures of its own.
+    progress: Mutex<Option<Progress>>,
     outcome: Mutex<Outcome>,
 }
 
@@ -202,8 +201,8 @@ impl Work<'_> {
         }
         let mut outcome = self.outcome();
         outcome.done += 1;
-        if !live {
-            let mut progress = self.progress.lock().unwrap_or_else(|e| e.into_inner());
+        let mut progress = self.progress.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some(progress) = &mut *progress {
             progress.set(outcome.done + outcome.unreadable.len(), self.all.len());
         }
         outcome.targets += found.record.targets.len();
@@ -247,7 +246,7 @@ impl Work<'_> {
                 failures: outcome.unreadable.iter().map(Failure::one_line).collect(),
                 total,
                 interrupted: interrupt::asked(),
-                resumes: false,
+                resumes: outcome.done == 0,
             }
             .into());
         }
@@ -255,7 +254,7 @@ impl Work<'_> {
             return Err(CliError::Interrupted {
                 done: outcome.done,
                 total,
-                resumes: false,
+                resumes: outcome.done == 0,
             }
             .into());
         }

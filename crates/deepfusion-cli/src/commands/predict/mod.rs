@@ -61,6 +61,8 @@ pub(super) struct Job<'a> {
     intervals: IntervalFactors,
     /// Warns once of cameras that nobody gave.
     camera_warning: Once,
+    /// Warns once of a camera that looks like that of images of another size.
+    size_warning: Once,
 }
 
 /// An image on its way through the network.
@@ -196,29 +198,45 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
     };
     let mut found = deepfusion_jobs::find_inputs(&args.inputs, &options, warnings::print)?;
     // Where the outputs lie among the images: depth of a picture of depth means nothing.
-    found.retain(|input| input.frame.is_some() || !is_output(&args.out, &input.path));
+    if let Ok(out) = args.out.canonicalize() {
+        let images = found.len();
+        found.retain(|input| input.frame.is_some() || !is_output(&out, &input.path));
+        if found.is_empty() && images > 0 {
+            let input = args.inputs.join(" ");
+            return Err(CliError::OutputsAlone { input }.into());
+        }
+    }
     Ok(found)
 }
 
-/// Whether a picture in the folder of the outputs is one of them: named as those of an image whose sidecar lies there.
+/// Whether a picture lies in the folder of the outputs, given without links, and is one of them: the sidecar of an image lists it, or
+/// targets were written beside it.
 fn is_output(out: &Path, picture: &Path) -> bool {
-    let real = |path: &Path| path.canonicalize().ok();
     let name = picture.file_name().and_then(|name| name.to_str());
-    let (Some(name), Some(out), Some(folder)) = (name, real(out), picture.parent().and_then(real))
-    else {
+    let folder = picture.parent().map(|folder| {
+        // A bare name lies in the current folder.
+        if folder == Path::new("") {
+            Path::new(".")
+        } else {
+            folder
+        }
+    });
+    let folder = folder.and_then(|folder| folder.canonicalize().ok());
+    let Some(name) = name.filter(|_| folder.as_deref() == Some(out)) else {
         return false;
     };
     let of_an_image = |save: &Save| {
         let image = name.strip_suffix(outputs::ending(*save));
-        image.is_some_and(|image| sidecar_path(&out, image).exists())
+        let listed = |text: String| text.contains(&format!("\"{name}\""));
+        image.is_some_and(|image| {
+            std::fs::read_to_string(sidecar_path(out, image)).is_ok_and(listed)
+        })
     };
     let of_targets = |ending: &&str| {
         let image = name.strip_suffix(*ending);
         image.is_some_and(|image| out.join(format!("{image}_targets.json")).exists())
     };
-    out == folder
-        && (Save::value_variants().iter().any(of_an_image)
-            || TARGET_PICTURES.iter().any(|ending| of_targets(&ending)))
+    Save::value_variants().iter().any(of_an_image) || TARGET_PICTURES.iter().any(of_targets)
 }
 
 /// Whether an image is a file of its own, which whoever looks at its depth can open.
@@ -289,8 +307,10 @@ fn print_videos(videos: &[(PathBuf, usize)]) {
 }
 
 /// Warns of a camera that nobody gave.
-fn warn_of_assumed_camera(image: &Path) {
-    let remedy = match calibration_near(image) {
+fn warn_of_assumed_camera(input: &Input) {
+    // Recordings know where theirs would lie.
+    let near = input.frame.is_none().then(|| calibration_near(&input.path));
+    let remedy = match near.flatten() {
         Some(file) => format!("is this its calibration? --calib {}", file.display()),
         None => "give --intrinsics, --hfov or --calib".into(),
     };
@@ -300,23 +320,27 @@ fn warn_of_assumed_camera(image: &Path) {
     );
 }
 
-/// How far from the middle of the image a principal point may lie before it is warned of, as a share of its side.
-const MOST_OFF: f64 = 0.3;
+/// How far a principal point may lie from the middle of the image, as a share of its side, in both axes and the same way: numbers of an
+/// image half as large again are 0.25 off, those of a cut image in one axis alone.
+const MOST_OFF: f64 = 0.2;
 
-/// Warns of given numbers that are those of images of another size, as a rule.
+/// Whether given numbers look like those of images of another size.
+fn is_of_another_size(k: &Intrinsics) -> bool {
+    let off = |c: f64, size: u32| c / f64::from(size) - 0.5;
+    let (x, y) = (off(k.cx, k.width), off(k.cy, k.height));
+    x * y > 0.0 && x.abs().min(y.abs()) > MOST_OFF
+}
+
 fn warn_of_another_size(image: &Path, k: &Intrinsics) {
-    let off = |c: f64, size: u32| (c / f64::from(size) - 0.5).abs();
-    if off(k.cx, k.width).max(off(k.cy, k.height)) > MOST_OFF {
-        tracing::warn!(
-            "{}: the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
-             The metres would be wrong by as much",
-            image.display(),
-            k.cx,
-            k.cy,
-            k.width,
-            k.height
-        );
-    }
+    tracing::warn!(
+        "{}: the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
+         Metres are then wrong by the ratio of the two sizes",
+        image.display(),
+        k.cx,
+        k.cy,
+        k.width,
+        k.height
+    );
 }
 
 /// Warns of a camera that nobody gave, and that training found.
@@ -409,6 +433,7 @@ impl<'a> Job<'a> {
             step: estimator.step,
             intervals: model.interval_factors()?,
             camera_warning: Once::new(),
+            size_warning: Once::new(),
             scale: model.scale(set, !args.no_focal_correction, estimator.step)?,
             inspector: if outputs.save.contains(&Save::Features) {
                 Some(inspection::open(&model.load(set)?, args.engine.device)?)
@@ -463,15 +488,15 @@ impl<'a> Job<'a> {
             }
         };
         match taken.from {
-            "assumed" => {
-                let warn = || warn_of_assumed_camera(&input.path);
-                self.camera_warning.call_once(warn);
-            }
-            "given" => self.camera_warning.call_once(|| {
-                if let Some(k) = &taken.camera {
-                    warn_of_another_size(&input.path, k);
+            "assumed" => self
+                .camera_warning
+                .call_once(|| warn_of_assumed_camera(input)),
+            "given" => {
+                if let Some(k) = taken.camera.as_ref().filter(|k| is_of_another_size(k)) {
+                    let warn = || warn_of_another_size(&input.path, k);
+                    self.size_warning.call_once(warn);
                 }
-            }),
+            }
             "learned" => self.camera_warning.call_once(warn_of_learned_camera),
             _ => {}
         }

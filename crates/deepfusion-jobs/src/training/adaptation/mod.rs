@@ -40,7 +40,8 @@ pub struct AdaptSettings {
     pub data: Vec<PathBuf>,
     /// Folder of the adapted network's run, which must be new.
     pub out: PathBuf,
-    /// Which cameras of the drives.
+    /// Which cameras of the drives. Of both, where they are rectified, each is by default a second view of the same moment, unless the given
+    /// network learned from drives without that.
     pub camera: Cameras,
     /// For bags: topics that are named.
     pub topics: Vec<NamedTopic>,
