@@ -47,6 +47,17 @@ pub(crate) struct Stretch {
     pub style: Option<GroundStyle>,
 }
 
+impl Stretch {
+    /// A stretch of a varied world: its ground stands for all else.
+    pub(crate) fn styled(style: GroundStyle) -> Self {
+        Self {
+            zebra: f32::NAN,
+            style: Some(style),
+            ..Self::default()
+        }
+    }
+}
+
 /// Ground beyond the pavement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum Beyond {

@@ -5,7 +5,7 @@ use super::motorway::{between, verge};
 use super::sections::{Section, Side, apply_widths};
 use super::site::{Site, Spot};
 use crate::scene::ObjectClass;
-use crate::texture::ground::{Beyond, Paving, Stretch};
+use crate::texture::ground::Stretch;
 use crate::texture::ground_style::Line;
 use rand::Rng;
 
@@ -24,16 +24,7 @@ pub(super) fn furnish(site: &mut Site) {
             sides: [Side::open(), Side::open()],
         });
         let style = ground(site, half);
-        site.world.stretches.push(Stretch {
-            dashes: [0.0; 2],
-            edge_lines: false,
-            zebra: f32::NAN,
-            asphalt: 0.2,
-            bays: false,
-            beyond: [Beyond::Grass; 2],
-            paving: [Paving::Asphalt; 2],
-            style: Some(style),
-        });
+        site.world.stretches.push(Stretch::styled(style));
         from = to;
     }
     // The road itself stays the same.

@@ -3,7 +3,7 @@
 use super::site::{Site, Spot};
 use crate::road::Road;
 use crate::scene::{ObjectClass, Room};
-use crate::texture::ground::{Beyond, Paving, Stretch};
+use crate::texture::ground::Stretch;
 use crate::texture::ground_style::{GroundStyle, Kind as Floor, Surface};
 use crate::texture::pattern::{Kind, Pattern, wall_colour};
 use crate::texture::{Material, Rgb};
@@ -127,16 +127,7 @@ fn lay(site: &mut Site, room: &Room) {
         indoors: true,
     };
     let number = site.world.stretches.len() as u16;
-    site.world.stretches.push(Stretch {
-        dashes: [0.0; 2],
-        edge_lines: false,
-        zebra: f32::NAN,
-        asphalt: 0.2,
-        bays: false,
-        beyond: [Beyond::Paved; 2],
-        paving: [Paving::Slabs; 2],
-        style: Some(style),
-    });
+    site.world.stretches.push(Stretch::styled(style));
     let road = &site.world.road;
     let (from, to) = (road.index_at(room.low[0]), road.index_at(room.high[0]));
     site.world.stretch_of[from..=to].fill(number);

@@ -3,7 +3,7 @@
 use super::sections::{Section, Side, apply_widths};
 use super::site::{Site, Spot};
 use crate::scene::{Lane, ObjectClass};
-use crate::texture::ground::{Beyond, Paving, Stretch};
+use crate::texture::ground::Stretch;
 use crate::texture::ground_style::Line;
 use rand::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -67,16 +67,7 @@ fn paint(site: &mut Site, half: f64, [right, left]: [u8; 2]) {
         let from = site.draw(1.5, 5.0) as f32;
         style.second = [from, from + site.draw(8.0, 14.0) as f32];
     }
-    site.world.stretches.push(Stretch {
-        dashes: [0.0; 2],
-        edge_lines: false,
-        zebra: f32::NAN,
-        asphalt: 0.2,
-        bays: false,
-        beyond: [Beyond::Grass; 2],
-        paving: [Paving::Asphalt; 2],
-        style: Some(style),
-    });
+    site.world.stretches.push(Stretch::styled(style));
 }
 
 fn lanes(site: &mut Site, [right, left]: [u8; 2]) {

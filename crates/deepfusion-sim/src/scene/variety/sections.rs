@@ -3,7 +3,7 @@
 use super::site::Site;
 use crate::config::Scene;
 use crate::road::STEP;
-use crate::texture::ground::{Beyond, Paving, Stretch};
+use crate::texture::ground::Stretch;
 use crate::texture::noise::{lerp, smoothstep};
 use rand::Rng;
 use std::f64::consts::FRAC_PI_2;
@@ -101,16 +101,7 @@ pub(super) fn sections(site: &mut Site) -> Vec<Section> {
         } as f32;
         let sides = [0, 1].map(|side| plan(site, scene, home, half_width, side));
         let style = site.style(half_width);
-        site.world.stretches.push(Stretch {
-            dashes: [0.0; 2],
-            edge_lines: false,
-            zebra: f32::NAN,
-            asphalt: 0.2,
-            bays: false,
-            beyond: [Beyond::Grass; 2],
-            paving: [Paving::Slabs; 2],
-            style: Some(style),
-        });
+        site.world.stretches.push(Stretch::styled(style));
         sections.push(Section {
             from,
             to,
