@@ -76,9 +76,16 @@ pub(crate) enum CliError {
         /// Whether it is a log of speeds by itself.
         is_log: bool,
     },
-    /// A clock of its own for the camera, in a layout with one clock.
-    #[error("--clock-offset is for bags: a KITTI drive has one clock")]
-    OneClock,
+    /// An option that says nothing of the layout to be written.
+    #[error("{option} is not for this layout: {why}")]
+    OtherLayout {
+        /// The option.
+        option: &'static str,
+        /// Why not.
+        why: &'static str,
+        /// The layout that it is for.
+        layout: &'static str,
+    },
     /// A log without anything that saw the drive.
     #[error("neither a video nor images are given for the log")]
     NoMedia,
@@ -314,7 +321,9 @@ impl Reportable for CliError {
         match self {
             Self::Interrupted { .. } | Self::Stopped { .. } | Self::Ended { .. } => Exit::Stopped,
             // Clap could not see it: what is needed depends on what is embedded, what applies on what lies at the path.
-            Self::NoModelGiven | Self::OutOfPlace { .. } | Self::OneClock => Exit::WrongArguments,
+            Self::NoModelGiven | Self::OutOfPlace { .. } | Self::OtherLayout { .. } => {
+                Exit::WrongArguments
+            }
             _ => Exit::Failed,
         }
     }
@@ -413,7 +422,7 @@ impl Reportable for CliError {
             Self::OutOfPlace { .. } => Some(
                 "leave it out; the columns of a recording's own log stand in its dataset.toml (time_column, speed_column, speed_unit, dbc)".into(),
             ),
-            Self::OneClock => Some("leave it out, or add --format bag".into()),
+            Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(

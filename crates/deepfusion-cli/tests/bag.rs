@@ -65,6 +65,27 @@ fn bags_are_trained_on_and_measured_by_scenario() {
 }
 
 #[test]
+fn an_option_of_another_layout_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, option, layout) in [
+        ("--compression none", "--compression", "--format bag"),
+        ("--clock-offset 20", "--clock-offset", "--format bag"),
+        (
+            "--format bag --scan-every 5",
+            "--scan-every",
+            "--format kitti",
+        ),
+    ] {
+        let refused = run(folder.path(), &format!("simulate --out new {args}"));
+        assert_eq!(refused.code, 2, "{}", refused.stderr);
+        for part in [option, "not for this layout", layout] {
+            assert!(refused.stderr.contains(part), "{part}: {}", refused.stderr);
+        }
+        assert!(!folder.path().join("new").exists());
+    }
+}
+
+#[test]
 fn a_bag_is_converted_both_ways() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -1,6 +1,7 @@
 //! What can go wrong with a recording.
 
 use crate::{CalibrationSource, DatasetKind, FoundInstead, GtKind, NamedTopic};
+use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 
 mod hint;
@@ -33,6 +34,16 @@ pub enum Error {
         path: PathBuf,
         /// What is there instead.
         found: FoundInstead,
+    },
+    /// The folder is no recording, but holds some.
+    #[error("{}: no recording by itself: it holds {} (such as {})", path.display(), count_of(*count, "recording"), such_as.display())]
+    FolderOfRecordings {
+        /// The folder.
+        path: PathBuf,
+        /// How many recordings lie directly in it.
+        count: usize,
+        /// The first of them.
+        such_as: PathBuf,
     },
     /// A part of the recording that is needed is not there.
     #[error("{}: missing, it holds {what}", path.display())]

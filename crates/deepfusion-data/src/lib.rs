@@ -26,8 +26,8 @@ pub use convert::{
 pub use dataset::{
     CalibrationPlace, Camera, CameraPath, Cameras, ClockOffset, Dataset, DatasetKind, DatasetParts,
     DriveInspection, Ego, EgoMotion, Frame, FrameImage, Heading, Inspection, IntrinsicsSummary,
-    Mount, NamedTopic, NoMotion, OpenOptions, PLAUSIBLE_HEIGHT_M, Receiver, Recording, Snippet,
-    Source, SpeedRange, SpeedWarning, Split, SplitCoverage, SplitEntry, Stream, TopicRole,
+    Mount, NamedTopic, NoMotion, OpenOptions, PLAUSIBLE_HEIGHT_M, Receiver, Recording, SeenTurn,
+    Snippet, Source, SpeedRange, SpeedWarning, Split, SplitCoverage, SplitEntry, Stream, TopicRole,
     grey_image, hold_out, road_camera_height, speed_unit_warning,
 };
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};

@@ -170,6 +170,17 @@ fn what_is_there_instead_is_said() {
         text.contains("1 file and 1 folder (such as readme.md)"),
         "{text}"
     );
+    for name in ["monday", "tuesday"] {
+        fs::create_dir(at(name)).unwrap();
+        fs::write(at(name).join("1.jpg"), "x").unwrap();
+    }
+    let text = refusal(dir.path());
+    assert!(
+        text.contains("it holds 2 recordings") && text.contains("monday)"),
+        "{text}"
+    );
+    let all = dir.path().join("*");
+    assert!(text.ends_with(&format!("all: {}", all.display())), "{text}");
 }
 
 #[test]

@@ -58,16 +58,12 @@ pub(crate) fn pairs(survey: &Survey<'_>) -> Vec<EpipolarPair> {
     let k = &survey.intrinsics;
     let of = |pair: &super::survey::SeenPair| {
         let motion = pair.motion.as_ref()?;
-        let points: Vec<_> = pair.flow.iter().map(|f| in_plane(k, f)).collect();
-        (points.len() >= LEAST_POINTS).then_some(())?;
-        let later = &survey.dataset.frames()[survey.frames[pair.later].index];
+        let later_s = survey.dataset.frames()[survey.frames[pair.later].index].time_s?;
+        let times = (later_s - motion.dt_s, later_s);
+        let found = EpipolarPair::new(&pair.flow, k, motion.source_from_target?, times)?;
         Some(EpipolarPair {
-            points,
-            noise: NOISE_PX / k.fx,
-            earlier_from_later: motion.source_from_target?,
-            dt_s: motion.dt_s,
-            middle_s: later.time_s? - 0.5 * motion.dt_s,
             speed_mps: motion.speed_mps,
+            ..found
         })
     };
     survey.pairs.iter().filter_map(of).collect()
@@ -80,6 +76,24 @@ fn in_plane(k: &Intrinsics, flow: &Flow) -> (Vector2<f64>, Vector2<f64>) {
 }
 
 impl EpipolarPair {
+    /// Points that a camera followed between two times, and how it moved by the vehicle; `None` for too few points.
+    pub(crate) fn new(
+        followed: &[Flow],
+        k: &Intrinsics,
+        earlier_from_later: Se3,
+        (from_s, to_s): (f64, f64),
+    ) -> Option<Self> {
+        let dt_s = to_s - from_s;
+        (followed.len() >= LEAST_POINTS).then(|| Self {
+            points: followed.iter().map(|f| in_plane(k, f)).collect(),
+            noise: NOISE_PX / k.fx,
+            earlier_from_later,
+            dt_s,
+            middle_s: 0.5 * (from_s + to_s),
+            speed_mps: earlier_from_later.translation().norm() / dt_s,
+        })
+    }
+
     /// The same where the vehicle's clock is so far ahead of the frames': another motion by the vehicle. `None` where its
     /// track does not reach so far.
     pub(crate) fn with_clock(&self, ego: &Ego<'_>, vehicle_ahead_s: f64) -> Option<Self> {

@@ -25,6 +25,7 @@ mod opening;
 mod parallax;
 mod plots;
 mod record;
+mod seen_turns;
 mod speed;
 mod standing;
 mod steering;
@@ -42,6 +43,7 @@ pub use heading::{NoHeading, heading};
 pub use log::{doctor_log, is_log};
 pub use plots::{DrivePlots, Line};
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
+pub use seen_turns::seen_turns;
 
 use deepfusion_data::{
     Cameras, ClockOffset, Dataset, DatasetKind, Error, Inspection, OpenOptions, Result,

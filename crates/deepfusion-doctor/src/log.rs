@@ -28,7 +28,11 @@ pub fn is_log(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let named = ENDINGS.contains(&ending.to_ascii_lowercase().as_str());
     let is_one = (path.is_file() && named) || path.join("Location.csv").is_file();
-    is_one && matches!(Dataset::kind_at(path), Err(DataError::UnknownLayout { .. }))
+    is_one
+        && matches!(
+            Dataset::kind_at(path),
+            Err(DataError::UnknownLayout { .. } | DataError::FolderOfRecordings { .. })
+        )
 }
 
 /// Examines a log by itself. One that cannot be read is a finding, not an error.

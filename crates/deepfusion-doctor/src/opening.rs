@@ -57,11 +57,11 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
             Severity::Note,
             None,
             if survey.dataset.receiver().course_rate_radps.is_some() {
-                "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot, and only \
-                 configurations that do not read turns can train"
+                "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot; \
+                 training takes the turns from the images"
             } else {
-                "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked, and only \
-                 configurations that do not read turns can train"
+                "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from \
+                 the images"
             }
             .into(),
             "record an inertial unit or the steering angle",

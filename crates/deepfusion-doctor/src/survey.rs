@@ -76,8 +76,7 @@ impl<'a> Survey<'a> {
         let stride = stride(dataset);
         let wanted = sample(dataset.frames().len(), stride, most_frames);
         let k = dataset.intrinsics(0);
-        let width = WIDTH.min(k.width).max(1);
-        let height = (k.height * width).div_ceil(k.width).max(1);
+        let (width, height) = small_size(&k);
         let read: Vec<_> = wanted
             .into_par_iter()
             .map(|index| SeenFrame::read(dataset, index, width, height))
@@ -174,6 +173,12 @@ impl SeenFrame {
             coarse,
         })
     }
+}
+
+/// Width and height at which this camera's images are looked at, pixels.
+pub(crate) fn small_size(k: &Intrinsics) -> (u32, u32) {
+    let width = WIDTH.min(k.width).max(1);
+    (width, (k.height * width).div_ceil(k.width).max(1))
 }
 
 /// How many frames on the other one of a pair is.

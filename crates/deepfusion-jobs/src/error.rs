@@ -323,7 +323,7 @@ impl Hint for Error {
             ),
             #[cfg(feature = "train")]
             Self::NotJudged { .. } => Some(
-                "give longer drives with speed and yaw rate, or hold more of them out; or train on from the network without this check".into(),
+                "give longer drives with a speed, or hold more of them out; or train on from the network without this check".into(),
             ),
             #[cfg(feature = "train")]
             Self::NotAdapted { .. } => {

@@ -62,12 +62,19 @@ pub fn find_inputs(
         } else if path.exists() && has_ending(&path, &RECORDINGS) {
             recordings.extend(open(&path, argument, options)?);
         } else if path.exists() || !argument.contains(['*', '?', '[']) {
-            // A file that is not there is an error of whoever opens it.
+            // One of several files that is not there is an error of whoever opens it.
             found.push(path);
         } else {
             let paths = glob::glob(argument)?.filter_map(Result::ok);
             found.extend(images_among(paths, argument)?);
         }
+    }
+    if let Some(path) = found.first()
+        && recordings.is_empty()
+        && !found.iter().any(|path| path.exists())
+    {
+        let path = path.clone();
+        return Err(deepfusion_data::Error::NoSuchPath { path }.into());
     }
     opened(&recordings);
     let mut inputs = named(found);

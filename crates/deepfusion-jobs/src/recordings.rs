@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Camera, Cameras, Dataset, Heading, NamedTopic, OpenOptions, Split};
-use deepfusion_doctor::heading;
-use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig};
+use deepfusion_doctor::{heading, seen_turns};
+use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig, ViewMotion};
 
 use crate::Result;
 
@@ -28,11 +28,57 @@ pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
 pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let mut datasets = open_recordings(paths, options)?;
     for dataset in datasets.iter_mut().filter(|d| d.mount_assumed()) {
-        if let Some(heading) = heading(dataset).ok().filter(Heading::is_sure) {
+        if let Some(heading) = sure_heading(dataset) {
             dataset.aim(&heading);
         }
     }
     Ok(datasets)
+}
+
+/// As [`open_aimed`], for what learns from the vehicle's motion: where its roll and pitch are not recorded, they are taken from the images
+/// ([`seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of such a drive.
+///
+/// # Errors
+/// As [`open_recordings`].
+pub fn open_with_turns(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    open_turning(paths, options, Dataset::tilt_unknown)
+}
+
+/// As [`open_aimed`], for what measures by the vehicle's motion and takes roll and pitch from the images itself: its turns are taken from
+/// all images of a drive only where there is no yaw rate.
+///
+/// # Errors
+/// As [`open_recordings`].
+pub fn open_with_yaw(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    open_turning(paths, options, |dataset| {
+        dataset.tilt_unknown() && !dataset.yaw_known()
+    })
+}
+
+fn open_turning(
+    paths: &[PathBuf],
+    options: &OpenOptions,
+    is_to_turn: impl Fn(&Dataset) -> bool,
+) -> Result<Vec<Dataset>> {
+    let mut datasets = open_aimed(paths, options)?;
+    for dataset in datasets.iter_mut().filter(|d| is_to_turn(d)) {
+        if !dataset.yaw_known() && dataset.mount_assumed() {
+            // Where it heads shows once its turns are known, and these are surer once it is known where it heads.
+            let mut turning = dataset.clone();
+            turning.take_turns(&seen_turns(dataset));
+            if let Some(heading) = sure_heading(&turning) {
+                dataset.aim(&heading);
+            }
+        }
+        let turns = seen_turns(dataset);
+        dataset.take_turns(&turns);
+    }
+    Ok(datasets)
+}
+
+/// Where a camera heads, where its images show it well enough.
+fn sure_heading(dataset: &Dataset) -> Option<Heading> {
+    heading(dataset).ok().filter(Heading::is_sure)
 }
 
 /// The split file of a name, read.
@@ -89,6 +135,10 @@ pub fn open_for(
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
 ) -> Result<Vec<(usize, Dataset)>> {
     let data = &config.data;
+    let open = match config.view_motion {
+        ViewMotion::Vehicle | ViewMotion::Auto if !data.level => open_with_turns,
+        _ => open_aimed,
+    };
     if data.sets.is_empty() {
         let validation = (&data.validation, &data.validation_split);
         let (paths, split) = of_role(role, (&data.paths, &data.split), validation);
@@ -99,7 +149,7 @@ pub fn open_for(
             data.camera_ahead_s,
             &data.topics,
         )?;
-        let datasets = open_aimed(paths, &options)?;
+        let datasets = open(paths, &options)?;
         opened(&options, &datasets);
         return Ok(placed(0, datasets));
     }
@@ -117,7 +167,7 @@ pub fn open_for(
             _ => &set.topics,
         };
         let options = open_options(config, split, camera, ahead_s, topics)?;
-        let datasets = open_aimed(paths, &options)?;
+        let datasets = open(paths, &options)?;
         opened(&options, &datasets);
         all.extend(placed(i, datasets));
     }
@@ -277,6 +327,37 @@ mod tests {
         let given = &open_aimed(&[folder], &options)?[0];
         assert!(!given.mount_assumed());
         assert!(straight(ahead(given)));
+        Ok(())
+    }
+
+    /// Of a drive with a speed alone the images tell how it turned and where its camera looks; with `level` nothing is taken from them.
+    #[test]
+    fn a_speed_is_enough() -> std::result::Result<(), Box<dyn Error>> {
+        let at = tempfile::tempdir()?;
+        let folder = folder(at.path())?;
+        let speeds = fs::read_to_string(folder.join("speed.csv"))?;
+        let without_yaw = |line: &str| line.rsplit_once(',').map(|(rest, _)| rest.to_owned());
+        let speeds: Vec<String> = speeds.lines().filter_map(without_yaw).collect();
+        fs::write(folder.join("speed.csv"), speeds.join("\n"))?;
+        let mut config = deepfusion_model::Preset::Tiny.config();
+        config.data.paths = vec![folder];
+        let open = |config: &TrainConfig| -> std::result::Result<Dataset, Box<dyn Error>> {
+            Ok(training_recordings(config)?.remove(0).1)
+        };
+        let turning = open(&config)?;
+        let (right, down) = ahead(&turning);
+        let off = (TOO_LOW_PX / turning.intrinsics(0).fy).atan();
+        println!(
+            "{right:.4} to the right, {down:.4} down; {:.4} up",
+            off.sin()
+        );
+        assert!((down + off.sin()).abs() < 0.008 && right.abs() < 0.008);
+        assert!(turning.yaw_known() && !turning.tilt_unknown());
+        let known = |drive: &Dataset| drive.camera_motion(1, 2).is_some();
+        assert!(known(&turning));
+        config.data.level = true;
+        let level = open(&config)?;
+        assert!(!level.yaw_known() && level.tilt_unknown() && !known(&level));
         Ok(())
     }
 }

@@ -37,6 +37,31 @@ impl MotionModel {
         }
     }
 
+    /// Whether it is a track of one unit that does not measure roll and pitch. Of several sensors that is an inertial unit's part, and
+    /// nothing is put in its place.
+    #[must_use]
+    pub fn lacks_tilt(&self) -> bool {
+        matches!(self, Self::Track(track) if !track.has_tilt())
+    }
+
+    /// A track of one unit with these samples of roll and pitch (time in s, then as [`Self::tilt`]); others stay as they are.
+    #[must_use]
+    pub fn with_tilt(self, samples: &[(f64, f64, f64)]) -> Self {
+        match self {
+            Self::Track(track) => Self::Track(Box::new(track.with_tilt(samples))),
+            Self::Fused(_) => self,
+        }
+    }
+
+    /// A track of one unit with these samples of its yaw rate (time in s, rad/s, positive to the left); others stay as they are.
+    #[must_use]
+    pub fn with_yaw_rate(self, samples: &[(f64, f64)]) -> Self {
+        match self {
+            Self::Track(track) => Self::Track(Box::new(track.with_yaw_rate(samples))),
+            Self::Fused(_) => self,
+        }
+    }
+
     /// The vehicle's motion between two times; `None` across gaps, outside the recording, and
     /// backwards in time.
     #[must_use]

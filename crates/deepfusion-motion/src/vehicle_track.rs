@@ -49,6 +49,21 @@ impl VehicleTrack {
         }
     }
 
+    /// The same with samples of another yaw rate (time in s, rad/s, positive to the left), at times of their own.
+    #[must_use]
+    pub fn with_yaw_rate(self, samples: &[(f64, f64)]) -> Self {
+        Self {
+            yaw_rate_radps: Signal::with_max_gap(samples.iter().copied(), MAX_GAP_S),
+            ..self
+        }
+    }
+
+    /// Whether roll and pitch are known.
+    #[must_use]
+    pub fn has_tilt(&self) -> bool {
+        self.tilt_rad.is_some()
+    }
+
     /// The same with every speed multiplied by `scale`, the ratio of true to measured speed.
     #[must_use]
     pub fn with_speed_scale(self, scale: f64) -> Self {

@@ -113,6 +113,7 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
             ahead.expand([batch, 3]),
         )],
         turns_known: None,
+        other_camera: None,
         offsets: vec![1],
         names: vec![String::new(); batch],
     }

@@ -30,6 +30,9 @@ pub struct SnippetBatch {
     pub measured: Vec<Motion>,
     /// Which samples are of drives whose turns were measured, B, 1 or 0; `None` where all are. The others' `measured` says nothing.
     pub turns_known: Option<Tensor<1>>,
+    /// Which samples have the other camera's view, B, 1 or 0; `None` where all have what the run has. The others show their target
+    /// in its place, which no loss may look at.
+    pub other_camera: Option<Tensor<1>>,
     /// Offsets of the sources in time.
     pub offsets: Vec<i32>,
     /// Drive and frame of each target.
@@ -63,6 +66,7 @@ struct RawBatch {
     rotation: Vec<Vec<f32>>,
     translation: Vec<Vec<f32>>,
     turns_known: Vec<f32>,
+    other_camera: Vec<f32>,
     offsets: Vec<i32>,
     names: Vec<String>,
     /// The scale factors of each sample; empty if they are the same for all.
@@ -189,6 +193,10 @@ impl BatchLoader {
                 .turns_known
                 .contains(&0.0)
                 .then(|| vectors(raw.turns_known)),
+            other_camera: raw
+                .other_camera
+                .contains(&0.0)
+                .then(|| vectors(raw.other_camera)),
             offsets: raw.offsets,
             names: raw.names,
             factors: (!raw.factors.is_empty())
@@ -209,6 +217,8 @@ struct Item {
     weights: Vec<f32>,
     /// Whether the vehicle's turns were measured.
     turns_known: bool,
+    /// Whether the other camera's view is there, where the run has stereo.
+    other_camera: bool,
 }
 
 impl Maker {
@@ -250,6 +260,7 @@ impl Maker {
                 .map(|s| items.iter().flat_map(|i| i.motion[s].2).collect())
                 .collect(),
             turns_known: items.iter().map(|i| f32::from(i.turns_known)).collect(),
+            other_camera: items.iter().map(|i| f32::from(i.other_camera)).collect(),
             offsets: self.config.frames.clone(),
             names: samples.iter().map(|s| self.set.name(*s)).collect(),
             factors: if !self.config.has_factors() {
@@ -282,7 +293,11 @@ impl Maker {
         let sources = &sample.snippet.sources;
         let target = (sample.dataset, sample.snippet.target);
         let mut clean = Vec::new();
-        for (dataset, frame) in std::iter::once(target).chain(sample.sources()) {
+        // A batch's samples have as many views: the target stands for one that is not there.
+        let other_camera = sample.stereo.is_some() || !self.config.stereo;
+        let in_place = (!other_camera).then_some(target);
+        let sources_seen = sample.sources().chain(in_place);
+        for (dataset, frame) in std::iter::once(target).chain(sources_seen) {
             clean.push(self.image(dataset, frame, flip)?);
         }
         let network = clean
@@ -317,6 +332,7 @@ impl Maker {
         });
         let motion = measured
             .chain(calibrated)
+            .chain(in_place.map(|_| (0.0, Se3::identity())))
             .map(|(distance_m, motion)| {
                 let motion = if flip { motion.mirrored_x() } else { motion };
                 (
@@ -335,6 +351,7 @@ impl Maker {
             turns_known: sources
                 .iter()
                 .all(|source| source.motion.source_from_target.is_some()),
+            other_camera,
             clean,
             network,
             intrinsics: row_major(&k.matrix()),

@@ -134,12 +134,12 @@ impl Hint for Error {
                     .into(),
             ),
             Self::NoYawRate { .. } => Some(
-                "train with view_motion auto, distance or posenet and loss.rotation = 0, or give a yaw rate: \
-                 yaw_rate_radps in speed.csv, or imu.csv"
+                "its images do not show enough of its turns either: train with view_motion auto, distance or posenet and \
+                 loss.rotation = 0, or give a yaw rate: yaw_rate_radps in speed.csv, or imu.csv"
                     .into(),
             ),
             Self::NoStereo { .. } => Some(
-                "stereo needs both cameras of each drive, as KITTI's image_02 and image_03; without it one camera and the speeds will do"
+                "stereo needs both cameras of a drive, as KITTI's image_02 and image_03; without it one camera and the speeds will do"
                     .into(),
             ),
             Self::NoDepth { .. } => Some(

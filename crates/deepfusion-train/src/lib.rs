@@ -73,7 +73,7 @@ pub use runner::{BurnRunner, depth_net, peak_device_bytes};
 pub use sampler::Sampler;
 pub use shared_frames::{SharedFrames, shared_frames};
 pub use source::{Sample, SampleSet};
-pub use stereo::{NoStereo, StereoSource};
+pub use stereo::{NoStereo, StereoSource, recordings_with_stereo};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};
 pub use workers::{SingleWorker, Workers};

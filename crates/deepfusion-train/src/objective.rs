@@ -85,7 +85,12 @@ impl Model {
                 0 => &finest,
                 _ => &self.views((pass, batch), index, level, &motions),
             };
-            let compared = compared(views, level, masks.as_deref());
+            let mut compared = compared(views, level, masks.as_deref());
+            if let Some(there) = &batch.other_camera {
+                // The other camera's view is the last; only `minimum` has one.
+                let other = compared.pop().map(|view| view.only_where(there));
+                compared.extend(other);
+            }
             let output = if self.config.reprojection == Reprojection::Mean {
                 let [_, _, _, width] = level.targets.dims();
                 let logits = pass.explained.iter().map(|logit| meaned(logit, width));

@@ -23,7 +23,7 @@ pub struct Sample {
     pub dataset: usize,
     /// The frames and the motion between them.
     pub snippet: Snippet,
-    /// The other camera's view of the target's moment, where the run has stereo.
+    /// The other camera's view of the target's moment, where the run has stereo and the drive another camera.
     pub stereo: Option<StereoSource>,
 }
 
@@ -144,6 +144,7 @@ impl SampleSet {
         let (mut train, mut held) = (Vec::new(), Vec::new());
         // Why drives have no sample: an error, the last, or unsure distances.
         let (mut last, mut unsure) = (None, Vec::<String>::new());
+        let mut one_camera = None;
         let learns = |dataset: &usize| config.learn(set_of[*dataset]);
         let other_cameras = OtherCameras::of(datasets, set_of);
         for (dataset, recording) in datasets.iter().enumerate() {
@@ -176,7 +177,10 @@ impl SampleSet {
                     }
                     let (a, b) = hold_out(snippets, share);
                     let other = config.stereo.then(|| other_cameras.beside(dataset));
-                    let other = other.transpose()?;
+                    let other = other.transpose()?.flatten();
+                    if config.stereo && other.is_none() {
+                        one_camera.get_or_insert(dataset);
+                    }
                     // A frame that the other camera lacks is left out.
                     let sample = |snippet: Snippet| {
                         let number = recording.frames()[snippet.target].number;
@@ -209,6 +213,13 @@ impl SampleSet {
                     last = Some(error);
                 }
             }
+        }
+        let no_pair = || train.iter().all(|sample| sample.stereo.is_none());
+        if let Some(dataset) = one_camera.filter(|_| no_pair()) {
+            return Err(Error::NoStereo {
+                drive: datasets[dataset].name().to_owned(),
+                why: NoStereo::OneCamera,
+            });
         }
         let depth_alone =
             (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());

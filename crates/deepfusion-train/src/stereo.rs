@@ -1,12 +1,12 @@
 //! The other camera's view of the same moment.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 use deepfusion_data::{Camera, Dataset};
 use deepfusion_geometry::{Intrinsics, Se3};
 
-use crate::Error;
+use crate::{Error, SampleSet, TrainConfig};
 
 /// How far the two cameras' intrinsics may differ, in pixels: rectified ones are the same.
 const SAME_CAMERA_PX: f64 = 0.5;
@@ -15,7 +15,7 @@ const SAME_CAMERA_PX: f64 = 0.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoStereo {
-    /// It is not among the data.
+    /// No drive of the run has a second one among the data.
     OneCamera,
     /// No frame of the drive has one of the other camera.
     NoCommonFrame,
@@ -28,7 +28,7 @@ pub enum NoStereo {
 impl std::fmt::Display for NoStereo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::OneCamera => "its other camera is not among the data, and stereo asks for it",
+            Self::OneCamera => "its other camera is not among the data, nor is that of any other drive, and stereo asks for it",
             Self::NoCommonFrame => "its two cameras have no frame in common",
             Self::NoBaseline => "nothing says where its two cameras are",
             Self::NotRectified => {
@@ -47,6 +47,18 @@ pub struct StereoSource {
     pub frame: usize,
     /// From the target's camera to that one, metres.
     pub source_from_target: Se3,
+}
+
+/// How many of these recordings have another camera among them whose images are views of the same moments.
+///
+/// # Errors
+/// [`Error::NoStereo`] where one has another camera that is no view: not rectified, or with no frame in common.
+pub fn recordings_with_stereo(datasets: &[Dataset]) -> Result<usize, Error> {
+    let one_set = vec![0; datasets.len()];
+    let others = OtherCameras::of(datasets, &one_set);
+    let found = (0..datasets.len()).map(|dataset| others.beside(dataset));
+    let found: Vec<_> = found.collect::<Result<_, _>>()?;
+    Ok(found.into_iter().flatten().count())
 }
 
 /// The other cameras of a run's recordings.
@@ -76,11 +88,11 @@ impl<'a> OtherCameras<'a> {
         }
     }
 
-    /// The camera beside a recording's.
+    /// The camera beside a recording's; `None` where the recording has one camera.
     ///
     /// # Errors
-    /// [`Error::NoStereo`].
-    pub(crate) fn beside(&self, dataset: usize) -> Result<OtherCamera, Error> {
+    /// [`Error::NoStereo`] where there are two, and neither is a view of the other.
+    pub(crate) fn beside(&self, dataset: usize) -> Result<Option<OtherCamera>, Error> {
         let own = &self.datasets[dataset];
         let fail = |why| Error::NoStereo {
             drive: own.name().to_owned(),
@@ -91,8 +103,9 @@ impl<'a> OtherCameras<'a> {
             Camera::Right => Camera::Left,
         };
         let place = (self.set_of[dataset], own.folder(), own.name(), camera);
-        let other = self.places.get(&place).copied();
-        let other = other.ok_or_else(|| fail(NoStereo::OneCamera))?;
+        let Some(&other) = self.places.get(&place) else {
+            return Ok(None);
+        };
         let theirs = &self.datasets[other];
         let mounts = own.cam_from_vehicle().zip(theirs.cam_from_vehicle());
         let (here, there) = mounts.ok_or_else(|| fail(NoStereo::NoBaseline))?;
@@ -110,11 +123,11 @@ impl<'a> OtherCameras<'a> {
             return Err(fail(NoStereo::NotRectified));
         }
         let frames = theirs.frames().iter().enumerate();
-        Ok(OtherCamera {
+        Ok(Some(OtherCamera {
             dataset: other,
             frames: frames.map(|(i, frame)| (frame.number, i)).collect(),
             source_from_target,
-        })
+        }))
     }
 }
 
@@ -127,6 +140,26 @@ impl OtherCamera {
             source_from_target: self.source_from_target,
         })
     }
+}
+
+/// Which drives learn without the other camera's view in a run that has stereo.
+pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<String> {
+    if !config.stereo {
+        return None;
+    }
+    let alone = samples.samples.iter().filter(|s| s.stereo.is_none());
+    let alone: BTreeSet<usize> = alone.map(|sample| sample.dataset).collect();
+    let first = samples.datasets.get(*alone.first()?)?.name();
+    Some(match alone.len() {
+        1 => format!("{first} has one camera: it learns from its own frames alone"),
+        2 => format!(
+            "{first} and 1 other drive have one camera: they learn from their own frames alone"
+        ),
+        n => format!(
+            "{first} and {} other drives have one camera: they learn from their own frames alone",
+            n - 1
+        ),
+    })
 }
 
 fn same(a: Intrinsics, b: Intrinsics) -> bool {

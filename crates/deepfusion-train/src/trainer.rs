@@ -12,12 +12,12 @@ pub use validation::validation_loss;
 
 use crate::freeze::freeze;
 use crate::learned_focal::{self, check_camera};
-use crate::unmeasured_turns;
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
     Sampler, StepOutcome, TrainConfig, TrainEvent,
 };
+use crate::{stereo, unmeasured_turns};
 use burn::tensor::Device;
 use deepfusion_model::Error as ModelError;
 use pace::{Pace, Smoothed};
@@ -251,6 +251,7 @@ impl Trainer {
         let warnings = [
             learned_focal::warning(&self.config, &self.train),
             unmeasured_turns::warning(&self.config, &self.train),
+            stereo::warning(&self.config, &self.train),
         ];
         for message in warnings.into_iter().flatten() {
             let step = self.state.step;

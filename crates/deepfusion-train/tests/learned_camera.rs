@@ -100,6 +100,7 @@ fn pairs(k: &Intrinsics, source_from_target: &[Se3], device: &Device) -> Snippet
         distance_weight: Vec::new(),
         measured: vec![motions(source_from_target, device)],
         turns_known: None,
+        other_camera: None,
         offsets: vec![1],
         names: vec![String::new(); n],
         factors: None,

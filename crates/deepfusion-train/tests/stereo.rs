@@ -182,6 +182,55 @@ fn posenet_is_not_asked_for_the_other_camera() {
     assert_ne!(with.terms.reprojection, without.terms.reprojection);
 }
 
+/// Of two drives one has one camera: it learns from its own frames, as without stereo, beside the other's pairs.
+#[test]
+fn a_drive_with_one_camera_learns_beside_one_with_two() {
+    let folder = tempfile::tempdir().unwrap();
+    let two = write_kitti(&street(), folder.path(), &mut |_, _| ()).unwrap();
+    let alone = folder.path().join("alone");
+    let one = write_kitti(&street(), &alone, &mut |_, _| ()).unwrap();
+    std::fs::remove_dir_all(one.join("image_03")).unwrap();
+    let mut config = settings();
+    (config.batch, config.loss.automask) = (12, true);
+    config.pose_net.metres_per_unit = 1.0;
+    let mut drives = opened(&two, Cameras::Both);
+    drives.extend(opened(&one, Cameras::Both));
+    let (set, ..) = SampleSet::split(&config, drives, None).unwrap();
+    let paired = set.samples.iter().filter(|s| s.stereo.is_some()).count();
+    assert_eq!((set.samples.len(), paired), (12, 8));
+
+    let device = Device::flex();
+    let batch = BatchLoader::training(&config, set, 0)
+        .next(&device)
+        .unwrap()
+        .unwrap();
+    assert_eq!((batch.clean.len(), batch.measured.len()), (3, 2));
+    let there: Vec<f32> = values(batch.other_camera.clone().unwrap());
+    assert_eq!(there.iter().sum::<f32>(), 8.0);
+    let learning = device.autodiff();
+    let model = Model::new(&config, &learning).unwrap().valid(&learning);
+    let schedule = Schedule {
+        speed_weight: 1.0,
+        masks_active: false,
+    };
+    let errors = |batch: &deepfusion_train::SnippetBatch| {
+        let loss = model.loss(&model.forward(batch), batch, schedule);
+        values(loss.finest.error)
+    };
+    let both = errors(&batch);
+    let mut in_time = batch.clone();
+    in_time.clean.pop();
+    in_time.network.pop();
+    in_time.measured.pop();
+    in_time.other_camera = None;
+    let in_time = errors(&in_time);
+    for (sample, there) in there.iter().enumerate() {
+        let pixels = sample * 192 * 96..(sample + 1) * 192 * 96;
+        let same = both[pixels.clone()] == in_time[pixels];
+        assert_eq!(same, *there == 0.0, "sample {sample}");
+    }
+}
+
 #[test]
 fn one_camera_is_no_stereo() {
     let folder = tempfile::tempdir().unwrap();

@@ -19,7 +19,7 @@ pub struct Card {
     pub bytes: u64,
     /// Number of learned parameters of the depth network.
     pub parameters: u64,
-    /// Steps it was trained for.
+    /// Steps of its last run; what it began from is in the note.
     pub steps: usize,
     /// The checkpoint of its run: `best` or `last`.
     pub checkpoint: String,

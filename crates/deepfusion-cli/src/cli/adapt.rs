@@ -26,7 +26,7 @@ pub(crate) struct AdaptArgs {
     /// The data set whose metric scale to use, for a network trained on several.
     #[arg(long = "data-set", value_name = "NAME")]
     pub data_set: Option<String>,
-    /// Drives to learn on, with speed and yaw rate.
+    /// Drives to learn on, with a speed; turns that are not recorded are taken from the images.
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present = "undo")]
     pub data: Vec<PathBuf>,
     /// Folder of the adapted network's run, new.
@@ -54,7 +54,7 @@ pub(crate) struct AdaptArgs {
     #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = held_out)]
     pub held_out: f64,
     /// Which cameras. Where rectified cameras are both taken, each is also a second view of the same moment (as `train --stereo`), unless
-    /// the given network learned from drives without it; `--set stereo=false` turns that off.
+    /// the given network learned from drives without it; `--set stereo=false` turns that off. Drives with one camera may stand beside.
     #[arg(long, value_name = "2|3|both", default_value = "2")]
     pub camera: Cameras,
     /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,

@@ -12,7 +12,7 @@ use super::{CameraIntrinsics, EngineArgs, names};
 #[command(
     group(ArgGroup::new("what").args(["model", "pred"])),
     after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels separately where \
-    the simulator's masks or KITTI's tracklets exist. Drives with speed and yaw rate are also judged without ground truth: the scale \
+    the simulator's masks or KITTI's tracklets exist. Drives with a speed are also judged without ground truth: the scale \
     certificate is the bias of the metre with a 95 % interval, from frames that training did not see. Array files: .npz (matched by \
     name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. The result \
     of a run is kept in RUN/eval, where `compare` finds it.\n\n\

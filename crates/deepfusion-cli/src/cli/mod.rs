@@ -200,12 +200,12 @@ pub(crate) struct SimulateArgs {
         allow_negative_numbers = true
     )]
     pub clock_offset: f64,
-    /// Compression of the bag.
-    #[arg(long, value_parser = names::compression(), default_value = "lz4")]
-    pub compression: Compression,
-    /// A velodyne scan for every N-th frame (KITTI); 0 writes none.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub scan_every: usize,
+    /// Compression of the bag [default: lz4].
+    #[arg(long, value_parser = names::compression())]
+    pub compression: Option<Compression>,
+    /// A velodyne scan for every N-th frame (KITTI); 0 writes none [default: 1].
+    #[arg(long, value_name = "N")]
+    pub scan_every: Option<usize>,
     /// Print what was written as JSON on stdout.
     #[arg(long)]
     pub json: bool,

@@ -104,11 +104,11 @@ pub(super) fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
             ),
             (
                 ViewMotion::Vehicle,
-                "The vehicle's, from speed and yaw rate",
+                "The vehicle's, from its speed and its turns: measured ones, else those that the images show",
             ),
             (
                 ViewMotion::Auto,
-                "vehicle for drives with a yaw rate, distance for the others",
+                "vehicle for drives whose turns are known, distance for the others",
             ),
         ],
     )

@@ -4,13 +4,12 @@ use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
 use deepfusion_hint::count_of;
+use deepfusion_rosbag::Compression;
 use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
 /// `deepfusion simulate`.
 pub(super) fn run(args: &SimulateArgs) -> Result<()> {
-    if args.format == SimulateFormat::Kitti && args.clock_offset != 0.0 {
-        return Err(CliError::OneClock.into());
-    }
+    check_layout(args)?;
     let config = config(args);
     let simulation = Simulation::new(&config)?;
     let mut progress = Progress::new("simulating");
@@ -19,7 +18,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
         SimulateFormat::Kitti => write_kitti(&simulation, &args.out, &mut report)?,
         SimulateFormat::Bag => {
             let settings = BagSettings {
-                compression: args.compression,
+                compression: args.compression.unwrap_or(Compression::Lz4),
                 clock_offset_s: 1e-3 * args.clock_offset,
                 ..BagSettings::default()
             };
@@ -44,6 +43,32 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     output::print(&format!("{}\n", drive.display()))
 }
 
+/// That no option is given that would be silently without effect.
+///
+/// # Errors
+/// [`CliError::OtherLayout`].
+fn check_layout(args: &SimulateArgs) -> Result<(), CliError> {
+    let is_bag = args.format == SimulateFormat::Bag;
+    let (option, why) = match args {
+        args if !is_bag && args.clock_offset != 0.0 => {
+            ("--clock-offset", "a KITTI drive has one clock")
+        }
+        args if !is_bag && args.compression.is_some() => {
+            ("--compression", "a KITTI drive is a folder of files")
+        }
+        args if is_bag && args.scan_every.is_some() => {
+            ("--scan-every", "a bag's LiDAR has a rate of its own")
+        }
+        _ => return Ok(()),
+    };
+    let layout = if is_bag { "kitti" } else { "bag" };
+    Err(CliError::OtherLayout {
+        option,
+        why,
+        layout,
+    })
+}
+
 /// What to simulate; what is not said follows the layout's data set.
 fn config(args: &SimulateArgs) -> SimConfig {
     let (sensors, size, fps) = match args.format {
@@ -64,7 +89,7 @@ fn config(args: &SimulateArgs) -> SimConfig {
         sensors: args.sensors.unwrap_or(sensors),
         camera_height_m: args.camera_height,
         stereo_baseline_m: args.stereo.unwrap_or(0.0),
-        scan_every: args.scan_every,
+        scan_every: args.scan_every.unwrap_or(1),
         ..SimConfig::default()
     }
 }

@@ -7,6 +7,7 @@ use super::kind::DatasetKind;
 use super::options::OpenOptions;
 use super::receiver::Receiver;
 use super::recording::{CameraPath, Recording};
+use super::seen_turn::{self, NO_YAW_RATE, SeenTurn};
 use super::selection::Selection;
 use super::split::drive_name;
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
@@ -145,6 +146,44 @@ impl Dataset {
             self.warnings.retain(|warning| warning != NO_MOUNT);
             self.warnings.push(format!("{NOT_GIVEN} {heading}"));
         }
+    }
+
+    /// Whether nothing says how the vehicle rolls and pitches, though its speed is known.
+    #[must_use]
+    pub fn tilt_unknown(&self) -> bool {
+        let track = self.parts.track.as_ref();
+        track.is_some_and(MotionModel::lacks_tilt)
+    }
+
+    /// With the vehicle's turns as its images show them, in the order of time: roll and pitch, and where no yaw rate was recorded the turns
+    /// to the side as well. Nothing happens where [they are known](Self::tilt_unknown), where none are given, and without a yaw rate where
+    /// those of a tenth of the pairs that moved are missing: a drive with holes in it is no better known.
+    pub fn take_turns(&mut self, turns: &[SeenTurn]) {
+        let enough = self.parts.yaw_known || 10 * turns.len() >= 9 * self.moving_pairs();
+        if !self.tilt_unknown() || turns.is_empty() || !enough {
+            return;
+        }
+        let track = self.parts.track.take();
+        self.parts.track =
+            track.map(|track| seen_turn::put_into(track, turns, self.parts.yaw_known));
+        self.warnings
+            .retain(|warning| !warning.contains(NO_YAW_RATE));
+        self.warnings
+            .push(seen_turn::warning(turns, self.parts.yaw_known));
+        self.parts.yaw_known = true;
+    }
+
+    /// Images from one of which to the next the vehicle moved.
+    fn moving_pairs(&self) -> usize {
+        /// Slower than this it stands, m/s.
+        const STANDING: f64 = 0.5;
+        let Ok(ego) = self.ego() else { return 0 };
+        let later = 1..self.frames().len();
+        let moves = |i: &usize| {
+            let motion = ego.between(self.frames(), *i, i - 1);
+            motion.is_ok_and(|motion| motion.speed_mps > STANDING)
+        };
+        later.filter(moves).count()
     }
 
     /// With what a satellite receiver says beside the speeds.

@@ -48,6 +48,12 @@ pub enum NoMotion {
 }
 
 impl Ego<'_> {
+    /// Whether its turns to the side were measured.
+    #[must_use]
+    pub fn yaw_known(&self) -> bool {
+        self.yaw_known
+    }
+
     /// The same on a body without roll and pitch: for what measures them in the pictures.
     #[must_use]
     pub fn level(self) -> Self {

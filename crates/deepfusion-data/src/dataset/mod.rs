@@ -15,6 +15,7 @@ mod kind;
 mod options;
 mod receiver;
 mod recording;
+pub(crate) mod seen_turn;
 pub(crate) mod selection;
 mod snippet;
 mod speed_check;
@@ -35,6 +36,7 @@ pub use options::OpenOptions;
 pub(crate) use options::{assumed_warning, numbers_of_hfov};
 pub use receiver::Receiver;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
+pub use seen_turn::SeenTurn;
 pub use snippet::{Snippet, Source, hold_out};
 pub use speed_check::{
     PLAUSIBLE_HEIGHT_M, SpeedWarning, grey_image, road_camera_height, speed_unit_warning,

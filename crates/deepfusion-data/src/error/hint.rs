@@ -24,6 +24,10 @@ impl Hint for Error {
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }
+            Self::FolderOfRecordings { path, .. } => {
+                let all = path.join("*");
+                return Some(format!("give one of them, or all: {}", all.display()));
+            }
             Self::Exists { .. } => "choose another place, or remove it first",
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",

@@ -1,5 +1,6 @@
 //! Telling layouts apart.
 
+use super::files::folders;
 use super::found_instead::FoundInstead;
 use super::kitti::{self, Drive, drive_around, find_drives};
 use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
@@ -20,7 +21,7 @@ impl Dataset {
     /// (evaluation needs neither); where they are there, they must be readable.
     ///
     /// # Errors
-    /// [`Error::UnknownLayout`] where no layout fits, [`Error::NoSuchPath`], [`Error::Missing`]
+    /// [`Error::UnknownLayout`] where no layout fits, [`Error::FolderOfRecordings`], [`Error::NoSuchPath`], [`Error::Missing`]
     /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
     /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
     /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
@@ -34,7 +35,7 @@ impl Dataset {
     /// The layout in which [`Self::open`] reads what is at a path, found without opening it.
     ///
     /// # Errors
-    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`], [`Error::SeveralVersions`].
+    /// [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::NoSuchPath`], [`Error::Config`], [`Error::SeveralVersions`].
     pub fn kind_at(path: &Path) -> Result<DatasetKind> {
         Ok(Layout::of(path)?.kind())
     }
@@ -68,23 +69,47 @@ impl Layout {
     /// The first layout that fits.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::UnknownLayout`], [`Error::SeveralVersions`].
+    /// [`Error::NoSuchPath`], [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::SeveralVersions`].
     pub(crate) fn of(path: &Path) -> Result<Self> {
+        if let Some(layout) = Self::known(path)? {
+            return Ok(layout);
+        }
+        let mut recordings = folders(path)?;
+        recordings.retain(|inner| matches!(Self::known(inner), Ok(Some(_))));
+        let path = path.to_owned();
+        Err(match recordings.first() {
+            Some(first) => Error::FolderOfRecordings {
+                count: recordings.len(),
+                such_as: first.clone(),
+                path,
+            },
+            None => Error::UnknownLayout {
+                found: FoundInstead::folder(&path)?,
+                path,
+            },
+        })
+    }
+
+    /// The first layout that fits; `None` for a folder that none does.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    fn known(path: &Path) -> Result<Option<Self>> {
         let sequences = kitti_odometry::find(path)?;
         if !sequences.is_empty() {
-            return Ok(Self::KittiOdometry(sequences));
+            return Ok(Some(Self::KittiOdometry(sequences)));
         }
         // Its fisheye cameras 2 and 3 have the names of KITTI raw's.
         let drives = kitti360::find(path)?;
         if !drives.is_empty() {
-            return Ok(Self::Kitti360(drives));
+            return Ok(Some(Self::Kitti360(drives)));
         }
         if let Some(place) = nuscenes::find(path)? {
-            return Ok(Self::NuScenes(place));
+            return Ok(Some(Self::NuScenes(place)));
         }
         let drives = find_drives(path)?;
         if !drives.is_empty() {
-            return Ok(Self::Kitti(drives));
+            return Ok(Some(Self::Kitti(drives)));
         }
         // `.` and links have names too once they are resolved.
         let real = path.canonicalize().map_err(|e| Error::file(path, e))?;
@@ -95,11 +120,11 @@ impl Layout {
         let given = named(path, &real);
         // By either name: a link may have no ending, or lead to a store whose files have none.
         if bag::is_bag(&given) || bag::is_bag(&real) {
-            return Ok(Self::Bags(vec![given]));
+            return Ok(Some(Self::Bags(vec![given])));
         }
         if !real.is_dir() {
             return if video::is_video(&real) {
-                Ok(Self::Video(real))
+                Ok(Some(Self::Video(real)))
             } else {
                 Err(unknown(FoundInstead::file(&real)))
             };
@@ -108,15 +133,15 @@ impl Layout {
             return Err(unknown(FoundInstead::PartOf { drive }));
         }
         if comma::is_segment(&real) {
-            return Ok(Self::Comma(real));
+            return Ok(Some(Self::Comma(real)));
         }
         let bags = bag::bags_in(&real)?;
         if !bags.is_empty() {
-            return Ok(Self::Bags(bags));
+            return Ok(Some(Self::Bags(bags)));
         }
         let rgbd = rgbd::find(&real)?;
         if !rgbd.is_empty() {
-            return Ok(Self::RgbD(rgbd));
+            return Ok(Some(Self::RgbD(rgbd)));
         }
         let (images, video) = (folder::has_images(&real)?, video::in_folder(&real)?);
         match (images, video) {
@@ -127,9 +152,9 @@ impl Layout {
                     video.file.display()
                 ),
             }),
-            (_, Some(_)) => Ok(Self::Video(real)),
-            (true, None) => Ok(Self::Folder(real)),
-            (false, None) => Err(unknown(FoundInstead::folder(&real)?)),
+            (_, Some(_)) => Ok(Some(Self::Video(real))),
+            (true, None) => Ok(Some(Self::Folder(real))),
+            (false, None) => Ok(None),
         }
     }
 

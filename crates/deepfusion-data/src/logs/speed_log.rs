@@ -6,6 +6,7 @@ use super::table::{Column, Table};
 use super::times::{TIMES, times};
 use super::vehicle_log::{VehicleLog, imu_readings};
 use crate::Receiver;
+use crate::dataset::seen_turn::NO_YAW_RATE;
 use crate::dataset_toml::FolderConfig;
 use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
 use deepfusion_logs::{Clock, DriveLog, ReadOptions, YawRate, is_gps_track};
@@ -122,8 +123,7 @@ impl SpeedLog {
             streams.push(stream(&path, "imu", &turns.ns));
         } else {
             warnings.push(format!(
-                "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
-                 view_motion = \"vehicle\" and a rotation loss need",
+                "{}: {NO_YAW_RATE}: how the car turned is not recorded",
                 name(&path)
             ));
         }

@@ -40,10 +40,10 @@ pub enum ViewMotion {
     PoseNet,
     /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
     Distance,
-    /// The vehicle's own, from speed and yaw rate, and the body's roll and pitch where they are known. PoseNet learns
-    /// that motion beside it.
+    /// The vehicle's own, from its speed and its turns: yaw, roll and pitch as they were measured, else as the images show them. PoseNet
+    /// learns that motion beside it.
     Vehicle,
-    /// As much of it as each drive's sensors know: `vehicle` for drives with a yaw rate, `distance` for those without one.
+    /// As much of it as is known of each drive: `vehicle` where its turns are, measured or by the images, else `distance`.
     Auto,
 }
 
@@ -114,6 +114,10 @@ pub struct DataConfig {
     pub topics: Vec<String>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
+    /// Whether vehicles are taken to be level where no sensor measures their roll and pitch. Else their images tell them, each read once
+    /// more before training.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub level: bool,
     /// What is learned from.
     #[serde(skip_serializing_if = "Learn::is_own_motion")]
     pub learn: Learn,
@@ -149,7 +153,7 @@ pub struct TrainConfig {
     /// Where the reversed pair's motion comes from.
     pub reversed_pose: ReversedPose,
     /// Whether the other camera's image of the same moment is a source, too, warped by the calibrated baseline, which gives metres
-    /// whatever the speeds say. Needs both cameras of each drive, and `reprojection = "minimum"`.
+    /// whatever the speeds say. Needs `reprojection = "minimum"` and both cameras of a drive; drives with one learn from their own frames.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub stereo: bool,
     /// Samples a step.
@@ -277,6 +281,7 @@ impl DataConfig {
             camera_ahead_s: _,
             topics: _,
             camera: _,
+            level: _,
             learn: _,
             loader_threads: _,
             cache_mib: _,
@@ -484,6 +489,7 @@ mod tests {
             camera_ahead_s: None,
             topics: Vec::new(),
             camera: "both".into(),
+            level: true,
             learn: Learn::default(),
             loader_threads: None,
             cache_mib: None,

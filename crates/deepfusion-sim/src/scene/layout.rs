@@ -5,10 +5,10 @@ use super::buildings::{self, Plot, Style};
 use super::cars;
 use super::furniture::Furniture;
 use super::greenery::Greens;
+use super::widths::Widths;
 use crate::config::Scene;
-use crate::road::{KERB_HEIGHT, SIDE_STREET_LENGTH, STEP, SideStreet};
+use crate::road::{KERB_HEIGHT, SIDE_STREET_LENGTH, SideStreet};
 use crate::texture::ground::{Beyond, Paving, Stretch};
-use crate::texture::noise::{lerp, smoothstep};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -31,6 +31,19 @@ struct Section {
     to: f64,
     half_width: f32,
     sides: [Side; 2],
+}
+
+impl Section {
+    fn widths(&self) -> Widths {
+        Widths {
+            to: self.to,
+            half_width: self.half_width,
+            sides: self
+                .sides
+                .each_ref()
+                .map(|side| (side.pavement, side.verge)),
+        }
+    }
 }
 
 impl Side {
@@ -71,7 +84,8 @@ struct Side {
 /// Fills the world: widths, side streets, houses, plants, furniture, parked cars.
 pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
     let sections = sections(world, rng);
-    apply_widths(world, &sections);
+    let widths: Vec<Widths> = sections.iter().map(Section::widths).collect();
+    world.apply_widths(&widths, BLEND);
     add_side_streets(world, rng);
     let greens = Greens::new(world, rng);
     let furniture = Furniture::new(world, rng);
@@ -178,32 +192,6 @@ fn sections(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<Section> {
         from = to;
     }
     sections
-}
-
-fn apply_widths(world: &mut World, sections: &[Section]) {
-    let start = world.road.start;
-    let count = world.road.samples_mut().len();
-    world.stretch_of = vec![0; count];
-    for (i, sample) in world.road.samples_mut().iter_mut().enumerate() {
-        let s = start + i as f64 * STEP;
-        let number = sections
-            .iter()
-            .position(|section| s < section.to)
-            .unwrap_or(sections.len() - 1);
-        let (here, next) = (
-            &sections[number],
-            &sections[(number + 1).min(sections.len() - 1)],
-        );
-        let t = smoothstep((here.to - BLEND) as f32, here.to as f32, s as f32);
-        sample.half_width = lerp(here.half_width, next.half_width, t);
-        for side in 0..2 {
-            let (a, b) = (&here.sides[side], &next.sides[side]);
-            sample.pavement[side] = lerp(a.pavement, b.pavement, t);
-            sample.verge[side] = lerp(a.verge, b.verge, t);
-        }
-        world.stretch_of[i] = number as u16;
-    }
-    world.road.index();
 }
 
 fn add_side_streets(world: &mut World, rng: &mut ChaCha8Rng) {

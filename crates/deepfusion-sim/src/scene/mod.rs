@@ -8,6 +8,7 @@ mod greenery;
 mod lamps;
 mod layout;
 mod variety;
+mod widths;
 
 pub use variety::Variety;
 

@@ -457,6 +457,7 @@ fn snippets(on: &Inputs) -> SnippetBatch {
         distance_weight: vec![None],
         measured: vec![Motion::new(Tensor::zeros([2, 3], &on.device), ahead)],
         turns_known: None,
+        other_camera: None,
         offsets: vec![1],
         names: vec![String::new(); 2],
         factors: None,

@@ -13,6 +13,28 @@ pub struct View {
     pub moving: Option<Tensor<4, Bool>>,
 }
 
+/// More than any photometric error, which is at most 1.
+const NO_ERROR: f64 = 10.0;
+
+impl View {
+    /// A view that only some samples have (`there`, N, 1 or 0): in the others it sees no pixel, and its constant is larger than any
+    /// error, so that it wins nowhere.
+    ///
+    /// Each sample must have another view.
+    #[must_use]
+    pub fn only_where(self, there: &Tensor<1>) -> Self {
+        let [n] = there.dims();
+        let there = there.clone().reshape([n, 1, 1, 1]);
+        let constant = there.clone().neg().add_scalar(1.0).mul_scalar(NO_ERROR);
+        let seen = there.greater_elem(0.5).expand(self.valid.dims());
+        Self {
+            valid: self.valid.bool_and(seen),
+            unwarped_error: self.unwarped_error.add(constant),
+            ..self
+        }
+    }
+}
+
 /// The reprojection loss and its per-pixel results.
 #[derive(Debug, Clone)]
 pub struct ReprojectionOutput {
@@ -170,6 +192,38 @@ mod tests {
             // Every constant competes with automask: standing still explains all but the last pixel best.
             let masked = reprojection(views.to_vec(), true);
             assert_eq!(read(masked.error), [0.1, 0.1, 0.1, 0.2]);
+        }
+    }
+
+    /// Of two samples the second lacks the better view: it costs what it would cost with the first view alone, and only that is drawn.
+    #[test]
+    fn a_view_that_a_sample_lacks_wins_nowhere() {
+        let device = Device::flex().autodiff();
+        let rows = |a: f32, b: f32| Tensor::<4>::from_data([[[[a]]], [[[b]]]], &device);
+        let (in_time, beside) = (rows(0.4, 0.4).require_grad(), rows(0.1, 0.0).require_grad());
+        let view = |error: &Tensor<4>, constant: [f32; 2]| View {
+            error: error.clone(),
+            valid: error.ones_like().greater_elem(0.5),
+            unwarped_error: rows(constant[0], constant[1]),
+            moving: None,
+        };
+        for automask in [false, true] {
+            let there = Tensor::<1>::from_data([1.0, 0.0], &device);
+            // The target in its place has no error at all.
+            let other = view(&beside, [0.9, 0.0]).only_where(&there);
+            for views in [
+                vec![view(&in_time, [0.8, 0.8]), other.clone()],
+                vec![other.clone(), view(&in_time, [0.8, 0.8])],
+            ] {
+                let out = reprojection(views, automask);
+                let read = |t: Tensor<4>| -> Vec<f32> { t.into_data().iter().collect() };
+                assert_eq!(read(out.error), [0.1, 0.4]);
+                assert_eq!(read(out.valid.float()), [1.0, 1.0]);
+                assert_eq!(read(out.explained.float()), [1.0, 1.0]);
+                let gradients = out.loss.backward();
+                assert_eq!(read(in_time.grad(&gradients).unwrap()), [0.0, 0.5]);
+                assert_eq!(read(beside.grad(&gradients).unwrap()), [0.5, 0.0]);
+            }
         }
     }
 

@@ -210,6 +210,7 @@ fn batch(size: [usize; 2], device: &Device) -> SnippetBatch {
         distance_weight: vec![None; 2],
         measured: vec![still.clone(), still],
         turns_known: None,
+        other_camera: None,
         offsets: OFFSETS.into(),
         names: vec!["first".into(), "second".into()],
         factors: None,

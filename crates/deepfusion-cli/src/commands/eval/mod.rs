@@ -28,7 +28,7 @@ use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
 use super::clocks;
-use super::recordings::{open_aimed, open_recordings};
+use super::recordings::{open_recordings, open_with_yaw};
 use super::run_report::{self, Choice};
 use super::used_checkpoint::UsedCheckpoint;
 use super::warnings;
@@ -138,7 +138,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     let datasets = if verdict::is_declined(args) {
         open_recordings(&args.data, &options)?
     } else {
-        open_aimed(&args.data, &options)?
+        open_with_yaw(&args.data, &options)?
     };
     let found = verdict::of_model(args, &model, &mut estimator, &datasets)?;
     // A figure that needs ground truth is an error where there is none.

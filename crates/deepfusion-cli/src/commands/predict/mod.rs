@@ -227,9 +227,10 @@ fn is_output(out: &Path, picture: &Path) -> bool {
     };
     let of_an_image = |save: &Save| {
         let image = name.strip_suffix(outputs::ending(*save));
-        let listed = |text: String| text.contains(&format!("\"{name}\""));
+        let listed = |sidecar: Sidecar| sidecar.files.iter().any(|file| file == name);
         image.is_some_and(|image| {
-            std::fs::read_to_string(sidecar_path(out, image)).is_ok_and(listed)
+            let text = std::fs::read(sidecar_path(out, image)).unwrap_or_default();
+            serde_json::from_slice(&text).is_ok_and(listed)
         })
     };
     let of_targets = |ending: &&str| {

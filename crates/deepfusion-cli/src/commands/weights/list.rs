@@ -148,7 +148,7 @@ fn network_text(card: &Card) -> String {
         ""
     };
     let mut text = format!(
-        "  {}{default}\n    network   {}{size}, {:.2} M parameters, {:.1} MB ({})\n    learned   {}, the {} checkpoint, {}\n    \
+        "  {}{default}\n    network   {}{size}, {:.2} M parameters, {:.1} MB ({})\n    last run  {}, the {} checkpoint, {}\n    \
          from      {}{real}\n",
         card.name,
         card.preset(),

@@ -25,7 +25,7 @@ use self::folders::Folders;
 use super::{Began, Start};
 use crate::held_out::unseen_frames;
 use crate::model_facts::ModelFacts as _;
-use crate::recordings::open_aimed;
+use crate::recordings::open_with_turns;
 use crate::samples::{SampleWarning, open_samples};
 use crate::verdict::{SPEED_SD, Unseen, VerdictOptions, plan, verdict};
 use crate::{Error, Result};
@@ -36,7 +36,7 @@ const LEAST_FRAMES: usize = 4;
 /// What to learn on, and how.
 #[derive(Debug, Clone)]
 pub struct AdaptSettings {
-    /// Drives with speed and yaw rate.
+    /// Drives with a speed.
     pub data: Vec<PathBuf>,
     /// Folder of the adapted network's run, which must be new.
     pub out: PathBuf,
@@ -146,7 +146,7 @@ impl Adaptation {
         let folders = Folders::of(&settings.out)?;
         let start = Start::from_source(&given);
         let options = settings.open_options(assumed_camera(estimator).as_ref());
-        let drives = open_aimed(&settings.data, &options)?;
+        let drives = open_with_turns(&settings.data, &options)?;
         opened(&options, &drives);
         let mut config = recipe::config(&settings, estimator, device, &drives)?;
         start.record_in(&mut config)?;

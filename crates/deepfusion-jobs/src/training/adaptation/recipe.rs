@@ -7,7 +7,7 @@ use deepfusion_model::{
 };
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_runtime::DepthEstimator;
-use deepfusion_train::Device;
+use deepfusion_train::{Device, recordings_with_stereo};
 
 use super::{AdaptSettings, cameras};
 use crate::Result;
@@ -57,7 +57,7 @@ pub(super) fn config(
     config.assumed_camera = assumed_camera(estimator);
     // Of two cameras each is a view of the other: their baseline is known better than any speed.
     let both = settings.camera == Cameras::Both;
-    config.stereo = both && (config.stereo || (!learned_from_drives && are_pairs(opened)));
+    config.stereo = both && (config.stereo || (!learned_from_drives && has_pairs(opened)));
     if !learned_from_drives {
         // A new PoseNet's unit is found from these drives.
         config.pose_net.metres_per_unit = 0.0;
@@ -101,20 +101,9 @@ pub(super) fn config(
     Ok(config)
 }
 
-/// Whether each recording has a rectified other camera among them.
-fn are_pairs(opened: &[Dataset]) -> bool {
-    let is_beside = |own: &Dataset, other: &Dataset| {
-        let mounts = own.cam_from_vehicle().zip(other.cam_from_vehicle());
-        let rectified = mounts.is_some_and(|(here, there)| {
-            let between = there * here.inverse();
-            between.angle() < 1e-3 && between.translation().norm() > 1e-3
-        });
-        own.camera() != other.camera()
-            && (own.folder(), own.name()) == (other.folder(), other.name())
-            && rectified
-    };
-    let has_other = |own: &Dataset| opened.iter().any(|other| is_beside(own, other));
-    opened.iter().all(has_other)
+/// Whether a recording has a rectified other camera among them, and none has one that is no view of it.
+fn has_pairs(opened: &[Dataset]) -> bool {
+    recordings_with_stereo(opened).is_ok_and(|count| count > 0)
 }
 
 /// Of a network whose run had recordings without a camera, the one that it learned or assumed for them, held as it is.

@@ -2,9 +2,8 @@
 
 use super::site::Site;
 use crate::config::Scene;
-use crate::road::STEP;
+use crate::scene::widths::Widths;
 use crate::texture::ground::Stretch;
-use crate::texture::noise::{lerp, smoothstep};
 use rand::Rng;
 use std::f64::consts::FRAC_PI_2;
 
@@ -81,6 +80,19 @@ pub(super) struct Section {
     pub to: f64,
     pub half_width: f32,
     pub sides: [Side; 2],
+}
+
+impl Section {
+    fn widths(&self) -> Widths {
+        Widths {
+            to: self.to,
+            half_width: self.half_width,
+            sides: self
+                .sides
+                .each_ref()
+                .map(|side| (side.pavement, side.verge)),
+        }
+    }
 }
 
 /// The stretches of a street, from its start to its end.
@@ -185,26 +197,6 @@ fn plan(site: &mut Site, scene: Scene, home: Frontage, half_width: f32, side: us
 
 /// Gives the road its widths.
 pub(super) fn apply_widths(site: &mut Site, sections: &[Section]) {
-    let world = &mut *site.world;
-    let start = world.road.start;
-    let count = world.road.samples_mut().len();
-    world.stretch_of = vec![0; count];
-    let mut number = 0;
-    for (i, sample) in world.road.samples_mut().iter_mut().enumerate() {
-        let s = start + i as f64 * STEP;
-        while number + 1 < sections.len() && s >= sections[number].to {
-            number += 1;
-        }
-        let here = &sections[number];
-        let next = &sections[(number + 1).min(sections.len() - 1)];
-        let t = smoothstep((here.to - BLEND) as f32, here.to as f32, s as f32);
-        sample.half_width = lerp(here.half_width, next.half_width, t);
-        for side in 0..2 {
-            let (a, b) = (&here.sides[side], &next.sides[side]);
-            sample.pavement[side] = lerp(a.pavement, b.pavement, t);
-            sample.verge[side] = lerp(a.verge, b.verge, t);
-        }
-        world.stretch_of[i] = number as u16;
-    }
-    world.road.index();
+    let widths: Vec<Widths> = sections.iter().map(Section::widths).collect();
+    site.world.apply_widths(&widths, BLEND);
 }

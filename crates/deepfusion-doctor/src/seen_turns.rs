@@ -1,0 +1,94 @@
+//! How a vehicle turned, by its own images.
+//!
+//! A body on springs rolls and pitches by a tenth of a degree from one image to the next, which moves the picture as much as a metre's drive
+//! moves the road 25 m ahead. Whoever has a yaw rate alone does not know of it. The points of two images do: the camera's turn follows from
+//! them ([`super::epipolar`]), and the vehicle's roll, pitch and yaw from that by the mount.
+
+use super::epipolar::EpipolarPair;
+use super::flow::flow;
+use super::survey;
+use deepfusion_data::{Dataset, Ego, SeenTurn, VehicleMotion, grey_image};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_motion::GreyImage;
+use rayon::prelude::*;
+
+/// Images that are in memory at a time.
+const AT_ONCE: usize = 64;
+/// Looks at a pair whose yaw nobody measured: the way that it went depends on it.
+const LOOKS: usize = 3;
+
+/// How the vehicle turned from each image to the next, in their order, where enough points show it and the way between them is known.
+/// Reads all images.
+#[must_use]
+pub fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
+    let Some(ego) = dataset.ego().ok().map(Ego::level) else {
+        return Vec::new();
+    };
+    let count = dataset.frames().len().saturating_sub(1);
+    let mut found = Vec::with_capacity(count);
+    let mut last = Small::read(dataset, 0);
+    for first in (0..count).step_by(AT_ONCE) {
+        let end = (first + AT_ONCE).min(count);
+        let read: Vec<_> = (first + 1..end + 1)
+            .into_par_iter()
+            .map(|index| Small::read(dataset, index))
+            .collect();
+        let images: Vec<&Option<Small>> = std::iter::once(&last).chain(&read).collect();
+        let turns: Vec<_> = (first..end)
+            .into_par_iter()
+            .filter_map(|earlier| {
+                let [a, b] = [earlier, earlier + 1].map(|index| images[index - first].as_ref());
+                let [from_s, to_s] = [earlier, earlier + 1].map(|i| dataset.frames()[i].time_s);
+                turn(&ego, (from_s?, to_s?), (a?, b?))
+            })
+            .collect();
+        found.extend(turns);
+        last = read.into_iter().next_back().flatten();
+    }
+    found
+}
+
+/// An image, small and grey, and its camera.
+struct Small {
+    image: GreyImage,
+    intrinsics: Intrinsics,
+}
+
+impl Small {
+    /// `None` for an image that cannot be read.
+    fn read(dataset: &Dataset, index: usize) -> Option<Self> {
+        let k = dataset.intrinsics(index);
+        let (width, height) = survey::small_size(&k);
+        let image = dataset.load_image(index).ok()?;
+        Some(Self {
+            image: grey_image(&image, width, height),
+            intrinsics: k.resized(width, height),
+        })
+    }
+}
+
+fn turn(ego: &Ego<'_>, (from_s, to_s): (f64, f64), (a, b): (&Small, &Small)) -> Option<SeenTurn> {
+    let mut vehicle = ego.vehicle_motion(from_s, to_s)?;
+    let points = flow(&a.image, &b.image);
+    let vehicle_from_cam = ego.cam_from_vehicle.inverse();
+    let looks = if ego.yaw_known() { 1 } else { LOOKS };
+    let mut seen = None;
+    for _ in 0..looks {
+        let said = vehicle.camera0_from_camera1(&ego.cam_from_vehicle);
+        let pair = EpipolarPair::new(&points, &a.intrinsics, said, (from_s, to_s))?;
+        let turn = vehicle_from_cam.rotate(&pair.turn_of_a_pitching_body(&pair.direction()?)?);
+        if !ego.yaw_known() {
+            vehicle = VehicleMotion {
+                yaw_rad: turn.z,
+                ..vehicle
+            };
+        }
+        seen = Some(SeenTurn {
+            from_s,
+            to_s,
+            yaw_rad: turn.z,
+            tilt_rad: [turn.x, turn.y],
+        });
+    }
+    seen
+}

@@ -1,0 +1,133 @@
+//! How the vehicle turned, by its images, against how it did.
+
+use std::path::Path;
+
+use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_doctor::seen_turns;
+use deepfusion_sim::{Scene, SimConfig, Simulation, write_kitti};
+
+/// A drive of 60 frames with traffic, whose oxts know every turn.
+fn drive(folder: &Path, scene: Scene) -> Dataset {
+    let simulation = Simulation::new(&SimConfig {
+        seed: 7,
+        frames: 60,
+        width: 320,
+        height: 96,
+        moving_cars: 3,
+        scan_every: 0,
+        scene,
+        ..SimConfig::default()
+    })
+    .unwrap();
+    let drive = write_kitti(&simulation, folder, &mut |_, _| ()).unwrap();
+    Dataset::open(&drive, &OpenOptions::default())
+        .unwrap()
+        .remove(0)
+}
+
+/// Root of the mean square, in degrees.
+fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|v| v.powi(2)).sum();
+    (squares / values.len() as f64).sqrt().to_degrees()
+}
+
+/// The same drive as a folder of images with a speed alone.
+fn with_speed_alone(drive: &Dataset, folder: &Path) -> Dataset {
+    let images = folder.join("images");
+    std::fs::rename(drive.folder().join("image_02/data"), &images).unwrap();
+    let times: Vec<f64> = drive.frames().iter().map(|f| f.time_s.unwrap()).collect();
+    let mut frames = String::from("time_s,file\n");
+    let mut speeds = String::from("time_s,speed_mps\n");
+    let track = drive.track().unwrap();
+    for (frame, time_s) in drive.frames().iter().zip(&times) {
+        let file = frame.image.path().file_name().unwrap().to_string_lossy();
+        frames += &format!("{time_s:.6},{file}\n");
+        speeds += &format!("{time_s:.6},{}\n", track.speed_at(*time_s).unwrap());
+    }
+    let k = drive.intrinsics(0);
+    let numbers = format!("{} {} {} {}", k.fx, k.fy, k.cx, k.cy);
+    for (file, text) in [
+        ("frames.csv", frames),
+        ("speed.csv", speeds),
+        ("intrinsics.txt", numbers),
+    ] {
+        std::fs::write(folder.join(file), text).unwrap();
+    }
+    Dataset::open(folder, &OpenOptions::default())
+        .unwrap()
+        .remove(0)
+}
+
+/// In every place the images tell roll and pitch to a fraction of what they are, and without a yaw rate the turns to the side as well.
+#[test]
+fn images_show_how_the_vehicle_turned() {
+    for scene in Scene::ALL {
+        let at = tempfile::tempdir().unwrap();
+        let truth = drive(&at.path().join("kitti"), scene);
+        let folder = at.path().join("folder");
+        std::fs::create_dir(&folder).unwrap();
+        let with_yaw = seen_turns(&truth);
+        let mut alone = with_speed_alone(&truth, &folder);
+        assert!(alone.tilt_unknown() && !alone.yaw_known() && !truth.tilt_unknown());
+        let without_yaw = seen_turns(&alone);
+        for (turns, yaw_known) in [(&with_yaw, true), (&without_yaw, false)] {
+            assert_eq!(turns.len(), 59, "{scene:?}");
+            let ego = truth.ego().unwrap();
+            let (mut real, mut off) = (Vec::new(), Vec::new());
+            let mut yaw_off = Vec::new();
+            for turn in turns {
+                let known = ego.vehicle_motion(turn.from_s, turn.to_s).unwrap();
+                real.extend(known.tilt_rad);
+                off.extend([0, 1].map(|axis| turn.tilt_rad[axis] - known.tilt_rad[axis]));
+                yaw_off.push(turn.yaw_rad - known.yaw_rad);
+            }
+            let (real, off, yaw_off) = (rms(&real), rms(&off), rms(&yaw_off));
+            println!(
+                "{scene:?}, yaw known {yaw_known}: tilt {real:.3}, off {off:.3}; yaw off {yaw_off:.3} degrees"
+            );
+            assert!(off < 0.6 * real, "{scene:?} {yaw_known}: {off} of {real}");
+            assert!(yaw_off < 0.06, "{scene:?} {yaw_known}: {yaw_off}");
+        }
+        // The camera then moves between images as it did.
+        alone.take_turns(&without_yaw);
+        assert!(alone.yaw_known() && !alone.tilt_unknown());
+        let said = alone.warnings().join("\n");
+        assert!(
+            said.contains("taken from the images") && !said.contains("no yaw rate"),
+            "{said}"
+        );
+        let turned_off: Vec<f64> = (1..60)
+            .map(|i| {
+                let [seen, known] = [&alone, &truth].map(|drive| {
+                    let motion = drive.ego().unwrap().between(drive.frames(), i, i - 1);
+                    motion.unwrap().source_from_target.unwrap()
+                });
+                (seen * known.inverse()).angle()
+            })
+            .collect();
+        assert!(rms(&turned_off) < 0.07, "{scene:?}: {}", rms(&turned_off));
+    }
+}
+
+/// Images that show nothing leave a drive as it was.
+#[test]
+fn turns_that_nothing_shows_are_not_made_up() {
+    let at = tempfile::tempdir().unwrap();
+    let truth = drive(&at.path().join("kitti"), Scene::Urban);
+    let folder = at.path().join("folder");
+    std::fs::create_dir(&folder).unwrap();
+    let mut alone = with_speed_alone(&truth, &folder);
+    let grey = image::RgbImage::from_pixel(320, 96, image::Rgb([90; 3]));
+    // A third of the images are grey, and one cannot be read.
+    for (i, frame) in alone.frames().iter().enumerate() {
+        match i {
+            7 => std::fs::write(frame.image.path(), "no image").unwrap(),
+            _ if i % 3 == 0 => grey.save(frame.image.path()).unwrap(),
+            _ => {}
+        }
+    }
+    let turns = seen_turns(&alone);
+    assert!(!turns.is_empty() && turns.len() < 25, "{}", turns.len());
+    alone.take_turns(&turns);
+    assert!(!alone.yaw_known() && alone.tilt_unknown());
+}
