@@ -64,7 +64,7 @@ def adapt(
     seed: int = 0,
     config: Mapping[str, Any] | None = None,
 ) -> Adaptation:
-    """Learns on drives with speed and yaw rate from a network that is there, and keeps the result only if it is no worse.
+    """Learns on drives with a speed from a network that is there, and keeps the result only if it is no worse.
 
     The end of each drive (`held_out`, a share) is never learned from. The network is judged there before and after, without ground truth:
     how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the bias of the metre.

@@ -62,7 +62,7 @@ impl Reportable for Error {
             }
             #[cfg(feature = "train")]
             Self::NotJudged { .. } => Some(
-                "give longer drives with speed and yaw rate, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
+                "give longer drives with a speed, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
             ),
             #[cfg(feature = "train")]
             Self::NotAdapted { .. } => Some("give the folder that `adapt --out` named".into()),

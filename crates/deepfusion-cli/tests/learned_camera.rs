@@ -121,7 +121,11 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
         "eval --model run/last.safetensors --data drive --assume-unseen --json",
     );
     let focal_px = report["checkpoint"]["learned_camera"]["focal_px"][0].as_f64();
-    assert_eq!(focal_px, Some(last));
+    // JSON's readers may be off by the last digit.
+    assert!(
+        focal_px.is_some_and(|f| (f - last).abs() < 1e-9),
+        "{focal_px:?} {last}"
+    );
 
     // A network whose run knew its cameras has none to lend.
     ok(

@@ -10,10 +10,13 @@ use super::survey;
 use deepfusion_data::{Dataset, Ego, SeenTurn, VehicleMotion, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::GreyImage;
+use nalgebra::Rotation3;
 use rayon::prelude::*;
 
 /// Images that are in memory at a time.
 const AT_ONCE: usize = 64;
+/// Turn to the side above which a pair shows no roll and pitch, radians: the movement of points is linear in small turns alone.
+const MOST_YAW: f64 = 0.08;
 /// Looks at a pair whose yaw nobody measured: the way that it went depends on it.
 const LOOKS: usize = 3;
 
@@ -77,17 +80,19 @@ fn turn(ego: &Ego<'_>, (from_s, to_s): (f64, f64), (a, b): (&Small, &Small)) -> 
         let said = vehicle.camera0_from_camera1(&ego.cam_from_vehicle);
         let pair = EpipolarPair::new(&points, &a.intrinsics, said, (from_s, to_s))?;
         let turn = vehicle_from_cam.rotate(&pair.turn_of_a_pitching_body(&pair.direction()?)?);
+        let (roll, pitch, yaw) = Rotation3::from_scaled_axis(turn).euler_angles();
         if !ego.yaw_known() {
             vehicle = VehicleMotion {
-                yaw_rad: turn.z,
+                yaw_rad: yaw,
                 ..vehicle
             };
         }
+        let slight = yaw.abs() < MOST_YAW;
         seen = Some(SeenTurn {
             from_s,
             to_s,
-            yaw_rad: turn.z,
-            tilt_rad: [turn.x, turn.y],
+            yaw_rad: yaw,
+            tilt_rad: if slight { [roll, pitch] } else { [0.0; 2] },
         });
     }
     seen

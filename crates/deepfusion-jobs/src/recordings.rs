@@ -21,7 +21,8 @@ pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
 }
 
 /// As [`open_recordings`], for what takes the vehicle's motion: a camera whose mount is not given is turned to where its images show that
-/// it looks ([`heading`]), where they do, and the drive's warnings then say so. Reads up to 160 images of such a drive.
+/// it looks ([`heading`]), where they do, and the drive's warnings then say so. Reads up to 160 images of such a drive, if its yaw rate is
+/// known.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -36,7 +37,8 @@ pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Datase
 }
 
 /// As [`open_aimed`], for what learns from the vehicle's motion: where its roll and pitch are not recorded, they are taken from the images
-/// ([`seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of such a drive.
+/// ([`seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of such a drive,
+/// twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -99,12 +101,14 @@ pub fn camera_word(camera: Cameras) -> &'static str {
     }
 }
 
-/// All recordings to train on, with the place of their set in `data.sets`.
+/// All recordings to train on, with the place of their set in `data.sets`; turns that no sensor measured stay unknown.
 ///
 /// # Errors
 /// As [`open_recordings`].
 pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
-    open_for(config, RecordingRole::Training, &mut |_, _| ())
+    let mut measured = config.clone();
+    measured.data.measured_turns_only = true;
+    open_for(&measured, RecordingRole::Training, &mut |_, _| ())
 }
 
 /// What recordings are for.
@@ -135,9 +139,12 @@ pub fn open_for(
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
 ) -> Result<Vec<(usize, Dataset)>> {
     let data = &config.data;
-    let open = match config.view_motion {
-        ViewMotion::Vehicle | ViewMotion::Auto if !data.level => open_with_turns,
-        _ => open_aimed,
+    let open = |set: usize, paths: &[PathBuf], options: &OpenOptions| {
+        if takes_turns(config, set) {
+            open_with_turns(paths, options)
+        } else {
+            open_aimed(paths, options)
+        }
     };
     if data.sets.is_empty() {
         let validation = (&data.validation, &data.validation_split);
@@ -149,7 +156,7 @@ pub fn open_for(
             data.camera_ahead_s,
             &data.topics,
         )?;
-        let datasets = open(paths, &options)?;
+        let datasets = open(0, paths, &options)?;
         opened(&options, &datasets);
         return Ok(placed(0, datasets));
     }
@@ -167,11 +174,20 @@ pub fn open_for(
             _ => &set.topics,
         };
         let options = open_options(config, split, camera, ahead_s, topics)?;
-        let datasets = open(paths, &options)?;
+        let datasets = open(i, paths, &options)?;
         opened(&options, &datasets);
         all.extend(placed(i, datasets));
     }
     Ok(all)
+}
+
+/// Whether a set's drives are to turn as their images show: not where nothing reads how they turned, nor where turns are to tell the
+/// focal length, as those of the images follow from it.
+fn takes_turns(config: &TrainConfig, set: usize) -> bool {
+    let reads = matches!(config.view_motion, ViewMotion::Vehicle | ViewMotion::Auto)
+        || config.reads_rotation();
+    let wanted = !config.data.measured_turns_only && config.learned_camera().is_none();
+    reads && wanted && config.learn(set).from_motion()
 }
 
 /// Paths and the split file that selects their frames.
@@ -330,7 +346,7 @@ mod tests {
         Ok(())
     }
 
-    /// Of a drive with a speed alone the images tell how it turned and where its camera looks; with `level` nothing is taken from them.
+    /// Of a drive with a speed alone the images tell how it turned and where its camera looks; with `measured_turns_only` nothing is taken from them.
     #[test]
     fn a_speed_is_enough() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
@@ -342,7 +358,8 @@ mod tests {
         let mut config = deepfusion_model::Preset::Tiny.config();
         config.data.paths = vec![folder];
         let open = |config: &TrainConfig| -> std::result::Result<Dataset, Box<dyn Error>> {
-            Ok(training_recordings(config)?.remove(0).1)
+            let role = RecordingRole::Training;
+            Ok(open_for(config, role, &mut |_, _| ())?.remove(0).1)
         };
         let turning = open(&config)?;
         let (right, down) = ahead(&turning);
@@ -355,9 +372,19 @@ mod tests {
         assert!(turning.yaw_known() && !turning.tilt_unknown());
         let known = |drive: &Dataset| drive.camera_motion(1, 2).is_some();
         assert!(known(&turning));
-        config.data.level = true;
-        let level = open(&config)?;
-        assert!(!level.yaw_known() && level.tilt_unknown() && !known(&level));
+        config.assumed_camera = Some(deepfusion_model::AssumedCamera {
+            learn: true,
+            ..Default::default()
+        });
+        let learned = open(&config)?;
+        assert!(
+            !learned.yaw_known(),
+            "turns of the images follow from the focal length"
+        );
+        config.assumed_camera = None;
+        config.data.measured_turns_only = true;
+        let measured = open(&config)?;
+        assert!(!measured.yaw_known() && measured.tilt_unknown() && !known(&measured));
         Ok(())
     }
 }

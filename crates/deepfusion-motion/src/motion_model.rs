@@ -37,28 +37,26 @@ impl MotionModel {
         }
     }
 
-    /// Whether it is a track of one unit that does not measure roll and pitch. Of several sensors that is an inertial unit's part, and
-    /// nothing is put in its place.
+    /// Whether roll and pitch are not measured, and could be taken from elsewhere: of several sensors, whether none of them turns.
     #[must_use]
     pub fn lacks_tilt(&self) -> bool {
-        matches!(self, Self::Track(track) if !track.has_tilt())
-    }
-
-    /// A track of one unit with these samples of roll and pitch (time in s, then as [`Self::tilt`]); others stay as they are.
-    #[must_use]
-    pub fn with_tilt(self, samples: &[(f64, f64, f64)]) -> Self {
         match self {
-            Self::Track(track) => Self::Track(Box::new(track.with_tilt(samples))),
-            Self::Fused(_) => self,
+            Self::Track(track) => !track.has_tilt(),
+            Self::Fused(track) => !track.knows_yaw(),
         }
     }
 
-    /// A track of one unit with these samples of its yaw rate (time in s, rad/s, positive to the left); others stay as they are.
+    /// Its speed, with its yaw rate if one unit measures both, as a track of that unit.
     #[must_use]
-    pub fn with_yaw_rate(self, samples: &[(f64, f64)]) -> Self {
+    pub fn into_track(self) -> VehicleTrack {
         match self {
-            Self::Track(track) => Self::Track(Box::new(track.with_yaw_rate(samples))),
-            Self::Fused(_) => self,
+            Self::Track(track) => *track,
+            Self::Fused(track) => {
+                let speed = track.speed();
+                let samples = speed.times_s().iter().zip(speed.values());
+                let samples: Vec<_> = samples.map(|(t, v)| (*t, *v, 0.0)).collect();
+                VehicleTrack::new(&samples)
+            }
         }
     }
 

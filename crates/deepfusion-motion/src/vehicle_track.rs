@@ -13,6 +13,8 @@ pub struct VehicleTrack {
     yaw_rate_radps: Signal,
     /// Roll and pitch.
     tilt_rad: Option<[Signal; 2]>,
+    /// Their rates, where these alone are known.
+    tilt_rates_radps: Option<[Signal; 2]>,
 }
 
 impl VehicleTrack {
@@ -30,6 +32,7 @@ impl VehicleTrack {
             speed_mps: Signal::with_max_gap(good().map(|s| (s.0, s.1)), MAX_GAP_S),
             yaw_rate_radps: Signal::with_max_gap(good().map(|s| (s.0, s.2)), MAX_GAP_S),
             tilt_rad: None,
+            tilt_rates_radps: None,
         }
     }
 
@@ -49,19 +52,33 @@ impl VehicleTrack {
         }
     }
 
-    /// The same with samples of another yaw rate (time in s, rad/s, positive to the left), at times of their own.
+    /// The same with samples of the rates of roll and pitch (time in s, then rad/s, as [`VehicleTrack::tilt`]), which are bridged over up to
+    /// so many seconds. Where they are not known a motion is level.
     #[must_use]
-    pub fn with_yaw_rate(self, samples: &[(f64, f64)]) -> Self {
+    pub fn with_tilt_rates(self, samples: &[(f64, [f64; 2])], max_gap_s: f64) -> Self {
+        let rates = |axis: usize| {
+            let samples = samples.iter().map(|(time_s, rates)| (*time_s, rates[axis]));
+            Signal::with_max_gap(samples, max_gap_s)
+        };
         Self {
-            yaw_rate_radps: Signal::with_max_gap(samples.iter().copied(), MAX_GAP_S),
+            tilt_rates_radps: Some([rates(0), rates(1)]),
             ..self
         }
     }
 
-    /// Whether roll and pitch are known.
+    /// The same with samples of another yaw rate (time in s, rad/s, positive to the left), which are bridged over up to so many seconds.
+    #[must_use]
+    pub fn with_yaw_rate(self, samples: &[(f64, f64)], max_gap_s: f64) -> Self {
+        Self {
+            yaw_rate_radps: Signal::with_max_gap(samples.iter().copied(), max_gap_s),
+            ..self
+        }
+    }
+
+    /// Whether roll and pitch, or their rates, are known.
     #[must_use]
     pub fn has_tilt(&self) -> bool {
-        self.tilt_rad.is_some()
+        self.tilt_rad.is_some() || self.tilt_rates_radps.is_some()
     }
 
     /// The same with every speed multiplied by `scale`, the ratio of true to measured speed.
@@ -114,10 +131,18 @@ impl VehicleTrack {
         }
         let yaw_rad = self.yaw_rate_radps.integral(from_s, to_s)?;
         let tilts = self.tilt(from_s).zip(self.tilt(to_s));
+        let turned = || {
+            let [roll, pitch] = self.tilt_rates_radps.as_ref()?;
+            Some([roll.integral(from_s, to_s)?, pitch.integral(from_s, to_s)?])
+        };
+        let tilt_rad = match tilts {
+            Some((from, to)) => tilt_between(from, to, yaw_rad),
+            None => turned().unwrap_or_default(),
+        };
         Some(VehicleMotion {
             distance_m: self.speed_mps.integral(from_s, to_s)?,
             yaw_rad,
-            tilt_rad: tilts.map_or([0.0; 2], |(from, to)| tilt_between(from, to, yaw_rad)),
+            tilt_rad,
         })
     }
 }

@@ -15,7 +15,9 @@ pub enum Error {
         reason: String,
     },
     /// A configuration that reads how the car turned, and a drive that does not say.
-    #[error("{drive}: no yaw rate was recorded, and this configuration reads how the car turned")]
+    #[error(
+        "{drive}: how the car turned is not known, and this configuration reads it: no yaw rate was recorded"
+    )]
     NoYawRate {
         /// The drive.
         drive: String,
@@ -134,8 +136,8 @@ impl Hint for Error {
                     .into(),
             ),
             Self::NoYawRate { .. } => Some(
-                "its images do not show enough of its turns either: train with view_motion auto, distance or posenet and \
-                 loss.rotation = 0, or give a yaw rate: yaw_rate_radps in speed.csv, or imu.csv"
+                "turns are taken from the images where these show enough of them, unless data.measured_turns_only is set; else train with \
+                 view_motion auto, distance or posenet and loss.rotation = 0, or give a yaw rate: yaw_rate_radps in speed.csv, or imu.csv"
                     .into(),
             ),
             Self::NoStereo { .. } => Some(

@@ -84,6 +84,14 @@ impl SampleSet {
         };
         let (set_of, train) = shared(train);
         let (samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
+        if let (true, Some(first)) = (config.stereo, samples.first())
+            && samples.iter().all(|sample| sample.stereo.is_none())
+        {
+            return Err(Error::NoStereo {
+                drive: train[first.dataset].name().to_owned(),
+                why: NoStereo::OneCamera,
+            });
+        }
         let (depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
         let validation = match validation {
             Some(datasets) => {
@@ -144,7 +152,6 @@ impl SampleSet {
         let (mut train, mut held) = (Vec::new(), Vec::new());
         // Why drives have no sample: an error, the last, or unsure distances.
         let (mut last, mut unsure) = (None, Vec::<String>::new());
-        let mut one_camera = None;
         let learns = |dataset: &usize| config.learn(set_of[*dataset]);
         let other_cameras = OtherCameras::of(datasets, set_of);
         for (dataset, recording) in datasets.iter().enumerate() {
@@ -178,9 +185,6 @@ impl SampleSet {
                     let (a, b) = hold_out(snippets, share);
                     let other = config.stereo.then(|| other_cameras.beside(dataset));
                     let other = other.transpose()?.flatten();
-                    if config.stereo && other.is_none() {
-                        one_camera.get_or_insert(dataset);
-                    }
                     // A frame that the other camera lacks is left out.
                     let sample = |snippet: Snippet| {
                         let number = recording.frames()[snippet.target].number;
@@ -213,13 +217,6 @@ impl SampleSet {
                     last = Some(error);
                 }
             }
-        }
-        let no_pair = || train.iter().all(|sample| sample.stereo.is_none());
-        if let Some(dataset) = one_camera.filter(|_| no_pair()) {
-            return Err(Error::NoStereo {
-                drive: datasets[dataset].name().to_owned(),
-                why: NoStereo::OneCamera,
-            });
         }
         let depth_alone =
             (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());

@@ -123,9 +123,14 @@ impl<'a> OtherCameras<'a> {
             return Err(fail(NoStereo::NotRectified));
         }
         let frames = theirs.frames().iter().enumerate();
+        let frames: HashMap<u64, usize> = frames.map(|(i, frame)| (frame.number, i)).collect();
+        let mut own_frames = own.selected().iter().map(|i| own.frames()[*i].number);
+        if !own_frames.any(|number| frames.contains_key(&number)) {
+            return Err(fail(NoStereo::NoCommonFrame));
+        }
         Ok(Some(OtherCamera {
             dataset: other,
-            frames: frames.map(|(i, frame)| (frame.number, i)).collect(),
+            frames,
             source_from_target,
         }))
     }

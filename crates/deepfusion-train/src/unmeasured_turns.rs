@@ -1,11 +1,11 @@
-//! Drives whose turns nobody measured.
+//! Drives whose turns are not known.
 
 use std::collections::BTreeSet;
 
 use crate::{SampleSet, TrainConfig, ViewMotion};
 
 impl SampleSet {
-    /// The names of the drives with samples of video whose yaw rate is not known, in the order of their recordings.
+    /// The names of the drives with samples of video whose turns are not known, in the order of their recordings.
     #[must_use]
     pub fn without_turns(&self) -> Vec<&str> {
         let used: BTreeSet<usize> = self.samples.iter().map(|s| s.dataset).collect();
@@ -32,6 +32,6 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
         n => format!(" and {} other drives", n - 1),
     };
     Some(format!(
-        "no yaw rate in {first}{others}: warped by PoseNet's turns at the measured distance"
+        "no turns are known of {first}{others}: warped by PoseNet's at the measured distance"
     ))
 }

@@ -130,6 +130,6 @@ fn drives_with_and_without_a_yaw_rate_are_learned_from_together() {
     assert_eq!(summary.unwrap().step, 2);
     let named = warnings
         .iter()
-        .filter(|w| w.starts_with("no yaw rate in speeds-alone:"));
+        .filter(|w| w.starts_with("no turns are known of speeds-alone:"));
     assert_eq!(named.count(), 1, "{warnings:?}");
 }

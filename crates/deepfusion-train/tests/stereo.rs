@@ -199,6 +199,18 @@ fn a_drive_with_one_camera_learns_beside_one_with_two() {
     let paired = set.samples.iter().filter(|s| s.stereo.is_some()).count();
     assert_eq!((set.samples.len(), paired), (12, 8));
 
+    // It may be validated on by itself, and not trained on by itself.
+    let (two, one) = (opened(&two, Cameras::Both), opened(&one, Cameras::Both));
+    let (_, held_out, _) =
+        SampleSet::split(&config, two.clone(), Some(one.clone())).unwrap_or_else(|e| panic!("{e}"));
+    assert!(
+        held_out
+            .samples
+            .iter()
+            .all(|sample| sample.stereo.is_none())
+    );
+    assert!(SampleSet::split(&config, one, Some(two)).is_err());
+
     let device = Device::flex();
     let batch = BatchLoader::training(&config, set, 0)
         .next(&device)

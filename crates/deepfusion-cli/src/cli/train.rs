@@ -12,7 +12,7 @@ use crate::devices::ComputeDevice;
 /// `deepfusion train`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Learns from images and the car's speed alone (and its yaw rate, where there is one), or from recorded depth \
+    after_help = "Learns from images and the car's speed alone (turns that were not measured are taken from the images), or from recorded depth \
     (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. Options override a config file.\n\n\
     Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume continues the run as \

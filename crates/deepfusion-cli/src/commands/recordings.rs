@@ -37,16 +37,16 @@ pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Resul
     Ok(datasets)
 }
 
-/// As [`open_aimed`], for what measures by the vehicle's turns: without a yaw rate those that the images show.
-pub(super) fn open_with_yaw(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    let datasets = recordings::open_with_yaw(paths, options).map_err(jobs::in_words)?;
+/// As [`open_recordings`], for what takes the vehicle's motion: where no mount is given, the one that the images show.
+pub(super) fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let datasets = recordings::open_aimed(paths, options).map_err(jobs::in_words)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
 
-/// As [`open_recordings`], for what takes the vehicle's motion: where no mount is given, the one that the images show.
-pub(super) fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    let datasets = recordings::open_aimed(paths, options).map_err(jobs::in_words)?;
+/// As [`open_aimed`], for what measures by the vehicle's turns: without a yaw rate those that the images show.
+pub(super) fn open_with_yaw(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let datasets = recordings::open_with_yaw(paths, options).map_err(jobs::in_words)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }

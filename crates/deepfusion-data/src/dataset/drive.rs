@@ -159,31 +159,35 @@ impl Dataset {
     /// to the side as well. Nothing happens where [they are known](Self::tilt_unknown), where none are given, and without a yaw rate where
     /// those of a tenth of the pairs that moved are missing: a drive with holes in it is no better known.
     pub fn take_turns(&mut self, turns: &[SeenTurn]) {
-        let enough = self.parts.yaw_known || 10 * turns.len() >= 9 * self.moving_pairs();
+        let yaw_known = self.parts.yaw_known;
+        let enough = yaw_known || self.shows_enough(turns);
         if !self.tilt_unknown() || turns.is_empty() || !enough {
             return;
         }
         let track = self.parts.track.take();
-        self.parts.track =
-            track.map(|track| seen_turn::put_into(track, turns, self.parts.yaw_known));
+        self.parts.track = track.map(|track| seen_turn::put_into(track, turns, yaw_known));
+        self.parts.yaw_known = true;
         self.warnings
             .retain(|warning| !warning.contains(NO_YAW_RATE));
+        let images = self.frames().len();
         self.warnings
-            .push(seen_turn::warning(turns, self.parts.yaw_known));
-        self.parts.yaw_known = true;
+            .push(seen_turn::warning(turns, images, yaw_known));
     }
 
-    /// Images from one of which to the next the vehicle moved.
-    fn moving_pairs(&self) -> usize {
+    /// Whether these are the turns of nine tenths of the neighbours between which the vehicle moved.
+    fn shows_enough(&self, turns: &[SeenTurn]) -> bool {
         /// Slower than this it stands, m/s.
         const STANDING: f64 = 0.5;
-        let Ok(ego) = self.ego() else { return 0 };
-        let later = 1..self.frames().len();
-        let moves = |i: &usize| {
-            let motion = ego.between(self.frames(), *i, i - 1);
-            motion.is_ok_and(|motion| motion.speed_mps > STANDING)
+        let Ok(ego) = self.ego() else { return false };
+        let moves = |(from_s, to_s): (f64, f64)| {
+            let motion = ego.vehicle_motion(from_s, to_s);
+            motion.is_some_and(|motion| motion.distance_m.abs() > STANDING * (to_s - from_s))
         };
-        later.filter(moves).count()
+        let pairs = self.frames().windows(2);
+        let pairs = pairs.filter_map(|pair| pair[0].time_s.zip(pair[1].time_s));
+        let moving = pairs.filter(|pair| moves(*pair)).count();
+        let seen = turns.iter().filter(|turn| moves((turn.from_s, turn.to_s)));
+        10 * seen.count() >= 9 * moving
     }
 
     /// With what a satellite receiver says beside the speeds.
@@ -305,7 +309,8 @@ impl Dataset {
         self.parts.track.as_ref()
     }
 
-    /// Whether the track's yaw rates were measured. Where not, only its speeds and distances mean anything.
+    /// Whether the track knows how the vehicle turned: measured, or [taken](Self::take_turns) from the images. Where not, only its speeds
+    /// and distances mean anything.
     #[must_use]
     pub fn yaw_known(&self) -> bool {
         self.parts.yaw_known

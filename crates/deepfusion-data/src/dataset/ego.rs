@@ -18,8 +18,8 @@ pub struct EgoMotion {
     /// The car's mean speed over that time, in m/s, positive also when reversing.
     pub speed_mps: f64,
     /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
-    /// frame after the target and positive for the one before. `None` where the recording has no yaw
-    /// rate: then nobody knows how the car turned, and only lengths may be used.
+    /// frame after the target and positive for the one before. `None` where neither a sensor nor, where
+    /// they were asked, the images know how the car turned: then only lengths may be used.
     pub source_from_target: Option<Se3>,
 }
 
@@ -28,13 +28,13 @@ pub struct EgoMotion {
 pub struct Ego<'a> {
     /// How the vehicle moved, on the frames' clock.
     pub(crate) track: &'a MotionModel,
-    /// Whether its turns were measured.
+    /// Whether its turns are known: measured, or taken from the images.
     pub(crate) yaw_known: bool,
     /// A point of the vehicle (x forward, y left, z up, metres) in the camera.
     pub cam_from_vehicle: Se3,
     /// How sure the speeds are, where that is known.
     pub(crate) speed_sigma_mps: Option<&'a Signal>,
-    /// Whether the body's roll and pitch, where an inertial unit measured them, turn the camera.
+    /// Whether the body's roll and pitch, where they are known, turn the camera.
     pub(crate) rolls_and_pitches: bool,
 }
 
@@ -48,7 +48,7 @@ pub enum NoMotion {
 }
 
 impl Ego<'_> {
-    /// Whether its turns to the side were measured.
+    /// Whether its turns to the side are known: measured, or taken from the images.
     #[must_use]
     pub fn yaw_known(&self) -> bool {
         self.yaw_known

@@ -1,7 +1,7 @@
 //! How a vehicle turned, as its images show it.
 
 use crate::MotionModel;
-use nalgebra::Rotation3;
+use deepfusion_hint::count_of;
 
 /// What is said of a log of speeds that knows no turns.
 pub(crate) const NO_YAW_RATE: &str = "no yaw rate, here or in imu.csv";
@@ -21,58 +21,57 @@ pub struct SeenTurn {
 
 /// The track with the turns' roll and pitch, and where it has no yaw rate with their yaw as well.
 pub(super) fn put_into(track: MotionModel, turns: &[SeenTurn], yaw_known: bool) -> MotionModel {
-    let track = match yaw_known {
-        true => track,
-        false => track.with_yaw_rate(&yaw_rates(turns)),
-    };
-    let tilts = tilts(turns, &track);
-    track.with_tilt(&tilts)
+    // A single pair that shows nothing is bridged, and no more.
+    let longest = turns.iter().map(|turn| turn.to_s - turn.from_s);
+    let max_gap_s = 1.5 * longest.fold(0.0, f64::max);
+    let samples = rates(turns);
+    let tilts: Vec<_> = samples.iter().map(|(t, (_, tilt))| (*t, *tilt)).collect();
+    let mut track = track.into_track();
+    if !yaw_known {
+        let yaws: Vec<_> = samples.iter().map(|(t, (yaw, _))| (*t, *yaw)).collect();
+        track = track.with_yaw_rate(&yaws, max_gap_s);
+    }
+    track.with_tilt_rates(&tilts, max_gap_s).into()
 }
 
-/// Yaw rates whose integral over each turn's time is its yaw: constant there, but for short ramps to the next.
-fn yaw_rates(turns: &[SeenTurn]) -> Vec<(f64, f64)> {
+/// Rates of yaw, and of roll and pitch, whose integral over each turn's time is its angle: constant there, but for short ramps to the next.
+fn rates(turns: &[SeenTurn]) -> Vec<(f64, (f64, [f64; 2]))> {
     /// Share of a turn's time that a ramp takes.
     const RAMP: f64 = 0.01;
-    let ends = |turn: &SeenTurn| {
+    let ends = |(i, turn): (usize, &SeenTurn)| {
         let dt_s = turn.to_s - turn.from_s;
-        let rate = turn.yaw_rad / dt_s;
-        [turn.from_s + RAMP * dt_s, turn.to_s - RAMP * dt_s].map(|time_s| (time_s, rate))
+        let rate = (turn.yaw_rad / dt_s, turn.tilt_rad.map(|angle| angle / dt_s));
+        let before = i.checked_sub(1).map(|before| turns[before].to_s);
+        let after = turns.get(i + 1).map(|after| after.from_s);
+        // No ramp where no other turn follows at once: the track ends there.
+        let ramp = |neighbour: Option<f64>, end_s| {
+            let follows = neighbour == Some(end_s);
+            if follows { RAMP * dt_s } else { 0.0 }
+        };
+        let from_s = turn.from_s + ramp(before, turn.from_s);
+        [(from_s, rate), (turn.to_s - ramp(after, turn.to_s), rate)]
     };
-    turns.iter().flat_map(ends).collect()
+    turns.iter().enumerate().flat_map(ends).collect()
 }
 
-/// Roll and pitch at the images' times, from a level start: where two turns are apart, the vehicle is taken to stand as it did.
-fn tilts(turns: &[SeenTurn], track: &MotionModel) -> Vec<(f64, f64, f64)> {
-    let mut body = Rotation3::identity();
-    let mut found: Vec<(f64, f64, f64)> = Vec::with_capacity(turns.len() + 1);
-    for turn in turns {
-        let (roll, pitch, _) = body.euler_angles();
-        if found.last().is_none_or(|last| last.0 < turn.from_s) {
-            found.push((turn.from_s, roll, pitch));
-        }
-        // The body as seen from where the vehicle heads now.
-        let yaw = track.motion(turn.from_s, turn.to_s);
-        let yaw = Rotation3::from_euler_angles(0.0, 0.0, yaw.map_or(0.0, |moved| moved.yaw_rad));
-        let [roll, pitch] = turn.tilt_rad;
-        let moved = Rotation3::from_euler_angles(roll, pitch, 0.0);
-        let (roll, pitch, _) = (yaw.inverse() * body * yaw * moved).euler_angles();
-        body = Rotation3::from_euler_angles(roll, pitch, 0.0);
-        found.push((turn.to_s, roll, pitch));
-    }
-    found
-}
-
-/// What is said of a recording whose turns were taken from its images.
-pub(super) fn warning(turns: &[SeenTurn], yaw_known: bool) -> String {
+/// What is said of a recording of so many images whose turns were taken from them.
+pub(super) fn warning(turns: &[SeenTurn], images: usize, yaw_known: bool) -> String {
     let mut pitches: Vec<f64> = turns.iter().map(|turn| turn.tilt_rad[1].abs()).collect();
     pitches.sort_by(f64::total_cmp);
     let pitch = pitches.get(pitches.len() / 2).copied().unwrap_or(0.0);
-    let what = match yaw_known {
-        true => "roll and pitch",
-        false => "the vehicle's turns (yaw, roll and pitch)",
+    let what = if yaw_known {
+        "roll and pitch"
+    } else {
+        "the vehicle's turns (yaw, roll and pitch)"
+    };
+    let pairs = images.saturating_sub(1);
+    let seen = if turns.len() == pairs {
+        String::new()
+    } else {
+        format!(" ({} of {})", turns.len(), count_of(pairs, "pair"))
     };
     format!(
-        "{what} are not recorded: they are taken from the images, {:.2} degrees of pitch from one to the next (median)",
+        "{what} are not recorded: they are taken from the images{seen}, {:.2} degrees of pitch from one to the next (median)",
         pitch.to_degrees()
     )
 }
@@ -82,41 +81,63 @@ mod tests {
     use super::*;
     use crate::VehicleTrack;
 
-    /// A weaving drive that rolls and pitches, and rises all the way: between any two of its images the track turns as was seen.
+    fn track(seconds: u32) -> MotionModel {
+        let speeds: Vec<_> = (0..=10 * seconds)
+            .map(|i| (0.1 * f64::from(i), 8.0, 0.02))
+            .collect();
+        VehicleTrack::new(&speeds).into()
+    }
+
+    /// An hour of weaving that rolls and pitches, and always a little more to one side: between any two of its images the track turns as
+    /// was seen, at its end as at its start.
     #[test]
     fn the_track_turns_as_was_seen() {
         let wave = |i: usize, k: f64| (k * i as f64).sin();
-        let turns: Vec<SeenTurn> = (0..80)
-            .filter(|i| *i != 40)
+        let turns: Vec<SeenTurn> = (0..36_000)
             .map(|i| SeenTurn {
                 from_s: 0.1 * i as f64,
                 to_s: 0.1 * (i + 1) as f64,
                 yaw_rad: 0.05 * wave(i, 0.1),
-                tilt_rad: [0.003 * wave(i, 1.3), 0.002 + 0.004 * wave(i, 0.9)],
+                tilt_rad: [0.0003 + 0.003 * wave(i, 1.3), 0.0005 + 0.004 * wave(i, 0.9)],
             })
             .collect();
-        let speeds: Vec<_> = (0..=80).map(|i| (0.1 * f64::from(i), 8.0, 0.02)).collect();
         for yaw_known in [true, false] {
-            let track = put_into(VehicleTrack::new(&speeds).into(), &turns, yaw_known);
-            for turn in &turns {
+            let track = put_into(track(3600), &turns, yaw_known);
+            for turn in turns.iter().step_by(7) {
                 let moved = track.motion(turn.from_s, turn.to_s).unwrap();
                 let yaw = if yaw_known { 0.002 } else { turn.yaw_rad };
-                // The ramps between yaw rates are a hundredth of a turn long; a yaw that the body turns by is no part of its tilt.
-                assert!((moved.yaw_rad - yaw).abs() < 1e-4, "{turn:?} {moved:?}");
+                // The ramps are a hundredth of a turn long.
+                assert!((moved.yaw_rad - yaw).abs() < 2e-4, "{turn:?} {moved:?}");
                 for axis in 0..2 {
                     let off = (moved.tilt_rad[axis] - turn.tilt_rad[axis]).abs();
-                    assert!(off < 2e-4, "{yaw_known} {turn:?} {moved:?}");
+                    assert!(off < 1e-4, "{turn:?} {moved:?}");
                 }
             }
         }
-        // Half a second without a turn is a gap in the yaw, not a straight.
-        let late = SeenTurn {
-            from_s: 9.0,
-            to_s: 9.1,
-            ..turns[0]
+    }
+
+    /// A pair that shows nothing is bridged; two are a gap in the yaw, and level where that is measured.
+    #[test]
+    fn what_was_not_seen_is_not_made_up() {
+        let turn = |i: usize| SeenTurn {
+            from_s: 2.0 * i as f64,
+            to_s: 2.0 * (i + 1) as f64,
+            yaw_rad: 0.1,
+            tilt_rad: [0.01, 0.02],
         };
-        let speeds: Vec<_> = (0..=100).map(|i| (0.1 * f64::from(i), 8.0, 0.0)).collect();
-        let gap = put_into(VehicleTrack::new(&speeds).into(), &[turns[0], late], false);
-        assert!(gap.motion(4.0, 4.1).is_none() && gap.motion(9.0, 9.1).is_some());
+        let speeds: Vec<_> = (0..=160).map(|i| (0.25 * f64::from(i), 8.0, 0.0)).collect();
+        let track: MotionModel = VehicleTrack::new(&speeds).into();
+        let seen: Vec<_> = [0, 1, 3, 4, 8, 9].map(turn).into();
+        let unmeasured = put_into(track.clone(), &seen, false);
+        for i in [0, 1, 2, 3, 4, 8, 9] {
+            let moved = unmeasured.motion(2.0 * i as f64, 2.0 * (i + 1) as f64);
+            assert!((moved.unwrap().yaw_rad - 0.1).abs() < 1e-3, "{i}");
+        }
+        assert!(unmeasured.motion(12.0, 14.0).is_none());
+        let measured = put_into(track, &seen, true);
+        let tilt = |from_s: f64| measured.motion(from_s, from_s + 2.0).unwrap().tilt_rad;
+        assert!((tilt(2.0)[1] - 0.02).abs() < 1e-3);
+        assert_eq!(tilt(12.0), [0.0; 2]);
+        assert!(warning(&seen, 11, false).contains("(6 of 10 pairs)"));
     }
 }

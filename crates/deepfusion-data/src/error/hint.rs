@@ -24,9 +24,9 @@ impl Hint for Error {
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }
-            Self::FolderOfRecordings { path, .. } => {
-                let all = path.join("*");
-                return Some(format!("give one of them, or all: {}", all.display()));
+            Self::FolderOfRecordings { such_as, .. } => {
+                let one = such_as.display();
+                return Some(format!("give them by themselves, one or several: {one}"));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",

@@ -114,10 +114,10 @@ pub struct DataConfig {
     pub topics: Vec<String>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
-    /// Whether vehicles are taken to be level where no sensor measures their roll and pitch. Else their images tell them, each read once
-    /// more before training.
+    /// Whether turns that no sensor measured stay unknown: roll and pitch are then 0, and drives without a yaw rate have no turns. Else
+    /// they are taken from the images, which are all read for that before training.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub level: bool,
+    pub measured_turns_only: bool,
     /// What is learned from.
     #[serde(skip_serializing_if = "Learn::is_own_motion")]
     pub learn: Learn,
@@ -281,7 +281,7 @@ impl DataConfig {
             camera_ahead_s: _,
             topics: _,
             camera: _,
-            level: _,
+            measured_turns_only: _,
             learn: _,
             loader_threads: _,
             cache_mib: _,
@@ -489,7 +489,7 @@ mod tests {
             camera_ahead_s: None,
             topics: Vec::new(),
             camera: "both".into(),
-            level: true,
+            measured_turns_only: true,
             learn: Learn::default(),
             loader_threads: None,
             cache_mib: None,

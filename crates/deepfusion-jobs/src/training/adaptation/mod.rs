@@ -25,7 +25,7 @@ use self::folders::Folders;
 use super::{Began, Start};
 use crate::held_out::unseen_frames;
 use crate::model_facts::ModelFacts as _;
-use crate::recordings::open_with_turns;
+use crate::recordings::{open_aimed, open_with_turns};
 use crate::samples::{SampleWarning, open_samples};
 use crate::verdict::{SPEED_SD, Unseen, VerdictOptions, plan, verdict};
 use crate::{Error, Result};
@@ -146,7 +146,12 @@ impl Adaptation {
         let folders = Folders::of(&settings.out)?;
         let start = Start::from_source(&given);
         let options = settings.open_options(assumed_camera(estimator).as_ref());
-        let drives = open_with_turns(&settings.data, &options)?;
+        let open = if recipe::takes_measured_turns_only(&settings, estimator)? {
+            open_aimed
+        } else {
+            open_with_turns
+        };
+        let drives = open(&settings.data, &options)?;
         opened(&options, &drives);
         let mut config = recipe::config(&settings, estimator, device, &drives)?;
         start.record_in(&mut config)?;

@@ -101,6 +101,19 @@ pub(super) fn config(
     Ok(config)
 }
 
+/// Whether the settings leave turns alone that no sensor measured, as [`config`] will say.
+pub(super) fn takes_measured_turns_only(
+    settings: &AdaptSettings,
+    estimator: &DepthEstimator,
+) -> Result<bool> {
+    let mut config = estimator.config().clone();
+    config.data = Default::default();
+    for assignment in &settings.set {
+        config.set(assignment)?;
+    }
+    Ok(config.data.measured_turns_only)
+}
+
 /// Whether a recording has a rectified other camera among them, and none has one that is no view of it.
 fn has_pairs(opened: &[Dataset]) -> bool {
     recordings_with_stereo(opened).is_ok_and(|count| count > 0)
