@@ -101,14 +101,18 @@ pub fn camera_word(camera: Cameras) -> &'static str {
     }
 }
 
-/// All recordings to train on, with the place of their set in `data.sets`; turns that no sensor measured stay unknown.
+/// All recordings to train on, with the place of their set in `data.sets`: the samples of a run are theirs. Roll and pitch, on which these
+/// do not depend, are not taken from the images; without a yaw rate the turns to the side are, where the run takes them.
 ///
 /// # Errors
 /// As [`open_recordings`].
 pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
-    let mut measured = config.clone();
-    measured.data.measured_turns_only = true;
-    open_for(&measured, RecordingRole::Training, &mut |_, _| ())
+    open_sets(
+        config,
+        RecordingRole::Training,
+        open_with_yaw,
+        &mut |_, _| (),
+    )
 }
 
 /// What recordings are for.
@@ -138,10 +142,20 @@ pub fn open_for(
     role: RecordingRole,
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
 ) -> Result<Vec<(usize, Dataset)>> {
+    open_sets(config, role, open_with_turns, opened)
+}
+
+/// The recordings of a role, those whose turns the images are to show opened by `open_turned`.
+fn open_sets(
+    config: &TrainConfig,
+    role: RecordingRole,
+    open_turned: fn(&[PathBuf], &OpenOptions) -> Result<Vec<Dataset>>,
+    opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
+) -> Result<Vec<(usize, Dataset)>> {
     let data = &config.data;
     let open = |set: usize, paths: &[PathBuf], options: &OpenOptions| {
         if takes_turns(config, set) {
-            open_with_turns(paths, options)
+            open_turned(paths, options)
         } else {
             open_aimed(paths, options)
         }
@@ -372,6 +386,8 @@ mod tests {
         assert!(turning.yaw_known() && !turning.tilt_unknown());
         let known = |drive: &Dataset| drive.camera_motion(1, 2).is_some();
         assert!(known(&turning));
+        // Whoever asks later what the run has seen finds its samples.
+        assert!(known(&training_recordings(&config)?.remove(0).1));
         config.assumed_camera = Some(deepfusion_model::AssumedCamera {
             learn: true,
             ..Default::default()

@@ -216,7 +216,10 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     if args.clock_offset == Some(ClockOffset::Auto) {
         // Measured against what the recordings' own files say, and kept in the configuration as a number.
         config.data.camera_ahead_s = None;
-        let datasets = training_recordings(&config).map_err(jobs::in_words)?;
+        let mut measured = config.clone();
+        // Turns of the images would be on the camera's clock.
+        measured.data.measured_turns_only = true;
+        let datasets = training_recordings(&measured).map_err(jobs::in_words)?;
         let ahead_s = clocks::measured(datasets.iter().map(|(_, dataset)| dataset))?;
         config.data.camera_ahead_s = Some(ahead_s);
     }
