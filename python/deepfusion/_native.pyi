@@ -1,7 +1,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 __version__: str
 
 Intrinsics = tuple[float, float, float, float]
+PostProcess: TypeAlias = Literal["flip", "multi-scale", "multi-scale-flip"]
 
 class DeepFusionError(Exception):
     """What went wrong, with the file, frame or field; `hint` says what to do about it."""
@@ -50,12 +51,14 @@ class Model:
         *,
         focal_correction: bool = True,
         stretch: bool = False,
+        post_process: PostProcess | None = None,
     ) -> Prediction:
         """Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
         `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
 
         `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
-        image where it would be cut to the aspect ratio trained with."""
+        image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two looks at the image or of four
+        (the image and the mirrored one; a smaller input and a larger one; both): it errs less, and takes as many times as long."""
     def predict_many(
         self,
         images: Iterable[NDArray[np.uint8] | str | PathLike[str] | Any],
@@ -63,6 +66,7 @@ class Model:
         *,
         focal_correction: bool = True,
         stretch: bool = False,
+        post_process: PostProcess | None = None,
     ) -> Predictions:
         """The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
         are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;

@@ -9,12 +9,12 @@ use std::thread;
 use deepfusion::DepthEstimator;
 use deepfusion::data::RgbImage;
 use deepfusion::geometry::Intrinsics;
-use deepfusion::runtime::{PreparedImage, Preparer};
+use deepfusion::runtime::{Augmentation, PreparedImage, Preparer};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
 
-use crate::error::Failure;
+use crate::error::{Failure, raise};
 use crate::model::{Prediction, Source};
 
 /// What is asked of the network.
@@ -23,6 +23,7 @@ pub struct BulkRequest {
     pub intrinsics: Option<[f64; 4]>,
     pub focal_correction: bool,
     pub crop: bool,
+    pub augmentation: Augmentation,
 }
 
 /// Where an image's prediction is waited for.
@@ -57,10 +58,10 @@ impl Predictions {
         let (to_network, read) = sync_channel::<LoadedImage>(readers);
         let (to_finish, seen) = sync_channel(2);
         let images = Arc::new(Mutex::new(images));
+        let preparer = estimator.augmented(request.augmentation).map_err(raise)?;
         let settings = (request.intrinsics, request.focal_correction, request.crop);
         for _ in 0..readers {
             let (images, to_network) = (Arc::clone(&images), to_network.clone());
-            let preparer = estimator.preparer();
             spawn(move || read_images(&images, &to_network, preparer, settings))?;
         }
         spawn(move || see(estimator, &read, &to_finish))?;

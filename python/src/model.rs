@@ -4,9 +4,11 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use deepfusion::data::{RgbImage, load_photo};
+use deepfusion::eval::PostProcess;
 use deepfusion::geometry::cloud::PointCloud;
 use deepfusion::geometry::{DepthMap, Intrinsics};
-use deepfusion::runtime::{DepthEstimator, ModelSource, Precision, embedded_names};
+use deepfusion::jobs::evaluation::augmentation;
+use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -78,8 +80,9 @@ impl Model {
     /// `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
     ///
     /// `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
-    /// image where it would be cut to the aspect ratio trained with.
-    #[pyo3(signature = (image, intrinsics=None, *, focal_correction=true, stretch=false))]
+    /// image where it would be cut to the aspect ratio trained with. `post_process` ("flip", "multi-scale" or "multi-scale-flip") takes the
+    /// mean of two or four looks: it errs less, and takes as many times as long.
+    #[pyo3(signature = (image, intrinsics=None, *, focal_correction=true, stretch=false, post_process=None))]
     fn predict(
         &self,
         py: Python<'_>,
@@ -87,7 +90,9 @@ impl Model {
         intrinsics: Option<[f64; 4]>,
         focal_correction: bool,
         stretch: bool,
+        post_process: Option<&str>,
     ) -> PyResult<Prediction> {
+        let augmentation = augmentation_named(post_process)?;
         let source = Source::of(image)?;
         let work = || -> Result<_, Failure> {
             let (image, camera) = source.read(intrinsics)?;
@@ -95,7 +100,10 @@ impl Model {
             // waits for its parts takes up other work meanwhile, and another prediction would then wait for the lock below it, for ever.
             let prediction = self.with(|estimator| {
                 deepfusion_cli::in_pool(|| {
-                    estimator.predict(&image, camera.as_ref(), focal_correction, !stretch)
+                    let preparer = estimator.augmented(augmentation)?;
+                    let camera = camera.as_ref();
+                    let seen = preparer.prepare(&image, camera, focal_correction, !stretch);
+                    estimator.infer(&seen)
                 })
             })?;
             Ok((prediction, image, camera))
@@ -108,7 +116,7 @@ impl Model {
     /// The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
     /// are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
     /// going on with `next` gives those behind it.
-    #[pyo3(signature = (images, intrinsics=None, *, focal_correction=true, stretch=false))]
+    #[pyo3(signature = (images, intrinsics=None, *, focal_correction=true, stretch=false, post_process=None))]
     fn predict_many(
         &self,
         py: Python<'_>,
@@ -116,12 +124,14 @@ impl Model {
         intrinsics: Option<[f64; 4]>,
         focal_correction: bool,
         stretch: bool,
+        post_process: Option<&str>,
     ) -> PyResult<Predictions> {
         let request = BulkRequest {
             images: images.try_iter()?.unbind(),
             intrinsics,
             focal_correction,
             crop: !stretch,
+            augmentation: augmentation_named(post_process)?,
         };
         let own = py.detach(|| self.with(|estimator| estimator.another()));
         Predictions::begin(request, own.map_err(raise)?)
@@ -150,6 +160,23 @@ impl Model {
     #[getter]
     fn engine(&self, py: Python<'_>) -> &'static str {
         py.detach(|| self.with(|estimator| estimator.engine()))
+    }
+}
+
+/// The looks at each image by the name that the command line has for them.
+fn augmentation_named(name: Option<&str>) -> PyResult<Augmentation> {
+    let Some(name) = name else {
+        return Ok(Augmentation::NONE);
+    };
+    let mut all = PostProcess::ALL.into_iter();
+    match all.find(|how| how.name() == name) {
+        Some(how) => Ok(augmentation(Some(how))),
+        None => Err(PyValueError::new_err(format!(
+            "post_process: expected None, {}, found {name:?}",
+            PostProcess::ALL
+                .map(|how| format!("{:?}", how.name()))
+                .join(" or ")
+        ))),
     }
 }
 

@@ -180,6 +180,16 @@ def test_the_command_gives_the_same_bytes(drive, model, tmp_path):
     subprocess.run([command, *arguments], check=True)
     file = sorted(Path(out).glob("*_depth.npy"))[0]
     assert np.array_equal(np.load(file), model.predict(frame.image, frame.intrinsics).depth)
+    with pytest.raises(ValueError, match="multi-scale-flip"):
+        model.predict(frame.image, post_process="mirrored")
+    looks = {"post_process": "multi-scale-flip"}
+    several = tmp_path / "several"
+    arguments[arguments.index(out)] = several
+    subprocess.run([command, *arguments, "--post-process", looks["post_process"]], check=True)
+    theirs = np.load(several / file.name)
+    assert np.array_equal(theirs, model.predict(frame.image, frame.intrinsics, **looks).depth)
+    assert np.array_equal(theirs, next(model.predict_many([frame.image], frame.intrinsics, **looks)).depth)
+    assert not np.array_equal(theirs, np.load(file))
     gt = tmp_path / "gt.npz"
     subprocess.run([command, "data", "export-gt", drive, "--out", gt, "--quiet"], check=True)
     evaluated = subprocess.run(

@@ -117,6 +117,7 @@ fn options_of(what: Difference) -> &'static str {
         Difference::FocalCorrection => "another --no-focal-correction",
         Difference::Stretch => "another --stretch",
         Difference::CorrectScale => "another --correct-scale",
+        Difference::PostProcess => "another --post-process",
         _ => "other options",
     }
 }

@@ -106,6 +106,21 @@ fn the_protocols_of_the_fields_tables() {
         .iter()
         .filter(|text| text.contains(r#""post_process": "flip""#));
     assert_eq!(post_processed.count(), 1);
+    // It learned one camera at one size; an embedded network takes any.
+    fails(
+        at,
+        &format!("{eval} --post-process multi-scale"),
+        &["canonical focal length", "flip"],
+    );
+    let tiny = "eval --model tiny --data sim --crop none --no-verdict --json";
+    let one = abs_rel(&json(at, tiny));
+    for how in ["multi-scale", "multi-scale-flip"] {
+        let many = abs_rel(&json(at, &format!("{tiny} --post-process {how}")));
+        assert!(
+            many != one && (many / one - 1.0).abs() < 0.3,
+            "{how}: {many}, {one}"
+        );
+    }
 
     // Of scans every second frame, of depth images all; the simulator's are exact, and the same camera z.
     let annotated = json(at, &format!("{eval} --gt-depth annotated"));

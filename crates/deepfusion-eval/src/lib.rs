@@ -43,7 +43,7 @@ pub use mean_depth_baseline::MeanDepthBaseline;
 pub use metrics::Metrics;
 pub use points::{DrawnPoint, PointErrors, PointRange, Points};
 pub use points_table::points_csv;
-pub use post_process::{PostProcess, blend_flipped};
+pub use post_process::PostProcess;
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
 pub use report::{
     FixedScaled, MeanDepthRow, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow,

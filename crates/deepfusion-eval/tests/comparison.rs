@@ -290,7 +290,7 @@ fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
             change(&mut saved);
             saved.write(&at).unwrap();
         }
-        MetricScale::measured(&at, "abc", None, true, 2000)
+        MetricScale::measured(&at, "abc", None, true, None, 2000)
     };
     let good: Change = |_| {};
     let found = verdict("good", &[good]);

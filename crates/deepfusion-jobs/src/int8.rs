@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use deepfusion_data::load_photo;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Int8Calibration, StoredNetwork, TrainConfig};
-use deepfusion_runtime::{DepthRunner, FusedRunner, ModelSource, Precision, Preparer, SeenInputs};
+use deepfusion_runtime::{
+    Augmentation, DepthRunner, FusedRunner, ModelSource, Precision, Preparer, SeenInputs,
+};
 use deepfusion_weights::Shipped;
 
 use crate::packing::simulated_input;
@@ -93,6 +95,7 @@ fn prepared(network: &StoredNetwork, input: &Input) -> Result<Vec<f32>> {
         size: network.config.size,
         training_camera: network.camera,
         canonical_focal_px: None,
+        augmentation: Augmentation::NONE,
     };
     let (image, camera) = match &input.frame {
         Some((dataset, frame)) => {
@@ -104,7 +107,8 @@ fn prepared(network: &StoredNetwork, input: &Input) -> Result<Vec<f32>> {
             (photo.image, photo.intrinsics)
         }
     };
-    Ok(preparer.prepare(&image, camera.as_ref(), false, true).input)
+    let seen = preparer.prepare(&image, camera.as_ref(), false, true);
+    Ok(seen.views.into_iter().flat_map(|view| view.input).collect())
 }
 
 /// Up to `most` of them, evenly spread.

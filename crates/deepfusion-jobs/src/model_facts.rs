@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::{MetricScale, sha256_of_file};
+use deepfusion_eval::{IntervalFactors, PostProcess};
 use deepfusion_runtime::{ModelSource, Precision};
 use sha2::{Digest, Sha256};
 
@@ -46,8 +46,13 @@ pub trait ModelFacts {
     ///
     /// # Errors
     /// As [`Self::sha256`].
-    fn scale(&self, set: Option<&str>, focal_correction: bool, steps: usize)
-    -> Result<MetricScale>;
+    fn scale(
+        &self,
+        set: Option<&str>,
+        focal_correction: bool,
+        post_process: Option<PostProcess>,
+        steps: usize,
+    ) -> Result<MetricScale>;
 }
 
 impl ModelFacts for ModelSource {
@@ -116,6 +121,7 @@ impl ModelFacts for ModelSource {
         &self,
         set: Option<&str>,
         focal_correction: bool,
+        post_process: Option<PostProcess>,
         steps: usize,
     ) -> Result<MetricScale> {
         let Some(folder) = self.folder() else {
@@ -127,6 +133,7 @@ impl ModelFacts for ModelSource {
             &sha256,
             set,
             focal_correction,
+            post_process,
             steps,
         ))
     }

@@ -1,5 +1,6 @@
 //! What else than its image an output depends on.
 
+use deepfusion_eval::PostProcess;
 use serde::{Deserialize, Serialize};
 
 /// Program, weights and options: outputs of the same image with equal ones are equal (on one machine; the last digits
@@ -34,6 +35,9 @@ pub struct MadeWith {
     /// Whether the scale monitor brings depth back to the metres that were learned.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub correct_scale: bool,
+    /// In how many ways the network looked at each image; absent: in one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub post_process: Option<PostProcess>,
     /// The data set, of those that the network learned from, whose metres are meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
@@ -65,6 +69,8 @@ pub enum Difference {
     Stretch,
     /// Whether the scale is corrected.
     CorrectScale,
+    /// In how many ways the network looked.
+    PostProcess,
 }
 
 impl std::fmt::Display for Difference {
@@ -111,6 +117,10 @@ impl MadeWith {
             (
                 self.correct_scale != other.correct_scale,
                 Difference::CorrectScale,
+            ),
+            (
+                self.post_process != other.post_process,
+                Difference::PostProcess,
             ),
         ]
         .into_iter()

@@ -121,6 +121,7 @@ mod tests {
                 focal_correction: true,
                 stretch: false,
                 correct_scale: false,
+                post_process: None,
                 set: None,
             },
         }

@@ -35,6 +35,11 @@ pub enum Error {
         /// As many as there were.
         found: usize,
     },
+    /// Several input sizes of a network that learned one camera at one size.
+    #[error(
+        "several input sizes: the network learned one camera at one size, without a canonical focal length"
+    )]
+    OneSize,
     /// A packed network.
     #[error(transparent)]
     Weights(#[from] deepfusion_weights::Error),
@@ -77,6 +82,9 @@ impl Hint for Error {
             Self::NotCalibrated => Some("bf16 needs no calibration".into()),
             Self::Calibration(_) => Some("calibrate the network again; bf16 needs no calibration".into()),
             Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
+            Self::OneSize => Some(
+                "the mirrored image (flip) needs no other size; the embedded networks, and what was trained from them, take any".into(),
+            ),
             Self::Weights(error) => error.hint(),
             Self::Model(error) => error.hint(),
             Self::Onnx(error) => error.hint(),

@@ -8,9 +8,11 @@ use deepfusion_infer::Precision;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{InputSize, LOG_SCALE_BOUNDS, StoredNetwork, TrainConfig};
 
+use crate::augmentation::{blend_flipped, mirror};
+use crate::resample::Resample;
 use crate::{
-    DepthRunner, Error, FusedRunner, ModelSource, NetworkOutput, Prediction, PreparedImage,
-    Preparer,
+    Augmentation, DepthRunner, Error, FusedRunner, ModelSource, NetworkOutput, Prediction,
+    PreparedImage, Preparer, View,
 };
 
 /// A trained depth network, ready for images. It belongs to one thread; [`Self::another`] makes one for another thread.
@@ -26,8 +28,8 @@ pub struct DepthEstimator {
     pub step: usize,
 }
 
-/// Number of other input sizes for which runners are kept; each camera needs one.
-const SIZES_KEPT: usize = 3;
+/// Number of other input sizes for which runners are kept; each camera needs one, or as many as [`Augmentation::scales`].
+const SIZES_KEPT: usize = 4;
 
 /// Runners for other input sizes, made on demand.
 struct OtherSizes {
@@ -199,7 +201,22 @@ impl DepthEstimator {
             size: self.config.size,
             training_camera: self.camera,
             canonical_focal_px: self.config.canonical_focal_px,
+            augmentation: Augmentation::NONE,
         }
+    }
+
+    /// A preparer for more than one look at each image.
+    ///
+    /// # Errors
+    /// [`Error::OneSize`] for several input sizes of a network that has no canonical focal length.
+    pub fn augmented(&self, augmentation: Augmentation) -> Result<Preparer, Error> {
+        if augmentation.resizes() && self.others.is_none() {
+            return Err(Error::OneSize);
+        }
+        Ok(Preparer {
+            augmentation,
+            ..self.preparer()
+        })
     }
 
     /// The metric depth of an image. `camera` is the image's own; without it the training camera is assumed, and the
@@ -245,37 +262,98 @@ impl DepthEstimator {
         self.infer(&preparer.prepare(image, camera, focal_correction, crop))
     }
 
-    /// Runs the network on an image that [`Self::preparer`] prepared, on any thread.
+    /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Of several views the mean of
+    /// the disparities is taken, at the size of the largest; and of ln b, where it predicts that: how sure it is of one look.
     ///
     /// # Errors
     /// As [`DepthRunner::run`].
     pub fn infer(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
-        let runner = match &mut self.others {
-            Some(others) if image.size != self.config.size => others.runner(image.size)?,
-            _ => &mut *self.runner,
+        let Some(&View {
+            size, focal_factor, ..
+        }) = image.largest()
+        else {
+            return Err(Error::ImageSize {
+                expected: 3 * self.config.size.width * self.config.size.height,
+                found: 0,
+            });
         };
-        let mut output = NetworkOutput::default();
-        runner.run(&image.input, &mut output)?;
+        let mut looks = Vec::with_capacity(image.views.len());
+        for view in &image.views {
+            looks.push((view.size, self.look(view, image.flip)?));
+        }
         let NetworkOutput {
-            mut disparity,
-            mut log_scale,
-        } = output;
-        for d in &mut disparity {
-            *d = (f64::from(*d) / image.focal_factor) as f32;
-        }
-        // As the loss saw it: what lies beyond has never been learned.
-        let (low, high) = LOG_SCALE_BOUNDS;
-        for log_scale in log_scale.iter_mut().flatten() {
-            *log_scale = log_scale.clamp(low as f32, high as f32);
-        }
+            disparity,
+            log_scale,
+        } = mean_of(looks, size);
         Ok(Prediction {
             disparity,
             log_scale,
-            width: image.size.width,
-            height: image.size.height,
+            width: size.width,
+            height: size.height,
             window: image.window,
             image_size: image.image_size,
-            focal_factor: image.focal_factor,
+            focal_factor,
         })
+    }
+
+    /// What the network says of one view, with metres corrected; blended with its mirror image's where `flip` says so.
+    fn look(&mut self, view: &View, flip: bool) -> Result<NetworkOutput, Error> {
+        let (width, factor) = (view.size.width, view.focal_factor);
+        let mut own = self.run(&view.input, view.size, factor)?;
+        if flip {
+            let mut input = view.input.clone();
+            mirror(&mut input, width);
+            let mut mirrored = self.run(&input, view.size, factor)?;
+            mirror(&mut mirrored.disparity, width);
+            blend_flipped(&mut own.disparity, &mirrored.disparity, width);
+            if let (Some(own), Some(mirrored)) = (&mut own.log_scale, &mut mirrored.log_scale) {
+                mirror(mirrored, width);
+                blend_flipped(own, mirrored, width);
+            }
+        }
+        Ok(own)
+    }
+
+    /// Runs the network once.
+    fn run(&mut self, input: &[f32], size: InputSize, factor: f64) -> Result<NetworkOutput, Error> {
+        let runner = match &mut self.others {
+            Some(others) if size != self.config.size => others.runner(size)?,
+            _ => &mut *self.runner,
+        };
+        let mut output = NetworkOutput::default();
+        runner.run(input, &mut output)?;
+        for d in &mut output.disparity {
+            *d = (f64::from(*d) / factor) as f32;
+        }
+        // As the loss saw it: what lies beyond has never been learned.
+        let (low, high) = LOG_SCALE_BOUNDS;
+        for log_scale in output.log_scale.iter_mut().flatten() {
+            *log_scale = log_scale.clamp(low as f32, high as f32);
+        }
+        Ok(output)
+    }
+}
+
+/// The mean of what a network said at several sizes, at one of them.
+fn mean_of(mut looks: Vec<(InputSize, NetworkOutput)>, size: InputSize) -> NetworkOutput {
+    if looks.len() == 1
+        && let Some((_, only)) = looks.pop()
+    {
+        return only;
+    }
+    let share = 1.0 / looks.len() as f32;
+    let mean = |of: &dyn Fn(&NetworkOutput) -> Option<&Vec<f32>>| {
+        let mut sum = vec![0.0; size.width * size.height];
+        for (from, look) in &looks {
+            let resample = Resample::new((from.width, from.height), (size.width, size.height));
+            for (sum, value) in sum.iter_mut().zip(resample.map(of(look)?)) {
+                *sum += share * value;
+            }
+        }
+        Some(sum)
+    };
+    NetworkOutput {
+        disparity: mean(&|look| Some(&look.disparity)).unwrap_or_default(),
+        log_scale: mean(&|look| look.log_scale.as_ref()),
     }
 }

@@ -1,9 +1,11 @@
 use deepfusion_geometry::{DepthMap, Intrinsics};
 
+use crate::resample::Resample;
+
 /// The metric depth of an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Metric disparity, 1/m, at network size, row by row; focal correction applied.
+    /// Metric disparity, 1/m, at network size (the largest of several), row by row; focal correction applied.
     pub disparity: Vec<f32>,
     /// ln b at network size, b the Laplace scale of the error of ln depth; `None` if the network does not predict it.
     pub log_scale: Option<Vec<f32>>,
@@ -15,7 +17,7 @@ pub struct Prediction {
     pub window: [u32; 4],
     /// Size of the whole image.
     pub image_size: [u32; 2],
-    /// Factor applied to depth because the focal length differs from the one trained with.
+    /// Factor applied to depth because the focal length differs from the one trained with; of several looks that of the largest.
     pub focal_factor: f64,
 }
 
@@ -109,23 +111,10 @@ impl Prediction {
         (map.width, map.height) = (width, height);
         map.data.clear();
         map.data.resize(width * height, 0.0);
-        let axis = |i: usize, to: usize, from: usize| {
-            let p = (i as f32 + 0.5) * from as f32 / to as f32 - 0.5;
-            let p = p.clamp(0.0, (from - 1) as f32);
-            let low = (p as usize).min(from.saturating_sub(2));
-            (low, (low + 1).min(from - 1), p - low as f32)
-        };
-        let columns: Vec<_> = (0..w).map(|x| axis(x, w, self.width)).collect();
+        let resample = Resample::new((self.width, self.height), (w, h));
         for y in 0..h {
-            let (top, bottom, fy) = axis(y, h, self.height);
-            let (top, bottom) = (top * self.width, bottom * self.width);
-            let row = &mut map.data[(y0 + y) * self.image_size[0] as usize + x0..][..w];
-            for (depth, &(left, right, fx)) in row.iter_mut().zip(&columns) {
-                let d = values;
-                let upper = d[top + left] + (d[top + right] - d[top + left]) * fx;
-                let lower = d[bottom + left] + (d[bottom + right] - d[bottom + left]) * fx;
-                *depth = of(upper + (lower - upper) * fy);
-            }
+            let row = &mut map.data[(y0 + y) * width + x0..][..w];
+            resample.row(values, y, &of, row);
         }
     }
 }

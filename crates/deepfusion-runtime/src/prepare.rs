@@ -2,6 +2,8 @@ use deepfusion_data::{RgbImage, to_network_input};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_model::InputSize;
 
+use crate::Augmentation;
+
 /// Relative difference up to which two aspect ratios count as equal.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
@@ -15,19 +17,39 @@ pub struct Preparer {
     pub training_camera: Option<Intrinsics>,
     /// The canonical focal length in pixels, for a network trained with many cameras.
     pub canonical_focal_px: Option<f64>,
+    /// In how many ways the network looks at each image.
+    pub augmentation: Augmentation,
 }
 
 /// An image as network input.
 #[derive(Debug, Clone)]
 pub struct PreparedImage {
-    /// 3×H×W at network size, in [0, 1], channel by channel.
-    pub input: Vec<f32>,
-    /// The network's input size.
-    pub size: InputSize,
+    /// One for each input size; at least one.
+    pub views: Vec<View>,
+    /// Whether the network looks at the mirror image of each as well.
+    pub flip: bool,
     /// The part of the image that the network sees: x, y, width, height.
     pub window: [u32; 4],
     /// Size of the whole image.
     pub image_size: [u32; 2],
+}
+
+impl PreparedImage {
+    /// The view at the largest input size; `None` where there is no view at all.
+    #[must_use]
+    pub fn largest(&self) -> Option<&View> {
+        let pixels = |view: &&View| view.size.width * view.size.height;
+        self.views.iter().max_by_key(pixels)
+    }
+}
+
+/// An image at one input size.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// 3×H×W at `size`, in [0, 1], channel by channel.
+    pub input: Vec<f32>,
+    /// The network's input size.
+    pub size: InputSize,
     /// Factor to be applied to depth because the focal length differs from the one trained with.
     pub focal_factor: f64,
 }
@@ -47,20 +69,28 @@ impl Preparer {
         focal_correction: bool,
         crop: bool,
     ) -> PreparedImage {
-        let (size, window) = match self.canonical_focal_px {
-            Some(_) => {
-                let (width, height) = image.dimensions();
-                (fitting(self.size, width, height), [0, 0, width, height])
-            }
-            None => (self.size, self.window(image, camera, crop)),
+        let (width, height) = image.dimensions();
+        let window = match self.canonical_focal_px {
+            Some(_) => [0, 0, width, height],
+            None => self.window(image, camera, crop),
         };
         let camera_that_counts = camera.filter(|_| focal_correction);
+        let view = |scale: &f64| {
+            let size = match self.canonical_focal_px {
+                Some(_) => fitting_scaled(self.size, width, height, *scale),
+                None => self.size,
+            };
+            View {
+                input: to_network_input(image, window, size.width as u32, size.height as u32),
+                size,
+                focal_factor: self.focal_factor(camera_that_counts, window, size),
+            }
+        };
         PreparedImage {
-            input: to_network_input(image, window, size.width as u32, size.height as u32),
-            size,
+            views: self.augmentation.scales.iter().map(view).collect(),
+            flip: self.augmentation.flip,
             window,
-            image_size: [image.width(), image.height()],
-            focal_factor: self.focal_factor(camera_that_counts, window, size),
+            image_size: [width, height],
         }
     }
 
@@ -120,17 +150,23 @@ impl Preparer {
 /// that stretches the image least and has about as many pixels as `trained`; `trained` itself if it fits.
 #[must_use]
 pub fn fitting(trained: InputSize, width: u32, height: u32) -> InputSize {
+    fitting_scaled(trained, width, height, 1.0)
+}
+
+/// As [`fitting`], of images `scale` times as wide and high.
+fn fitting_scaled(trained: InputSize, width: u32, height: u32, scale: f64) -> InputSize {
     let aspect = f64::from(width) / f64::from(height);
     let pixels = |size: InputSize| (size.width * size.height) as f64;
+    let wanted = pixels(trained) * scale * scale;
     let cost = |size: InputSize| {
         let stretched = (size.width as f64 / size.height as f64 / aspect).ln().abs();
-        stretched + 0.5 * (pixels(size) / pixels(trained)).ln().abs()
+        stretched + 0.5 * (pixels(size) / wanted).ln().abs()
     };
-    let sides = |most: usize| (64..=most).step_by(32);
-    let longest = 2 * trained.width.max(trained.height);
-    sides(longest)
-        .flat_map(|width| sides(longest).map(move |height| InputSize { width, height }))
-        .chain([trained])
+    let longest = (2.0 * scale * trained.width.max(trained.height) as f64) as usize;
+    let sides = || (64..=longest.max(64)).step_by(32);
+    sides()
+        .flat_map(|width| sides().map(move |height| InputSize { width, height }))
+        .chain((scale == 1.0).then_some(trained))
         .min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
         .unwrap_or(trained)
 }
@@ -158,6 +194,32 @@ mod tests {
             assert_eq!(fitting(trained, image.0, image.1), expected, "{image:?}");
         }
         assert_eq!(fitting(size(640, 192), 640, 480), size(384, 288));
+        let scaled = |scale| fitting_scaled(size(640, 192), 1242, 375, scale);
+        assert_eq!(
+            [0.8, 1.0, 1.2].map(scaled),
+            [size(512, 160), size(640, 192), size(736, 224)]
+        );
+    }
+
+    /// At every size the factor is that size's own.
+    #[test]
+    fn an_image_is_prepared_at_each_scale() {
+        let preparer = Preparer {
+            size: size(640, 192),
+            training_camera: None,
+            canonical_focal_px: Some(185.0),
+            augmentation: Augmentation::MULTI_SCALE_FLIP,
+        };
+        let camera = Intrinsics::centred(721.5, (1242, 375));
+        let prepared = preparer.prepare(&RgbImage::new(1242, 375), Some(&camera), true, true);
+        assert!(prepared.flip);
+        let sizes: Vec<_> = prepared.views.iter().map(|view| view.size).collect();
+        assert_eq!(sizes, [size(512, 160), size(736, 224)]);
+        for view in &prepared.views {
+            assert_eq!(view.input.len(), 3 * view.size.width * view.size.height);
+            let factor = 721.5 * view.size.height as f64 / 375.0 / 185.0;
+            assert!((view.focal_factor - factor).abs() < 1e-9);
+        }
     }
 
     /// A wall 10 m away is 10 m away, whatever the lens and the picture's shape: the factor is the focal length at the
@@ -175,6 +237,7 @@ mod tests {
                 height: 96,
             }),
             canonical_focal_px: Some(185.0),
+            augmentation: Augmentation::NONE,
         };
         let camera = Intrinsics {
             fx: 585.0,
@@ -187,17 +250,19 @@ mod tests {
         let image = RgbImage::new(640, 480);
         for crop in [true, false] {
             let known = preparer.prepare(&image, Some(&camera), true, crop);
-            assert_eq!(
-                (known.size, known.window),
-                (size(192, 160), [0, 0, 640, 480])
-            );
-            assert_eq!(known.input.len(), 3 * 192 * 160);
-            assert!((known.focal_factor - 585.0 / 3.0 / 185.0).abs() < 1e-9);
+            assert_eq!(known.window, [0, 0, 640, 480]);
+            let [view] = known.views.as_slice() else {
+                panic!("{} views", known.views.len())
+            };
+            assert_eq!(view.size, size(192, 160));
+            assert_eq!(view.input.len(), 3 * 192 * 160);
+            assert!((view.focal_factor - 585.0 / 3.0 / 185.0).abs() < 1e-9);
         }
+        let factor = |prepared: &PreparedImage| prepared.views[0].focal_factor;
         let unknown = preparer.prepare(&image, None, true, true);
-        assert!((unknown.focal_factor - 230.4 * 0.6 / 185.0).abs() < 1e-9);
+        assert!((factor(&unknown) - 230.4 * 0.6 / 185.0).abs() < 1e-9);
         let uncorrected = preparer.prepare(&image, Some(&camera), false, true);
-        assert_eq!(uncorrected.focal_factor, unknown.focal_factor);
+        assert_eq!(factor(&uncorrected), factor(&unknown));
         // A network of one camera cuts.
         let own = Preparer {
             canonical_focal_px: None,
@@ -205,9 +270,9 @@ mod tests {
         };
         let cut = own.prepare(&image, Some(&camera), true, true);
         assert_eq!(
-            (cut.size, cut.window[2..].to_vec()),
+            (cut.views[0].size, cut.window[2..].to_vec()),
             (size(320, 96), vec![640, 192])
         );
-        assert!((cut.focal_factor - 0.5 * 585.0 / 230.4).abs() < 1e-9);
+        assert!((factor(&cut) - 0.5 * 585.0 / 230.4).abs() < 1e-9);
     }
 }

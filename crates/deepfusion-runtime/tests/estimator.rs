@@ -6,7 +6,10 @@ use std::path::Path;
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_hint::Hint;
-use deepfusion_runtime::{DepthEstimator, DepthRunner, Error as RuntimeError, ModelSource};
+use deepfusion_runtime::{
+    Augmentation, DepthEstimator, DepthRunner, Error as RuntimeError, ModelSource, Precision,
+    Prediction,
+};
 use rayon::prelude::*;
 
 type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
@@ -115,4 +118,96 @@ fn a_name_that_is_none_says_which_there_are() {
     let folder = tempfile::tempdir().unwrap();
     let error = DepthEstimator::load(folder.path()).unwrap_err();
     assert!(error.hint().is_some(), "{error}");
+}
+
+/// A prediction by more than one look.
+fn augmented(
+    estimator: &mut DepthEstimator,
+    image: &RgbImage,
+    how: Augmentation,
+) -> Result<Prediction> {
+    let preparer = estimator.augmented(how)?;
+    let k = camera(image.width(), image.height());
+    Ok(estimator.infer(&preparer.prepare(image, Some(&k), true, true))?)
+}
+
+#[test]
+fn several_looks_give_their_mean() -> Result {
+    let mut estimator = tiny()?;
+    let image = picture(640, 192, 4);
+    let at = |estimator: &mut DepthEstimator, scales| {
+        let how = Augmentation {
+            scales,
+            ..Augmentation::NONE
+        };
+        augmented(estimator, &image, how)
+    };
+    let small = at(&mut estimator, &[0.8])?;
+    let large = at(&mut estimator, &[1.2])?;
+    let both = augmented(&mut estimator, &image, Augmentation::MULTI_SCALE)?;
+    let size = |of: &Prediction| (of.width, of.height);
+    assert_eq!(
+        [&small, &large, &both].map(size),
+        [(224, 64), (384, 128), (384, 128)]
+    );
+    assert_eq!(both.focal_factor, large.focal_factor);
+    // Metric disparity at the image's size: enlarging is linear, so that the order of means does not matter inside.
+    let inverse = |of: &Prediction| of.depth().data.iter().map(|d| 1.0 / d).collect::<Vec<_>>();
+    let [small, large, both] = [&small, &large, &both].map(inverse);
+    let mut farthest = 0.0_f32;
+    for ((a, b), mean) in small.iter().zip(&large).zip(&both) {
+        farthest = farthest.max(((a + b) / 2.0 / mean - 1.0).abs());
+    }
+    // What resampling twice takes from edges.
+    assert!(farthest < 0.2, "{farthest}");
+    let mean = |of: &[f32]| of.iter().sum::<f32>() / of.len() as f32;
+    let ratio = (mean(&small) + mean(&large)) / 2.0 / mean(&both);
+    assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
+    assert!((mean(&small) / mean(&large) - 1.0).abs() > 0.01);
+    Ok(())
+}
+
+/// What looks both ways sees a mirrored image as the mirrored prediction.
+#[test]
+fn a_mirrored_image_is_seen_mirrored() -> Result {
+    let mut estimator = DepthEstimator::load("street")?;
+    let image = picture(640, 192, 6);
+    let mirrored = image::imageops::flip_horizontal(&image);
+    for how in [Augmentation::FLIP, Augmentation::MULTI_SCALE_FLIP] {
+        let own = augmented(&mut estimator, &image, how)?;
+        let mut other = augmented(&mut estimator, &mirrored, how)?;
+        let scale = other.log_scale.as_mut().ok_or("no ln b")?;
+        for values in [&mut other.disparity, scale] {
+            for row in values.chunks_exact_mut(own.width) {
+                row.reverse();
+            }
+        }
+        for (a, b) in own.disparity.iter().zip(&other.disparity) {
+            assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+        }
+        for (a, b) in own
+            .log_scale
+            .iter()
+            .flatten()
+            .zip(other.log_scale.iter().flatten())
+        {
+            assert!((a - b).abs() < 1e-3, "{a} {b}");
+        }
+    }
+    let plain = augmented(&mut estimator, &image, Augmentation::NONE)?;
+    assert_eq!(plain, estimator.estimate(&image, Some(&camera(640, 192)))?);
+    Ok(())
+}
+
+#[test]
+fn a_network_of_one_camera_takes_one_size() -> Result {
+    let mut network = ModelSource::named(Path::new("tiny"))?.load(None)?;
+    network.config.canonical_focal_px = None;
+    let mut estimator = DepthEstimator::fused(network, Precision::F32)?;
+    let refused = estimator.augmented(Augmentation::MULTI_SCALE).unwrap_err();
+    assert!(matches!(refused, RuntimeError::OneSize), "{refused}");
+    assert!(refused.hint().is_some_and(|hint| hint.contains("flip")));
+    let seen = augmented(&mut estimator, &picture(320, 96, 1), Augmentation::FLIP)?;
+    assert_eq!((seen.width, seen.height), (320, 96));
+    Ok(())
 }

@@ -68,6 +68,7 @@ class _Job:
     intrinsics: tuple[float, float, float, float] | None
     focal_correction: bool
     stretch: bool
+    post_process: str | None
     output: str
     save: tuple[str, ...]
     overwrite: bool
@@ -85,6 +86,9 @@ class _Job:
         made["model"] = self.model if self.weights is None else None
         made["intrinsics"] = None if self.intrinsics is None else list(self.intrinsics)
         made["save"] = list(self.save)
+        # Absent where there is one look, as in what was made before there could be more.
+        if self.post_process is not None:
+            made["post_process"] = self.post_process
         return made
 
 
@@ -132,6 +136,7 @@ class _Worker:
                 self.job.intrinsics,
                 focal_correction=self.job.focal_correction,
                 stretch=self.job.stretch,
+                post_process=self.job.post_process,
             )
             for i, mark, _ in readable:
                 begun = time.monotonic()
@@ -246,6 +251,7 @@ def predict(
     data_set: str | None = None,
     focal_correction: bool = True,
     stretch: bool = False,
+    post_process: str | None = None,
     overwrite: bool = False,
     storage_options: Mapping[str, Any] | None = None,
 ) -> PredictSummary:
@@ -256,7 +262,7 @@ def predict(
     of one camera: `intrinsics` are fx, fy, cx, cy in its pixels; without them each file's EXIF is asked, then the lens of the
     training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
     (`NAME_depth.npy`, f32 metres), "sigma" and "confidence" (`NAME_sigma.npy`, `NAME_confidence.npy`, of a network that says how sure it
-    is).
+    is). `post_process` is that of `Model.predict`.
 
     Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads. An
     image's `NAME.json` is written last and marks it as done: what is there whole, of the same image, network and options, is kept.
@@ -278,7 +284,9 @@ def predict(
         network = deepfusion.load(model, precision=precision, data_set=data_set)
         grey = np.full((64, 64, 3), 128, np.uint8)
         unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
-        if unsaid and network.predict(grey).sigma is None:
+        # What the network cannot do is one error as well.
+        seen = network.predict(grey, post_process=post_process)
+        if unsaid and seen.sigma is None:
             raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
     job = _Job(
         id=uuid.uuid4().hex,
@@ -288,6 +296,7 @@ def predict(
         intrinsics=None if intrinsics is None else tuple(map(float, intrinsics)),
         focal_correction=focal_correction,
         stretch=stretch,
+        post_process=post_process,
         output=urls(output)[0],
         save=tuple(dict.fromkeys(save)),
         overwrite=overwrite,

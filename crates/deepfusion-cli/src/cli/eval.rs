@@ -100,8 +100,8 @@ pub(crate) struct EvalArgs {
     /// Also write the drawn points: image, pixel, true and predicted place in the camera's axes, error, as CSV.
     #[arg(long, value_name = "FILE.csv", requires = "points")]
     pub points_out: Option<PathBuf>,
-    /// Blend each prediction with that of the mirrored image, as the field's post-processed rows do; at twice the time, and without the
-    /// verdict, which is of the network's own predictions.
+    /// Take the mean of several looks at each image, as `predict --post-process` does; without the verdict, which is of the network's
+    /// own predictions.
     #[arg(long, value_parser = names::post_process(), conflicts_with_all = ["pred", "calibrate_confidence", "calibrate_uncertainty"])]
     pub post_process: Option<PostProcess>,
     /// Also write a page that opens offline: tables, charts, best and worst frames, learning curves, settings.

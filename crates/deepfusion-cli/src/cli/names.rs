@@ -164,14 +164,24 @@ pub(super) fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
     )
 }
 
-/// What is done with predictions before they are compared.
+/// In how many ways the network looks at each image.
 pub(super) fn post_process() -> impl TypedValueParser<Value = PostProcess> {
     one_of(
-        |PostProcess::Flip| "flip",
-        &[(
-            PostProcess::Flip,
-            "The mean of the prediction and the mirrored image's; near the left edge the latter alone, near the right edge the former",
-        )],
+        PostProcess::name,
+        &[
+            (
+                PostProcess::Flip,
+                "The mean with the mirrored image's prediction (at the left edge that alone, at the right edge the image's); twice the time",
+            ),
+            (
+                PostProcess::MultiScale,
+                "The mean of a smaller input's prediction (0.8 times as wide and high) and a larger one's (1.2); twice the time",
+            ),
+            (
+                PostProcess::MultiScaleFlip,
+                "The same, each with the mirrored image's; four times the time",
+            ),
+        ],
     )
 }
 

@@ -2,10 +2,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use deepfusion_data::{NamedTopic, OpenOptions};
+use deepfusion_eval::PostProcess;
 use deepfusion_motion::ScaleMonitorConfig;
 
 use super::values::{hfov, positive};
-use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save};
+use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save, names};
 
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
 #[derive(Debug, Clone, Args)]
@@ -43,6 +44,10 @@ pub(crate) struct PredictionArgs {
     /// cameras, as the embedded ones, sees the whole image either way, at an input of its aspect ratio.
     #[arg(long)]
     pub stretch: bool,
+    /// Take the mean of several looks at each image: it errs less, and takes longer. Several sizes need a network that learned with many
+    /// cameras, as the embedded ones did.
+    #[arg(long, value_parser = names::post_process())]
+    pub post_process: Option<PostProcess>,
     /// The camera's height over the road in metres, where it was measured: the scale monitor, which watches recordings
     /// with speed and yaw rate, otherwise learns it from the first frames.
     #[arg(long, value_name = "M", value_parser = positive)]

@@ -137,12 +137,10 @@ impl Evaluation {
     }
 
     /// How its predictions were changed before they were compared.
-    pub(crate) fn post_process(&self) -> Option<&'static str> {
+    pub(crate) fn post_process(&self) -> Option<PostProcess> {
         match &self.origin {
             Origin::Plain => None,
-            Origin::Saved { measured, .. } => measured.post_process.map(|how| match how {
-                PostProcess::Flip => "post-processed",
-            }),
+            Origin::Saved { measured, .. } => measured.post_process,
         }
     }
 
@@ -159,11 +157,19 @@ impl Evaluation {
     }
 }
 
+/// How a row's name says that its predictions were post-processed. The field's tables mean the mirrored image by the word alone.
+pub(crate) fn in_words(how: PostProcess) -> String {
+    match how {
+        PostProcess::Flip => "post-processed".into(),
+        other => format!("post-processed: {}", other.name()),
+    }
+}
+
 /// Adds what tells rows of one name in one table apart: the checkpoint, then the engine, then the path.
 fn tell_apart(all: &mut [Evaluation]) {
     type Distinction = fn(&Evaluation) -> Option<String>;
     let distinctions: [Distinction; 4] = [
-        |e| e.post_process().map(str::to_owned),
+        |e| e.post_process().map(in_words),
         |e| e.checkpoint().map(str::to_owned),
         |e| e.engine().map(str::to_owned),
         |e| Some(e.path.display().to_string()),

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::saved::SavedEvaluation;
+use crate::PostProcess;
 
 /// How far a prediction may be off as a whole, and its metres still be trusted: exp(|bias|) ≤ 1 ± this.
 pub const TRUSTED_WITHIN: f64 = 0.1;
@@ -63,7 +64,7 @@ impl MetricScale {
     }
 
     /// From the evaluations that a run's folder keeps: those of this very checkpoint (by the SHA-256 of its file), of the same
-    /// data set where it learned several, with the same correction for the focal length, of predictions as they are, and known to be of frames that training
+    /// data set where it learned several, with the same correction for the focal length and the same post-processing, and known to be of frames that training
     /// did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
     /// place and not in another are not trusted.
     ///
@@ -74,6 +75,7 @@ impl MetricScale {
         checkpoint_sha256: &str,
         set: Option<&str>,
         focal_correction: bool,
+        post_process: Option<PostProcess>,
         steps: usize,
     ) -> Self {
         let read = |path: &std::path::PathBuf| -> Option<SavedEvaluation> {
@@ -83,7 +85,7 @@ impl MetricScale {
             saved.model.sha256 == checkpoint_sha256
                 && saved.measured.set.as_deref() == set
                 && saved.measured.focal_correction == focal_correction
-                && saved.measured.post_process.is_none()
+                && saved.measured.post_process == post_process
                 && saved.measured.held_out == Some(true)
                 && saved.report.n >= LEAST_IMAGES
         };

@@ -4,7 +4,7 @@ use std::path::Path;
 use crate::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
 use deepfusion_hint::count_of;
 
-use super::evaluation::{Evaluation, Origin};
+use super::evaluation::{Evaluation, Origin, in_words};
 use super::plausibility::{Flag, Severity, check, identical};
 use super::table::{Better, Column, Row, Table, Tables, Value};
 
@@ -262,7 +262,9 @@ fn notes(member: &Evaluation) -> Vec<Flag> {
     }
     if let Some(how) = member.post_process() {
         flags.push(Flag::note(format!(
-            "{how}: the mean with the mirrored image's prediction, which takes two passes of the network"
+            "{}: {}",
+            in_words(how),
+            how.explained()
         )));
     }
     if let Some(rate) = member.report.missing_rate.filter(|r| *r > 0.0) {

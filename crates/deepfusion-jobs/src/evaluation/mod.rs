@@ -11,12 +11,11 @@ use std::collections::HashMap;
 
 use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage, ground_truth_names};
 use deepfusion_eval::{
-    ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, MeanDepthBaseline, Prediction,
-    Protocol, Report, Sample, blend_flipped, match_names,
+    ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, MeanDepthBaseline, PostProcess,
+    Prediction, Protocol, Report, Sample, match_names,
 };
 use deepfusion_geometry::Intrinsics;
-use deepfusion_runtime::DepthEstimator;
-use image::imageops::flip_horizontal;
+use deepfusion_runtime::{Augmentation, DepthEstimator};
 
 use crate::{Error, Result};
 
@@ -56,8 +55,19 @@ pub struct Evaluated {
     pub places: Vec<ImageRef>,
 }
 
-/// The disparity of an image, as the protocol wants it. An image of another aspect ratio is stretched, so that all of its ground
-/// truth counts.
+/// The looks that a way of post-processing takes.
+#[must_use]
+pub fn augmentation(how: Option<PostProcess>) -> Augmentation {
+    match how {
+        None => Augmentation::NONE,
+        Some(PostProcess::Flip) => Augmentation::FLIP,
+        Some(PostProcess::MultiScale) => Augmentation::MULTI_SCALE,
+        Some(PostProcess::MultiScaleFlip) => Augmentation::MULTI_SCALE_FLIP,
+    }
+}
+
+/// The disparity of an image, as the protocol wants it, by one look. An image of another aspect ratio is stretched, so that all of its
+/// ground truth counts.
 ///
 /// # Errors
 /// What the network's engine says.
@@ -67,42 +77,25 @@ pub fn predict(
     camera: &Intrinsics,
     focal_correction: bool,
 ) -> Result<Prediction> {
-    let prediction = estimator.predict(image, Some(camera), focal_correction, false)?;
-    let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
-    Ok(Prediction::Disparity(grid))
+    predict_post_processed(estimator, image, camera, focal_correction, None)
 }
 
-/// The disparity of an image blended with that of its mirror image ([`blend_flipped`]); else as [`predict`].
+/// As [`predict`], by as many looks as the post-processing takes.
 ///
 /// # Errors
-/// What the network's engine says.
+/// What the network's engine says; several input sizes of a network that takes one.
 pub fn predict_post_processed(
     estimator: &mut DepthEstimator,
     image: &RgbImage,
     camera: &Intrinsics,
     focal_correction: bool,
+    how: Option<PostProcess>,
 ) -> Result<Prediction> {
-    let own = estimator.predict(image, Some(camera), focal_correction, false)?;
-    let mirrored = mirrored_disparity(estimator, image, camera, focal_correction)?;
-    let grid = |disparity: &[f32]| Grid::from_f32(own.width, own.height, disparity);
-    let blended = blend_flipped(&grid(&own.disparity)?, &grid(&mirrored)?)?;
-    Ok(Prediction::Disparity(blended))
-}
-
-/// The disparity that the mirrored image is given, mirrored back: beside the image's own, pixel by pixel.
-fn mirrored_disparity(
-    estimator: &mut DepthEstimator,
-    image: &RgbImage,
-    camera: &Intrinsics,
-    focal_correction: bool,
-) -> Result<Vec<f32>> {
-    let mirror = flip_horizontal(image);
-    let seen = estimator.predict(&mirror, Some(&camera.flipped()), focal_correction, false)?;
-    let mut disparity = seen.disparity;
-    for row in disparity.chunks_exact_mut(seen.width.max(1)) {
-        row.reverse();
-    }
-    Ok(disparity)
+    let preparer = estimator.augmented(augmentation(how))?;
+    let prepared = preparer.prepare(image, Some(camera), focal_correction, false);
+    let prediction = estimator.infer(&prepared)?;
+    let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
+    Ok(Prediction::Disparity(grid))
 }
 
 /// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth; `progress` takes the frames done

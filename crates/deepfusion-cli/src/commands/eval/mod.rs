@@ -7,9 +7,7 @@ use std::path::Path;
 use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_eval::verdict::{ScaleCertificate, Verdict};
-use deepfusion_eval::{
-    ArraySet, Crop, Grid, PostProcess, Prediction, Protocol, Report, points_csv,
-};
+use deepfusion_eval::{ArraySet, Crop, Grid, Prediction, Protocol, Report, points_csv};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
 pub(super) use deepfusion_jobs::evaluation::predict;
@@ -162,11 +160,8 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     let see = |estimator: &mut DepthEstimator, dataset: &Dataset, frame: usize| -> Result<_> {
         let image = dataset.load_image(frame)?;
         let camera = dataset.intrinsics(frame);
-        let predict = match args.post_process {
-            Some(PostProcess::Flip) => predict_post_processed,
-            None => predict,
-        };
-        let prediction = predict(estimator, &image, &camera, !args.no_focal_correction)?;
+        let (correct, how) = (!args.no_focal_correction, args.post_process);
+        let prediction = predict_post_processed(estimator, &image, &camera, correct, how)?;
         Ok((image, prediction))
     };
     let mut evaluated = evaluate_datasets(
@@ -525,9 +520,8 @@ fn how_a_model_was_measured(
         ("program", m.program.clone()),
         ("time (UTC)", m.time.clone()),
     ];
-    if m.post_process == Some(PostProcess::Flip) {
-        let how = "the mean with the mirrored image's".to_owned();
-        rows.push(("post-processing", how));
+    if let Some(how) = m.post_process {
+        rows.push(("post-processing", how.explained().to_owned()));
     }
     if let Some(split) = &args.split {
         rows.insert(1, ("split", split.display().to_string()));

@@ -44,6 +44,7 @@ pub(super) fn made_with(
         focal_correction: !args.no_focal_correction,
         stretch: args.stretch,
         correct_scale: args.correct_scale,
+        post_process: args.post_process,
         set: args.engine.set.clone(),
     })
 }

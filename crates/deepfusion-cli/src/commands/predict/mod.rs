@@ -21,6 +21,7 @@ use deepfusion_jobs::bulk::{
     BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, StartedJob, Summary, add_output,
     commit, queue, sidecar_path, write_unsynced, write_videos,
 };
+use deepfusion_jobs::evaluation::augmentation;
 use deepfusion_jobs::scene::{DepthWatch, unwatched};
 use deepfusion_jobs::{Input, intervals};
 use deepfusion_records::{FileMark, LiveMark, MadeWith, PredictionRecord, ScaleRecord, Sidecar};
@@ -430,12 +431,17 @@ impl<'a> Job<'a> {
             made_with: made_with::made_with(args, &outputs, model, estimator, &camera)?,
             camera,
             learned,
-            preparer: estimator.preparer(),
+            preparer: estimator.augmented(augmentation(args.post_process))?,
             step: estimator.step,
             intervals: model.interval_factors()?,
             camera_warning: Once::new(),
             size_warning: Once::new(),
-            scale: model.scale(set, !args.no_focal_correction, estimator.step)?,
+            scale: model.scale(
+                set,
+                !args.no_focal_correction,
+                args.post_process,
+                estimator.step,
+            )?,
             inspector: if outputs.save.contains(&Save::Features) {
                 Some(inspection::open(&model.load(set)?, args.engine.device)?)
             } else {
@@ -539,9 +545,9 @@ impl<'a> Job<'a> {
     ) -> Result<Seen> {
         Ok(Seen {
             prediction: estimator.infer(prepared)?,
-            layers: match &self.inspector {
-                Some(inspector) => inspector.inspect(&prepared.input, prepared.size),
-                None => Vec::new(),
+            layers: match (&self.inspector, prepared.largest()) {
+                (Some(inspector), Some(view)) => inspector.inspect(&view.input, view.size),
+                _ => Vec::new(),
             },
             scale: None,
         })

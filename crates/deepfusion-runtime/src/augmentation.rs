@@ -1,0 +1,121 @@
+/// In how many ways a network looks at one image: at several input sizes, mirrored or not. The mean of their disparities errs less than any
+/// of them, and takes the time of all (test-time augmentation; what it is worth: docs/BENCHMARKS.md, "More than one look").
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Augmentation {
+    /// Input sizes, as multiples of the one that fits the image; each is rounded to one that the network takes.
+    pub scales: &'static [f64],
+    /// Whether the network also looks at the mirrored image, at each size. The two are blended as Godard et al. do (CVPR 2017, section 3.4;
+    /// Monodepth2's evaluation as well).
+    pub flip: bool,
+}
+
+impl Augmentation {
+    /// One look at the size that fits.
+    pub const NONE: Self = Self {
+        scales: &[1.0],
+        flip: false,
+    };
+    /// The image and its mirror image, at the size that fits.
+    pub const FLIP: Self = Self {
+        flip: true,
+        ..Self::NONE
+    };
+    /// A smaller input, which shows the network more of the scene at once, and a larger one, which shows it more of what is far: with
+    /// 640×192 to fit, 512×160 and 736×224.
+    pub const MULTI_SCALE: Self = Self {
+        scales: &[0.8, 1.2],
+        flip: false,
+    };
+    /// [`Self::MULTI_SCALE`], each mirrored as well.
+    pub const MULTI_SCALE_FLIP: Self = Self {
+        flip: true,
+        ..Self::MULTI_SCALE
+    };
+
+    /// Whether it takes input sizes other than the one that fits.
+    #[must_use]
+    pub fn resizes(&self) -> bool {
+        self.scales.iter().any(|scale| *scale != 1.0)
+    }
+}
+
+impl Default for Augmentation {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+/// Where the blending with the mirrored image's disparity begins and ends, from an edge, as shares of the width.
+const EDGE: (f64, f64) = (0.05, 0.10);
+
+/// Values of an image and of its mirror image as one, in `own`: the mean of both; in the leftmost twentieth the mirrored image's alone, in the
+/// rightmost the image's, with a ramp as wide between. At its left edge a network trained on views to the right has not seen what it
+/// should predict; at the mirrored image's it has.
+///
+/// # Shapes
+/// - `own`: H×`width`
+/// - `mirrored`: H×`width`, the mirrored image's values mirrored back
+pub(crate) fn blend_flipped(own: &mut [f32], mirrored: &[f32], width: usize) {
+    let (from, to) = EDGE;
+    let last = width.saturating_sub(1).max(1) as f64;
+    let near_left = |column: usize| {
+        let x = column as f64 / last;
+        1.0 - ((x - from) / (to - from)).clamp(0.0, 1.0)
+    };
+    // What counts of the image's own value; the rest is the mirrored one's.
+    let weights: Vec<f32> = (0..width)
+        .map(|column| {
+            let (left, right) = (near_left(column), near_left(width - 1 - column));
+            (right + (1.0 - left - right) / 2.0) as f32
+        })
+        .collect();
+    let rows = own.chunks_exact_mut(width.max(1));
+    for (own, mirrored) in rows.zip(mirrored.chunks_exact(width.max(1))) {
+        for ((own, mirrored), weight) in own.iter_mut().zip(mirrored).zip(&weights) {
+            *own = mirrored + (*own - mirrored) * weight;
+        }
+    }
+}
+
+/// Mirrors an image of rows of `width` values from left to right.
+pub(crate) fn mirror(values: &mut [f32], width: usize) {
+    for row in values.chunks_exact_mut(width.max(1)) {
+        row.reverse();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_edge_is_of_the_image_that_saw_it() {
+        let mut blended = vec![1.0; 202];
+        blend_flipped(&mut blended, &[3.0; 202], 101);
+        let at = |column: usize| blended[column];
+        assert_eq!([0, 5, 50, 95, 100].map(at), [3.0, 3.0, 2.0, 1.0, 1.0]);
+        // Halfway down the ramp, between the seventh column and the eighth: three quarters and one.
+        assert!((f32::midpoint(at(7), at(8)) - 2.5).abs() < 1e-6);
+        assert!((f32::midpoint(at(92), at(93)) - 1.5).abs() < 1e-6);
+        assert_eq!(blended[..101], blended[101..]);
+    }
+
+    #[test]
+    fn equal_values_stay_and_one_column_is_a_width() {
+        let mut own = vec![7.5; 101];
+        blend_flipped(&mut own, &[7.5; 101], 101);
+        assert_eq!(own, vec![7.5; 101]);
+        let mut narrow = vec![1.0, 2.0];
+        blend_flipped(&mut narrow, &[1.0, 2.0], 1);
+        assert_eq!(narrow, [1.0, 2.0]);
+    }
+
+    #[test]
+    fn a_mirror_is_its_own_inverse() {
+        let mut values = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        mirror(&mut values, 3);
+        assert_eq!(values, [3.0, 2.0, 1.0, 6.0, 5.0, 4.0]);
+        mirror(&mut values, 3);
+        assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    }
+}
