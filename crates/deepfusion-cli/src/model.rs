@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use deepfusion_eval::PostProcess;
 pub(crate) use deepfusion_jobs::ModelFacts;
+use deepfusion_model::TrainConfig;
 use deepfusion_runtime::ModelSource;
 
 use crate::error::CliError;
@@ -33,4 +35,24 @@ pub(crate) fn embedded_default() -> Result<Option<ModelSource>> {
         ));
     }
     Ok(source)
+}
+
+/// Warns where several input sizes are asked of a run that learned at one: it may then be worse than by one look.
+pub(crate) fn warn_of_one_size(
+    model: &ModelSource,
+    config: &TrainConfig,
+    how: Option<PostProcess>,
+) {
+    let several = matches!(
+        how,
+        Some(PostProcess::MultiScale | PostProcess::MultiScaleFlip)
+    );
+    if several && model.folder().is_some() && config.augmentation.sizes.is_empty() {
+        tracing::warn!(
+            "--post-process {}: the run learned at {}x{} alone, and may be worse at other sizes; `eval` with and without it says",
+            how.map_or("", PostProcess::name),
+            config.size.width,
+            config.size.height
+        );
+    }
 }

@@ -326,6 +326,6 @@ fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
     for entry in std::fs::read_dir(&at).unwrap() {
         std::fs::write(entry.unwrap().path(), [0_u8; 99]).unwrap();
     }
-    let found = MetricScale::measured(&folder.path().join("good"), "abc", None, true, 2000);
+    let found = MetricScale::measured(&folder.path().join("good"), "abc", None, true, None, 2000);
     assert_eq!(found, MetricScale::default());
 }

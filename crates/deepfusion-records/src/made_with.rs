@@ -87,6 +87,7 @@ impl std::fmt::Display for Difference {
             Self::FocalCorrection => "another correction for the focal length",
             Self::Stretch => "another way of fitting images to the network",
             Self::CorrectScale => "another correction of the scale",
+            Self::PostProcess => "another post-processing",
         })
     }
 }

@@ -4,6 +4,9 @@ use deepfusion_model::InputSize;
 
 use crate::Augmentation;
 
+/// The shortest side of an input that is not of the size trained with.
+const SHORTEST_SIDE: usize = 96;
+
 /// Relative difference up to which two aspect ratios count as equal.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
@@ -163,7 +166,9 @@ fn fitting_scaled(trained: InputSize, width: u32, height: u32, scale: f64) -> In
         stretched + 0.5 * (pixels(size) / wanted).ln().abs()
     };
     let longest = (2.0 * scale * trained.width.max(trained.height) as f64) as usize;
-    let sides = || (64..=longest.max(64)).step_by(32);
+    // 64 pixels are two cells of the deepest features: `tiny`, shrunk to them, saw everything four times too far.
+    let shortest = if scale == 1.0 { 64 } else { SHORTEST_SIDE };
+    let sides = || (shortest..=longest.max(shortest)).step_by(32);
     sides()
         .flat_map(|width| sides().map(move |height| InputSize { width, height }))
         .chain((scale == 1.0).then_some(trained))
@@ -199,6 +204,8 @@ mod tests {
             [0.8, 1.0, 1.2].map(scaled),
             [size(512, 160), size(640, 192), size(736, 224)]
         );
+        let of_a_small = |scale| fitting_scaled(size(320, 96), 1242, 375, scale);
+        assert_eq!([0.8, 1.2].map(of_a_small), [size(320, 96), size(416, 128)]);
     }
 
     /// At every size the factor is that size's own.

@@ -120,6 +120,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
         return Err(CliError::NoRunFolder { option, model }.into());
     }
     let mut estimator = engine::load(&model, &args.engine)?;
+    model::warn_of_one_size(&model, estimator.config(), args.post_process);
     if args.calibrate_uncertainty {
         check_calibration(&model, &estimator)?;
     }

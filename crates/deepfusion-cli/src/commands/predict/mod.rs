@@ -425,6 +425,7 @@ impl<'a> Job<'a> {
             }
         };
         let set = args.engine.set.as_deref();
+        model::warn_of_one_size(model, estimator.config(), args.post_process);
         Ok(Self {
             args,
             model,
