@@ -1,4 +1,4 @@
-//! What the field does with predictions before it compares them.
+//! Predictions by more than one look at each image.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 pub enum PostProcess {
     /// The image and the mirrored image, as Monodepth2's post-processed rows have it; at twice the time.
     Flip,
-    /// A smaller input and a larger one.
+    /// A smaller input and a larger one; at two to two and a half times the time.
     MultiScale,
-    /// The same, each mirrored as well; at about four times the time.
+    /// The same, each mirrored as well; at four to five times the time.
     MultiScaleFlip,
 }
 

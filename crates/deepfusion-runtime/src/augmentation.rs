@@ -1,5 +1,6 @@
-/// In how many ways a network looks at one image: at several input sizes, mirrored or not. The mean of their disparities errs less than any
-/// of them, and takes the time of all (test-time augmentation; what it is worth: docs/BENCHMARKS.md, "More than one look").
+/// In how many ways a network looks at one image: at several input sizes, mirrored or not. The mean of their disparities usually errs less
+/// on images unlike those learned from, and takes the time of all (test-time augmentation; what it is worth, and where it is worse:
+/// docs/BENCHMARKS.md, "More than one look").
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmentation {
     /// Input sizes, as multiples of the one that fits the image; each is rounded to one that the network takes.

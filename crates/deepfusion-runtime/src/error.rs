@@ -83,7 +83,7 @@ impl Hint for Error {
             Self::Calibration(_) => Some("calibrate the network again; bf16 needs no calibration".into()),
             Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
             Self::OneSize => Some(
-                "the mirrored image (flip) needs no other size; the embedded networks, and what was trained from them, take any".into(),
+                "the mirrored image (flip) needs no other size; the embedded networks, and what was trained from them, run at any".into(),
             ),
             Self::Weights(error) => error.hint(),
             Self::Model(error) => error.hint(),

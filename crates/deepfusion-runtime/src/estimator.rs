@@ -29,7 +29,7 @@ pub struct DepthEstimator {
 }
 
 /// Number of other input sizes for which runners are kept; each camera needs one, or as many as [`Augmentation::scales`].
-const SIZES_KEPT: usize = 4;
+const SIZES_KEPT: usize = 6;
 
 /// Runners for other input sizes, made on demand.
 struct OtherSizes {
@@ -263,7 +263,8 @@ impl DepthEstimator {
     }
 
     /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Of several views the mean of
-    /// the disparities is taken, at the size of the largest; and of ln b, where it predicts that: how sure it is of one look.
+    /// the disparities is taken, at the size of the largest; of ln b as well, where it predicts that, so that it says how sure a single
+    /// look is, not how sure their mean.
     ///
     /// # Errors
     /// As [`DepthRunner::run`].

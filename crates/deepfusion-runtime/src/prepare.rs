@@ -4,7 +4,8 @@ use deepfusion_model::InputSize;
 
 use crate::Augmentation;
 
-/// The shortest side of an input that is not of the size trained with.
+/// The shortest side of an input, but for networks trained with a shorter one: 64 pixels are two cells of the deepest features, and `tiny`,
+/// shrunk to them, saw everything four times too far.
 const SHORTEST_SIDE: usize = 96;
 
 /// Relative difference up to which two aspect ratios count as equal.
@@ -78,19 +79,24 @@ impl Preparer {
             None => self.window(image, camera, crop),
         };
         let camera_that_counts = camera.filter(|_| focal_correction);
-        let view = |scale: &f64| {
+        let mut sizes = Vec::new();
+        for scale in self.augmentation.scales {
             let size = match self.canonical_focal_px {
                 Some(_) => fitting_scaled(self.size, width, height, *scale),
                 None => self.size,
             };
-            View {
-                input: to_network_input(image, window, size.width as u32, size.height as u32),
-                size,
-                focal_factor: self.focal_factor(camera_that_counts, window, size),
+            // Of a narrow image two scales may fit the same size: nothing new to see.
+            if !sizes.contains(&size) {
+                sizes.push(size);
             }
+        }
+        let view = |size: InputSize| View {
+            input: to_network_input(image, window, size.width as u32, size.height as u32),
+            size,
+            focal_factor: self.focal_factor(camera_that_counts, window, size),
         };
         PreparedImage {
-            views: self.augmentation.scales.iter().map(view).collect(),
+            views: sizes.into_iter().map(view).collect(),
             flip: self.augmentation.flip,
             window,
             image_size: [width, height],
@@ -166,8 +172,7 @@ fn fitting_scaled(trained: InputSize, width: u32, height: u32, scale: f64) -> In
         stretched + 0.5 * (pixels(size) / wanted).ln().abs()
     };
     let longest = (2.0 * scale * trained.width.max(trained.height) as f64) as usize;
-    // 64 pixels are two cells of the deepest features: `tiny`, shrunk to them, saw everything four times too far.
-    let shortest = if scale == 1.0 { 64 } else { SHORTEST_SIDE };
+    let shortest = trained.width.min(trained.height).clamp(32, SHORTEST_SIDE);
     let sides = || (shortest..=longest.max(shortest)).step_by(32);
     sides()
         .flat_map(|width| sides().map(move |height| InputSize { width, height }))
@@ -194,7 +199,7 @@ mod tests {
             ((640, 480), size(192, 160)),
             ((1000, 500), size(256, 128)),
             ((1080, 1920), size(128, 224)),
-            ((9000, 300), size(640, 64)),
+            ((9000, 300), size(640, 96)),
         ] {
             assert_eq!(fitting(trained, image.0, image.1), expected, "{image:?}");
         }
@@ -205,7 +210,22 @@ mod tests {
             [size(512, 160), size(640, 192), size(736, 224)]
         );
         let of_a_small = |scale| fitting_scaled(size(320, 96), 1242, 375, scale);
+        // No side is shorter than 96: there is no smaller input than its own.
         assert_eq!([0.8, 1.2].map(of_a_small), [size(320, 96), size(416, 128)]);
+    }
+
+    /// A narrow image fits one size alone at every scale: one look is as good as several.
+    #[test]
+    fn equal_sizes_are_looked_at_once() {
+        let preparer = Preparer {
+            size: size(320, 96),
+            training_camera: None,
+            canonical_focal_px: Some(185.0),
+            augmentation: Augmentation::MULTI_SCALE,
+        };
+        let prepared = preparer.prepare(&RgbImage::new(100, 400), None, true, true);
+        let sizes: Vec<_> = prepared.views.iter().map(|view| view.size).collect();
+        assert_eq!(sizes, [size(96, 384)]);
     }
 
     /// At every size the factor is that size's own.

@@ -284,9 +284,10 @@ def predict(
         network = deepfusion.load(model, precision=precision, data_set=data_set)
         grey = np.full((64, 64, 3), 128, np.uint8)
         unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
-        # What the network cannot do is one error as well.
-        seen = network.predict(grey, post_process=post_process)
-        if unsaid and seen.sigma is None:
+        if post_process is not None:
+            # Raised here, once: a way of looking that the network cannot take.
+            network.predict(grey, post_process=post_process)
+        if unsaid and network.predict(grey).sigma is None:
             raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
     job = _Job(
         id=uuid.uuid4().hex,

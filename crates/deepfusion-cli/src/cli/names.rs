@@ -171,15 +171,15 @@ pub(super) fn post_process() -> impl TypedValueParser<Value = PostProcess> {
         &[
             (
                 PostProcess::Flip,
-                "The mean with the mirrored image's prediction (at the left edge that alone, at the right edge the image's); twice the time",
+                "The mean with the mirrored image's prediction (near the left edge the mirrored image's alone, near the right edge the image's own); twice the time",
             ),
             (
                 PostProcess::MultiScale,
-                "The mean of a smaller input's prediction (0.8 times as wide and high) and a larger one's (1.2); twice the time",
+                "The mean of a smaller input's prediction (0.8 times as wide and high) and a larger one's (1.2); two to two and a half times the time",
             ),
             (
                 PostProcess::MultiScaleFlip,
-                "The same, each with the mirrored image's; four times the time",
+                "The same, each with the mirrored image's; four to five times the time",
             ),
         ],
     )

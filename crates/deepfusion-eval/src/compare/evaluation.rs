@@ -136,7 +136,7 @@ impl Evaluation {
         }
     }
 
-    /// How its predictions were changed before they were compared.
+    /// In how many ways the network looked at each image; `None`: in one.
     pub(crate) fn post_process(&self) -> Option<PostProcess> {
         match &self.origin {
             Origin::Plain => None,

@@ -48,7 +48,7 @@ pub struct Measured {
     pub set: Option<String>,
     /// Whether depth was corrected for another focal length than the one trained on.
     pub focal_correction: bool,
-    /// What was done with the predictions before they were compared; absent: nothing.
+    /// In how many ways the network looked at each image; absent: in one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub post_process: Option<PostProcess>,
     /// Whether training saw none of these frames; absent where that is unknown.

@@ -16,7 +16,6 @@ use deepfusion_eval::{
 };
 use deepfusion_geometry::Intrinsics;
 use deepfusion_runtime::{Augmentation, DepthEstimator};
-use image::imageops::flip_horizontal;
 
 use crate::{Error, Result};
 
@@ -78,14 +77,14 @@ pub fn predict(
     camera: &Intrinsics,
     focal_correction: bool,
 ) -> Result<Prediction> {
-    predict_post_processed(estimator, image, camera, focal_correction, None)
+    predict_by(estimator, image, camera, focal_correction, None)
 }
 
 /// As [`predict`], by as many looks as the post-processing takes.
 ///
 /// # Errors
 /// What the network's engine says; several input sizes of a network that takes one.
-pub fn predict_post_processed(
+pub fn predict_by(
     estimator: &mut DepthEstimator,
     image: &RgbImage,
     camera: &Intrinsics,
@@ -97,22 +96,6 @@ pub fn predict_post_processed(
     let prediction = estimator.infer(&prepared)?;
     let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
     Ok(Prediction::Disparity(grid))
-}
-
-/// The disparity that the mirrored image is given, mirrored back: beside the image's own, pixel by pixel.
-fn mirrored_disparity(
-    estimator: &mut DepthEstimator,
-    image: &RgbImage,
-    camera: &Intrinsics,
-    focal_correction: bool,
-) -> Result<Vec<f32>> {
-    let mirror = flip_horizontal(image);
-    let seen = estimator.predict(&mirror, Some(&camera.flipped()), focal_correction, false)?;
-    let mut disparity = seen.disparity;
-    for row in disparity.chunks_exact_mut(seen.width.max(1)) {
-        row.reverse();
-    }
-    Ok(disparity)
 }
 
 /// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth; `progress` takes the frames done

@@ -14,7 +14,7 @@ pub(super) use deepfusion_jobs::evaluation::predict;
 use deepfusion_jobs::evaluation::{
     Evaluated, ImageRef, Truth, array_places, baseline_from_arrays, baseline_from_training,
     check_used, default_crop, depth_map, evaluate_arrays, evaluate_datasets, expected_frames,
-    predict_post_processed,
+    predict_by,
 };
 use deepfusion_jobs::held_out::{held_out, unseen};
 use deepfusion_jobs::intervals;
@@ -162,7 +162,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
         let image = dataset.load_image(frame)?;
         let camera = dataset.intrinsics(frame);
         let (correct, how) = (!args.no_focal_correction, args.post_process);
-        let prediction = predict_post_processed(estimator, &image, &camera, correct, how)?;
+        let prediction = predict_by(estimator, &image, &camera, correct, how)?;
         Ok((image, prediction))
     };
     let mut evaluated = evaluate_datasets(
