@@ -47,7 +47,9 @@ pub(crate) fn warn_of_one_size(
         how,
         Some(PostProcess::MultiScale | PostProcess::MultiScaleFlip)
     );
-    if several && model.folder().is_some() && config.augmentation.sizes.is_empty() {
+    let learned = &config.augmentation;
+    let at_one = learned.sizes.is_empty() && learned.video_sizes.is_empty();
+    if several && model.folder().is_some() && at_one {
         tracing::warn!(
             "--post-process {}: the run learned at {}x{} alone, and may be worse at other sizes; `eval` with and without it says",
             how.map_or("", PostProcess::name),

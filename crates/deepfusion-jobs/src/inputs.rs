@@ -35,8 +35,9 @@ const RECORDINGS: [&str; 8] = ["bag", "mcap", "db3", "mp4", "mkv", "mov", "avi",
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
 /// apart agree on both.
 ///
-/// A folder with images in it (neither `dataset.toml` nor depth beside colour) is a folder of images; any other that
-/// [`Dataset::open`] takes is a recording, whose cameras are `options`' and its own. `opened` sees the recordings.
+/// A folder with images in it is a folder of images, unless it has a `dataset.toml` or the layout of a recording whose frames lie
+/// elsewhere (a comma2k19 segment's picture for an overview) or beside something else (depth). Any other that [`Dataset::open`] takes is
+/// a recording, whose cameras are `options`' and its own. `opened` sees the recordings.
 ///
 /// # Errors
 /// [`Error::NoImages`], a pattern that is none, and what cannot be opened.
@@ -54,7 +55,7 @@ pub fn find_inputs(
                 std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
             let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
             let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
-            if images.is_empty() || path.join("dataset.toml").exists() || is_rgbd(&path) {
+            if images.is_empty() || path.join("dataset.toml").exists() || has_layout(&path) {
                 recordings.extend(open(&path, argument, options)?);
             } else {
                 found.extend(images);
@@ -83,10 +84,11 @@ pub fn find_inputs(
     Ok(inputs)
 }
 
-/// Whether the images of a folder are colour and depth, of which only the colour is to be looked at.
-fn is_rgbd(folder: &Path) -> bool {
+/// Whether a folder with images in it is laid out as a recording. Bags and videos may lie beside images without being of them.
+fn has_layout(folder: &Path) -> bool {
+    let beside = [DatasetKind::Folder, DatasetKind::Bag, DatasetKind::Video];
     // What is wrong with the folder as a recording says nothing of its images.
-    Dataset::kind_at(folder).is_ok_and(|kind| kind == DatasetKind::RgbD)
+    Dataset::kind_at(folder).is_ok_and(|kind| !beside.contains(&kind))
 }
 
 /// Opens a recording; that it is none is an error that names the argument.
@@ -210,6 +212,20 @@ mod tests {
         let absolute = std::path::absolute("a/0.png").unwrap();
         let twice = ["./a/0.png", "a/0.png", absolute.to_str().unwrap()];
         assert_eq!(names(&twice), ["0"]);
+    }
+
+    /// A comma2k19 segment has a picture for an overview beside its video.
+    #[test]
+    fn a_picture_beside_a_recording_is_no_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        std::fs::write(at.join("preview.png"), []).unwrap();
+        let found = || find_inputs(&[at.display().to_string()], &OpenOptions::default(), |_| ());
+        assert_eq!(found().unwrap().len(), 1, "a folder of images");
+        std::fs::create_dir(at.join("global_pose")).unwrap();
+        std::fs::write(at.join("global_pose/frame_times"), []).unwrap();
+        let error = found().unwrap_err().to_string();
+        assert!(error.contains("video.hevc"), "{error}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::{
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{Source, resize_rgb, to_chw};
 use deepfusion_geometry::Se3;
+use deepfusion_nn::InputSize;
 use rand::Rng;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -57,6 +58,7 @@ impl SnippetBatch {
 
 /// A batch as plain values, made on the loader's thread.
 struct RawBatch {
+    size: InputSize,
     clean: Vec<Vec<f32>>,
     network: Vec<Vec<f32>>,
     intrinsics: Vec<f32>,
@@ -73,8 +75,13 @@ struct RawBatch {
     factors: Vec<SampleFactors>,
 }
 
-/// Resized images, H×W×3 bytes, by data set and frame.
-type ImageCache = HashMap<(usize, usize), Arc<Vec<u8>>>;
+/// Resized images, H×W×3 bytes, by data set, frame and size.
+#[derive(Default)]
+struct ImageCache {
+    images: HashMap<(usize, usize, InputSize), Arc<Vec<u8>>>,
+    /// What all of them take.
+    bytes: usize,
+}
 
 /// Everything needed to make a batch.
 struct Maker {
@@ -88,16 +95,13 @@ struct Maker {
 /// Makes batches in order, ahead of the trainer, on its own thread.
 pub struct BatchLoader {
     batches: Ahead<RawBatch>,
-    size: (usize, usize),
     /// The pose network's own metres per unit.
     unit_m: f64,
 }
 
 impl std::fmt::Debug for BatchLoader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("BatchLoader")
-            .field("size", &self.size)
-            .finish()
+        f.debug_struct("BatchLoader").finish_non_exhaustive()
     }
 }
 
@@ -146,7 +150,6 @@ impl BatchLoader {
                 batches,
                 move |number, samples: &Vec<usize>| maker.make(number, samples),
             ),
-            size: (config.size.height, config.size.width),
             unit_m: config.pose_net.metres_per_unit,
         }
     }
@@ -162,7 +165,7 @@ impl BatchLoader {
             Err(error) => return Some(Err(error)),
         };
         let n = raw.names.len();
-        let (height, width) = self.size;
+        let InputSize { width, height } = raw.size;
         let images = |frames: Vec<Vec<f32>>| {
             let tensor = |v| Tensor::from_data(TensorData::new(v, [n, 3, height, width]), device);
             frames.into_iter().map(tensor).collect()
@@ -223,10 +226,15 @@ struct Item {
 
 impl Maker {
     fn make(&self, number: usize, samples: &[usize]) -> Result<RawBatch, Error> {
+        let size = if self.augment {
+            self.config.size_of_video_batch(number)
+        } else {
+            self.config.size
+        };
         let items = samples
             .par_iter()
             .enumerate()
-            .map(|(slot, sample)| self.item(*sample, number * samples.len() + slot))
+            .map(|(slot, sample)| self.item(*sample, size, number * samples.len() + slot))
             .collect::<Result<Vec<Item>, Error>>()?;
         let views = self.config.frames.len() + usize::from(self.config.stereo);
         let frames = 1 + views;
@@ -242,6 +250,7 @@ impl Maker {
         };
         let sources = 0..self.config.frames.len();
         Ok(RawBatch {
+            size,
             clean: images(|item| &item.clean),
             network: images(|item| &item.network),
             intrinsics: items.iter().flat_map(|i| i.intrinsics).collect(),
@@ -266,22 +275,21 @@ impl Maker {
             factors: if !self.config.has_factors() {
                 Vec::new()
             } else {
-                samples.iter().map(|s| self.factors(*s)).collect()
+                samples.iter().map(|s| self.factors(*s, size)).collect()
             },
         })
     }
 
-    fn factors(&self, sample: usize) -> SampleFactors {
+    fn factors(&self, sample: usize, size: InputSize) -> SampleFactors {
         let sample = &self.set.samples[sample];
         let camera = self.set.datasets[sample.dataset].intrinsics(sample.snippet.target);
         let set = self.set.set_of[sample.dataset];
-        self.config.sample_factors(set, &camera)
+        self.config.sample_factors(set, &camera, size)
     }
 
-    fn item(&self, sample: usize, draw: usize) -> Result<Item, Error> {
+    fn item(&self, sample: usize, size: InputSize, draw: usize) -> Result<Item, Error> {
         let sample = &self.set.samples[sample];
         let dataset = &self.set.datasets[sample.dataset];
-        let size = self.config.size;
         let (width, height) = (size.width as u32, size.height as u32);
         let mut rng = stream(self.config.seed, 1, draw);
         let flip = rng.random::<bool>() && self.augment && self.config.augmentation.flip;
@@ -298,7 +306,7 @@ impl Maker {
         let in_place = (!other_camera).then_some(target);
         let sources_seen = sample.sources().chain(in_place);
         for (dataset, frame) in std::iter::once(target).chain(sources_seen) {
-            clean.push(self.image(dataset, frame, flip)?);
+            clean.push(self.image(dataset, frame, size, flip)?);
         }
         let network = clean
             .iter()
@@ -360,10 +368,16 @@ impl Maker {
         })
     }
 
-    /// The image at network size, 3×H×W in [0, 1].
-    fn image(&self, dataset: usize, frame: usize, flip: bool) -> Result<Vec<f32>, Error> {
-        let size = self.config.size;
-        let cached = self.lock().get(&(dataset, frame)).cloned();
+    /// The image at this size, 3×H×W in [0, 1].
+    fn image(
+        &self,
+        dataset: usize,
+        frame: usize,
+        size: InputSize,
+        flip: bool,
+    ) -> Result<Vec<f32>, Error> {
+        let key = (dataset, frame, size);
+        let cached = self.lock().images.get(&key).cloned();
         let bytes = match cached {
             Some(bytes) => bytes,
             None => {
@@ -371,8 +385,10 @@ impl Maker {
                 let small = resize_rgb(&image, size.width as u32, size.height as u32);
                 let bytes = Arc::new(small.into_raw());
                 let mut cache = self.lock();
-                if (cache.len() + 1) * bytes.len() <= self.config.data.cache_bytes() {
-                    cache.insert((dataset, frame), Arc::clone(&bytes));
+                if cache.bytes + bytes.len() <= self.config.data.cache_bytes()
+                    && cache.images.insert(key, Arc::clone(&bytes)).is_none()
+                {
+                    cache.bytes += bytes.len();
                 }
                 bytes
             }

@@ -206,7 +206,7 @@ fn item(config: &TrainConfig, view: &DepthView, draw: usize, augment: bool) -> R
     if let Some(jitter) = &jitter {
         jitter.apply(&mut network);
     }
-    let factors = config.sample_factors(view.set, &window.of_camera(&view.camera));
+    let factors = config.sample_factors(view.set, &window.of_camera(&view.camera), config.size);
     let nearest = (factors.range.min_m * factors.focal) as f32;
     let farthest = (FAR_SHARE * factors.range.max_m * factors.focal) as f32;
     let is_far = |d: f32| d >= farthest || (d == 0.0 && view.sky);

@@ -194,9 +194,12 @@ impl Model {
     ) -> ScaleViews {
         let settings = &self.config.loss;
         let disparity = pass.disparities[index].clone();
-        let smaller = self.config.size.width / disparity.dims()[3];
         let disparity = match settings.compare_at {
-            CompareAt::Full => self.enlarge[smaller.ilog2() as usize].apply(disparity),
+            CompareAt::Full => {
+                let [_, _, height, width] = level.targets.dims();
+                let halvings = (width / disparity.dims()[3]).ilog2();
+                self.enlarged(halvings as usize, disparity, height, width)
+            }
             CompareAt::Own => disparity,
         };
         let metric_disparity = self.metric_disparity(disparity, batch);

@@ -22,5 +22,6 @@ mod simulated;
 mod stereo;
 mod support;
 mod trainer;
+mod video_sizes;
 mod whole_step;
 mod workers;

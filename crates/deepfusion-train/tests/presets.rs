@@ -11,7 +11,7 @@ use deepfusion_train::{
 use std::path::Path;
 
 /// The preset's losses, views and architecture, with few channels and small images.
-fn narrow(preset: Preset) -> TrainConfig {
+pub(crate) fn narrow(preset: Preset) -> TrainConfig {
     let mut config = preset.config();
     (config.size.width, config.size.height) = (96, 64);
     config.batch = 2;

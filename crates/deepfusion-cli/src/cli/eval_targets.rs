@@ -1,8 +1,9 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
+use deepfusion_eval::PostProcess;
 
-use super::EngineArgs;
+use super::{EngineArgs, names};
 
 /// `deepfusion eval-targets`.
 #[derive(Debug, Args)]
@@ -23,6 +24,9 @@ pub(crate) struct EvalTargetsArgs {
     /// Depth that was measured.
     #[arg(long, value_enum)]
     pub depth: Option<TargetDepth>,
+    /// Take the mean of several looks at each image, as `predict --post-process` does.
+    #[arg(long, value_parser = names::post_process(), conflicts_with = "depth")]
+    pub post_process: Option<PostProcess>,
     /// Settings of the perception (TOML).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,

@@ -56,7 +56,7 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
             Trainer::create(config, folder, sets, &device, |model| {
-                start.initialise(model, &device, &mut began)
+                start.initialise(model, &device, &mut began_by_default)
             })?
         }
     };
@@ -84,6 +84,11 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
 
 /// Prints what a run starts from.
 pub(super) fn began(began: Began) {
+    say(&began.to_string());
+}
+
+/// As [`began`], where an option chooses otherwise.
+fn began_by_default(began: Began) {
     let embedded = matches!(began, Began::Packed { path: None, .. });
     let hint = if embedded {
         " (--init none starts from nothing)"

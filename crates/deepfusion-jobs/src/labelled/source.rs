@@ -4,7 +4,7 @@ use deepfusion_data::{Dataset, RgbImage, kitti::GtKind};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp, Target, working_depth};
-use deepfusion_runtime::DepthEstimator;
+use deepfusion_runtime::{Augmentation, DepthEstimator};
 
 use super::{ObjectFrame, VisibilityDepth, gathered};
 use crate::{Result, intervals};
@@ -15,8 +15,18 @@ pub enum DepthSource {
     Truth,
     /// The scans.
     Lidar,
-    /// A network, of every frame: targets need more than one to be confirmed. Its intervals are stretched by the factors.
-    Network(Box<DepthEstimator>, IntervalFactors),
+    /// A network, of every frame: targets need more than one to be confirmed.
+    Network(Box<PredictedDepth>),
+}
+
+/// A network, and what is made of what it says.
+pub struct PredictedDepth {
+    /// The network.
+    pub estimator: DepthEstimator,
+    /// What its intervals are stretched by.
+    pub intervals: IntervalFactors,
+    /// How often it looks at each image.
+    pub augmentation: Augmentation,
 }
 
 impl DepthSource {
@@ -26,7 +36,7 @@ impl DepthSource {
         match self {
             Self::Truth => "truth",
             Self::Lidar => "lidar",
-            Self::Network(..) => "predicted",
+            Self::Network(_) => "predicted",
         }
     }
 
@@ -35,7 +45,7 @@ impl DepthSource {
     pub fn settings(&self) -> PerceptionConfig {
         match self {
             Self::Truth | Self::Lidar => PerceptionConfig::default(),
-            Self::Network(..) => PerceptionConfig::predicted(),
+            Self::Network(_) => PerceptionConfig::predicted(),
         }
     }
 
@@ -54,10 +64,7 @@ impl DepthSource {
             Self::Lidar => dataset
                 .ground_truth(index, GtKind::Z)?
                 .map(|scan| Measured::exact(gathered(&scan, &camera))),
-            Self::Network(estimator, intervals) => {
-                let image = dataset.load_image(index)?;
-                Some(predicted((estimator, intervals), &image, &camera)?)
-            }
+            Self::Network(network) => Some(network.measured(&dataset.load_image(index)?, &camera)?),
         })
     }
 
@@ -66,28 +73,28 @@ impl DepthSource {
         Ok(match self {
             Self::Truth => None,
             Self::Lidar => Some(Measured::exact(gathered(&frame.scan, &frame.camera))),
-            Self::Network(estimator, intervals) => {
+            Self::Network(network) => {
                 let image = deepfusion_data::load_rgb(&frame.image)?;
-                Some(predicted((estimator, intervals), &image, &frame.camera)?)
+                Some(network.measured(&image, &frame.camera)?)
             }
         })
     }
 }
 
-fn predicted(
-    (estimator, factors): (&mut DepthEstimator, &IntervalFactors),
-    image: &RgbImage,
-    camera: &Intrinsics,
-) -> Result<Measured> {
-    let prediction = estimator.predict(image, Some(camera), true, true)?;
-    let whole = prediction.depth();
-    let sigma = intervals::sigma(&prediction, &whole, factors);
-    let (depth, camera_of_depth) = working_depth(&whole, camera);
-    Ok(Measured {
-        depth,
-        sigma: sigma.map(|sigma| working_depth(&sigma, camera).0),
-        camera: camera_of_depth,
-    })
+impl PredictedDepth {
+    fn measured(&mut self, image: &RgbImage, camera: &Intrinsics) -> Result<Measured> {
+        let preparer = self.estimator.augmented(self.augmentation)?;
+        let prepared = preparer.prepare(image, Some(camera), true, true);
+        let prediction = self.estimator.infer(&prepared)?;
+        let whole = prediction.depth();
+        let sigma = intervals::sigma(&prediction, &whole, &self.intervals);
+        let (depth, camera_of_depth) = working_depth(&whole, camera);
+        Ok(Measured {
+            depth,
+            sigma: sigma.map(|sigma| working_depth(&sigma, camera).0),
+            camera: camera_of_depth,
+        })
+    }
 }
 
 /// Depth of a frame, and what it is worth where its source says so.

@@ -13,7 +13,7 @@ use super::{
 pub const LOG_SCALE_BOUNDS: (f64, f64) = (-6.0, 2.0);
 
 /// The size of the images a network is given, in pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InputSize {
     /// Width in pixels.

@@ -178,6 +178,7 @@ impl Preset {
                 hue: 0.1,
                 zoom: 1.0,
                 sizes: Vec::new(),
+                video_sizes: Vec::new(),
             },
             depth_net: DepthNetConfig::new(depth),
             pose_net: PoseNetConfig {

@@ -1,6 +1,6 @@
 use deepfusion_geometry::{DepthRange, Intrinsics};
 
-use crate::TrainConfig;
+use crate::{InputSize, TrainConfig};
 
 /// What the networks' raw outputs mean of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,11 +20,17 @@ impl TrainConfig {
         !self.data.sets.is_empty() || self.canonical_focal_px.is_some()
     }
 
-    /// What the outputs mean of a sample of a set, by its place in `data.sets`, seen by `camera` (at any size).
+    /// What the outputs mean of a sample of a set, by its place in `data.sets`, seen by `camera` (at any size) and shown to
+    /// the networks at `size`.
     #[must_use]
-    pub fn sample_factors(&self, set: usize, camera: &Intrinsics) -> SampleFactors {
+    pub fn sample_factors(
+        &self,
+        set: usize,
+        camera: &Intrinsics,
+        size: InputSize,
+    ) -> SampleFactors {
         let (range, metres_per_unit) = self.factors(set);
-        let (width, height) = (self.size.width as u32, self.size.height as u32);
+        let (width, height) = (size.width as u32, size.height as u32);
         let fy = camera.resized(width, height).fy;
         SampleFactors {
             range,

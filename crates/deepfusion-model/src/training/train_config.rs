@@ -79,6 +79,10 @@ pub struct Augmentation {
     /// the batches have the run's own size, the others in turns one of these.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<InputSize>,
+    /// Other sizes of video's images, likewise, so that a network is as good by several looks (`--post-process multi-scale`) as by one.
+    /// Only with `canonical_focal_px`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub video_sizes: Vec<InputSize>,
 }
 
 /// How the learning rate changes over a run, after its rise.
@@ -436,12 +440,13 @@ impl TrainConfig {
     /// The size of the images of batch number `number` of those whose depth is known.
     #[must_use]
     pub fn size_of_depth_batch(&self, number: usize) -> InputSize {
-        let others = &self.augmentation.sizes;
-        if others.is_empty() || number.is_multiple_of(2) {
-            self.size
-        } else {
-            others[number / 2 % others.len()]
-        }
+        in_turns(self.size, &self.augmentation.sizes, number)
+    }
+
+    /// The size of the images of batch number `number` of video.
+    #[must_use]
+    pub fn size_of_video_batch(&self, number: usize) -> InputSize {
+        in_turns(self.size, &self.augmentation.video_sizes, number)
     }
 
     /// Whether anything in training needs to know how the vehicle turned, not only how far it went. `auto` reads it where it is known.
@@ -454,6 +459,15 @@ impl TrainConfig {
                 self.loss.speed > 0.0 && self.loss.rotation > 0.0
             }
         }
+    }
+}
+
+/// A run's own size for every other batch, for those between in turns one of the others.
+fn in_turns(own: InputSize, others: &[InputSize], number: usize) -> InputSize {
+    if others.is_empty() || number.is_multiple_of(2) {
+        own
+    } else {
+        others[number / 2 % others.len()]
     }
 }
 

@@ -85,8 +85,18 @@ impl TrainConfig {
         if !(1.0..=8.0).contains(&zoom) {
             return fail("augmentation.zoom", "1 to 8", zoom.to_string());
         }
-        for size in &self.augmentation.sizes {
+        let video_sizes = &self.augmentation.video_sizes;
+        for size in self.augmentation.sizes.iter().chain(video_sizes) {
             size.validate()?;
+        }
+        // One image at two sizes would be of one depth, and look like two.
+        if !video_sizes.is_empty() && self.canonical_focal_px.is_none() {
+            let found = format!("{} sizes", video_sizes.len());
+            return fail(
+                "augmentation.video_sizes",
+                "none without canonical_focal_px",
+                found,
+            );
         }
         for (field, share) in [
             ("augmentation.jitter", self.augmentation.jitter),

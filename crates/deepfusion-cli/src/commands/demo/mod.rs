@@ -37,6 +37,8 @@ const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
 pub(super) fn run(args: &DemoArgs) -> Result<()> {
+    // The first notice is the one that stands: what training and `perceive` say of going on does not hold here.
+    interrupt::catch("stopping after the step or image at work; the demo cannot be gone on with");
     let embedded = if args.from_scratch {
         None
     } else {
@@ -69,9 +71,11 @@ impl Demo<'_> {
         let simulation = Simulation::new(config)?;
         let mut progress = Progress::new("simulating");
         let out = self.out.join(name);
-        Ok(write_kitti(&simulation, &out, &mut |done, total| {
+        let drive = write_kitti(&simulation, &out, &mut |done, total| {
             progress.set(done, total);
-        })?)
+        })?;
+        interrupt::check(DEMO)?;
+        Ok(drive)
     }
 
     /// Trains into the folder `model`.

@@ -5,7 +5,10 @@ mod table;
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, OpenOptions, save_png};
-use deepfusion_jobs::labelled::{DepthSource, EvaluatedFrame, TargetEvaluation, is_folder_of};
+use deepfusion_jobs::evaluation::augmentation;
+use deepfusion_jobs::labelled::{
+    DepthSource, EvaluatedFrame, PredictedDepth, TargetEvaluation, is_folder_of,
+};
 use deepfusion_perception::{ScoringRules, TargetScore};
 use deepfusion_render::box_overlay;
 use deepfusion_runtime::ModelSource;
@@ -15,7 +18,7 @@ use super::perceive::read_config;
 use super::warnings;
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::failure::Result;
-use crate::model::ModelFacts;
+use crate::model::{self, ModelFacts};
 use crate::progress::Progress;
 use crate::{engine, output};
 
@@ -80,7 +83,12 @@ fn source(args: &EvalTargetsArgs) -> Result<DepthSource> {
         (None, Some(model)) => {
             let model = ModelSource::named(model)?;
             let estimator = engine::load(&model, &args.engine)?;
-            DepthSource::Network(Box::new(estimator), model.interval_factors()?)
+            model::warn_of_one_size(&model, estimator.config(), args.post_process);
+            DepthSource::Network(Box::new(PredictedDepth {
+                intervals: model.interval_factors()?,
+                augmentation: augmentation(args.post_process),
+                estimator,
+            }))
         }
         (Some(TargetDepth::Lidar), _) => DepthSource::Lidar,
         // One of the two is asked for by the command line.

@@ -2,7 +2,7 @@
 
 use deepfusion_data::{Cameras, Dataset};
 use deepfusion_model::{
-    AssumedCamera, DataSetConfig, Learn, LearningRateSchedule, Preset, SimulatedCamera,
+    AssumedCamera, DataSetConfig, InputSize, Learn, LearningRateSchedule, Preset, SimulatedCamera,
     SimulatedConfig, TrainConfig, ViewMotion,
 };
 use deepfusion_nn::ops::{Precision, supports};
@@ -19,6 +19,11 @@ const WARMUP: usize = 30;
 const SEED: u64 = 91;
 /// Share of them in clear weather and through a plain camera.
 const PLAIN: f64 = 0.2;
+
+/// Sizes beside the network's own at which it goes on learning, as multiples of that: as `--post-process multi-scale` looks.
+const SCALES: [f64; 2] = [0.8, 1.2];
+/// How far the aspect ratio of such a size may be from the network's own, as a share: what is squeezed looks otherwise.
+const SQUEEZE: f64 = 0.05;
 
 /// The configuration: the network as it is, the loss of its own run where that learned from drives, else Monodepth2's with the
 /// vehicle's motion, in small steps.
@@ -95,10 +100,29 @@ pub(super) fn config(
         config.loss.depth.weight = 1.0;
         config.loss.depth.gradient = 0.5;
     }
+    if !learned_from_drives && own.canonical_focal_px.is_some() {
+        let sizes = sizes_around(own.size);
+        config.augmentation.sizes.clone_from(&sizes);
+        config.augmentation.video_sizes = sizes;
+    }
     for assignment in &settings.set {
         config.set(assignment)?;
     }
     Ok(config)
+}
+
+/// The sizes at [`SCALES`] that the encoder takes and that hardly squeeze the image.
+fn sizes_around(own: InputSize) -> Vec<InputSize> {
+    let aspect = |size: &InputSize| size.width as f64 / size.height as f64;
+    let side = |side: usize, scale: f64| 32 * (side as f64 * scale / 32.0).round() as usize;
+    let sizes = SCALES.map(|scale| InputSize {
+        width: side(own.width, scale),
+        height: side(own.height, scale),
+    });
+    let like_own = |size: &InputSize| {
+        size.validate().is_ok() && (aspect(size) / aspect(&own) - 1.0).abs() < SQUEEZE
+    };
+    sizes.into_iter().filter(like_own).collect()
 }
 
 /// Whether the settings leave turns alone that no sensor measured, as [`config`] will say.
@@ -157,5 +181,22 @@ fn simulated(config: &TrainConfig, cameras: Vec<SimulatedCamera>) -> DataSetConf
         }),
         metres_per_unit: 1.0,
         ..DataSetConfig::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_hardly_squeeze_the_image() {
+        let around = |width, height| -> Vec<[usize; 2]> {
+            let sizes = sizes_around(InputSize { width, height });
+            sizes.iter().map(|s| [s.width, s.height]).collect()
+        };
+        assert_eq!(around(640, 192), [[512, 160], [768, 224]]);
+        assert_eq!(around(1024, 320), [[832, 256], [1216, 384]]);
+        // Of so low an image a thirty-second is too much.
+        assert_eq!(around(320, 96), Vec::<[usize; 2]>::new());
     }
 }
