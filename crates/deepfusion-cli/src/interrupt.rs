@@ -10,7 +10,7 @@ use crate::failure::{Result, STOPPED};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// From now on these signals set [`asked`] and say `notice`.
+/// From now on these signals set [`asked`] and say `notice`; the first call's stands.
 pub(crate) fn catch(notice: &'static str) {
     static SET: OnceLock<()> = OnceLock::new();
     SET.get_or_init(|| {

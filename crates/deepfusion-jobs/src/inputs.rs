@@ -35,9 +35,9 @@ const RECORDINGS: [&str; 8] = ["bag", "mcap", "db3", "mp4", "mkv", "mov", "avi",
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
 /// apart agree on both.
 ///
-/// A folder with images in it is a folder of images, unless it has a `dataset.toml` or the layout of a recording whose frames lie
-/// elsewhere (a comma2k19 segment's picture for an overview) or beside something else (depth). Any other that [`Dataset::open`] takes is
-/// a recording, whose cameras are `options`' and its own. `opened` sees the recordings.
+/// A folder with images in it is a folder of images, unless it has a `dataset.toml`, depth beside colour, or is a comma2k19 segment, in
+/// which a picture for an overview lies beside the video. Any other that [`Dataset::open`] takes is a recording, whose cameras are
+/// `options`' and its own. `opened` sees the recordings.
 ///
 /// # Errors
 /// [`Error::NoImages`], a pattern that is none, and what cannot be opened.
@@ -55,7 +55,8 @@ pub fn find_inputs(
                 std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
             let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
             let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
-            if images.is_empty() || path.join("dataset.toml").exists() || has_layout(&path) {
+            if images.is_empty() || path.join("dataset.toml").exists() || has_other_pictures(&path)
+            {
                 recordings.extend(open(&path, argument, options)?);
             } else {
                 found.extend(images);
@@ -84,11 +85,11 @@ pub fn find_inputs(
     Ok(inputs)
 }
 
-/// Whether a folder with images in it is laid out as a recording. Bags and videos may lie beside images without being of them.
-fn has_layout(folder: &Path) -> bool {
-    let beside = [DatasetKind::Folder, DatasetKind::Bag, DatasetKind::Video];
+/// Whether a folder has images that are not its frames alone: colour beside depth, or the picture for an overview of a comma2k19 segment.
+fn has_other_pictures(folder: &Path) -> bool {
+    let such = [DatasetKind::RgbD, DatasetKind::Comma2k19];
     // What is wrong with the folder as a recording says nothing of its images.
-    Dataset::kind_at(folder).is_ok_and(|kind| !beside.contains(&kind))
+    Dataset::kind_at(folder).is_ok_and(|kind| such.contains(&kind))
 }
 
 /// Opens a recording; that it is none is an error that names the argument.
@@ -221,7 +222,14 @@ mod tests {
         let at = folder.path();
         std::fs::write(at.join("preview.png"), []).unwrap();
         let found = || find_inputs(&[at.display().to_string()], &OpenOptions::default(), |_| ());
+        // Calibration and times as beside an odometry sequence do not make the pictures another's.
+        for name in ["calib.txt", "times.txt"] {
+            std::fs::write(at.join(name), []).unwrap();
+        }
         assert_eq!(found().unwrap().len(), 1, "a folder of images");
+        for name in ["calib.txt", "times.txt"] {
+            std::fs::remove_file(at.join(name)).unwrap();
+        }
         std::fs::create_dir(at.join("global_pose")).unwrap();
         std::fs::write(at.join("global_pose/frame_times"), []).unwrap();
         let error = found().unwrap_err().to_string();

@@ -150,6 +150,9 @@ impl Model {
         if (size.height, size.width) == (height, width) {
             return self.enlarge[scale].apply(disparity);
         }
+        if scale == 0 {
+            return disparity;
+        }
         let from = [height >> scale, width >> scale];
         BilinearResize::new(from, [height, width], &disparity.device()).apply(disparity)
     }

@@ -98,6 +98,7 @@ impl Trainer {
     ) -> Result<Self, Error> {
         let workers = WorkerGroup::of(workers);
         config.validate()?;
+        config.validate_video_sizes()?;
         check_precision(&config, device)?;
         config.make_absolute();
         check_samples(&config, &train, &validation)?;

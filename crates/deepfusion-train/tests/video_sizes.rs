@@ -154,15 +154,20 @@ fn a_resumed_run_sees_the_same_sizes() {
     assert_eq!(begun, whole);
 }
 
-/// Without a canonical focal length one street would have two depths; and a size must be one that the networks take.
+/// Without a canonical focal length one disparity would mean the same metres at every size; and a size must be one that the networks take.
 #[test]
 fn sizes_that_cannot_be_learned_at_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = support::drive(&folder.path().join("drive"), 8);
     let mut config = settings(Preset::Tiny);
-    config.validate().unwrap();
     config.canonical_focal_px = None;
-    let error = config.validate().unwrap_err().to_string();
+    let run = RunFolder::create(&folder.path().join("run")).unwrap();
+    let sets = samples(&config, &drive);
+    let error = Trainer::create(config.clone(), run, sets, &Device::flex(), Ok).unwrap_err();
+    let error = error.to_string();
     assert!(error.contains("augmentation.video_sizes"), "{error}");
     config.canonical_focal_px = Some(60.0);
+    config.validate().unwrap();
     config.augmentation.video_sizes[0].width = 100;
     assert!(config.validate().is_err());
 }

@@ -4,7 +4,7 @@ use deepfusion_data::{Dataset, RgbImage, kitti::GtKind};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp, Target, working_depth};
-use deepfusion_runtime::{Augmentation, DepthEstimator};
+use deepfusion_runtime::{DepthEstimator, Preparer};
 
 use super::{ObjectFrame, VisibilityDepth, gathered};
 use crate::{Result, intervals};
@@ -23,10 +23,10 @@ pub enum DepthSource {
 pub struct PredictedDepth {
     /// The network.
     pub estimator: DepthEstimator,
+    /// How its input is made: of [`DepthEstimator::preparer`], or of [`DepthEstimator::augmented`] for several looks.
+    pub preparer: Preparer,
     /// What its intervals are stretched by.
     pub intervals: IntervalFactors,
-    /// How often it looks at each image.
-    pub augmentation: Augmentation,
 }
 
 impl DepthSource {
@@ -83,8 +83,7 @@ impl DepthSource {
 
 impl PredictedDepth {
     fn measured(&mut self, image: &RgbImage, camera: &Intrinsics) -> Result<Measured> {
-        let preparer = self.estimator.augmented(self.augmentation)?;
-        let prepared = preparer.prepare(image, Some(camera), true, true);
+        let prepared = self.preparer.prepare(image, Some(camera), true, true);
         let prediction = self.estimator.infer(&prepared)?;
         let whole = prediction.depth();
         let sigma = intervals::sigma(&prediction, &whole, &self.intervals);

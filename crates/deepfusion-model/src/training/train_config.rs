@@ -79,8 +79,8 @@ pub struct Augmentation {
     /// the batches have the run's own size, the others in turns one of these.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<InputSize>,
-    /// Other sizes of video's images, likewise, so that a network is as good by several looks (`--post-process multi-scale`) as by one.
-    /// Only with `canonical_focal_px`.
+    /// Other sizes of video's images, for a network that is to be used by several looks (`--post-process multi-scale`): half of the
+    /// batches have the run's own size, the others in turns one of these. Only with `canonical_focal_px`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub video_sizes: Vec<InputSize>,
 }
@@ -128,8 +128,8 @@ pub struct DataConfig {
     /// Threads that decode, resize and render ahead of the training; absent: one a processor, at most 4.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loader_threads: Option<usize>,
-    /// Memory for images at the run's size, in MiB, so that they are decoded once and not every epoch; absent: 2048. Workers and trials on one
-    /// machine have one each.
+    /// Memory for images at the run's size (and at each of `augmentation.video_sizes`), in MiB, so that they are decoded once and not every
+    /// epoch; absent: 2048. Workers and trials on one machine have one each.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cache_mib: Option<usize>,
     /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.

@@ -1,8 +1,27 @@
 //! Which settings of a run mean something.
 
+use deepfusion_hint::count_of;
+
 use crate::{Error, Reprojection, TrainConfig, ViewMotion};
 
 impl TrainConfig {
+    /// That video at several sizes has a canonical focal length: without it one sigmoid disparity would have to mean the same metres at
+    /// every size. [`Self::validate`] leaves this open, as the network that a run starts from may bring it.
+    ///
+    /// # Errors
+    /// [`Error::Config`].
+    pub fn validate_video_sizes(&self) -> Result<(), Error> {
+        let sizes = self.augmentation.video_sizes.len();
+        if sizes == 0 || self.canonical_focal_px.is_some() {
+            return Ok(());
+        }
+        Err(Error::Config {
+            field: "augmentation.video_sizes",
+            expected: "none without canonical_focal_px".into(),
+            found: count_of(sizes, "size"),
+        })
+    }
+
     /// # Errors
     /// [`Error::Config`] naming the first setting that means nothing.
     pub fn validate(&self) -> Result<(), Error> {
@@ -88,15 +107,6 @@ impl TrainConfig {
         let video_sizes = &self.augmentation.video_sizes;
         for size in self.augmentation.sizes.iter().chain(video_sizes) {
             size.validate()?;
-        }
-        // One image at two sizes would be of one depth, and look like two.
-        if !video_sizes.is_empty() && self.canonical_focal_px.is_none() {
-            let found = format!("{} sizes", video_sizes.len());
-            return fail(
-                "augmentation.video_sizes",
-                "none without canonical_focal_px",
-                found,
-            );
         }
         for (field, share) in [
             ("augmentation.jitter", self.augmentation.jitter),

@@ -15,12 +15,12 @@ use deepfusion_sim::SimConfig;
 use deepfusion_weights::{DEFAULT, Shipped};
 
 use super::page::{self, Shown};
-use super::{Demo, TEST_SEED, measure};
+use super::{DEMO, Demo, TEST_SEED, measure};
 use crate::cli::PerceiveArgs;
 use crate::commands::{perceive, run_report, train};
 use crate::failure::Result;
-use crate::output;
 use crate::progress::{clock, say};
+use crate::{interrupt, output};
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
 const FRAMES: usize = 200;
@@ -70,7 +70,10 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     let first = Shown::of(demo, &mut estimator, &parts.all, frame)?;
     let first_ms = 1e3 * before.elapsed().as_secs_f64();
     let targets = demo.out.join("targets");
-    perceive(demo, &drive, &targets)?;
+    let followed = perceive(demo, &drive, &targets);
+    // Before what it says of being interrupted: this is no command that can be repeated.
+    interrupt::check(DEMO)?;
+    followed?;
     let at_first_sight = measure(&mut estimator, &parts.learned, &parts.measured)?;
     say(&format!(
         "abs_rel {:.3} unscaled, from one image and nothing learned here",

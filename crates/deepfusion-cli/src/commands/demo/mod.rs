@@ -38,7 +38,7 @@ const DEMO: &str = "the demo";
 /// `deepfusion demo`.
 pub(super) fn run(args: &DemoArgs) -> Result<()> {
     // The first notice is the one that stands: what training and `perceive` say of going on does not hold here.
-    interrupt::catch("stopping after the step or image at work; the demo cannot be gone on with");
+    interrupt::catch("stopping after the drive, step or image at work; the demo cannot be resumed");
     let embedded = if args.from_scratch {
         None
     } else {

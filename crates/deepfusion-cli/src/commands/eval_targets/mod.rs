@@ -5,6 +5,7 @@ mod table;
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, OpenOptions, save_png};
+use deepfusion_eval::PostProcess;
 use deepfusion_jobs::evaluation::augmentation;
 use deepfusion_jobs::labelled::{
     DepthSource, EvaluatedFrame, PredictedDepth, TargetEvaluation, is_folder_of,
@@ -27,6 +28,9 @@ use crate::{engine, output};
 struct Report {
     /// `truth`, `lidar` or `predicted`.
     depth: &'static str,
+    /// How the looks at each image were combined, where there were several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    post_process: Option<&'static str>,
     /// What counted as found.
     rules: ScoringRules,
     #[serde(flatten)]
@@ -68,13 +72,16 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
     }
     let report = Report {
         depth: evaluation.source().word(),
+        post_process: args.post_process.map(PostProcess::name),
         rules: ScoringRules::default(),
         score: evaluation.score(),
     };
     if args.json {
         output::print_json(&report)
     } else {
-        output::print(&table::text(report.depth, &report.score))
+        let looks = report.post_process.map(|how| format!(" ({how})"));
+        let depth = format!("{}{}", report.depth, looks.unwrap_or_default());
+        output::print(&table::text(&depth, &report.score))
     }
 }
 
@@ -86,7 +93,7 @@ fn source(args: &EvalTargetsArgs) -> Result<DepthSource> {
             model::warn_of_one_size(&model, estimator.config(), args.post_process);
             DepthSource::Network(Box::new(PredictedDepth {
                 intervals: model.interval_factors()?,
-                augmentation: augmentation(args.post_process),
+                preparer: estimator.augmented(augmentation(args.post_process))?,
                 estimator,
             }))
         }

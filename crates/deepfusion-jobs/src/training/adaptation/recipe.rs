@@ -6,7 +6,7 @@ use deepfusion_model::{
     SimulatedConfig, TrainConfig, ViewMotion,
 };
 use deepfusion_nn::ops::{Precision, supports};
-use deepfusion_runtime::DepthEstimator;
+use deepfusion_runtime::{Augmentation, DepthEstimator};
 use deepfusion_train::{Device, recordings_with_stereo};
 
 use super::{AdaptSettings, cameras};
@@ -20,9 +20,7 @@ const SEED: u64 = 91;
 /// Share of them in clear weather and through a plain camera.
 const PLAIN: f64 = 0.2;
 
-/// Sizes beside the network's own at which it goes on learning, as multiples of that: as `--post-process multi-scale` looks.
-const SCALES: [f64; 2] = [0.8, 1.2];
-/// How far the aspect ratio of such a size may be from the network's own, as a share: what is squeezed looks otherwise.
+/// How far the aspect ratio of another size may be from the network's own, as a share: what is squeezed looks otherwise.
 const SQUEEZE: f64 = 0.05;
 
 /// The configuration: the network as it is, the loss of its own run where that learned from drives, else Monodepth2's with the
@@ -100,29 +98,49 @@ pub(super) fn config(
         config.loss.depth.weight = 1.0;
         config.loss.depth.gradient = 0.5;
     }
-    if !learned_from_drives && own.canonical_focal_px.is_some() {
-        let sizes = sizes_around(own.size);
-        config.augmentation.sizes.clone_from(&sizes);
-        config.augmentation.video_sizes = sizes;
-    }
-    for assignment in &settings.set {
-        config.set(assignment)?;
+    assign(&mut config, &settings.set)?;
+    // Around the size as it is now; a setting of the sizes themselves has the last word.
+    if own.canonical_focal_px.is_some() {
+        learn_at_several_sizes(&mut config, settings.simulated > 0);
+        assign(&mut config, &settings.set)?;
     }
     Ok(config)
 }
 
-/// The sizes at [`SCALES`] that the encoder takes and that hardly squeeze the image.
+fn assign(config: &mut TrainConfig, settings: &[String]) -> Result<()> {
+    for assignment in settings {
+        config.set(assignment)?;
+    }
+    Ok(())
+}
+
+/// A network of many cameras stays as good by several looks as it was. One that learned at several sizes already keeps those.
+fn learn_at_several_sizes(config: &mut TrainConfig, simulated: bool) {
+    let sizes = sizes_around(config.size);
+    let augmentation = &mut config.augmentation;
+    if simulated && augmentation.sizes.is_empty() {
+        augmentation.sizes.clone_from(&sizes);
+    }
+    if augmentation.video_sizes.is_empty() {
+        augmentation.video_sizes = sizes;
+    }
+}
+
+/// Sizes near those of `--post-process multi-scale` that the encoder takes and that hardly squeeze the image.
 fn sizes_around(own: InputSize) -> Vec<InputSize> {
     let aspect = |size: &InputSize| size.width as f64 / size.height as f64;
     let side = |side: usize, scale: f64| 32 * (side as f64 * scale / 32.0).round() as usize;
-    let sizes = SCALES.map(|scale| InputSize {
-        width: side(own.width, scale),
-        height: side(own.height, scale),
-    });
-    let like_own = |size: &InputSize| {
-        size.validate().is_ok() && (aspect(size) / aspect(&own) - 1.0).abs() < SQUEEZE
-    };
-    sizes.into_iter().filter(like_own).collect()
+    let sizes = Augmentation::MULTI_SCALE
+        .scales
+        .iter()
+        .map(|scale| InputSize {
+            width: side(own.width, *scale),
+            height: side(own.height, *scale),
+        });
+    let hardly_squeezes = |size: &InputSize| (aspect(size) / aspect(&own) - 1.0).abs() < SQUEEZE;
+    sizes
+        .filter(|size| size.validate().is_ok() && hardly_squeezes(size))
+        .collect()
 }
 
 /// Whether the settings leave turns alone that no sensor measured, as [`config`] will say.
@@ -196,7 +214,25 @@ mod tests {
         };
         assert_eq!(around(640, 192), [[512, 160], [768, 224]]);
         assert_eq!(around(1024, 320), [[832, 256], [1216, 384]]);
-        // Of so low an image a thirty-second is too much.
+        // Of so low an image a step of 32 pixels is too much.
         assert_eq!(around(320, 96), Vec::<[usize; 2]>::new());
+    }
+
+    #[test]
+    fn sizes_that_are_set_stay() {
+        let mut config = Preset::Light.config();
+        learn_at_several_sizes(&mut config, false);
+        let video = config.augmentation.video_sizes.clone();
+        assert_eq!((video.len(), config.augmentation.sizes.len()), (2, 0));
+        let own = vec![InputSize {
+            width: 320,
+            height: 96,
+        }];
+        config.augmentation.video_sizes.clone_from(&own);
+        learn_at_several_sizes(&mut config, true);
+        assert_eq!(config.augmentation.video_sizes, own);
+        assert_eq!(config.augmentation.sizes, video);
+        assign(&mut config, &["augmentation.video_sizes=[]".into()]).unwrap();
+        assert!(config.augmentation.video_sizes.is_empty());
     }
 }
