@@ -9,6 +9,7 @@
 mod ablate;
 mod adapt;
 mod architecture;
+mod average;
 mod bag;
 mod bag_video;
 mod bulk;

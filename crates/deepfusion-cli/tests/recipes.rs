@@ -24,7 +24,7 @@ fn each_row_of_kittis_tables_starts() {
         ok(
             at,
             &format!(
-                "train --config {} --data sim --size 96x64 --batch 1 --steps 2 --init none --out {name}",
+                "train --config {} --data sim --size 96x64 --batch 1 --steps 2 --init none --set validation_share=0 --out {name}",
                 path.display()
             ),
         );

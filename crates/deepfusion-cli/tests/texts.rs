@@ -33,6 +33,7 @@ fn help_texts() {
         "weights",
         "weights import",
         "weights pack",
+        "weights average",
         "weights list",
         "bench",
         "completions",

@@ -94,6 +94,14 @@ pub enum Error {
         /// The checkpoint.
         path: PathBuf,
     },
+    /// Networks whose weights have no mean.
+    #[error("{}: {why}", path.display())]
+    NoMean {
+        /// The network that does not fit the first.
+        path: PathBuf,
+        /// Why not.
+        why: NoMean,
+    },
     /// A packed network where a run is needed.
     #[error("{}: is packed already", path.display())]
     PackedAlready {
@@ -277,6 +285,39 @@ impl std::fmt::Display for OtherJob {
     }
 }
 
+/// Why there is no mean of weights.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NoMean {
+    /// There is no run to put the mean into.
+    Packed,
+    /// Its depth network never learned.
+    EncodersOnly,
+    /// It learned its camera, which belongs to its weights.
+    LearnedCamera,
+    /// What it is not alike in.
+    Other(&'static str),
+    /// A share that is none.
+    Shares,
+}
+
+impl std::fmt::Display for NoMean {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Packed => write!(f, "is packed, and the first network must be a run's"),
+            Self::EncodersOnly => write!(f, "only its encoders were ever trained"),
+            Self::LearnedCamera => {
+                write!(
+                    f,
+                    "learned its camera with its weights, so that they have no mean with others"
+                )
+            }
+            Self::Other(what) => write!(f, "{what} than the first network's"),
+            Self::Shares => write!(f, "the shares must be positive, one of each network"),
+        }
+    }
+}
+
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
@@ -300,6 +341,15 @@ impl Hint for Error {
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
+            Self::NoMean { why, .. } => match why {
+                NoMean::Packed => Some("give a run's folder first: its settings are those of the mean".into()),
+                NoMean::EncodersOnly => Some("train from it first".into()),
+                NoMean::Other(_) => Some("take networks that were trained from the same one".into()),
+                NoMean::Shares => Some("give one positive number for each network, such as 2,1".into()),
+                NoMean::LearnedCamera => {
+                    Some("train them with the camera that one of them learned as a known one".into())
+                }
+            },
             Self::NothingInInt8 { .. } => {
                 Some("allow more, or use bf16; what was calibrated before stays".into())
             }

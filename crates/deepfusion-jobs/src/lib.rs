@@ -10,6 +10,7 @@
 //! | [`verdict`] | what a drive with speeds says of a network's depth, without ground truth |
 //! | [`board`] | the board of a calibration in pictures and videos |
 //! | [`int8`] | the ranges of what a network's convolutions read, for int8 |
+//! | [`averaging`] | the mean of several runs' weights |
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
@@ -27,6 +28,7 @@
 //!
 //! Nothing here prints. What a person should know is returned, or passed to a callback.
 
+pub mod averaging;
 pub mod board;
 pub mod bulk;
 pub mod dates;
@@ -51,6 +53,6 @@ pub mod scene;
 pub mod training;
 pub mod verdict;
 
-pub use error::{Error, OtherJob, Result, StaleReason};
+pub use error::{Error, NoMean, OtherJob, Result, StaleReason};
 pub use inputs::{Input, find_inputs};
 pub use model_facts::{ModelFacts, name_of};

@@ -55,7 +55,7 @@ pub(crate) use prediction::{Outputs, PredictionArgs};
 pub(crate) use train::TrainArgs;
 pub(crate) use values::{CameraIntrinsics, ClockOffset, Shard, Size};
 pub(crate) use view::ViewArgs;
-pub(crate) use weights::{CalibrateWeightsArgs, PackArgs, WeightsCommand};
+pub(crate) use weights::{AverageArgs, CalibrateWeightsArgs, PackArgs, WeightsCommand};
 
 /// Metric depth from one camera and a speed signal.
 #[derive(Debug, Parser)]

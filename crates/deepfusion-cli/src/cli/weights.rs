@@ -25,6 +25,8 @@ pub(crate) enum WeightsCommand {
     },
     /// Pack a run as an embedded network: its weights in bf16, and a card.
     Pack(PackArgs),
+    /// Average the weights of runs that began from the same network: one network out of several.
+    Average(AverageArgs),
     /// Find the ranges of what a network's convolutions read on your images, for `--precision int8`.
     Calibrate(CalibrateWeightsArgs),
     /// Which networks are embedded and what they were made from; which weights can be imported.
@@ -61,6 +63,26 @@ pub(crate) struct CalibrateWeightsArgs {
     /// Print the ranges as JSON on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `deepfusion weights average`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "The mean of networks that were trained from the same one can be better than each on images that none of them saw (model soups): measure it. It costs \
+    no training. Settings and PoseNet are the first run's; intervals and int8 are calibrated anew.\n\n\
+    Examples:\n  deepfusion weights average runs/video runs/mixed --out runs/mean\n  \
+    deepfusion weights average runs/own street --shares 2,1 --out runs/careful      # less of what one drive taught"
+)]
+pub(crate) struct AverageArgs {
+    /// A run's folder or a checkpoint in it; after the first also packed networks, and embedded ones by their names.
+    #[arg(required = true, num_args = 2.., value_name = "RUN")]
+    pub models: Vec<PathBuf>,
+    /// How much each of them counts [default: all alike].
+    #[arg(long, value_name = "A,B,…", value_delimiter = ',')]
+    pub shares: Option<Vec<f64>>,
+    /// Folder of the run to make.
+    #[arg(long, value_name = "RUN")]
+    pub out: PathBuf,
 }
 
 /// `deepfusion weights pack`.

@@ -83,6 +83,7 @@ pub(crate) fn run(command: Option<Command>) -> Result<()> {
             weights::import::run(&files, &out)
         }
         Command::Weights(WeightsCommand::Pack(args)) => weights::pack::run(&args),
+        Command::Weights(WeightsCommand::Average(args)) => weights::average::run(&args),
         Command::Weights(WeightsCommand::Calibrate(args)) => weights::calibrate::run(&args),
         Command::Weights(WeightsCommand::List { json }) => weights::list::run(json),
         Command::Calibrate(args) => calibrate::run(&args),

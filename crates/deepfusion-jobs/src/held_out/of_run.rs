@@ -1,10 +1,9 @@
 //! What a run saw, and those it began from.
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use deepfusion_data::{Dataset, Frame};
-use deepfusion_model::{RunFolder, TrainConfig};
+use deepfusion_model::{RunFolder, TrainConfig, WeightsOrigin};
 use deepfusion_runtime::embedded;
 use deepfusion_train::SampleSet;
 use deepfusion_weights::Shipped;
@@ -69,32 +68,32 @@ fn seen_by(
     for frame in &train.depth.frames {
         seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));
     }
-    if let Some(init) = &config.init {
-        let packed = match &config.init_sha256 {
-            Some(sha256) => {
-                let network = embedded(init).ok()??;
-                // Another one of the name tells nothing of the one it began from.
-                (network.card.sha256 == *sha256).then_some(())?;
-                Some(*network)
-            }
-            None if Shipped::is_at(init) => Some(Shipped::read(init).ok()?),
-            None => None,
-        };
-        match packed {
-            Some(network) if unseen(&network.card, datasets) => {}
-            Some(_) => return None,
-            None => seen.extend(seen_before(init, datasets, runs)?),
-        }
+    for origin in config.beginning().iter().chain(&config.averaged_with) {
+        seen.extend(seen_before(origin, datasets, runs)?);
     }
     Some(seen)
 }
 
-/// What the weights that a run began from have seen; weights that are no run's are of other pictures (ImageNet's).
+/// What the weights have seen that a run began from, or is the mean with; weights that are no run's are of other pictures (ImageNet's).
 fn seen_before(
-    init: &Path,
+    origin: &WeightsOrigin,
     datasets: &[Dataset],
     runs: &mut HashSet<std::path::PathBuf>,
 ) -> Option<HashSet<Seen>> {
+    let init = &origin.path;
+    let packed = match &origin.sha256 {
+        Some(sha256) => {
+            let network = embedded(init).ok()??;
+            // Another one of the name tells nothing of the one it began from.
+            (network.card.sha256 == *sha256).then_some(())?;
+            Some(*network)
+        }
+        None if Shipped::is_at(init) => Some(Shipped::read(init).ok()?),
+        None => None,
+    };
+    if let Some(network) = packed {
+        return unseen(&network.card, datasets).then(HashSet::new);
+    }
     if !init.exists() {
         return None;
     }

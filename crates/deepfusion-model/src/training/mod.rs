@@ -21,5 +21,5 @@ pub use preset::{Compute, Preset};
 pub use sample_factors::SampleFactors;
 pub use train_config::{
     Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
-    ViewMotion,
+    ViewMotion, WeightsOrigin,
 };

@@ -202,6 +202,10 @@ pub struct TrainConfig {
     #[schemars(skip)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_sha256: Option<String>,
+    /// The other networks whose weights the run's are the mean with. Training does not look at it, and a new run is without.
+    #[schemars(skip)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub averaged_with: Vec<WeightsOrigin>,
     /// Pairs slower than this are dropped, in m/s.
     pub min_speed_mps: f64,
     /// Share of each drive's end that is held out for validation.
@@ -244,6 +248,17 @@ pub struct TrainConfig {
     /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
     #[serde(default)]
     pub flow_decoder: FlowDecoderConfig,
+}
+
+/// Where weights came from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WeightsOrigin {
+    /// A run, a checkpoint, a packed file; or with `sha256` the name of a network that the program carries.
+    pub path: PathBuf,
+    /// SHA-256 of the embedded network's weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
 }
 
 fn no_zoom() -> f32 {
@@ -317,6 +332,19 @@ impl TrainConfig {
         if self.init_sha256.is_none() {
             self.init = self.init.take().map(absolute);
         }
+        for origin in &mut self.averaged_with {
+            if origin.sha256.is_none() {
+                origin.path = absolute(std::mem::take(&mut origin.path));
+            }
+        }
+    }
+
+    /// The weights that the run began from; `None` for those of its seed.
+    #[must_use]
+    pub fn beginning(&self) -> Option<WeightsOrigin> {
+        let path = self.init.clone()?;
+        let sha256 = self.init_sha256.clone();
+        Some(WeightsOrigin { path, sha256 })
     }
 
     /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms

@@ -1,0 +1,66 @@
+//! `weights average`: one network out of several.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{fails, ok};
+use serde_json::Value;
+
+/// Whether training saw the drive, as the evaluation says that a run keeps.
+fn held_out(at: &Path, model: &str, drive: &str) -> Value {
+    let kept = at.join(model).join("eval");
+    let _ = fs::remove_dir_all(&kept);
+    let eval = format!("eval --model {model} --data {drive} --crop none --no-verdict");
+    ok(at, &eval);
+    let file = fs::read_dir(kept).unwrap().next().unwrap().unwrap();
+    let saved: Value = serde_json::from_slice(&fs::read(file.path()).unwrap()).unwrap();
+    saved["measured"]["held_out"].clone()
+}
+
+#[test]
+fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, seed) in [("first", 3), ("second", 4), ("third", 5)] {
+        ok(
+            at,
+            &format!("simulate --out {name} --frames 8 --seed {seed} --scan-every 4 --size 320x96"),
+        );
+    }
+    let train = "train --size 96x64 --batch 2 --steps 2 --set validation_share=0";
+    ok(at, &format!("{train} --data first --init none --out a"));
+    ok(at, &format!("{train} --data second --init a --out b"));
+    let made = ok(at, "weights average a b --out mean");
+    assert!(made.stdout.starts_with("mean"), "{}", made.stdout);
+    assert!(!made.stderr.contains("WARN"), "{}", made.stderr);
+    // The settings are those of `a`, which saw the first drive alone.
+    assert_eq!(held_out(at, "a", "second"), true);
+    for (drive, unseen) in [("first", false), ("second", false), ("third", true)] {
+        assert_eq!(held_out(at, "mean", drive), unseen, "{drive}");
+    }
+    // It is trained on, and its run is not the mean of anything.
+    ok(at, &format!("{train} --data first --init mean --out on"));
+    let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
+    assert!(!on.contains("averaged_with"), "{on}");
+    assert_eq!(held_out(at, "on", "second"), false, "by what it began from");
+    fails(at, "train --out mean --resume", &["optimiser"]);
+
+    ok(at, "weights average a b --shares 3,1 --out third-of-b");
+    fails(at, "weights average a b --shares 1 --out no", &["shares"]);
+    fails(
+        at,
+        "weights average a street --out no",
+        &["street", "has other layers", "hint:"],
+    );
+    fails(
+        at,
+        "weights average street a --out no",
+        &["street", "must be a run's"],
+    );
+    ok(
+        at,
+        &format!("{train} --data first --init none --seed 9 --out strange"),
+    );
+    let strangers = ok(at, "weights average a strange --out strangers");
+    assert!(strangers.stderr.contains("WARN"), "{}", strangers.stderr);
+}
