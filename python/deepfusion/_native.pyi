@@ -57,7 +57,7 @@ class Model:
         `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
 
         `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
-        image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two looks at the image or of four
+        image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two predictions of the image or of four
         (the image and the mirrored one; a smaller input and a larger one; both): it usually errs less on real streets, and takes two to
         five times as long. Several sizes are for networks that learned at several, as `street` did."""
     def predict_many(

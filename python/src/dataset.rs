@@ -98,7 +98,8 @@ impl Dataset {
 
     fn __repr__(&self) -> String {
         let (name, frames) = (self.inner.name(), self.__len__());
-        format!("Dataset({name:?}, {frames} frames, {})", self.layout())
+        let s = if frames == 1 { "" } else { "s" };
+        format!("Dataset({name:?}, {frames} frame{s}, {})", self.layout())
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a calibration is made of, and what it says.
 
 use crate::{Coverage, LensModel};
-use deepfusion_geometry::{Distortion, Intrinsics};
+use deepfusion_geometry::{Distortion, Intrinsics, NoDistortion};
 use nalgebra::Vector2;
 use serde::Serialize;
 
@@ -41,8 +41,8 @@ impl Calibration {
     /// The lens as the rest of the program takes it.
     ///
     /// # Errors
-    /// A sentence, for coefficients that are not finite.
-    pub fn distortion(&self) -> Result<Distortion, String> {
+    /// [`NoDistortion`], for coefficients that are not finite.
+    pub fn distortion(&self) -> Result<Distortion, NoDistortion> {
         match self.model {
             LensModel::BrownConrady => Distortion::from_opencv(&self.coefficients),
             LensModel::Fisheye => Distortion::from_fisheye(&self.coefficients),

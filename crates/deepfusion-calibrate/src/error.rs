@@ -1,5 +1,5 @@
 use crate::Board;
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 
 /// Why there is no calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -15,7 +15,7 @@ pub enum Error {
         board: Board,
     },
     /// No picture shows the board.
-    #[error("no board of {}x{} inner corners in any of {pictures} pictures{}", board.columns, board.rows, instead(*seen))]
+    #[error("no board of {}x{} inner corners in any of {}{}", board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen))]
     NoBoard {
         /// What was looked for.
         board: Board,
@@ -26,8 +26,8 @@ pub enum Error {
     },
     /// Too few pictures show the board.
     #[error(
-        "the board of {}x{} inner corners is whole in {found} of {pictures} pictures, and {needed} are needed{}",
-        board.columns, board.rows, instead(*seen)
+        "the board of {}x{} inner corners is whole in {found} of {}, and {needed} are needed{}",
+        board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen)
     )]
     TooFewViews {
         /// What was looked for.

@@ -37,7 +37,7 @@ pub(crate) fn embedded_default() -> Result<Option<ModelSource>> {
     Ok(source)
 }
 
-/// Warns where several input sizes are asked of a run that learned at one: it may then be worse than by one look.
+/// Warns where several input sizes are asked of a run that learned at one: it may then be worse than by one prediction.
 pub(crate) fn warn_of_one_size(
     model: &ModelSource,
     config: &TrainConfig,

@@ -265,3 +265,67 @@ fn paths_in_documents_exist() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+/// The heading's anchor as GitHub makes it: small letters, digits, dashes and underscores, spaces as dashes.
+fn anchor(heading: &str) -> String {
+    let heading = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = heading.chars().filter_map(|c| match c {
+        ' ' => Some('-'),
+        c if c.is_alphanumeric() || c == '-' || c == '_' => Some(c),
+        _ => None,
+    });
+    kept.collect()
+}
+
+/// Links between documents lead to a file and a heading that are there.
+#[test]
+fn links_in_documents_lead_somewhere() {
+    let root = root().canonicalize().unwrap();
+    let mut pages = Vec::new();
+    files_below(&root.join("docs"), &mut pages);
+    pages.retain(|file| file.extension().is_some_and(|e| e == "md"));
+    pages.extend(
+        [
+            "README.md",
+            "ARCHITECTURE.md",
+            "CONTRIBUTING.md",
+            "CHANGELOG.md",
+        ]
+        .map(|p| root.join(p)),
+    );
+    let anchors_of = |page: &Path| -> Vec<String> {
+        let text = fs::read_to_string(page).unwrap();
+        let mut code = false;
+        let mut anchors = Vec::new();
+        for line in text.lines() {
+            code ^= line.starts_with("```");
+            if line.starts_with('#') && !code {
+                anchors.push(anchor(line));
+            }
+        }
+        anchors
+    };
+    let (mut wrong, mut found) = (Vec::new(), 0);
+    for page in &pages {
+        let text = fs::read_to_string(page).unwrap();
+        for link in text.split("](").skip(1) {
+            let link = link.split(')').next().unwrap();
+            if link.contains("://") || link.starts_with("mailto:") {
+                continue;
+            }
+            let (path, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match path {
+                "" => page.clone(),
+                path => page.parent().unwrap().join(path),
+            };
+            found += 1;
+            let is_there = target.exists()
+                && (heading.is_empty() || anchors_of(&target).iter().any(|a| a == heading));
+            if !is_there {
+                wrong.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(found > 200, "{found} links");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{fails, ok};
+use crate::support::{fails, json, ok};
 use serde_json::Value;
 
 /// Whether training saw the drive, as the evaluation says that a run keeps.
@@ -32,30 +32,56 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     ok(at, &format!("{train} --data second --init a --out b"));
     let made = ok(at, "weights average a b --out mean");
     assert!(made.stdout.starts_with("mean"), "{}", made.stdout);
+    assert!(made.stderr.contains("0.500 of "), "{}", made.stderr);
     assert!(!made.stderr.contains("WARN"), "{}", made.stderr);
     // The settings are those of `a`, which saw the first drive alone.
     assert_eq!(held_out(at, "a", "second"), true);
     for (drive, unseen) in [("first", false), ("second", false), ("third", true)] {
         assert_eq!(held_out(at, "mean", drive), unseen, "{drive}");
     }
-    // It is trained on, and its run is not the mean of anything.
-    ok(at, &format!("{train} --data first --init mean --out on"));
-    let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
-    assert!(!on.contains("averaged_with"), "{on}");
-    assert_eq!(held_out(at, "on", "second"), false, "by what it began from");
+    let card = json(
+        at,
+        "weights pack --model mean --name hut --out packed --json",
+    );
+    assert_eq!(card["data"], serde_json::json!(["first", "second"]));
     fails(at, "train --out mean --resume", &["optimiser"]);
 
-    ok(at, "weights average a b --shares 3,1 --out third-of-b");
-    fails(at, "weights average a b --shares 1 --out no", &["shares"]);
+    // A run by its settings is not the mean of anything, and goes on.
+    let from = format!("{train} --config mean/config.toml --data third");
+    ok(at, &format!("{from} --init mean --out on"));
+    let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
+    assert!(!on.contains("averaged"), "{on}");
+    assert_eq!(held_out(at, "on", "second"), false, "by what it began from");
+
+    // A packed network is one of them, as an embedded one is.
+    let third = json(
+        at,
+        "weights average a packed/hut.safetensors --shares 3,1 --out c --json",
+    );
+    let shares: Vec<&Value> = (0..2).map(|i| &third["networks"][i]["share"]).collect();
+    assert_eq!(shares, [0.75, 0.25]);
+    // Of what it was made nothing is known but its kind.
+    assert_eq!(held_out(at, "c", "third"), Value::Null);
+
+    fails(
+        at,
+        "weights average a b --shares 1 --out no",
+        &["shares", "hint:"],
+    );
     fails(
         at,
         "weights average a street --out no",
-        &["street", "has other layers", "hint:"],
+        &["street: has other layers", "hint:"],
     );
     fails(
         at,
         "weights average street a --out no",
         &["street", "must be a run's"],
+    );
+    fails(
+        at,
+        "weights average a b --out mean",
+        &["mean: is not empty"],
     );
     ok(
         at,

@@ -483,7 +483,7 @@ pub enum Error {
         problem: String,
     },
     /// A recording has no scan to make ground truth from.
-    #[error("{}: no velodyne scan belongs to any of the {frames} frames", path.display())]
+    #[error("{}: no velodyne scan belongs to any of its frames ({frames})", path.display())]
     NoScans {
         /// The recording.
         path: PathBuf,

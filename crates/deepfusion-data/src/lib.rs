@@ -19,7 +19,9 @@ mod logs;
 mod pictures;
 mod truth;
 
-pub use camera::{CalibrationSource, CameraCalibration, Lens, calibration_near, camera_info_yaml};
+pub use camera::{
+    CalibrationSource, CameraCalibration, Lens, NoLens, calibration_near, camera_info_yaml,
+};
 pub use convert::{
     Converted, VELOCITY, convert_to_bag, convert_to_kitti, export_gt, ground_truth_names,
 };

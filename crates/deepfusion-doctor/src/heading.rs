@@ -8,7 +8,7 @@ use super::epipolar::{self, EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Heading};
-use deepfusion_hint::count_of;
+use deepfusion_hint::{Hint, count_of};
 use nalgebra::Vector2;
 use std::fmt;
 
@@ -43,6 +43,7 @@ pub fn heading(dataset: &Dataset) -> Result<Heading, NoHeading> {
 
 /// Why images do not show where a camera heads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct NoHeading {
     /// Pairs of them that were taken driving straight ahead.
     pub straight: usize,
@@ -59,6 +60,15 @@ impl fmt::Display for NoHeading {
 }
 
 impl std::error::Error for NoHeading {}
+
+impl Hint for NoHeading {
+    fn hint(&self) -> Option<String> {
+        Some(
+            "give a drive with more of it straight ahead, or the camera's place on the vehicle"
+                .into(),
+        )
+    }
+}
 
 fn measure(pairs: &[EpipolarPair]) -> Result<Heading, NoHeading> {
     let straight: Vec<&EpipolarPair> = pairs

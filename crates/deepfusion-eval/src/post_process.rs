@@ -1,8 +1,8 @@
-//! Predictions by more than one look at each image.
+//! Test-time augmentation: one depth of several predictions of an image.
 
 use serde::{Deserialize, Serialize};
 
-/// More than one look at each image, whose disparities become one.
+/// Several predictions of each image, whose disparities become one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PostProcess {

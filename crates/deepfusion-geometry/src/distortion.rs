@@ -1,5 +1,6 @@
 mod fisheye;
 
+use deepfusion_hint::Hint;
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -33,25 +34,45 @@ pub struct Distortion {
     pub fisheye: Option<[f64; 4]>,
 }
 
+/// Why coefficients are no lens's.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoDistortion {
+    /// One is NaN or infinite.
+    #[error("a coefficient is {0}")]
+    NotFinite(f64),
+    /// So many are none of OpenCV's models.
+    #[error("{0} coefficients, expected k1, k2, p1, p2[, k3[, k4, k5, k6]]")]
+    Count(usize),
+    /// So many are not a fisheye lens's.
+    #[error("{0} coefficients, a fisheye lens has k1, k2, k3, k4")]
+    FisheyeCount(usize),
+    /// OpenCV's further coefficients, which are not zero.
+    #[error("thin prism or tilt coefficients are not supported")]
+    ThinPrism,
+}
+
+impl Hint for NoDistortion {
+    fn hint(&self) -> Option<String> {
+        Some("calibrate with k1, k2, p1, p2 and k3, or a fisheye lens with k1 to k4".into())
+    }
+}
+
 impl Distortion {
     /// From coefficients in OpenCV's order k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆; 0, 4, 5 or 8 of them. More
     /// (thin prism, tilt) only where all further ones are zero.
     ///
     /// # Errors
-    /// A sentence that says why they are invalid.
-    pub fn from_opencv(coefficients: &[f64]) -> Result<Self, String> {
+    /// [`NoDistortion`].
+    pub fn from_opencv(coefficients: &[f64]) -> Result<Self, NoDistortion> {
         if let Some(bad) = coefficients.iter().find(|c| !c.is_finite()) {
-            return Err(format!("a coefficient is {bad}"));
+            return Err(NoDistortion::NotFinite(*bad));
         }
         let used = match coefficients.len() {
             0 | 4 | 5 | 8 => coefficients,
             12 | 14 if coefficients[8..].iter().all(|c| *c == 0.0) => &coefficients[..8],
-            12 | 14 => return Err("thin prism or tilt coefficients are not supported".into()),
-            n => {
-                return Err(format!(
-                    "{n} coefficients, expected k1, k2, p1, p2[, k3[, k4, k5, k6]]"
-                ));
-            }
+            12 | 14 => return Err(NoDistortion::ThinPrism),
+            n => return Err(NoDistortion::Count(n)),
         };
         let at = |i: usize| used.get(i).copied().unwrap_or(0.0);
         Ok(Self {
@@ -66,16 +87,13 @@ impl Distortion {
     /// r' = θ.
     ///
     /// # Errors
-    /// A sentence that says why they are invalid.
-    pub fn from_fisheye(coefficients: &[f64]) -> Result<Self, String> {
+    /// [`NoDistortion`].
+    pub fn from_fisheye(coefficients: &[f64]) -> Result<Self, NoDistortion> {
         let Ok(k) = <[f64; 4]>::try_from(coefficients) else {
-            return Err(format!(
-                "{} coefficients, a fisheye lens has k1, k2, k3, k4",
-                coefficients.len()
-            ));
+            return Err(NoDistortion::FisheyeCount(coefficients.len()));
         };
         match k.iter().find(|c| !c.is_finite()) {
-            Some(bad) => Err(format!("a coefficient is {bad}")),
+            Some(bad) => Err(NoDistortion::NotFinite(*bad)),
             None => Ok(Self {
                 fisheye: Some(k),
                 ..Self::default()
@@ -168,10 +186,9 @@ mod tests {
         assert!(Distortion::from_opencv(&twelve).is_err());
         twelve[8..].fill(0.0);
         assert_eq!(Distortion::from_opencv(&twelve).unwrap().rational, [0.1; 3]);
-        assert!(
-            Distortion::from_opencv(&[0.1; 3])
-                .unwrap_err()
-                .contains("3 coefficients")
+        assert_eq!(
+            Distortion::from_opencv(&[0.1; 3]).unwrap_err(),
+            NoDistortion::Count(3)
         );
         assert!(Distortion::from_opencv(&[f64::NAN; 4]).is_err());
     }
@@ -193,10 +210,9 @@ mod tests {
         assert!(!plain.is_none());
         let seen = plain.distort(&Vector2::new(0.6, 0.8));
         assert!((seen.norm() - std::f64::consts::FRAC_PI_4).abs() < 1e-15);
-        assert!(
-            Distortion::from_fisheye(&[0.1; 5])
-                .unwrap_err()
-                .contains("5 coefficients")
+        assert_eq!(
+            Distortion::from_fisheye(&[0.1; 5]).unwrap_err(),
+            NoDistortion::FisheyeCount(5)
         );
         assert!(Distortion::from_fisheye(&[0.1, 0.1, 0.1, f64::INFINITY]).is_err());
     }

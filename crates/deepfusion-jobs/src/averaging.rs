@@ -2,96 +2,96 @@
 //!
 //! Networks that were trained from the same one lie in one valley of the loss, so that the mean of their weights is a network as well, and can be a better
 //! one on images that none of them saw ("model soups", Wortsman et al., arXiv 2203.05482; of a network and the one it began from, arXiv 2109.01903).
+//!
+//! What batch norms measured of their inputs is averaged like weights. That is exact where they were frozen (`frozen_statistics`), as in `adapt`, and
+//! close where networks are: the mean's own features are a little smaller than the mean of all features.
 
-use std::collections::{BTreeSet, HashSet};
+mod ancestors;
+mod fit;
+
 use std::path::{Path, PathBuf};
 
-use deepfusion_eval::compare::sha256_of_file;
 use deepfusion_model::weights::{Weights, read_safetensors_under, write_safetensors};
 use deepfusion_model::{
-    Checkpoint, CheckpointKind, Error as ModelError, RunFolder, StoredNetwork, TrainConfig,
-    WeightsOrigin,
+    AveragedNetwork, Checkpoint, CheckpointKind, Error as ModelError, RunFolder, StoredNetwork,
 };
-use deepfusion_runtime::ModelSource;
+use deepfusion_runtime::{ModelSource, unpacked};
 use deepfusion_weights::Shipped;
 
 use crate::{Error, NoMean, Result};
 
 /// The parts of a run's checkpoint beside the depth network that training goes on with.
 const OTHER_PARTS: [&str; 2] = ["pose.", "flow."];
-
-/// The head for uncertainty, which a network may lack or get anew.
+/// The head for uncertainty, which not all networks have.
 const UNCERTAINTY: &str = "uncertainty.";
 
 /// What [`average`] wrote.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Averaged {
     /// The new run's checkpoint.
     pub checkpoint: PathBuf,
-    /// Whether all networks are known to come from one. Others' mean may be worth nothing.
+    /// What it is the mean of, in the order given.
+    pub networks: Vec<AveragedNetwork>,
+    /// Whether all of them are known to come from one. Others' mean is worth nothing.
     pub related: bool,
+    /// Whether some could say how sure they are and others could not, so that the mean cannot.
+    pub lost_uncertainty: bool,
 }
 
 /// Writes the mean of the depth networks' weights as a new run into `out`: Σ sᵢ·wᵢ / Σ sᵢ, computed in f64; without `shares` all count alike.
 ///
-/// The first must be a run: settings, findings and PoseNet are its own, and the head for uncertainty where not all have one. The others may be packed, or embedded ones by their names. Factors of intervals
-/// and ranges for int8 belong to one network's weights and are not taken over.
+/// The first must be a run: settings, camera and PoseNet are its own. The others may be packed, or embedded ones by their names. A run's folder
+/// stands for the checkpoint that it prefers. Factors of intervals and ranges for int8 belong to one network's weights and are not taken over.
 ///
 /// # Errors
-/// [`Error::NoMean`] for networks that are not alike, and shares that are none; networks that cannot be read;
-/// [`ModelError::RunExists`] where `out` holds a run.
+/// [`Error::NoMean`] for networks that are not alike, [`Error::Shares`] for shares that are none, [`Error::Occupied`] where `out` holds anything;
+/// networks that cannot be read.
 pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result<Averaged> {
-    let sources = models
-        .iter()
-        .map(|model| Ok(ModelSource::named(model)?))
-        .collect::<Result<Vec<_>>>()?;
-    let refuse = |source: &ModelSource, why| Error::NoMean {
-        path: source.given().to_owned(),
-        why,
-    };
-    let Some(first) = sources.first() else {
-        return Err(Error::NoMean {
+    let shares = parts_of(models.len(), shares)?;
+    let is_empty = std::fs::read_dir(out).map_or(true, |mut entries| entries.next().is_none());
+    if !is_empty {
+        return Err(Error::Occupied {
             path: out.to_owned(),
-            why: NoMean::Shares,
+        });
+    }
+    let mut sources = Vec::with_capacity(models.len());
+    let mut networks = Vec::with_capacity(models.len());
+    for model in models {
+        let source = ModelSource::named(model)?;
+        networks.push(load(&source)?);
+        sources.push(source);
+    }
+    let ModelSource::Run { folder, kind, .. } = &sources[0] else {
+        return Err(Error::NoMean {
+            path: models[0].clone(),
+            why: NoMean::Packed,
         });
     };
-    let ModelSource::Run { folder, kind, .. } = first else {
-        return Err(refuse(first, NoMean::Packed));
-    };
-    let equal = vec![1.0; sources.len()];
-    let shares = shares.unwrap_or(&equal);
-    if shares.len() != sources.len() || shares.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-        return Err(refuse(first, NoMean::Shares));
-    }
-    for source in &sources {
-        let ModelSource::Run { folder, kind, .. } = source else {
-            continue;
-        };
-        let state = folder.read_state(*kind)?;
-        if state.encoders_only {
-            return Err(refuse(source, NoMean::EncodersOnly));
-        }
-        if state.focal_ratio.is_some() {
-            return Err(refuse(source, NoMean::LearnedCamera));
-        }
-    }
-    let networks = sources
-        .iter()
-        .map(|source| Ok(source.load(None)?))
-        .collect::<Result<Vec<_>>>()?;
     for (source, network) in sources.iter().zip(&networks) {
-        if let Some(what) = difference(&networks[0], network) {
-            return Err(refuse(source, NoMean::Other(what)));
+        if let Some(why) = fit::hindrance(&networks[0], network) {
+            return Err(Error::NoMean {
+                path: source.given().to_owned(),
+                why,
+            });
         }
     }
-    let weights = networks.iter().map(|network| &network.weights);
-    let depth = mean(&weights.zip(shares.iter().copied()).collect::<Vec<_>>());
+    let origins: Vec<AveragedNetwork> = sources.iter().zip(&shares).map(origin).collect();
+    let related = ancestors::are_related(&origins);
 
+    let weights: Vec<(&Weights, f64)> = networks
+        .iter()
+        .map(|network| &network.weights)
+        .zip(shares)
+        .collect();
+    let depth = mean(&weights);
     let mut config = folder.read_settings()?;
-    let others = sources[1..].iter().map(origin);
-    config.averaged_with.extend(others);
     config.make_absolute();
+    let has_head = |weights: &Weights| weights.tensors.keys().any(|k| k.starts_with(UNCERTAINTY));
+    config.depth_net.uncertainty = has_head(&depth);
+    let lost_uncertainty =
+        !has_head(&depth) && networks.iter().any(|network| has_head(&network.weights));
+
     let file = folder.checkpoint_path(*kind);
     let mut all = depth.with_prefix("depth.");
     for part in OTHER_PARTS {
@@ -103,270 +103,96 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
         ..folder.read_state(*kind)?
     };
     all.metadata = state.metadata();
+    let mut findings = folder.read_findings()?;
+    findings.averaged.clone_from(&origins);
     let run = RunFolder::create(out)?;
-    run.write_config(&config, &folder.read_findings()?)?;
     let checkpoint = run.checkpoint_path(CheckpointKind::Last);
     write_safetensors(&checkpoint, &all).map_err(ModelError::from)?;
+    run.write_config(&config, &findings)?;
     Ok(Averaged {
         checkpoint,
-        related: related(&sources)?,
+        networks: origins,
+        related,
+        lost_uncertainty,
     })
 }
 
-/// Σ sᵢ·wᵢ / Σ sᵢ of the tensors that all have; the others are the first network's.
+/// The shares as parts of 1.
+fn parts_of(networks: usize, shares: Option<&[f64]>) -> Result<Vec<f64>> {
+    let equal = vec![1.0; networks];
+    let shares = shares.unwrap_or(&equal);
+    let total: f64 = shares.iter().sum();
+    let positive = shares.iter().all(|share| *share > 0.0) && total.is_finite();
+    if networks == 0 || shares.len() != networks || !positive {
+        return Err(Error::Shares {
+            found: shares.len(),
+            networks,
+        });
+    }
+    Ok(shares.iter().map(|share| share / total).collect())
+}
+
+/// The network, whichever of several data sets it learned: their metres do not matter here.
+fn load(source: &ModelSource) -> Result<StoredNetwork> {
+    match source {
+        ModelSource::Packed { network, .. } => Ok(unpacked(network, None)?),
+        ModelSource::Run { folder, kind, .. } => {
+            if folder.read_state(*kind)?.encoders_only {
+                return Err(Error::NoMean {
+                    path: source.given().to_owned(),
+                    why: NoMean::EncodersOnly,
+                });
+            }
+            let (weights, state) = folder.load_depth_weights(*kind)?;
+            Ok(StoredNetwork {
+                config: folder.read_config()?,
+                camera: folder.read_findings()?.camera,
+                weights,
+                step: state.step,
+                int8: Ok(None),
+            })
+        }
+    }
+}
+
+/// Σ sᵢ·wᵢ of the tensors that all have, for shares that add up to 1.
 fn mean(networks: &[(&Weights, f64)]) -> Weights {
-    let total: f64 = networks.iter().map(|(_, share)| share).sum();
     let mut mean = networks[0].0.clone();
+    mean.tensors
+        .retain(|name, _| networks.iter().all(|(w, _)| w.tensors.contains_key(name)));
     for (name, tensor) in &mut mean.tensors {
-        let all: Option<Vec<(&[f32], f64)>> = networks
-            .iter()
-            .map(|(weights, share)| Some((&weights.tensors.get(name)?.values[..], *share)))
-            .collect();
-        let Some(all) = all else {
-            continue;
-        };
         for (i, value) in tensor.values.iter_mut().enumerate() {
-            let sum: f64 = all.iter().map(|(v, share)| share * f64::from(v[i])).sum();
-            *value = (sum / total) as f32;
+            let of = |(weights, share): &(&Weights, f64)| {
+                share * f64::from(weights.tensors[name].values[i])
+            };
+            *value = networks.iter().map(of).sum::<f64>() as f32;
         }
     }
     mean
 }
 
-/// What makes another network's weights mean something else than the first's.
-fn difference(first: &StoredNetwork, other: &StoredNetwork) -> Option<&'static str> {
-    let (a, b) = (&first.config, &other.config);
-    let shapes = |network: &StoredNetwork| {
-        let tensors = network.weights.tensors.iter();
-        tensors
-            .filter(|(name, _)| !name.starts_with(UNCERTAINTY))
-            .map(|(name, tensor)| (name.clone(), tensor.shape.clone()))
-            .collect::<BTreeSet<_>>()
-    };
-    let checks = [
-        (shapes(first) != shapes(other), "has other layers"),
-        (
-            a.depth_net.range != b.depth_net.range,
-            "has another range of depths",
-        ),
-        (
-            a.canonical_focal_px != b.canonical_focal_px,
-            "has another canonical focal length",
-        ),
-        (
-            a.depth_net.encoder.normalisation != b.depth_net.encoder.normalisation,
-            "normalises images otherwise",
-        ),
-    ];
-    checks
-        .into_iter()
-        .find_map(|(differs, what)| differs.then_some(what))
-}
-
-fn origin(source: &ModelSource) -> WeightsOrigin {
-    let given = source.given();
-    // A packed file is found again by its path; an embedded network has a name alone.
-    let sha256 = source.packed_sha256().filter(|_| !Shipped::is_at(given));
-    WeightsOrigin {
-        path: given.to_owned(),
-        sha256: sha256.map(str::to_owned),
+fn origin((source, share): (&ModelSource, &f64)) -> AveragedNetwork {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let share = *share;
+    match source {
+        ModelSource::Run { folder, kind, .. } => AveragedNetwork {
+            path: absolute(&folder.checkpoint_path(*kind)),
+            sha256: None,
+            share,
+        },
+        // A packed file is found again by its path; an embedded network has a name alone.
+        ModelSource::Packed { given, .. } if Shipped::is_at(given) => AveragedNetwork {
+            path: absolute(given),
+            sha256: None,
+            share,
+        },
+        ModelSource::Packed { given, network } => AveragedNetwork {
+            path: given.clone(),
+            sha256: Some(network.card.sha256.clone()),
+            share,
+        },
     }
-}
-
-/// Whether all of them come from one network, as far as their configurations say.
-fn related(sources: &[ModelSource]) -> Result<bool> {
-    let mut common: Option<HashSet<String>> = None;
-    for source in sources {
-        let mut ancestors = HashSet::new();
-        add_ancestors(&origin(source), &mut ancestors)?;
-        common = Some(match common {
-            None => ancestors,
-            Some(common) => common.intersection(&ancestors).cloned().collect(),
-        });
-    }
-    Ok(common.is_some_and(|common| !common.is_empty()))
-}
-
-/// A network and those that it began from: runs by their folders, other files by what is in them.
-fn add_ancestors(origin: &WeightsOrigin, found: &mut HashSet<String>) -> Result<()> {
-    let path = std::path::absolute(&origin.path).unwrap_or_else(|_| origin.path.clone());
-    let config: Option<TrainConfig> = match (&origin.sha256, RunFolder::open(&path)) {
-        (Some(sha256), _) => {
-            found.insert(sha256.clone());
-            None
-        }
-        (None, Ok((folder, _))) => {
-            // Once around is enough.
-            let new = found.insert(folder.path().display().to_string());
-            if new {
-                Some(folder.read_settings()?)
-            } else {
-                None
-            }
-        }
-        (None, Err(_)) => {
-            if path.is_file() {
-                found.insert(sha256_of_file(&path)?);
-            }
-            None
-        }
-    };
-    for origin in config.iter().flat_map(|config| config.beginning()) {
-        add_ancestors(&origin, found)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use deepfusion_geometry::DepthRange;
-    use deepfusion_model::weights::{WeightTensor, read_safetensors};
-    use deepfusion_model::{Preset, TrainFindings};
-
-    fn weights(tensors: &[(&str, [f32; 2])]) -> Weights {
-        let mut weights = Weights::new("test");
-        for (name, values) in tensors {
-            let (shape, values) = (vec![2], values.to_vec());
-            let tensor = WeightTensor { shape, values };
-            weights.tensors.insert((*name).into(), tensor);
-        }
-        weights
-    }
-
-    const STATE: Checkpoint = Checkpoint {
-        step: 7,
-        best_validation: Some(0.25),
-        skipped: 0,
-        encoders_only: false,
-        focal_ratio: None,
-    };
-
-    /// A run of that folder's name, as `last`.
-    fn run(
-        folder: &Path,
-        tensors: &[(&str, [f32; 2])],
-        state: Checkpoint,
-        change: impl FnOnce(&mut TrainConfig),
-    ) -> PathBuf {
-        let run = RunFolder::create(folder).unwrap();
-        let mut config = Preset::Tiny.config();
-        change(&mut config);
-        run.write_config(&config, &TrainFindings::default())
-            .unwrap();
-        let mut all = weights(tensors);
-        all.metadata = state.metadata();
-        write_safetensors(&run.checkpoint_path(CheckpointKind::Last), &all).unwrap();
-        folder.to_owned()
-    }
-
-    #[test]
-    fn shares_need_not_add_up_to_one() {
-        let (a, b) = (
-            weights(&[("a", [1.0, -2.0])]),
-            weights(&[("a", [5.0, 2.0])]),
-        );
-        let values = |shares: [f64; 2]| {
-            let mean = mean(&[(&a, shares[0]), (&b, shares[1])]);
-            mean.tensors["a"].values.clone()
-        };
-        assert_eq!(values([1.0, 1.0]), [3.0, 0.0]);
-        assert_eq!(values([3.0, 1.0]), [2.0, -1.0]);
-        assert_eq!(values([0.3, 0.1]), values([3.0, 1.0]));
-    }
-
-    #[test]
-    fn depth_is_the_mean_and_the_rest_the_firsts() {
-        let at = tempfile::tempdir().unwrap();
-        let at = at.path();
-        let of = |depth, pose, adam| {
-            [
-                ("depth.a", depth),
-                ("pose.a", pose),
-                ("adam.m.depth.a", adam),
-            ]
-        };
-        let tensors = of([1.0, 2.0], [8.0, 9.0], [1.0, 1.0]);
-        let first = run(&at.join("first"), &tensors, STATE, |_| {});
-        let mut tensors = of([3.0, 6.0], [0.0, 0.0], [1.0, 1.0]).to_vec();
-        tensors.push(("depth.uncertainty.bias", [5.0, 5.0]));
-        let second = run(&at.join("second"), &tensors, STATE, |config| {
-            config.init = Some(first.join("last.safetensors"));
-        });
-        let made = average(&[first.clone(), second.clone()], None, &at.join("mean")).unwrap();
-        assert!(made.related);
-        let found = read_safetensors(&made.checkpoint).unwrap();
-        let expected = weights(&[("depth.a", [2.0, 4.0]), ("pose.a", [8.0, 9.0])]);
-        assert_eq!(found.tensors, expected.tensors);
-        let (folder, _) = RunFolder::open(&made.checkpoint).unwrap();
-        let state = folder.read_state(CheckpointKind::Last).unwrap();
-        assert_eq!((state.step, state.best_validation), (7, None));
-        let config = folder.read_settings().unwrap();
-        let with = WeightsOrigin {
-            path: second.clone(),
-            sha256: None,
-        };
-        assert_eq!(config.averaged_with, [with]);
-        assert!(config.without_places().averaged_with.is_empty());
-        // What is there stays.
-        let again = average(&[first, second], None, &at.join("mean"));
-        assert!(matches!(
-            again,
-            Err(Error::Model(ModelError::RunExists { .. }))
-        ));
-    }
-
-    #[test]
-    fn what_has_no_mean_is_refused() {
-        let at = tempfile::tempdir().unwrap();
-        let at = at.path();
-        let layers = [("depth.a", [1.0, 2.0])];
-        let first = run(&at.join("first"), &layers, STATE, |_| {});
-        let alone = run(&at.join("alone"), &layers, STATE, |_| {});
-        let both = [first.clone(), alone];
-        let made = average(&both, None, &at.join("strangers")).unwrap();
-        assert!(!made.related, "neither began from the other");
-        for shares in [&[1.0][..], &[1.0, 0.0], &[1.0, f64::NAN]] {
-            let refused = average(&both, Some(shares), &at.join("no"));
-            assert!(matches!(
-                refused,
-                Err(Error::NoMean {
-                    why: NoMean::Shares,
-                    ..
-                })
-            ));
-        }
-        let plain = |_: &mut TrainConfig| {};
-        let learned = Checkpoint {
-            focal_ratio: Some(1.1),
-            ..STATE
-        };
-        let encoders = Checkpoint {
-            encoders_only: true,
-            ..STATE
-        };
-        let others = [
-            run(&at.join("layers"), &[("depth.b", [1.0, 2.0])], STATE, plain),
-            run(&at.join("range"), &layers, STATE, |config| {
-                config.depth_net.initial_depth_m = None;
-                config.depth_net.range = DepthRange {
-                    min_m: 0.5,
-                    max_m: 7.0,
-                };
-            }),
-            run(&at.join("canonical"), &layers, STATE, |config| {
-                config.canonical_focal_px = Some(300.0);
-            }),
-            run(&at.join("learned"), &layers, learned, plain),
-            run(&at.join("encoders"), &layers, encoders, plain),
-        ];
-        for other in others {
-            let refused = average(&[first.clone(), other.clone()], None, &at.join("no"));
-            let Err(Error::NoMean { path, .. }) = refused else {
-                panic!("{}: {refused:?}", other.display());
-            };
-            assert_eq!(path, other);
-        }
-        assert!(!at.join("no").exists());
-    }
-}
+mod tests;

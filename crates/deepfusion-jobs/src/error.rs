@@ -102,6 +102,20 @@ pub enum Error {
         /// Why not.
         why: NoMean,
     },
+    /// A folder for something new that is not empty.
+    #[error("{}: is not empty", path.display())]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Shares of a mean that are none.
+    #[error("{found} shares for {networks} networks: one positive number for each is needed")]
+    Shares {
+        /// How many there are.
+        found: usize,
+        /// How many networks.
+        networks: usize,
+    },
     /// A packed network where a run is needed.
     #[error("{}: is packed already", path.display())]
     PackedAlready {
@@ -295,10 +309,20 @@ pub enum NoMean {
     EncodersOnly,
     /// It learned its camera, which belongs to its weights.
     LearnedCamera,
-    /// What it is not alike in.
-    Other(&'static str),
-    /// A share that is none.
-    Shares,
+    /// A tensor that one network lacks, or that has another shape.
+    Layers {
+        /// The tensor's name.
+        name: String,
+    },
+    /// A setting by which the same weights mean something else.
+    Setting {
+        /// The key, or what it is.
+        key: String,
+        /// Of this network.
+        found: String,
+        /// Of the first one.
+        first: String,
+    },
 }
 
 impl std::fmt::Display for NoMean {
@@ -306,14 +330,17 @@ impl std::fmt::Display for NoMean {
         match self {
             Self::Packed => write!(f, "is packed, and the first network must be a run's"),
             Self::EncodersOnly => write!(f, "only its encoders were ever trained"),
-            Self::LearnedCamera => {
-                write!(
-                    f,
-                    "learned its camera with its weights, so that they have no mean with others"
-                )
+            Self::LearnedCamera => write!(
+                f,
+                "learned its camera with its weights, so that they have no mean with others"
+            ),
+            Self::Layers { name } => write!(
+                f,
+                "has other layers than the first network: {name} is not the same in both"
+            ),
+            Self::Setting { key, found, first } => {
+                write!(f, "{key} is {found}, and {first} in the first network")
             }
-            Self::Other(what) => write!(f, "{what} than the first network's"),
-            Self::Shares => write!(f, "the shares must be positive, one of each network"),
         }
     }
 }
@@ -341,15 +368,25 @@ impl Hint for Error {
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
-            Self::NoMean { why, .. } => match why {
-                NoMean::Packed => Some("give a run's folder first: its settings are those of the mean".into()),
-                NoMean::EncodersOnly => Some("train from it first".into()),
-                NoMean::Other(_) => Some("take networks that were trained from the same one".into()),
-                NoMean::Shares => Some("give one positive number for each network, such as 2,1".into()),
-                NoMean::LearnedCamera => {
-                    Some("train them with the camera that one of them learned as a known one".into())
+            Self::NoMean { why, .. } => Some(
+                match why {
+                    NoMean::Packed => {
+                        "give a run's folder first: its settings are those of the mean"
+                    }
+                    NoMean::EncodersOnly => "train from it first",
+                    NoMean::LearnedCamera => {
+                        "train both with a known camera, for example the one that this run learned"
+                    }
+                    NoMean::Layers { .. } | NoMean::Setting { .. } => {
+                        "take networks that were trained from the same one"
+                    }
                 }
-            },
+                .into(),
+            ),
+            Self::Occupied { .. } => Some("choose a new folder".into()),
+            Self::Shares { .. } => {
+                Some("give one positive number for each network, in their order, such as 2,1".into())
+            }
             Self::NothingInInt8 { .. } => {
                 Some("allow more, or use bf16; what was calibrated before stays".into())
             }

@@ -35,6 +35,7 @@ pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
 #[must_use]
 pub fn held_out(
     _: &deepfusion_model::TrainConfig,
+    _: &[deepfusion_model::AveragedNetwork],
     _: &[Dataset],
     _: &[crate::evaluation::ImageRef],
 ) -> Option<bool> {
@@ -44,6 +45,10 @@ pub fn held_out(
 /// As [`held_out`], frame by frame.
 #[cfg(not(feature = "train"))]
 #[must_use]
-pub fn unseen_frames(_: &deepfusion_model::TrainConfig, _: &[Dataset]) -> crate::verdict::Unseen {
+pub fn unseen_frames(
+    _: &deepfusion_model::TrainConfig,
+    _: &[deepfusion_model::AveragedNetwork],
+    _: &[Dataset],
+) -> crate::verdict::Unseen {
     crate::verdict::Unseen::NotKnown
 }

@@ -6,10 +6,10 @@ use deepfusion_data::to_network_input;
 use deepfusion_eval::compare::sha256_of_file;
 use deepfusion_model::weights::read_bytes;
 use deepfusion_model::{
-    CheckpointKind, Error as ModelError, Int8Calibration, RunFolder, StoredNetwork, TrainConfig,
-    depth_graph_with_uncertainty,
+    AveragedNetwork, CheckpointKind, Error as ModelError, Int8Calibration, RunFolder,
+    StoredNetwork, TrainConfig, depth_graph_with_uncertainty,
 };
-use deepfusion_runtime::{DepthRunner, FusedRunner, Precision};
+use deepfusion_runtime::{DepthRunner, FusedRunner, ModelSource, Precision};
 use deepfusion_sim::{SimConfig, Simulation};
 use deepfusion_weights::{Card, FORMAT_VERSION, NUMBERS, Shipped, Tensor, pack};
 
@@ -81,6 +81,9 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
     let modified = modified.map_err(|e| deepfusion_data::Error::file(&file, e))?;
     let parts = config.depth_net.costs(config.size);
     let no_form = |what| move |source| Error::NoTomlForm { what, source };
+    let data = recordings(&config, &findings.averaged);
+    // Where the others lay means nothing elsewhere.
+    findings.averaged.clear();
     let card = Card {
         format_version: FORMAT_VERSION,
         name: options.name,
@@ -91,7 +94,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
         steps: state.step,
         checkpoint: kind.name().into(),
         date: dates::day(modified),
-        data: learned_from(&config),
+        data,
         simulated_only: options.simulated_only,
         recipe: options.recipe,
         licence: options.licence,
@@ -117,6 +120,27 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
             .map_err(no_form("the run's configuration has no TOML form"))?,
     };
     Ok(Shipped::new(card, bytes)?)
+}
+
+/// The names of the recordings that a run learned from, or those that it is the mean of, as far as these are there.
+fn recordings(config: &TrainConfig, averaged: &[AveragedNetwork]) -> Vec<String> {
+    let mut all = learned_from(config);
+    for network in averaged {
+        let others = match ModelSource::named(&network.path) {
+            Ok(ModelSource::Packed { network, .. }) => network.card.data,
+            Ok(ModelSource::Run { folder, .. }) => match folder.read_config() {
+                Ok(config) => learned_from(&config),
+                Err(_) => vec![format!("those of {}", network.path.display())],
+            },
+            Err(_) => vec![format!("those of {}", network.path.display())],
+        };
+        for name in others {
+            if !all.contains(&name) {
+                all.push(name);
+            }
+        }
+    }
+    all
 }
 
 /// The names of the recordings that a run learned from.

@@ -143,6 +143,12 @@ impl Hint for Error {
     }
 }
 
+impl Hint for NoGps {
+    fn hint(&self) -> Option<String> {
+        Some("switch the camera's GPS on and wait for its fix, or give another log".into())
+    }
+}
+
 impl Hint for ColumnProblem {
     fn hint(&self) -> Option<String> {
         let text = match self {

@@ -66,6 +66,7 @@ impl FromStr for SpeedUnit {
 /// A word that names no unit of speed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is not a unit of speed: m/s, km/h, mph or knots")]
+#[non_exhaustive]
 pub struct UnknownUnit(pub String);
 
 impl Hint for UnknownUnit {

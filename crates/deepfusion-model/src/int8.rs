@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use deepfusion_hint::Hint;
 use deepfusion_infer::InputRanges;
 use serde::{Deserialize, Serialize};
 
@@ -27,11 +28,18 @@ pub struct Int8Calibration {
 /// A calibration that cannot be read: of no account until int8 is asked for.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{origin}: {reason}")]
+#[non_exhaustive]
 pub struct UnreadableCalibration {
     /// The file, or the network's name.
     pub origin: String,
     /// Why not.
     pub reason: String,
+}
+
+impl Hint for UnreadableCalibration {
+    fn hint(&self) -> Option<String> {
+        Some("calibrate the network again".into())
+    }
 }
 
 impl Int8Calibration {

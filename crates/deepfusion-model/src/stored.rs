@@ -87,7 +87,6 @@ impl TrainConfig {
     pub fn without_places(&self) -> Self {
         let mut config = self.clone();
         (config.init, config.init_sha256) = (None, None);
-        config.averaged_with.clear();
         let data = &mut config.data;
         data.paths.clear();
         data.validation.clear();

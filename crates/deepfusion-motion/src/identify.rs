@@ -104,6 +104,7 @@ impl Identified {
 /// Why a drive does not determine the parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("not identifiable: {why} ({figure:.3}, needed {needed:.3})")]
+#[non_exhaustive]
 pub struct Unidentifiable {
     /// The reason.
     pub why: UnidentifiableReason,

@@ -29,8 +29,8 @@ pub use decoder::{DecoderStage, DisparityDecoder, SCALES};
 pub use deepfusion_model::{
     AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale, DispNetConfig,
     FlowDecoderConfig, HceConfig, InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize,
-    NetworkError as Error, PoseNetConfig, R_MSFM_STATE, RMsfmConfig, ResNetConfig, ResNetDepth,
-    TakenUp,
+    NetworkError as Error, PoseNetConfig, R_MSFM_STATE, RMsfmConfig, RefinementInput, ResNetConfig,
+    ResNetDepth,
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
 pub use disp_net::DispNet;

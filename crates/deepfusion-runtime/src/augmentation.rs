@@ -1,6 +1,6 @@
 /// In how many ways a network looks at one image: at several input sizes, mirrored or not. The mean of their disparities usually errs less
 /// on images unlike those learned from, and takes the time of all (test-time augmentation; what it is worth, and where it is worse:
-/// docs/BENCHMARKS.md, "More than one look").
+/// docs/BENCHMARKS.md, "Test-time augmentation").
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmentation {
     /// Input sizes, as multiples of the one that fits the image; each is rounded to one that the network takes.
@@ -11,7 +11,7 @@ pub struct Augmentation {
 }
 
 impl Augmentation {
-    /// One look at the size that fits.
+    /// One prediction at the size that fits.
     pub const NONE: Self = Self {
         scales: &[1.0],
         flip: false,

@@ -205,7 +205,7 @@ impl DepthEstimator {
         }
     }
 
-    /// A preparer for more than one look at each image.
+    /// A preparer for several predictions of each image (test-time augmentation).
     ///
     /// # Errors
     /// [`Error::OneSize`] for several input sizes of a network that has no canonical focal length.

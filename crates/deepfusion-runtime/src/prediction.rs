@@ -17,7 +17,7 @@ pub struct Prediction {
     pub window: [u32; 4],
     /// Size of the whole image.
     pub image_size: [u32; 2],
-    /// Factor applied to depth because the focal length differs from the one trained with; of several looks that of the largest.
+    /// Factor applied to depth because the focal length differs from the one trained with; of several predictions that of the largest.
     pub focal_factor: f64,
 }
 

@@ -21,7 +21,7 @@ pub struct Preparer {
     pub training_camera: Option<Intrinsics>,
     /// The canonical focal length in pixels, for a network trained with many cameras.
     pub canonical_focal_px: Option<f64>,
-    /// In how many ways the network looks at each image.
+    /// Of which predictions of an image its depth is the mean.
     pub augmentation: Augmentation,
 }
 
@@ -214,7 +214,7 @@ mod tests {
         assert_eq!([0.8, 1.2].map(of_a_small), [size(320, 96), size(416, 128)]);
     }
 
-    /// A narrow image fits one size alone at every scale: one look is as good as several.
+    /// A narrow image fits one size alone at every scale: one prediction is as good as several.
     #[test]
     fn equal_sizes_are_looked_at_once() {
         let preparer = Preparer {

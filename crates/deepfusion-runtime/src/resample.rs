@@ -2,20 +2,20 @@
 
 /// From one size to another.
 pub(crate) struct Resample {
-    columns: Vec<Place>,
+    columns: Vec<Taps>,
     width: usize,
     height: usize,
     to_height: usize,
 }
 
 /// Two neighbours, and how far from the first to the second.
-type Place = (usize, usize, f32);
+type Taps = (usize, usize, f32);
 
 impl Resample {
     /// From `width` by `height` to another width and height.
     pub(crate) fn new((width, height): (usize, usize), to: (usize, usize)) -> Self {
         Self {
-            columns: (0..to.0).map(|x| place(x, to.0, width)).collect(),
+            columns: (0..to.0).map(|x| taps(x, to.0, width)).collect(),
             width,
             height,
             to_height: to.1,
@@ -24,7 +24,7 @@ impl Resample {
 
     /// Row `y` of the resampled map, with `of` applied to each value, into `row`.
     pub(crate) fn row(&self, values: &[f32], y: usize, of: impl Fn(f32) -> f32, row: &mut [f32]) {
-        let (top, bottom, fy) = place(y, self.to_height, self.height);
+        let (top, bottom, fy) = taps(y, self.to_height, self.height);
         let (top, bottom) = (top * self.width, bottom * self.width);
         for (resampled, &(left, right, fx)) in row.iter_mut().zip(&self.columns) {
             let d = values;
@@ -45,7 +45,7 @@ impl Resample {
     }
 }
 
-fn place(i: usize, to: usize, from: usize) -> Place {
+fn taps(i: usize, to: usize, from: usize) -> Taps {
     let p = (i as f32 + 0.5) * from as f32 / to as f32 - 0.5;
     let p = p.clamp(0.0, (from - 1) as f32);
     let low = (p as usize).min(from.saturating_sub(2));

@@ -120,7 +120,7 @@ fn a_name_that_is_none_says_which_there_are() {
     assert!(error.hint().is_some(), "{error}");
 }
 
-/// A prediction by more than one look.
+/// Test-time augmentation.
 fn augmented(
     estimator: &mut DepthEstimator,
     image: &RgbImage,

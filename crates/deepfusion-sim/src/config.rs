@@ -63,6 +63,19 @@ impl Scene {
         }
     }
 
+    /// The scene of a name, of varied worlds' as well.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none.
+    pub fn of_varied(name: &str) -> Result<Self> {
+        let found = Self::EVERY.into_iter().find(|scene| scene.name() == name);
+        found.ok_or_else(|| Error::Config {
+            field: "scenes",
+            value: name.to_owned(),
+            expected: "urban, park, garage, commercial, night, motorway, country or indoor",
+        })
+    }
+
     /// How fast it is driven through, as a share of what a street allows.
     pub(crate) fn pace(self) -> f64 {
         match self {

@@ -89,6 +89,8 @@ struct Maker {
     set: SampleSet,
     /// Whether samples are mirrored and jittered.
     augment: bool,
+    /// How many batches in a row have one size: those that several workers learn from in one step.
+    workers: usize,
     cache: Mutex<ImageCache>,
 }
 
@@ -110,18 +112,19 @@ impl BatchLoader {
     /// configuration says. What a batch holds depends on the seed and its number alone.
     #[must_use]
     pub fn training(config: &TrainConfig, set: SampleSet, first: usize) -> Self {
-        Self::training_batches(config, set, first..)
+        Self::training_batches(config, set, first.., 1)
     }
 
-    /// As [`Self::training`], the batches of these numbers.
+    /// As [`Self::training`], the batches of these numbers, of which `workers` make one step: they have one size.
     pub(crate) fn training_batches(
         config: &TrainConfig,
         set: SampleSet,
         numbers: impl Iterator<Item = usize> + Send + 'static,
+        workers: usize,
     ) -> Self {
         let sampler = Sampler::new(set.samples.len(), config.batch, config.seed);
         let batches = numbers.map(move |i| (i, sampler.batch(i)));
-        Self::start(config, set, true, batches)
+        Self::start(config, set, Some(workers), batches)
     }
 
     /// All samples once, in order, clean.
@@ -129,19 +132,20 @@ impl BatchLoader {
     pub fn validation(config: &TrainConfig, set: SampleSet) -> Self {
         let indices: Vec<usize> = (0..set.samples.len()).collect();
         let batches: Vec<Vec<usize>> = indices.chunks(config.batch).map(<[_]>::to_vec).collect();
-        Self::start(config, set, false, batches.into_iter().enumerate())
+        Self::start(config, set, None, batches.into_iter().enumerate())
     }
 
     fn start(
         config: &TrainConfig,
         set: SampleSet,
-        augment: bool,
+        workers: Option<usize>,
         batches: impl Iterator<Item = (usize, Vec<usize>)> + Send + 'static,
     ) -> Self {
         let maker = Maker {
             config: config.clone(),
             set,
-            augment,
+            augment: workers.is_some(),
+            workers: workers.unwrap_or(1),
             cache: Mutex::default(),
         };
         Self {
@@ -227,7 +231,7 @@ struct Item {
 impl Maker {
     fn make(&self, number: usize, samples: &[usize]) -> Result<RawBatch, Error> {
         let size = if self.augment {
-            self.config.size_of_video_batch(number)
+            self.config.size_of_video_batch(number / self.workers)
         } else {
             self.config.size
         };

@@ -53,14 +53,15 @@ impl DepthLoader {
     /// Batches number `first`, `first + 1`, … What a batch holds depends on the seed and its number alone.
     #[must_use]
     pub fn training(config: &TrainConfig, set: DepthSet, first: usize) -> Self {
-        Self::training_batches(config, set, first..)
+        Self::training_batches(config, set, first.., 1)
     }
 
-    /// As [`Self::training`], the batches of these numbers.
+    /// As [`Self::training`], the batches of these numbers, of which `workers` make one step: they have one size.
     pub(crate) fn training_batches(
         config: &TrainConfig,
         set: DepthSet,
         numbers: impl Iterator<Item = usize> + Send + 'static,
+        workers: usize,
     ) -> Self {
         let (seed, size) = (config.seed, config.depth_batch());
         let picker = set.clone();
@@ -69,7 +70,7 @@ impl DepthLoader {
             let picks = draws.map(|draw| picker.pick(seed, draw)).collect();
             (number, picks)
         });
-        Self::start(config, set, true, plans)
+        Self::start(config, set, Some(workers), plans)
     }
 
     /// All views once, in order, clean.
@@ -80,26 +81,33 @@ impl DepthLoader {
             .chunks(config.depth_batch())
             .map(<[_]>::to_vec)
             .collect();
-        Self::start(config, set, false, plans.into_iter().enumerate())
+        Self::start(config, set, None, plans.into_iter().enumerate())
     }
 
     fn start(
         config: &TrainConfig,
         set: DepthSet,
-        augment: bool,
+        workers: Option<usize>,
         plans: impl Iterator<Item = (usize, Vec<ViewRef>)> + Send + 'static,
     ) -> Self {
         let own = config.clone();
         let make = move |number: usize, picks: &Vec<ViewRef>| {
             let mut own = own.clone();
-            if augment {
-                own.size = own.size_of_depth_batch(number);
+            if let Some(workers) = workers {
+                own.size = own.size_of_depth_batch(number / workers);
             }
             let first = number * picks.len();
             let items = picks
                 .par_iter()
                 .enumerate()
-                .map(|(slot, pick)| item(&own, &set.view(*pick, own.size)?, first + slot, augment))
+                .map(|(slot, pick)| {
+                    item(
+                        &own,
+                        &set.view(*pick, own.size)?,
+                        first + slot,
+                        workers.is_some(),
+                    )
+                })
                 .collect::<Result<Vec<Item>, Error>>()?;
             Ok(RawBatch::of(items, own.size))
         };

@@ -6,7 +6,7 @@ use crate::{Error, Sampler, SimulatedCamera, TrainConfig};
 use deepfusion_data::{Dataset, GtKind, RgbImage};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::InputSize;
-use deepfusion_sim::{Endless, EndlessConfig, Ingredient, MountedCamera};
+use deepfusion_sim::{Endless, EndlessConfig, Ingredient, MountedCamera, Scene};
 use rand::Rng;
 use std::sync::Arc;
 
@@ -88,7 +88,7 @@ pub struct DepthSet {
 
 impl DepthSet {
     /// Splits into training and validation: of the recordings for which `learn` is true, the last `share` of each
-    /// drive's frames with depth is held out; simulated views are made for both.
+    /// drive's frames with depth (exact depth of every pixel, or a scan) is held out; simulated views are made for both.
     ///
     /// # Errors
     /// [`Error::NoDepth`] for a drive that has none; [`Error::Simulator`].
@@ -105,7 +105,10 @@ impl DepthSet {
             }
             let selected = recording.selected().iter().copied();
             let own: Vec<DepthFrame> = selected
-                .filter(|frame| recording.has_ground_truth(*frame, GtKind::Z))
+                .filter(|frame| {
+                    recording.has_dense_depth(*frame)
+                        || recording.has_ground_truth(*frame, GtKind::Z)
+                })
                 .map(|frame| DepthFrame { dataset, frame })
                 .collect();
             if own.is_empty() {
@@ -192,7 +195,17 @@ impl DepthSet {
 
     fn frame(&self, DepthFrame { dataset, frame }: DepthFrame) -> Result<DepthView, Error> {
         let recording = &self.datasets[dataset];
-        let truth = recording.ground_truth(frame, GtKind::Z)?;
+        let dense = recording.dense_depth(frame)?;
+        // A simulated drive knows where the sky is: there its depth is infinite, here 0.
+        let sky = dense.is_some();
+        let truth = match dense {
+            Some(mut depth) => {
+                let far = depth.data.iter_mut().filter(|d| d.is_infinite());
+                far.for_each(|d| *d = 0.0);
+                Some(depth)
+            }
+            None => recording.ground_truth(frame, GtKind::Z)?,
+        };
         let depth = truth.ok_or_else(|| Error::NoDepth {
             drive: recording.name().to_owned(),
         })?;
@@ -201,7 +214,7 @@ impl DepthSet {
         // Depth cameras often have fewer pixels than the colour camera they look along.
         let (width, height) = (camera.width as usize, camera.height as usize);
         let depth = DepthMap {
-            data: fit_depth(&depth, width, height, false),
+            data: fit_depth(&depth, width, height, sky),
             width,
             height,
         };
@@ -209,7 +222,7 @@ impl DepthSet {
             image: recording.load_image(frame)?,
             depth,
             camera,
-            sky: false,
+            sky,
             set: self.set_of[dataset],
             name: format!("{drive}/{number:010}"),
         })
@@ -287,6 +300,10 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
         let without = names
             .map(|name| name.parse())
             .collect::<Result<Vec<Ingredient>, deepfusion_sim::Error>>()?;
+        let scenes = simulated.scenes.iter();
+        let scenes = scenes
+            .map(|name| Scene::of_varied(name))
+            .collect::<Result<Vec<_>, deepfusion_sim::Error>>()?;
         let views = |seed, views| -> Result<SimulatedViews, Error> {
             let endless = Endless::new(EndlessConfig {
                 seed,
@@ -296,6 +313,7 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
                 plain: simulated.plain,
                 hills: simulated.hills,
                 formation: simulated.formation,
+                scenes: scenes.clone(),
                 without: without.clone(),
                 cameras: simulated.cameras.iter().map(mounted).collect(),
                 ..EndlessConfig::default()

@@ -101,7 +101,6 @@ impl Trainer {
         config.validate_video_sizes()?;
         check_precision(&config, device)?;
         config.make_absolute();
-        config.averaged_with.clear();
         check_samples(&config, &train, &validation)?;
         check_camera(&config, [&train, &validation])?;
         let settings = config;

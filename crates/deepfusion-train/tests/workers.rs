@@ -6,6 +6,7 @@ use std::sync::{Arc, Barrier, Mutex};
 
 use crate::support::{drive, small};
 use burn::tensor::Device;
+use deepfusion_nn::InputSize;
 use deepfusion_train::{
     CheckpointKind, Checkpoints, Control, Error, LossTerms, RunFolder, SampleSet, TrainConfig,
     TrainEvent, Trainer, Workers,
@@ -125,6 +126,28 @@ fn prepared(at: &Path) -> (TrainConfig, Sets) {
     let (mut config, train, validation) = small(&drive(&at.join("street"), 20), 4);
     config.depth_net.encoder.frozen_statistics = true;
     (config, (train, validation))
+}
+
+/// With batches that take turns in size, one size is that of all workers' batches of a step.
+#[test]
+fn workers_take_turns_in_size_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| -> PathBuf { folder.path().join(name) };
+    let (mut config, sets) = prepared(folder.path());
+    (config.batch, config.accumulate, config.steps) = (1, 1, Some(2));
+    config.canonical_focal_px = Some(60.0);
+    config.augmentation.video_sizes = vec![InputSize {
+        width: 128,
+        height: 64,
+    }];
+    let start = (config.clone(), sets.clone());
+    let shared = together(2, &at("two"), |_, _, _| {}, &start);
+    let two = shared[0].as_ref().unwrap();
+    // Two samples in one batch: pixels that are masked differ in number, so that the means differ a little.
+    config.batch = 2;
+    let one = alone(&at("one"), &(config, sets));
+    assert_eq!(two.len(), 2);
+    assert!(apart(&one, two) < 2e-2, "{}", apart(&one, two));
 }
 
 fn weights(run: &Path, config: &TrainConfig) -> Vec<f32> {

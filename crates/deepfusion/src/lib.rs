@@ -1,7 +1,7 @@
 //! Metric depth from one camera and a speed signal.
 //!
 //! DeepFusion learns depth in metres from the video of a vehicle that knows its speed, without depth labels, and turns each
-//! image into metres, a point cloud and 3D targets. This crate is the library; the command `deepfusion` is built on it.
+//! image into metres, a point cloud and 3D targets. This crate is the library; the command `deepfusion` is built on the same crates.
 //!
 //! # From an image to metres
 //!

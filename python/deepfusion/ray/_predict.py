@@ -86,7 +86,7 @@ class _Job:
         made["model"] = self.model if self.weights is None else None
         made["intrinsics"] = None if self.intrinsics is None else list(self.intrinsics)
         made["save"] = list(self.save)
-        # Absent where there is one look, as in what was made before there could be more.
+        # Absent where there is one prediction, as in what was made before there could be more.
         if self.post_process is not None:
             made["post_process"] = self.post_process
         return made

@@ -100,7 +100,7 @@ pub(crate) struct EvalArgs {
     /// Also write the drawn points: image, pixel, true and predicted place in the camera's axes, error, as CSV.
     #[arg(long, value_name = "FILE.csv", requires = "points")]
     pub points_out: Option<PathBuf>,
-    /// Take the mean of several looks at each image, as `predict --post-process` does; without the verdict, which is of the network's
+    /// Test-time augmentation: take the mean of several predictions of each image, as `predict --post-process` does; without the verdict, which is of the network's
     /// own predictions.
     #[arg(long, value_parser = names::post_process(), conflicts_with_all = ["pred", "calibrate_confidence", "calibrate_uncertainty"])]
     pub post_process: Option<PostProcess>,

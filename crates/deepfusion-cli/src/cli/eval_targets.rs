@@ -24,7 +24,7 @@ pub(crate) struct EvalTargetsArgs {
     /// Depth that was measured.
     #[arg(long, value_enum)]
     pub depth: Option<TargetDepth>,
-    /// Take the mean of several looks at each image, as `predict --post-process` does.
+    /// Test-time augmentation: take the mean of several predictions of each image, as `predict --post-process` does.
     #[arg(long, value_parser = names::post_process(), conflicts_with = "depth")]
     pub post_process: Option<PostProcess>,
     /// Settings of the perception (TOML).

@@ -164,7 +164,7 @@ pub(super) fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
     )
 }
 
-/// In how many ways the network looks at each image.
+/// Of which predictions of an image its depth is the mean.
 pub(super) fn post_process() -> impl TypedValueParser<Value = PostProcess> {
     one_of(
         PostProcess::name,

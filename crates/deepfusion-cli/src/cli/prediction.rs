@@ -44,8 +44,8 @@ pub(crate) struct PredictionArgs {
     /// cameras, as the embedded ones, sees the whole image either way, at an input of its aspect ratio.
     #[arg(long)]
     pub stretch: bool,
-    /// Take the mean of several looks at each image, which usually errs less on real streets and takes longer. Several sizes are for
-    /// networks that learned at several, as `street` did; others may be worse by them. Sigma and confidence stay those of one look.
+    /// Test-time augmentation: take the mean of several predictions of each image, which usually errs less on real streets and takes longer. Several sizes are for
+    /// networks that learned at several, as `street` did; others may be worse by them. Sigma and confidence stay those of one prediction.
     #[arg(long, value_parser = names::post_process())]
     pub post_process: Option<PostProcess>,
     /// The camera's height over the road in metres, where it was measured: the scale monitor, which watches recordings

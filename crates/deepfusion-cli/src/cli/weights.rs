@@ -69,20 +69,23 @@ pub(crate) struct CalibrateWeightsArgs {
 #[derive(Debug, Args)]
 #[command(
     after_help = "The mean of networks that were trained from the same one can be better than each on images that none of them saw (model soups): measure it. It costs \
-    no training. Settings and PoseNet are the first run's; intervals and int8 are calibrated anew.\n\n\
+    no training. Settings and PoseNet are the first run's; intervals and int8 are calibrated anew. Where one of them does not say how sure it is, the mean does not.\n\n\
     Examples:\n  deepfusion weights average runs/video runs/mixed --out runs/mean\n  \
     deepfusion weights average runs/own street --shares 2,1 --out runs/careful      # less of what one drive taught"
 )]
 pub(crate) struct AverageArgs {
-    /// A run's folder or a checkpoint in it; after the first also packed networks, and embedded ones by their names.
-    #[arg(required = true, num_args = 2.., value_name = "RUN")]
+    /// A run's folder (its best checkpoint, where there is one) or a checkpoint in it; after the first also packed networks, and embedded ones by their names.
+    #[arg(required = true, num_args = 2.., value_name = "RUN|NAME")]
     pub models: Vec<PathBuf>,
-    /// How much each of them counts [default: all alike].
+    /// One positive number for each, in the order given: how much it counts [default: all alike].
     #[arg(long, value_name = "A,B,…", value_delimiter = ',')]
     pub shares: Option<Vec<f64>>,
-    /// Folder of the run to make.
-    #[arg(long, value_name = "RUN")]
+    /// New folder for the run to make.
+    #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Print what was averaged as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `deepfusion weights pack`.

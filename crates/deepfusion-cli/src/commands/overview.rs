@@ -28,7 +28,7 @@ Numbers of any method, from arrays:
 Also: adapt (a trained network to a new drive), calibrate (a camera, from a checkerboard), compare
 (runs side by side, published tables), ablate (the system's parts on and off), eval-odometry (the
 camera's path), eval-targets (boxes), export (ONNX), data import (a log beside a video), data convert,
-weights import, weights list, weights pack, bench, config show, completions.
+weights list, average, pack, calibrate and import (networks), bench, config show, completions.
 Every command explains itself: deepfusion train --help
 ";
 

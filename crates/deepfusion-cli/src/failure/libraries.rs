@@ -266,7 +266,7 @@ impl Reportable for deepfusion_model::Error {
                 "name a preset and the keys in which it differs; `deepfusion config show` prints them all".into(),
             ),
             Self::NotARun { .. } => {
-                Some("give the folder that `train`, `demo` or `weights import` wrote".into())
+                Some("give the folder that `train`, `adapt`, `demo` or a command of `weights` wrote".into())
             }
             Self::Foreign { .. } => {
                 Some("`weights import` reads weights of other programs".into())
@@ -322,7 +322,7 @@ impl Reportable for deepfusion_runtime::Error {
     fn remedy(&self) -> Option<String> {
         match self {
             Self::NoSuchModel { known, .. } => {
-                const WROTE: &str = "give the folder that `train`, `demo` or `weights import` wrote";
+                const WROTE: &str = "give the folder that `train`, `adapt`, `demo` or a command of `weights` wrote";
                 Some(match known.as_slice() {
                     [] => format!(
                         "{WROTE}; this build has no embedded network: train one with deepfusion train --data DRIVE"

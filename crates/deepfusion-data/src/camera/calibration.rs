@@ -117,7 +117,7 @@ impl CameraCalibration {
     pub fn lens(&self) -> Result<Lens> {
         Lens::new(self.intrinsics, &self.distortion).map_err(|problem| Error::CameraFile {
             by: self.source.clone(),
-            problem,
+            problem: problem.to_string(),
             remedy: "take matrix and coefficients from one calibration, for images of this size"
                 .into(),
         })

@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use deepfusion_geometry::{DepthMap, Distortion, Intrinsics};
+use deepfusion_hint::Hint;
 use image::{Rgb, RgbImage};
 use std::sync::Arc;
 
@@ -20,14 +21,32 @@ pub struct Lens {
     map: Option<Arc<Vec<[f32; 2]>>>,
 }
 
+/// Why a distortion does not fit a camera.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoLens {
+    /// It shows one place twice.
+    #[error("the distortion folds over within the image: it does not fit this camera matrix")]
+    FoldsOver,
+    /// What is left after it is no camera's.
+    #[error("after correction {0}")]
+    Implausible(String),
+}
+
+impl Hint for NoLens {
+    fn hint(&self) -> Option<String> {
+        Some("take matrix and coefficients from one calibration, for images of this size".into())
+    }
+}
+
 impl Lens {
     /// The correction of a camera with `distortion`, whose matrix `camera` is that of the images as they
     /// are.
     ///
     /// # Errors
-    /// A sentence, where the coefficients fold the image's border over: they belong to another camera, or
+    /// [`NoLens`], where the coefficients fold the image's border over: they belong to another camera, or
     /// to images of another size.
-    pub fn new(camera: Intrinsics, distortion: &Distortion) -> std::result::Result<Self, String> {
+    pub fn new(camera: Intrinsics, distortion: &Distortion) -> std::result::Result<Self, NoLens> {
         if distortion.is_none() {
             return Ok(Self {
                 pinhole: camera,
@@ -137,7 +156,7 @@ const WIDEST: f64 = 1.732_050_807_568_877_2;
 fn largest_valid(
     camera: &Intrinsics,
     distortion: &Distortion,
-) -> std::result::Result<Intrinsics, String> {
+) -> std::result::Result<Intrinsics, NoLens> {
     let (right, bottom) = (f64::from(camera.width - 1), f64::from(camera.height - 1));
     // Calibrations often fold over in the corners, where no board was seen: such pixels have no ray, and
     // the rectangle does not need them.
@@ -165,13 +184,10 @@ fn largest_valid(
     } else {
         [left_x, top_y, right_x, bottom_y]
     };
-    let folds = || {
-        "the distortion folds over within the image: it does not fit this camera matrix".to_owned()
-    };
     let (Some(left_x), Some(right_x), Some(top_y), Some(bottom_y)) =
         (left_x, right_x, top_y, bottom_y)
     else {
-        return Err(folds());
+        return Err(NoLens::FoldsOver);
     };
     let (fx, fy) = (right / (right_x - left_x), bottom / (bottom_y - top_y));
     let pinhole = Intrinsics {
@@ -182,14 +198,14 @@ fn largest_valid(
         ..*camera
     };
     if let Some(why) = pinhole.implausible() {
-        return Err(format!("after correction {why}"));
+        return Err(NoLens::Implausible(why));
     }
     // Its corners are its farthest rays. They must be what the lens shows where it shows them.
     for (u, v) in [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)] {
         let corner = pinhole.back_project(u, v, 1.0).xy();
         let back = distortion.undistort(&distortion.distort(&corner));
         if back.is_none_or(|back| (back - corner).norm() > 1e-6) {
-            return Err(folds());
+            return Err(NoLens::FoldsOver);
         }
     }
     Ok(pinhole)
@@ -224,11 +240,7 @@ mod tests {
     fn coefficients_of_another_camera_are_refused() {
         // x(1 - 2x²) is 0.27 at most; the image's sides are at 0.48 and more.
         let fold = Distortion::from_opencv(&[-2.0, 0.0, 0.0, 0.0]).unwrap();
-        assert!(
-            Lens::new(camera(), &fold)
-                .unwrap_err()
-                .contains("folds over")
-        );
+        assert_eq!(Lens::new(camera(), &fold).unwrap_err(), NoLens::FoldsOver);
     }
 
     #[test]

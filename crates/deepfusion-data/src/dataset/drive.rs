@@ -416,6 +416,15 @@ impl Dataset {
         self.recording.ground_truth(&self.frames()[frame], kind)
     }
 
+    /// Whether [`Self::dense_depth`] has something for a frame.
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    #[must_use]
+    pub fn has_dense_depth(&self, frame: usize) -> bool {
+        self.recording.has_dense_depth(&self.frames()[frame])
+    }
+
     /// Exact depth of every pixel of a frame, where the recording has it beside its scans, as the simulator's drives do:
     /// H×W at the image's size, camera z in metres, infinite where nothing is within 255 m (the sky). `None` where there is
     /// no such depth; that of an RGB-D folder is its [`Self::ground_truth`].

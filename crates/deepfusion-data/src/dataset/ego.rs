@@ -40,6 +40,7 @@ pub struct Ego<'a> {
 
 /// Why the motion between two frames is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum NoMotion {
     /// Their time stamps do not increase with their numbers.
     Time,

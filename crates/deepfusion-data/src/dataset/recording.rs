@@ -83,6 +83,11 @@ pub trait Recording: fmt::Debug + Send + Sync {
         Ok(None)
     }
 
+    /// Whether [`Self::dense_depth`] will have something for a frame.
+    fn has_dense_depth(&self, _frame: &Frame) -> bool {
+        false
+    }
+
     /// Depth of every pixel, where the recording knows it beside its scans: [`Dataset::dense_depth`].
     ///
     /// # Errors

@@ -26,7 +26,7 @@ const BINS: usize = 10;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Confidence {
-    /// From a single look at an image.
+    /// From a single prediction of an image.
     pub single: ConfidenceModel,
     /// From the image and its mirror image.
     pub mirrored: ConfidenceModel,

@@ -66,7 +66,7 @@ pub fn augmentation(how: Option<PostProcess>) -> Augmentation {
     }
 }
 
-/// The disparity of an image, as the protocol wants it, by one look. An image of another aspect ratio is stretched, so that all of its
+/// The disparity of an image, as the protocol wants it, by one prediction. An image of another aspect ratio is stretched, so that all of its
 /// ground truth counts.
 ///
 /// # Errors

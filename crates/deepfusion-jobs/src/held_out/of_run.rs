@@ -1,9 +1,10 @@
 //! What a run saw, and those it began from.
 
 use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Dataset, Frame};
-use deepfusion_model::{RunFolder, TrainConfig, WeightsOrigin};
+use deepfusion_model::{AveragedNetwork, RunFolder, TrainConfig};
 use deepfusion_runtime::embedded;
 use deepfusion_train::SampleSet;
 use deepfusion_weights::Shipped;
@@ -16,21 +17,31 @@ use crate::verdict::Unseen;
 /// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
 type Seen = (String, u64, u64);
 
-/// Whether none of the frames measured was a target or a source in training, of this run and of those it began from. `None` where
-/// that cannot be known: recordings that are not there any more, or a network that was learned elsewhere.
+/// Whether none of the frames measured was a target or a source in training, of this run, of those it began from and of those that it is
+/// the mean of (`averaged`, of its findings). `None` where that cannot be known: recordings that are not there any more, or a network that
+/// was learned elsewhere.
 #[must_use]
-pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[ImageRef]) -> Option<bool> {
-    let seen = seen_by(config, datasets, &mut HashSet::new())?;
+pub fn held_out(
+    config: &TrainConfig,
+    averaged: &[AveragedNetwork],
+    datasets: &[Dataset],
+    places: &[ImageRef],
+) -> Option<bool> {
+    let seen = seen_by(config, averaged, datasets, &mut HashSet::new())?;
     let mut measured = places
         .iter()
         .map(|ImageRef(number, frame)| &datasets[*number].frames()[*frame]);
     Some(measured.all(|frame| !seen.contains(&key(frame))))
 }
 
-/// Which of the recordings' frames training did not see, of this run and of those it began from.
+/// Which of the recordings' frames training did not see; of whom as in [`held_out`].
 #[must_use]
-pub fn unseen_frames(config: &TrainConfig, datasets: &[Dataset]) -> Unseen {
-    let Some(seen) = seen_by(config, datasets, &mut HashSet::new()) else {
+pub fn unseen_frames(
+    config: &TrainConfig,
+    averaged: &[AveragedNetwork],
+    datasets: &[Dataset],
+) -> Unseen {
+    let Some(seen) = seen_by(config, averaged, datasets, &mut HashSet::new()) else {
         return Unseen::NotKnown;
     };
     let mut known = HashSet::new();
@@ -46,11 +57,12 @@ pub fn unseen_frames(config: &TrainConfig, datasets: &[Dataset]) -> Unseen {
     }
 }
 
-/// What a run saw, and those it began from; `datasets` are what is measured on.
+/// What a run saw, those it began from and those that it is the mean of; `datasets` are what is measured on.
 fn seen_by(
     config: &TrainConfig,
+    averaged: &[AveragedNetwork],
     datasets: &[Dataset],
-    runs: &mut HashSet<std::path::PathBuf>,
+    runs: &mut HashSet<PathBuf>,
 ) -> Option<HashSet<Seen>> {
     let mut config = config.clone();
     if validates(&config) {
@@ -68,24 +80,29 @@ fn seen_by(
     for frame in &train.depth.frames {
         seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));
     }
-    for origin in config.beginning().iter().chain(&config.averaged_with) {
-        seen.extend(seen_before(origin, datasets, runs)?);
+    if let Some(init) = &config.init {
+        let sha256 = config.init_sha256.as_deref();
+        seen.extend(seen_before(init, sha256, datasets, runs)?);
+    }
+    for network in averaged {
+        let sha256 = network.sha256.as_deref();
+        seen.extend(seen_before(&network.path, sha256, datasets, runs)?);
     }
     Some(seen)
 }
 
-/// What the weights have seen that a run began from, or is the mean with; weights that are no run's are of other pictures (ImageNet's).
+/// What weights have seen that a run began from or is the mean of; those that are no run's are of other pictures (ImageNet's).
 fn seen_before(
-    origin: &WeightsOrigin,
+    init: &Path,
+    sha256: Option<&str>,
     datasets: &[Dataset],
-    runs: &mut HashSet<std::path::PathBuf>,
+    runs: &mut HashSet<PathBuf>,
 ) -> Option<HashSet<Seen>> {
-    let init = &origin.path;
-    let packed = match &origin.sha256 {
+    let packed = match sha256 {
         Some(sha256) => {
             let network = embedded(init).ok()??;
             // Another one of the name tells nothing of the one it began from.
-            (network.card.sha256 == *sha256).then_some(())?;
+            (network.card.sha256 == sha256).then_some(())?;
             Some(*network)
         }
         None if Shipped::is_at(init) => Some(Shipped::read(init).ok()?),
@@ -104,7 +121,8 @@ fn seen_before(
     if !runs.insert(folder.path().to_owned()) {
         return Some(HashSet::new());
     }
-    seen_by(&folder.read_config().ok()?, datasets, runs)
+    let (config, findings) = (folder.read_config().ok()?, folder.read_findings().ok()?);
+    seen_by(&config, &findings.averaged, datasets, runs)
 }
 
 fn key(frame: &Frame) -> Seen {

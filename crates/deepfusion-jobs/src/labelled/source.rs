@@ -23,7 +23,7 @@ pub enum DepthSource {
 pub struct PredictedDepth {
     /// The network.
     pub estimator: DepthEstimator,
-    /// How its input is made: of [`DepthEstimator::preparer`], or of [`DepthEstimator::augmented`] for several looks.
+    /// How its input is made: of [`DepthEstimator::preparer`], or of [`DepthEstimator::augmented`] for several predictions.
     pub preparer: Preparer,
     /// What its intervals are stretched by.
     pub intervals: IntervalFactors,

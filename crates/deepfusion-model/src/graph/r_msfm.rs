@@ -3,7 +3,7 @@
 use deepfusion_infer::{Activation, Border, Op, ValueId};
 
 use super::{Builder, Layer, Offset};
-use crate::{DepthNetConfig, NetworkError, R_MSFM_STATE, RMsfmConfig, TakenUp};
+use crate::{DepthNetConfig, NetworkError, R_MSFM_STATE, RMsfmConfig, RefinementInput};
 
 /// A mask is a quarter of what its layer gives (RAFT's balance of gradients).
 const MASK_SCALE: f32 = 0.25;
@@ -28,9 +28,9 @@ impl Builder {
         for index in 0..r_msfm.iterations {
             if index > 0 {
                 let seen = match r_msfm.taken_up(index) {
-                    TakenUp::Again(level) => self.second_look(level, state)?,
-                    TakenUp::Middle => self.feature("middle", f1, R_MSFM_STATE, 2)?,
-                    TakenUp::Fine => self.fine(f0)?,
+                    RefinementInput::Again(level) => self.second_look(level, state)?,
+                    RefinementInput::Middle => self.feature("middle", f1, R_MSFM_STATE, 2)?,
+                    RefinementInput::Fine => self.fine(f0)?,
                 };
                 state = self.gru(index, state, seen)?;
             }

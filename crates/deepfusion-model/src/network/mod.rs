@@ -26,5 +26,5 @@ pub use flow_decoder::FlowDecoderConfig;
 pub use hce::HceConfig;
 pub use lite_mono::{LAYER_NORM_EPSILON, LiteMonoConfig, LiteMonoSize, POSITION_CHANNELS};
 pub use pose_net::{EXPLAINABILITY_WIDTHS, POSE_WIDTH, PoseNetConfig};
-pub use r_msfm::{R_MSFM_STATE, RMsfmConfig, TakenUp};
+pub use r_msfm::{R_MSFM_STATE, RMsfmConfig, RefinementInput};
 pub use resnet::{BATCH_NORM_EPSILON, InputNormalisation, ResNetConfig, ResNetDepth};

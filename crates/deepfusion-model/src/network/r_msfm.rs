@@ -9,14 +9,14 @@ use super::{InputSize, NetworkError};
 /// Channels of what the features become before they refine the disparity, and of the gated unit's state.
 pub const R_MSFM_STATE: usize = 128;
 
-/// What a refinement of R-MSFM takes up before it.
+/// What a refinement of R-MSFM reads before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TakenUp {
+pub enum RefinementInput {
     /// The middle feature, `layer1`'s.
     Middle,
     /// The finest, the stem's.
     Fine,
-    /// The state itself, by the second look of this level: 0 is the coarsest.
+    /// The state itself, by the second refinement of this level: 0 is the coarsest.
     Again(usize),
 }
 
@@ -51,12 +51,12 @@ impl RMsfmConfig {
     /// What is taken up into the state before refinement `index`, from 1 on: features from coarse to fine, each once or twice. The first
     /// refinement has the coarsest feature as its state.
     #[must_use]
-    pub fn taken_up(&self, index: usize) -> TakenUp {
+    pub fn taken_up(&self, index: usize) -> RefinementInput {
         let looks = if self.twice() { 2 } else { 1 };
         match (index % looks, index / looks) {
-            (1, level) => TakenUp::Again(level),
-            (_, 1) => TakenUp::Middle,
-            _ => TakenUp::Fine,
+            (1, level) => RefinementInput::Again(level),
+            (_, 1) => RefinementInput::Middle,
+            _ => RefinementInput::Fine,
         }
     }
 
@@ -72,8 +72,8 @@ mod tests {
 
     #[test]
     fn features_are_taken_up_from_coarse_to_fine() {
-        use TakenUp::{Again, Fine, Middle};
-        let all = |iterations: usize| -> Vec<TakenUp> {
+        use RefinementInput::{Again, Fine, Middle};
+        let all = |iterations: usize| -> Vec<RefinementInput> {
             let config = RMsfmConfig { iterations };
             (1..iterations).map(|i| config.taken_up(i)).collect()
         };

@@ -66,6 +66,10 @@ pub struct SimulatedConfig {
     pub hills: f64,
     /// Whether a camera's image formation (exposure, noise, blur, JPEG and so on) is applied.
     pub formation: bool,
+    /// The kinds of scene that worlds are of, each as often as the others: `urban`, `park`, `garage`, `commercial`, `night`, `motorway`,
+    /// `country`, `indoor`; none: all, streets most often. For a robot in rooms: `["indoor"]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scenes: Vec<String>,
     /// What is left out of the varied views, so that a table can show what it is worth: `camera-height`, `camera-tilt`, `lenses`,
     /// `squeeze`, `weather`, `variety`, `traffic`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -121,6 +125,7 @@ impl Default for SimulatedConfig {
             plain: 0.0,
             hills: 0.0,
             formation: true,
+            scenes: Vec::new(),
             without: Vec::new(),
             cameras: Vec::new(),
         }

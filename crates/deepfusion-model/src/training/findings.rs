@@ -1,5 +1,7 @@
 //! What a run found out from its data, apart from what its configuration says.
 
+use std::path::PathBuf;
+
 use deepfusion_geometry::Intrinsics;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
@@ -29,6 +31,22 @@ pub struct TrainFindings {
     /// The same for each of `data.sets`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<SetFindings>,
+    /// The networks that its weights are the mean of; none where it was trained.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub averaged: Vec<AveragedNetwork>,
+}
+
+/// One of the networks that a run's weights are the mean of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AveragedNetwork {
+    /// A checkpoint or a packed file; or with `sha256` the name of a network that the program carries.
+    pub path: PathBuf,
+    /// SHA-256 of the embedded network's weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
+    /// Its part of the mean; all parts together are 1.
+    pub share: f64,
 }
 
 /// What a run found out from one of its data sets.
@@ -137,6 +155,7 @@ impl TrainFindings {
             camera,
             learned_camera: None,
             sets,
+            averaged: Vec::new(),
         };
         Ok((found != Self::default()).then_some(found))
     }
@@ -219,6 +238,11 @@ mod tests {
                 step: 12,
             }),
             sets: vec![set("road", Some(1.1), 230.4), set("hall", None, 150.0)],
+            averaged: vec![AveragedNetwork {
+                path: "/runs/first/best.safetensors".into(),
+                sha256: None,
+                share: 0.25,
+            }],
         }
     }
 

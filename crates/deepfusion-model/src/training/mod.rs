@@ -15,11 +15,11 @@ mod validation;
 pub use assumed_camera::{AssumedCamera, LearnedCamera};
 pub use config_keys::{ConfigKey, config_keys};
 pub use data_set::{DataSetConfig, Learn, SimulatedCamera, SimulatedConfig};
-pub use findings::{SetFindings, TrainFindings};
+pub use findings::{AveragedNetwork, SetFindings, TrainFindings};
 pub use loss_config::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
 pub use preset::{Compute, Preset};
 pub use sample_factors::SampleFactors;
 pub use train_config::{
     Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
-    ViewMotion, WeightsOrigin,
+    ViewMotion,
 };

@@ -147,7 +147,6 @@ impl Preset {
             precision: Precision::F32,
             init: None,
             init_sha256: None,
-            averaged_with: Vec::new(),
             min_speed_mps: 0.5,
             validation_share: 0.1,
             validate_every: 0,

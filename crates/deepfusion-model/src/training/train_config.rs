@@ -79,7 +79,7 @@ pub struct Augmentation {
     /// the batches have the run's own size, the others in turns one of these.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<InputSize>,
-    /// Other sizes of video's images, for a network that is to be used by several looks (`--post-process multi-scale`): half of the
+    /// Other sizes of video's images, for a network that is to be used by several predictions (`--post-process multi-scale`): half of the
     /// batches have the run's own size, the others in turns one of these. Only with `canonical_focal_px`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub video_sizes: Vec<InputSize>,
@@ -202,10 +202,6 @@ pub struct TrainConfig {
     #[schemars(skip)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_sha256: Option<String>,
-    /// The other networks whose weights the run's are the mean with. Training does not look at it, and a new run is without.
-    #[schemars(skip)]
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub averaged_with: Vec<WeightsOrigin>,
     /// Pairs slower than this are dropped, in m/s.
     pub min_speed_mps: f64,
     /// Share of each drive's end that is held out for validation.
@@ -248,17 +244,6 @@ pub struct TrainConfig {
     /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
     #[serde(default)]
     pub flow_decoder: FlowDecoderConfig,
-}
-
-/// Where weights came from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct WeightsOrigin {
-    /// A run, a checkpoint, a packed file; or with `sha256` the name of a network that the program carries.
-    pub path: PathBuf,
-    /// SHA-256 of the embedded network's weights.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sha256: Option<String>,
 }
 
 fn no_zoom() -> f32 {
@@ -332,19 +317,6 @@ impl TrainConfig {
         if self.init_sha256.is_none() {
             self.init = self.init.take().map(absolute);
         }
-        for origin in &mut self.averaged_with {
-            if origin.sha256.is_none() {
-                origin.path = absolute(std::mem::take(&mut origin.path));
-            }
-        }
-    }
-
-    /// The weights that the run began from; `None` for those of its seed.
-    #[must_use]
-    pub fn beginning(&self) -> Option<WeightsOrigin> {
-        let path = self.init.clone()?;
-        let sha256 = self.init_sha256.clone();
-        Some(WeightsOrigin { path, sha256 })
     }
 
     /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms
@@ -465,13 +437,13 @@ impl TrainConfig {
         }
     }
 
-    /// The size of the images of batch number `number` of those whose depth is known.
+    /// The size of the images of batch number `number` of those whose depth is known; the batches that several workers learn from in one step count as one.
     #[must_use]
     pub fn size_of_depth_batch(&self, number: usize) -> InputSize {
         in_turns(self.size, &self.augmentation.sizes, number)
     }
 
-    /// The size of the images of batch number `number` of video.
+    /// The size of the images of batch number `number` of video; the batches that several workers learn from in one step count as one.
     #[must_use]
     pub fn size_of_video_batch(&self, number: usize) -> InputSize {
         in_turns(self.size, &self.augmentation.video_sizes, number)

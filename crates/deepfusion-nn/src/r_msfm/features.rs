@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor, activation::leaky_relu};
 use super::strip::Strip;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
-use crate::{R_MSFM_STATE, TakenUp};
+use crate::{R_MSFM_STATE, RefinementInput};
 
 /// Slope of every leaky ReLU below 0.
 pub(super) const SLOPE: f64 = 0.01;
@@ -84,14 +84,14 @@ impl Features {
     /// What a refinement takes up.
     pub(super) fn next(
         &self,
-        taken_up: TakenUp,
+        taken_up: RefinementInput,
         features: &[Tensor<4>; 3],
         state: Tensor<4>,
     ) -> Tensor<4> {
         match taken_up {
-            TakenUp::Again(level) => self.context[level].forward(state),
-            TakenUp::Middle => self.middle.forward(features[1].clone()).tanh(),
-            TakenUp::Fine => {
+            RefinementInput::Again(level) => self.context[level].forward(state),
+            RefinementInput::Middle => self.middle.forward(features[1].clone()).tanh(),
+            RefinementInput::Fine => {
                 let x = leaky_relu(self.fine_reduce.forward(features[0].clone()), SLOPE);
                 self.fine.forward(x).tanh()
             }

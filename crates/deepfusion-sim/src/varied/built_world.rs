@@ -44,11 +44,19 @@ impl BuiltWorld {
         // Drawn apart, so that the other worlds are the same whatever the share of the plain ones is.
         let mut rng = generator(config.seed, number, 0x91A1);
         let plain = rng.random_bool(config.plain);
-        let plain_scene = Scene::ALL[rng.random_range(0..Scene::ALL.len())];
+        let plain_scene = one_of(&mut rng, &config.plain_scenes());
         let mut rng = generator(config.seed, number, 0x90D);
-        let varied_scene = scene(&mut rng, config.daylight);
+        let varied_scene = if config.scenes.is_empty() {
+            scene(&mut rng, config.daylight)
+        } else {
+            one_of(&mut rng, &config.scenes)
+        };
         let drawn_scene = match if plain { plain_scene } else { varied_scene } {
-            Scene::Indoor if config.on_cars() => Scene::Urban,
+            Scene::Indoor if config.on_cars() => {
+                // Cars drive through no rooms.
+                let other = config.scenes.iter().find(|scene| **scene != Scene::Indoor);
+                other.copied().unwrap_or(Scene::Urban)
+            }
             drawn => drawn,
         };
         let without = Without(&config.without);
@@ -94,6 +102,14 @@ impl BuiltWorld {
         let speed = 9.0 * self.world.scene.pace();
         let density = self.density * rng.random_range(0.0..1.0);
         Traffic::around(rng, &self.world, (s, speed, nearest), density)
+    }
+}
+
+/// Each as often as the others; the first where there is none.
+fn one_of(rng: &mut ChaCha8Rng, scenes: &[Scene]) -> Scene {
+    match scenes.len() {
+        0 => Scene::Urban,
+        count => scenes[rng.random_range(0..count)],
     }
 }
 

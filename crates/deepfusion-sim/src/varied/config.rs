@@ -3,6 +3,7 @@
 use super::draw::mix;
 use super::ingredient::Ingredient;
 use super::mounted::MountedCamera;
+use crate::config::Scene;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +33,9 @@ pub struct EndlessConfig {
     pub plain: f64,
     /// Share of the varied views in the open whose road rises and falls ahead of the camera.
     pub hills: f64,
+    /// The kinds of scene that worlds are of, each as often as the others; none: all, streets most often, `daylight` of them by day.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scenes: Vec<Scene>,
     /// What is left out of the varied views.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<Ingredient>,
@@ -54,6 +58,7 @@ impl Default for EndlessConfig {
             formation: true,
             plain: 0.0,
             hills: 0.0,
+            scenes: Vec::new(),
             without: Vec::new(),
             cameras: Vec::new(),
         }
@@ -115,7 +120,34 @@ impl EndlessConfig {
                 "0 to 1",
             )?;
         }
+        let names = || {
+            let names: Vec<&str> = self.scenes.iter().map(|scene| scene.name()).collect();
+            names.join(", ")
+        };
+        check(
+            self.scenes.is_empty() || self.plain == 0.0 || !self.plain_scenes().is_empty(),
+            "scenes",
+            names(),
+            "one that simulate draws, where a share of the worlds is plain",
+        )?;
+        check(
+            !(self.on_cars() && self.is_indoors()),
+            "scenes",
+            names(),
+            "one that cars drive through, for cameras on cars",
+        )?;
         self.cameras.iter().try_for_each(MountedCamera::validate)
+    }
+
+    /// The scenes of plain worlds.
+    pub(super) fn plain_scenes(&self) -> Vec<Scene> {
+        let meant = |scene: &Scene| self.scenes.is_empty() || self.scenes.contains(scene);
+        Scene::ALL.into_iter().filter(meant).collect()
+    }
+
+    /// Whether all worlds are rooms.
+    fn is_indoors(&self) -> bool {
+        !self.scenes.is_empty() && self.scenes.iter().all(|scene| *scene == Scene::Indoor)
     }
 
     /// The camera of a view, where they are known.
@@ -194,5 +226,18 @@ mod tests {
             assert!(error.to_string().contains(&format!("`{name}`")), "{error}");
         }
         assert!(base().validate().is_ok());
+    }
+
+    #[test]
+    fn scenes_fit_what_else_is_asked_for() {
+        let of = |scenes: &[Scene], plain| EndlessConfig {
+            scenes: scenes.to_vec(),
+            plain,
+            ..EndlessConfig::default()
+        };
+        assert!(of(&[Scene::Indoor], 0.0).validate().is_ok());
+        assert!(of(&[Scene::Indoor, Scene::Night], 0.5).validate().is_ok());
+        let error = of(&[Scene::Indoor], 0.5).validate().unwrap_err();
+        assert!(error.to_string().contains("`scenes`"), "{error}");
     }
 }

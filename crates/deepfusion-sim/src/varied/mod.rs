@@ -190,6 +190,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn worlds_are_of_the_scenes_asked_for() -> Result<()> {
+        let endless = Endless::new(EndlessConfig {
+            width: 64,
+            height: 32,
+            views_per_world: 1,
+            scenes: vec![Scene::Indoor, Scene::Night],
+            ..EndlessConfig::default()
+        })?;
+        let found: Vec<Scene> = (0..24).map(|index| endless.view(index).scene).collect();
+        assert!(found.contains(&Scene::Indoor) && found.contains(&Scene::Night));
+        assert!(found.iter().all(|s| endless.config().scenes.contains(s)));
+        Ok(())
+    }
+
+    #[test]
     fn the_number_of_worlds_in_memory_is_bounded() -> Result<()> {
         let endless = Endless::new(EndlessConfig {
             width: 64,

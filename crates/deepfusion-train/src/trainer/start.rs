@@ -31,6 +31,7 @@ pub(super) fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings
         camera: train.camera(),
         learned_camera: None,
         sets: sets.collect(),
+        averaged: Vec::new(),
     }
 }
 

@@ -106,9 +106,11 @@ impl Loaders {
         let numbers = move || (first..).step_by(count);
         let video = !set.samples.is_empty();
         Self {
-            video: video.then(|| BatchLoader::training_batches(config, set.clone(), numbers())),
-            depth: (!set.depth.is_empty())
-                .then(|| DepthLoader::training_batches(config, set.depth.clone(), numbers())),
+            video: video
+                .then(|| BatchLoader::training_batches(config, set.clone(), numbers(), count)),
+            depth: (!set.depth.is_empty()).then(|| {
+                DepthLoader::training_batches(config, set.depth.clone(), numbers(), count)
+            }),
         }
     }
 }

@@ -69,9 +69,9 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     enough(&seen, &board)?;
     let mut found = calibrate(&seen.views, &board, seen.size, args.model())?;
     found.warnings.extend(seen.turned());
-    let lens = found
-        .distortion()
-        .map_err(|problem| Error::Undetermined { problem })?;
+    let lens = found.distortion().map_err(|problem| Error::Undetermined {
+        problem: problem.to_string(),
+    })?;
     if let Err(problem) = Lens::new(found.intrinsics, &lens) {
         found.warnings.push(format!(
             "images cannot be corrected with this lens: {problem}; show the board nearer to the image's border"

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use deepfusion_data::{Dataset, OpenOptions, Split};
+use deepfusion_jobs::ModelFacts;
 use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_jobs::training::Start;
 use deepfusion_model::{TrainConfig, ViewMotion};
@@ -67,8 +68,16 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     let mut estimator = demo.estimator(&shipped)?;
     let frame = LEARNED + GAP + (FRAMES - LEARNED - GAP) / 3;
     let before = Instant::now();
-    let first = Shown::of(demo, &mut estimator, &parts.all, frame)?;
+    let factors = shipped.interval_factors()?;
+    let first = Shown::of(demo, (&mut estimator, &factors), &parts.all, frame)?;
     let first_ms = 1e3 * before.elapsed().as_secs_f64();
+    let (picture, cloud) = (first.write("")?, demo.cloud());
+    first.write_cloud(&cloud)?;
+    say(&format!(
+        "an image became metres in {first_ms:.0} ms\npicture {}\ncloud   {}",
+        picture.display(),
+        cloud.display()
+    ));
     let targets = demo.out.join("targets");
     let followed = perceive(demo, &drive, &targets);
     // Before what it says of being interrupted: this is no command that can be repeated.
@@ -114,7 +123,9 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     say("4/4 measuring again on the part that was not learned from; pictures and the report");
     let mut estimator = demo.estimator(&adapted)?;
     let learned = measure(&mut estimator, &parts.learned, &parts.measured)?;
-    let second = Shown::of(demo, &mut estimator, &parts.all, frame)?;
+    let factors = adapted.interval_factors()?;
+    let second = Shown::of(demo, (&mut estimator, &factors), &parts.all, frame)?;
+    second.write("_learned")?;
     let html = demo.out.join("report.html");
     let overlay = overlay_of(&targets, &first)?;
     report(
@@ -229,16 +240,16 @@ fn report(
         ("time", &clock(demo.start.elapsed().as_secs_f64())),
     ])
     .section("At first sight");
-    page = first.add_to(page, "its depth in metres", "")?;
+    page = first.add_to(page, "its depth in metres")?;
     page = first.add_truth_to(page)?;
-    page = first.add_cloud_to(page, &demo.out.join("cloud.ply"))?;
+    page = first.add_cloud_to(page)?;
     if let Some(path) = overlay {
         let picture = deepfusion_data::load_rgb(path)?;
         let caption = "3D targets: boxes with distance, followed over time";
         page = page.picture(caption, &picture, PictureFormat::Png)?;
     }
     page = page.section("After learning here");
-    page = second.add_to(page, "its depth in metres after learning", "_learned")?;
+    page = second.add_to(page, "its depth in metres after learning")?;
     page = second.add_error_to(page, "error_learned", "Relative error after learning")?;
     page = page
         .section("Accuracy on the part of the street that was not learned from")

@@ -1,6 +1,7 @@
 //! From scratch: six simulated streets, a small network that knows nothing, and a seventh street to be measured on.
 
 use deepfusion_data::{Cameras, Dataset, OpenOptions};
+use deepfusion_jobs::ModelFacts;
 use deepfusion_model::{CompareAt, InputSize, Preset, Reprojection, TrainConfig, ViewMotion};
 use deepfusion_render::HtmlReport;
 use deepfusion_sim::SimConfig;
@@ -100,16 +101,19 @@ pub(super) fn run(demo: &Demo) -> Result<()> {
     .section("Accuracy on the street never seen")
     .paragraph(page::PROTOCOL);
     page = run_report::accuracy(page, &evaluated).section("What it sees");
+    let factors = model.interval_factors()?;
     let frames = test_sets[0].frames().len();
     for (i, frame) in [frames / 10, frames * 2 / 5, frames * 7 / 10]
         .into_iter()
         .enumerate()
     {
-        let shown = Shown::of(demo, &mut estimator, &test_sets[0], frame)?;
-        page = shown.add_to(page, "predicted depth in metres", "")?;
+        let shown = Shown::of(demo, (&mut estimator, &factors), &test_sets[0], frame)?;
+        shown.write("")?;
+        page = shown.add_to(page, "predicted depth in metres")?;
         if i == 0 {
             page = shown.add_truth_to(page)?;
-            page = shown.add_cloud_to(page, &demo.out.join("cloud.ply"))?;
+            shown.write_cloud(&demo.cloud())?;
+            page = shown.add_cloud_to(page)?;
         }
     }
     let html = demo.out.join("report.html");

@@ -96,6 +96,10 @@ impl Demo<'_> {
         self.out.join("model")
     }
 
+    fn cloud(&self) -> PathBuf {
+        self.out.join("cloud.ply")
+    }
+
     fn estimator(&self, model: &ModelSource) -> Result<DepthEstimator> {
         engine::load(model, &EngineArgs::on(self.args.device))
     }
@@ -108,7 +112,7 @@ impl Demo<'_> {
             clock(self.start.elapsed().as_secs_f64()),
             page.display(),
             self.model().display(),
-            self.out.join("cloud.ply").display(),
+            self.cloud().display(),
         ));
         if self.args.json {
             output::print_json(report)

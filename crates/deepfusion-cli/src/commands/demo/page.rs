@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Dataset, RgbImage, save_png, write_depth_png};
+use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_jobs::intervals;
 use deepfusion_render::{
     CloudView, DepthScale, HtmlReport, PictureFormat, depth_picture, error_picture, render_cloud,
     side_by_side, with_depth_legend,
@@ -30,6 +32,8 @@ pub(super) struct Shown {
     image: RgbImage,
     camera: Intrinsics,
     depth: DepthMap,
+    /// How sure the network is, in metres, where it says so.
+    sigma: Option<DepthMap>,
     truth: DepthMap,
     scale: DepthScale,
     /// Folder of the pictures.
@@ -40,7 +44,7 @@ impl Shown {
     /// Predicts a frame of a simulated drive.
     pub(super) fn of(
         demo: &Demo,
-        estimator: &mut DepthEstimator,
+        (estimator, factors): (&mut DepthEstimator, &IntervalFactors),
         drive: &Dataset,
         frame: usize,
     ) -> Result<Self> {
@@ -49,13 +53,13 @@ impl Shown {
         std::fs::create_dir_all(&folder).map_err(|e| deepfusion_data::Error::file(&folder, e))?;
         let image = drive.load_image(frame)?;
         let camera = drive.intrinsics(frame);
-        let depth = estimator
-            .predict(&image, Some(&camera), true, true)?
-            .depth();
+        let prediction = estimator.predict(&image, Some(&camera), true, true)?;
+        let depth = prediction.depth();
         Ok(Self {
             number: drive.frames()[frame].number,
             image,
             camera,
+            sigma: intervals::sigma(&prediction, &depth, factors),
             depth,
             truth: exact_depth(drive, frame)?,
             scale: DepthScale::default(),
@@ -72,11 +76,40 @@ impl Shown {
         self.folder.join(format!("{:010}_{what}.png", self.number))
     }
 
-    /// The image beside its depth; `mark` is added to the files' names.
-    pub(super) fn add_to(&self, page: HtmlReport, what: &str, mark: &str) -> Result<HtmlReport> {
+    /// Writes the image beside its depth, and the depth; `mark` is added to the files' names. Returns the first.
+    pub(super) fn write(&self, mark: &str) -> Result<PathBuf> {
         let side = side_by_side(&self.image, &self.depth, &self.scale)?;
-        save_png(&side, &self.path(&format!("side{mark}")))?;
+        let path = self.path(&format!("side{mark}"));
+        save_png(&side, &path)?;
         write_depth_png(&self.depth, &self.path(&format!("depth{mark}")))?;
+        Ok(path)
+    }
+
+    /// Writes the point cloud, with how sure the network is of each point.
+    pub(super) fn write_cloud(&self, path: &Path) -> Result<()> {
+        let mut cloud = self.cloud()?;
+        let sigma = self.sigma.as_ref();
+        cloud.sigma =
+            sigma.map(|sigma| PointCloud::column(&sigma.data, &self.depth, CLOUD_REACH_M));
+        let mut bytes = Vec::new();
+        cloud.write_ply(&mut bytes)?;
+        output::write(path, bytes)?;
+        Ok(())
+    }
+
+    fn cloud(&self) -> Result<PointCloud> {
+        let colours = Some(self.image.as_raw().as_slice());
+        Ok(PointCloud::from_depth(
+            &self.depth,
+            &self.camera,
+            colours,
+            CLOUD_REACH_M,
+        )?)
+    }
+
+    /// The image beside its depth.
+    pub(super) fn add_to(&self, page: HtmlReport, what: &str) -> Result<HtmlReport> {
+        let side = side_by_side(&self.image, &self.depth, &self.scale)?;
         let caption = format!("Frame {}: the image, and {what}", self.number);
         Ok(page.picture(&caption, &side, PictureFormat::Jpeg)?)
     }
@@ -101,13 +134,9 @@ impl Shown {
         Ok(page.picture(caption, &errors, PictureFormat::Png)?)
     }
 
-    /// The point cloud from two sides, and as a PLY file.
-    pub(super) fn add_cloud_to(&self, mut page: HtmlReport, path: &Path) -> Result<HtmlReport> {
-        let colours = Some(self.image.as_raw().as_slice());
-        let cloud = PointCloud::from_depth(&self.depth, &self.camera, colours, CLOUD_REACH_M)?;
-        let mut bytes = Vec::new();
-        cloud.write_ply(&mut bytes)?;
-        output::write(path, bytes)?;
+    /// The point cloud from two sides.
+    pub(super) fn add_cloud_to(&self, mut page: HtmlReport) -> Result<HtmlReport> {
+        let cloud = self.cloud()?;
         for (view, caption) in [
             (
                 CloudView::oblique(),

@@ -461,9 +461,12 @@ fn saved(
             focal_correction: !args.no_focal_correction,
             post_process: args.post_process,
             held_out: match model {
-                ModelSource::Run { .. } => {
-                    held_out(estimator.config(), datasets, &evaluated.places)
-                }
+                ModelSource::Run { folder, .. } => held_out(
+                    estimator.config(),
+                    &folder.read_findings()?.averaged,
+                    datasets,
+                    &evaluated.places,
+                ),
                 ModelSource::Packed { network, .. } => {
                     unseen(&network.card, datasets).then_some(true)
                 }

@@ -47,7 +47,10 @@ pub(super) fn of_model(
         Unseen::All
     } else {
         match model {
-            ModelSource::Run { .. } => unseen_frames(estimator.config(), datasets),
+            ModelSource::Run { folder, .. } => {
+                let averaged = folder.read_findings()?.averaged;
+                unseen_frames(estimator.config(), &averaged, datasets)
+            }
             ModelSource::Packed { network, .. } if unseen(&network.card, datasets) => Unseen::All,
             ModelSource::Packed { .. } => Unseen::NotKnown,
         }

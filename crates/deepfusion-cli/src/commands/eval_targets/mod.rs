@@ -28,7 +28,7 @@ use crate::{engine, output};
 struct Report {
     /// `truth`, `lidar` or `predicted`.
     depth: &'static str,
-    /// How the looks at each image were combined, where there were several.
+    /// How the predictions of each image were combined, where there were several.
     #[serde(skip_serializing_if = "Option::is_none")]
     post_process: Option<&'static str>,
     /// What counted as found.

@@ -8,11 +8,27 @@ use crate::progress::say;
 /// `deepfusion weights average`.
 pub(crate) fn run(args: &AverageArgs) -> Result<()> {
     let made = averaging::average(&args.models, args.shares.as_deref(), &args.out)?;
+    for network in &made.networks {
+        say(&format!(
+            "{:.3} of {}",
+            network.share,
+            network.path.display()
+        ));
+    }
     if !made.related {
         tracing::warn!(
-            "nothing says that these networks began from the same one; the mean of others is worth nothing: measure it before it is used"
+            "nothing shows that these networks were trained from the same one; the mean of unrelated networks is worthless"
         );
     }
-    say("measure it beside the runs that it is made of: deepfusion eval, then deepfusion compare");
+    if made.lost_uncertainty {
+        tracing::warn!("not all of them say how sure they are, so the mean does not");
+    }
+    if args.json {
+        return output::print_json(&serde_json::json!({
+            "checkpoint": made.checkpoint,
+            "networks": made.networks,
+            "related": made.related,
+        }));
+    }
     output::print(&format!("{}\n", made.checkpoint.display()))
 }

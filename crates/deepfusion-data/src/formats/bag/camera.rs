@@ -34,7 +34,9 @@ pub(super) fn find(
         source: file.into(),
         field,
     };
-    let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
+    let pinhole = |intrinsics: Intrinsics| {
+        Lens::new(intrinsics, &Distortion::default()).map_err(|e| e.to_string())
+    };
     let mut assumed = false;
     let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
         let given = Intrinsics::from_numbers(numbers, (width, height));
@@ -114,7 +116,8 @@ fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Len
     let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
     if rectified && info.p[0] > 0.0 {
         let p = &info.p;
-        return Lens::new(of(p[0], p[5], p[2], p[6]), &Distortion::default());
+        let camera = of(p[0], p[5], p[2], p[6]);
+        return Lens::new(camera, &Distortion::default()).map_err(|e| e.to_string());
     }
     let known = ["plumb_bob", "rational_polynomial", ""];
     let model = info.distortion_model.as_str();
@@ -125,12 +128,13 @@ fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Len
         ));
     }
     let distortion = match info.d.as_slice() {
-        d if fisheye => Distortion::from_fisheye(d)?,
-        [] => Distortion::default(),
-        d => Distortion::from_opencv(d)?,
+        d if fisheye => Distortion::from_fisheye(d),
+        [] => Ok(Distortion::default()),
+        d => Distortion::from_opencv(d),
     };
+    let distortion = distortion.map_err(|e| e.to_string())?;
     let k = &info.k;
-    Lens::new(of(k[0], k[4], k[2], k[5]), &distortion)
+    Lens::new(of(k[0], k[4], k[2], k[5]), &distortion).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ use crate::{
     Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, OpenOptions, Result,
 };
 use deepfusion_geometry::{StampedPose, Trajectory};
+use deepfusion_hint::count_of;
 use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -168,7 +169,8 @@ fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<MessageRef> {
         return Err(Error::NoFrames {
             path: bag.path().to_owned(),
             why: format!(
-                "none of the {before} messages of {topic} is a key frame, with the parameters that decoding begins with"
+                "{topic} has {} and no key frame among them, with the parameters that decoding begins with",
+                count_of(*before, "message")
             ),
             remedy: "record for longer than from one key frame of the encoder to the next, or have it write them more often".into(),
         });

@@ -249,10 +249,16 @@ impl Recording for KittiRecording {
         )))
     }
 
-    fn dense_depth(&self, frame: &Frame) -> Result<Option<DepthMap>> {
+    fn has_dense_depth(&self, frame: &Frame) -> bool {
         // Only the simulator's masks tell its drives from KITTI's own, whose annotated depth may lie in the same place: there 0
         // is a pixel that no scan has met, here the sky.
-        if self.camera.number() != 2 || !self.drive.folder.join(MASKS).is_dir() {
+        self.camera.number() == 2
+            && self.drive.folder.join(MASKS).is_dir()
+            && self.depth_image(frame).is_some()
+    }
+
+    fn dense_depth(&self, frame: &Frame) -> Result<Option<DepthMap>> {
+        if !self.has_dense_depth(frame) {
             return Ok(None);
         }
         let Some(mut depth) = self.read_depth(frame, "the exact depth")? else {

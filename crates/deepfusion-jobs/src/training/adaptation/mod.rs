@@ -254,14 +254,14 @@ impl HeldOut {
     /// The frames that neither the given network nor the new one learns from; where that leaves none or is not known, those that
     /// the new one does not.
     fn of(datasets: Vec<Dataset>, config: &TrainConfig) -> Self {
-        let mut unseen = unseen_frames(config, &datasets);
+        let mut unseen = unseen_frames(config, &[], &datasets);
         let most = VerdictOptions::default().blocks;
         let maybe_seen =
             unseen == Unseen::NotKnown || plan(&datasets, &unseen, most).blocks.is_empty();
         if maybe_seen {
             let mut alone = config.clone();
             (alone.init, alone.init_sha256) = (None, None);
-            unseen = unseen_frames(&alone, &datasets);
+            unseen = unseen_frames(&alone, &[], &datasets);
         }
         Self {
             datasets,

@@ -114,7 +114,7 @@ fn assign(config: &mut TrainConfig, settings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// A network of many cameras stays as good by several looks as it was. One that learned at several sizes already keeps those.
+/// A network of many cameras stays as good by several predictions as it was. One that learned at several sizes already keeps those.
 fn learn_at_several_sizes(config: &mut TrainConfig, simulated: bool) {
     let sizes = sizes_around(config.size);
     let augmentation = &mut config.augmentation;

@@ -1,0 +1,90 @@
+//! Whether two networks' weights mean the same, so that they have a mean.
+
+use deepfusion_model::{DepthNetConfig, StoredNetwork};
+use toml::Value;
+
+use super::UNCERTAINTY;
+use crate::NoMean;
+
+/// Focal lengths that differ by less are one camera's.
+const SAME_FOCAL: f64 = 1e-3;
+
+/// What stands in the way of a mean with the first network; `None` where nothing does.
+pub(super) fn hindrance(first: &StoredNetwork, other: &StoredNetwork) -> Option<NoMean> {
+    if other.config.learned_camera().is_some() {
+        return Some(NoMean::LearnedCamera);
+    }
+    let settings = || {
+        let canonical = |network: &StoredNetwork| table_of(network.config.canonical_focal_px);
+        difference("depth_net", &bare(first), &bare(other))
+            .or_else(|| difference("canonical_focal_px", &canonical(first), &canonical(other)))
+    };
+    tensors(first, other).or_else(settings).or_else(|| {
+        // With a canonical focal length metres do not depend on the camera that was trained with.
+        if first.config.canonical_focal_px.is_some() {
+            return None;
+        }
+        let (a, b) = (focal(first), focal(other));
+        let same = match (a, b) {
+            (Some(a), Some(b)) => (a / b - 1.0).abs() < SAME_FOCAL,
+            (None, None) => true,
+            _ => false,
+        };
+        let say = |f: Option<f64>| f.map_or("unknown".into(), |f| format!("{f:.1} px"));
+        (!same).then(|| NoMean::Setting {
+            key: "the focal length trained with, at the network's input".into(),
+            found: say(b),
+            first: say(a),
+        })
+    })
+}
+
+/// A tensor that one of them lacks, or that has another shape. The head for uncertainty may be missing.
+fn tensors(first: &StoredNetwork, other: &StoredNetwork) -> Option<NoMean> {
+    let (a, b) = (&first.weights.tensors, &other.weights.tensors);
+    let mut names = a.keys().chain(b.keys());
+    let differs = |name: &&String| match (a.get(*name), b.get(*name)) {
+        (Some(a), Some(b)) => a.shape != b.shape,
+        _ => !name.starts_with(UNCERTAINTY),
+    };
+    let name = names.find(differs)?;
+    Some(NoMean::Layers { name: name.clone() })
+}
+
+/// The settings of the depth network that give its weights their meaning.
+fn bare(network: &StoredNetwork) -> Option<Value> {
+    let mut config: DepthNetConfig = network.config.depth_net.clone();
+    config.uncertainty = false;
+    config.encoder.frozen_statistics = false;
+    if config.r_msfm.is_none() {
+        // A depth that new weights start at; R-MSFM adds to it for good.
+        config.initial_depth_m = None;
+    }
+    table_of(config)
+}
+
+fn table_of(value: impl serde::Serialize) -> Option<Value> {
+    Value::try_from(value).ok()
+}
+
+/// The first key in which two tables differ.
+fn difference(key: &str, first: &Option<Value>, other: &Option<Value>) -> Option<NoMean> {
+    if let (Some(Value::Table(a)), Some(Value::Table(b))) = (first, other) {
+        let keys = a.keys().chain(b.keys().filter(|k| !a.contains_key(*k)));
+        return keys
+            .map(|k| (k, a.get(k).cloned(), b.get(k).cloned()))
+            .find_map(|(k, a, b)| difference(&format!("{key}.{k}"), &a, &b));
+    }
+    let say = |value: &Option<Value>| value.as_ref().map_or("none".into(), Value::to_string);
+    (first != other).then(|| NoMean::Setting {
+        key: key.into(),
+        found: say(other),
+        first: say(first),
+    })
+}
+
+/// f_y of the camera trained with, in pixels of the network's input.
+fn focal(network: &StoredNetwork) -> Option<f64> {
+    let camera = network.camera?;
+    Some(camera.fy * network.config.size.height as f64 / f64::from(camera.height))
+}

@@ -1,0 +1,236 @@
+use super::*;
+use deepfusion_geometry::Intrinsics;
+use deepfusion_model::weights::{WeightTensor, read_safetensors};
+use deepfusion_model::{InputNormalisation, Preset, TrainConfig, TrainFindings};
+
+fn weights(tensors: &[(&str, &[f32])]) -> Weights {
+    let mut weights = Weights::new("test");
+    for (name, values) in tensors {
+        let (shape, values) = (vec![values.len()], values.to_vec());
+        let tensor = WeightTensor { shape, values };
+        weights.tensors.insert((*name).into(), tensor);
+    }
+    weights
+}
+
+const STATE: Checkpoint = Checkpoint {
+    step: 7,
+    best_validation: Some(0.25),
+    skipped: 0,
+    encoders_only: false,
+    focal_ratio: None,
+};
+
+/// A run of that folder's name with a checkpoint.
+fn run(
+    (folder, kind): (&Path, CheckpointKind),
+    tensors: &[(&str, &[f32])],
+    state: Checkpoint,
+    change: impl FnOnce(&mut TrainConfig, &mut TrainFindings),
+) -> PathBuf {
+    let run = RunFolder::create(folder).unwrap();
+    let (mut config, mut findings) = (Preset::Tiny.config(), TrainFindings::default());
+    change(&mut config, &mut findings);
+    run.write_config(&config, &findings).unwrap();
+    let mut all = weights(tensors);
+    all.metadata = state.metadata();
+    write_safetensors(&run.checkpoint_path(kind), &all).unwrap();
+    folder.to_owned()
+}
+
+/// The depth network's values of the mean.
+fn depth_of(made: &Averaged) -> Weights {
+    read_safetensors(&made.checkpoint).unwrap().under("depth.")
+}
+
+const LAST: CheckpointKind = CheckpointKind::Last;
+const LAYERS: [(&str, &[f32]); 1] = [("depth.a", &[1.0, 2.0])];
+
+#[test]
+fn depth_is_the_mean_and_the_rest_the_firsts() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let tensors: [(&str, &[f32]); 3] = [
+        ("depth.a", &[1.0, 2.0]),
+        ("pose.a", &[8.0]),
+        ("adam.m.depth.a", &[1.0, 1.0]),
+    ];
+    let first = run((&at.join("first"), LAST), &tensors, STATE, |_, _| {});
+    // A folder stands for its best checkpoint.
+    let tensors: [(&str, &[f32]); 2] = [("depth.a", &[3.0, 6.0]), ("pose.a", &[0.0])];
+    let second = run(
+        (&at.join("second"), CheckpointKind::Best),
+        &tensors,
+        STATE,
+        |config, _| config.init = Some(first.join("last.safetensors")),
+    );
+    let both = [first, second.clone()];
+    let made = average(&both, None, &at.join("mean")).unwrap();
+    assert!(made.related && !made.lost_uncertainty);
+    let found = read_safetensors(&made.checkpoint).unwrap();
+    let expected = weights(&[("depth.a", &[2.0, 4.0]), ("pose.a", &[8.0])]);
+    assert_eq!(found.tensors, expected.tensors);
+    let (folder, _) = RunFolder::open(&made.checkpoint).unwrap();
+    let state = folder.read_state(LAST).unwrap();
+    assert_eq!((state.step, state.best_validation), (7, None));
+    let averaged = folder.read_findings().unwrap().averaged;
+    assert_eq!(averaged, made.networks);
+    assert_eq!(averaged[1].path, second.join("best.safetensors"));
+    assert_eq!(averaged[1].share, 0.5);
+
+    let shares = [3.0, 1.0];
+    let less = average(&both, Some(&shares), &at.join("less")).unwrap();
+    assert_eq!(depth_of(&less).tensors["a"].values, [1.5, 3.0]);
+    // What is there stays.
+    let again = average(&both, None, &at.join("mean"));
+    assert!(matches!(again, Err(Error::Occupied { .. })), "{again:?}");
+    // A mean comes from what it is the mean of, by whichever way that was named.
+    let by_slash = at.join("second/../second/");
+    let again = average(&[at.join("mean"), by_slash], None, &at.join("again"));
+    assert!(again.unwrap().related);
+}
+
+#[test]
+fn shares_are_positive_and_one_for_each() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let one = run((&at.join("one"), LAST), &LAYERS, STATE, |_, _| {});
+    let both = [one.clone(), one];
+    for shares in [&[1.0][..], &[1.0, 0.0], &[1.0, f64::NAN], &[1e308, 1e308]] {
+        let refused = average(&both, Some(shares), &at.join("no"));
+        assert!(matches!(refused, Err(Error::Shares { networks: 2, .. })));
+    }
+    assert!(average(&[], None, &at.join("no")).is_err());
+}
+
+/// A seed's weights and another seed's, and a run of which nothing is left but its name.
+#[test]
+fn relatives_are_told_from_strangers() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let from = |name: &str, init: Option<&str>| {
+        run((&at.join(name), LAST), &LAYERS, STATE, |config, _| {
+            config.init = init.map(|init| at.join(init));
+        })
+    };
+    let encoders = Checkpoint {
+        encoders_only: true,
+        ..STATE
+    };
+    run((&at.join("imagenet"), LAST), &LAYERS, encoders, |_, _| {});
+    std::fs::write(at.join("resnet18.pth"), b"PK").unwrap();
+    for (name, inits, related) in [
+        ("seeds", [None, None], false),
+        ("gone", [Some("gone/run"), Some("gone/run")], true),
+        ("encoders", [Some("imagenet"), Some("imagenet")], false),
+        (
+            "resnet",
+            [Some("resnet18.pth"), Some("resnet18.pth")],
+            false,
+        ),
+    ] {
+        let both = [0, 1].map(|i| from(&format!("{name}{i}"), inits[i]));
+        let made = average(&both, None, &at.join(name)).unwrap();
+        assert_eq!(made.related, related, "{name}");
+    }
+}
+
+/// It stays where all have it, and goes where one has not: it reads the others' features.
+#[test]
+fn the_head_for_uncertainty_is_everyones_or_no_ones() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let sure: [(&str, &[f32]); 2] = [("depth.a", &[1.0, 2.0]), ("depth.uncertainty.bias", &[4.0])];
+    let has = |config: &mut TrainConfig, _: &mut TrainFindings| config.depth_net.uncertainty = true;
+    let sure = [0, 1].map(|i| run((&at.join(format!("sure{i}")), LAST), &sure, STATE, has));
+    let plain = run((&at.join("plain"), LAST), &LAYERS, STATE, |_, _| {});
+    let made = |name: &str, a: &Path, b: &Path| {
+        let made = average(&[a.to_owned(), b.to_owned()], None, &at.join(name)).unwrap();
+        let (folder, _) = RunFolder::open(&made.checkpoint).unwrap();
+        let says = folder.read_settings().unwrap().depth_net.uncertainty;
+        let has = depth_of(&made).tensors.contains_key("uncertainty.bias");
+        assert_eq!(says, has, "{name}");
+        (has, made.lost_uncertainty)
+    };
+    assert_eq!(made("both", &sure[0], &sure[1]), (true, false));
+    assert_eq!(made("first", &sure[0], &plain), (false, true));
+    assert_eq!(made("second", &plain, &sure[0]), (false, true));
+}
+
+#[test]
+fn what_means_something_else_is_refused() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let seen_by = |fy: f64| {
+        move |findings: &mut TrainFindings| {
+            findings.camera = Some(Intrinsics {
+                fx: fy,
+                fy,
+                cx: 160.0,
+                cy: 48.0,
+                width: 320,
+                height: 96,
+            });
+        }
+    };
+    let first = run((&at.join("first"), LAST), &LAYERS, STATE, |_, f| {
+        seen_by(200.0)(f);
+    });
+    type Change = fn(&mut TrainConfig, &mut TrainFindings);
+    let changes: [(&str, Change); 6] = [
+        ("depth_net.range.max_m", |c, _| {
+            c.depth_net.range.max_m = 70.0;
+        }),
+        ("depth_net.encoder.normalisation", |c, _| {
+            c.depth_net.encoder.normalisation = InputNormalisation::ImageNet;
+        }),
+        ("depth_net.encoder.multi_grid", |c, _| {
+            c.depth_net.encoder.multi_grid = [1, 2, 4];
+        }),
+        ("canonical_focal_px", |c, _| {
+            c.canonical_focal_px = Some(300.0)
+        }),
+        ("focal length", |_, f| {
+            f.camera.as_mut().unwrap().fy = 260.0;
+        }),
+        ("focal length", |_, f| f.camera = None),
+    ];
+    for (i, (key, change)) in changes.into_iter().enumerate() {
+        let folder = at.join(i.to_string());
+        let other = run((&folder, LAST), &LAYERS, STATE, |c, f| {
+            seen_by(200.0)(f);
+            change(c, f);
+        });
+        let refused = average(&[first.clone(), other.clone()], None, &at.join("no"));
+        let Err(Error::NoMean { path, why }) = refused else {
+            panic!("{key}: {refused:?}");
+        };
+        assert_eq!(path, other);
+        assert!(why.to_string().contains(key), "{why}");
+    }
+    let shapes: [&[(&str, &[f32])]; 3] = [
+        &[("depth.b", &[1.0, 2.0])],
+        &[("depth.a", &[1.0])],
+        &[("depth.a", &[1.0, 2.0]), ("depth.b", &[1.0])],
+    ];
+    for (i, tensors) in shapes.into_iter().enumerate() {
+        let folder = at.join(format!("layers{i}"));
+        let other = run((&folder, LAST), tensors, STATE, |_, f| seen_by(200.0)(f));
+        let refused = average(&[first.clone(), other], None, &at.join("no"));
+        let why = NoMean::Layers {
+            name: if i == 1 { "a" } else { "b" }.into(),
+        };
+        let is_it =
+            |e: &Error| matches!(e, Error::NoMean { why: found, .. } if i == 0 || *found == why);
+        assert!(refused.as_ref().is_err_and(is_it), "{refused:?}");
+    }
+    let encoders = Checkpoint {
+        encoders_only: true,
+        ..STATE
+    };
+    let encoders = run((&at.join("encoders"), LAST), &LAYERS, encoders, |_, _| {});
+    let refused = average(&[first, encoders], None, &at.join("no"));
+    let why = NoMean::EncodersOnly;
+    assert!(matches!(refused, Err(Error::NoMean { why: found, .. }) if found == why));
+    assert!(!at.join("no").exists());
+}
