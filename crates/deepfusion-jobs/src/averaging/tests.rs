@@ -141,7 +141,12 @@ fn the_head_for_uncertainty_is_everyones_or_no_ones() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let sure: [(&str, &[f32]); 2] = [("depth.a", &[1.0, 2.0]), ("depth.uncertainty.bias", &[4.0])];
-    let has = |config: &mut TrainConfig, _: &mut TrainFindings| config.depth_net.uncertainty = true;
+    let has = |config: &mut TrainConfig, _: &mut TrainFindings| {
+        config.depth_net.uncertainty = true;
+        // The head learns from known depth alone.
+        let set = "sets = [{ name = 'streets', learn = 'depth', simulated = { seed = 1 } }]";
+        config.data = toml::from_str(set).unwrap();
+    };
     let sure = [0, 1].map(|i| run((&at.join(format!("sure{i}")), LAST), &sure, STATE, has));
     let plain = run((&at.join("plain"), LAST), &LAYERS, STATE, |_, _| {});
     let made = |name: &str, a: &Path, b: &Path| {
@@ -182,10 +187,10 @@ fn what_means_something_else_is_refused() {
             c.depth_net.range.max_m = 70.0;
         }),
         ("depth_net.encoder.normalisation", |c, _| {
-            c.depth_net.encoder.normalisation = InputNormalisation::ImageNet;
+            c.depth_net.encoder.normalisation = InputNormalisation::Centred;
         }),
         ("depth_net.encoder.multi_grid", |c, _| {
-            c.depth_net.encoder.multi_grid = [1, 2, 4];
+            c.depth_net.encoder.multi_grid = [1, 2, 1];
         }),
         ("canonical_focal_px", |c, _| {
             c.canonical_focal_px = Some(300.0)
