@@ -3,8 +3,8 @@
 //! Networks that were trained from the same one lie in one valley of the loss, so that the mean of their weights is a network as well, and can be a better
 //! one on images that none of them saw ("model soups", Wortsman et al., arXiv 2203.05482; of a network and the one it began from, arXiv 2109.01903).
 //!
-//! What batch norms measured of their inputs is averaged like weights. That is exact where they were frozen (`frozen_statistics`), as in `adapt`, and
-//! close where networks are: the mean's own features are a little smaller than the mean of all features.
+//! What batch norms measured of their inputs is averaged like weights, and not measured anew. Where they were frozen (`frozen_statistics`), as in
+//! `adapt`, all networks have the same.
 
 mod ancestors;
 mod fit;

@@ -150,16 +150,6 @@ pub fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) ->
     chunks.iter().map(|chunk| convert(*chunk)).collect()
 }
 
-/// Numbers as bytes. Cheap without optimisation, too: a checkpoint has tens of millions.
-fn le_bytes(values: &[f32]) -> Vec<u8> {
-    let mut bytes = vec![0; 4 * values.len()];
-    let (chunks, _) = bytes.as_chunks_mut::<4>();
-    for (chunk, value) in chunks.iter_mut().zip(values) {
-        *chunk = value.to_le_bytes();
-    }
-    bytes
-}
-
 /// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is
 /// complete and on the disk.
 ///
@@ -169,7 +159,10 @@ pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkEr
     let bytes: Vec<(&String, &WeightTensor, Vec<u8>)> = weights
         .tensors
         .iter()
-        .map(|(name, tensor)| (name, tensor, le_bytes(&tensor.values)))
+        .map(|(name, tensor)| {
+            let bytes = tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            (name, tensor, bytes)
+        })
         .collect();
     let mut views = Vec::with_capacity(bytes.len());
     for (name, tensor, bytes) in &bytes {
