@@ -58,6 +58,20 @@ impl Geometry {
     }
 }
 
+/// Pixels row by row from one on, as x and y: a division for the first of them, not for each.
+#[cfg(target_arch = "x86_64")]
+pub(crate) fn pixels_from(first: usize, width: usize) -> impl Iterator<Item = (usize, usize)> {
+    let (mut x, mut y) = (first % width, first / width);
+    std::iter::repeat_with(move || {
+        let pixel = (x, y);
+        x += 1;
+        if x == width {
+            (x, y) = (0, y + 1);
+        }
+        pixel
+    })
+}
+
 /// Inputs of one output pixel that lie one after the other in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Runs {

@@ -70,6 +70,8 @@ impl ConvForm<f32> for F32Conv {
 #[derive(Debug)]
 pub(crate) enum Bf16Conv {
     Amx(crate::bf16::Amx),
+    Head(crate::bf16::HeadDot),
+    Winograd(crate::bf16::WinogradDot),
     Dot(crate::bf16::Dot),
 }
 
@@ -77,6 +79,21 @@ pub(crate) enum Bf16Conv {
 impl Bf16Conv {
     pub(crate) fn available() -> bool {
         crate::bf16::has_dot()
+    }
+
+    /// The form by dot products of pairs.
+    pub(crate) fn without_matrix_unit(
+        conv: &Conv,
+        geometry: Geometry,
+        channel_of: &[Option<usize>],
+    ) -> Self {
+        if geometry.out.result {
+            Self::Head(crate::bf16::HeadDot::new(conv, geometry, channel_of))
+        } else if crate::bf16::WinogradDot::fits(conv, &geometry, channel_of) {
+            Self::Winograd(crate::bf16::WinogradDot::new(conv, geometry, channel_of))
+        } else {
+            Self::Dot(crate::bf16::Dot::new(conv, geometry, channel_of))
+        }
     }
 }
 
@@ -86,7 +103,7 @@ impl ConvForm<Bf16> for Bf16Conv {
         if crate::bf16::has_amx() {
             Self::Amx(crate::bf16::Amx::new(conv, geometry, channel_of))
         } else {
-            Self::Dot(crate::bf16::Dot::new(conv, geometry, channel_of))
+            Self::without_matrix_unit(conv, geometry, channel_of)
         }
     }
 
@@ -97,6 +114,8 @@ impl ConvForm<Bf16> for Bf16Conv {
     fn name(&self) -> &'static str {
         match self {
             Self::Amx(conv) => conv.name(),
+            Self::Head(_) => "head",
+            Self::Winograd(_) => "winograd",
             Self::Dot(conv) => conv.name(),
         }
     }
@@ -104,6 +123,8 @@ impl ConvForm<Bf16> for Bf16Conv {
     fn geometry(&self) -> &Geometry {
         match self {
             Self::Amx(conv) => conv.geometry(),
+            Self::Head(conv) => conv.geometry(),
+            Self::Winograd(conv) => conv.geometry(),
             Self::Dot(conv) => conv.geometry(),
         }
     }
@@ -111,6 +132,8 @@ impl ConvForm<Bf16> for Bf16Conv {
     fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
         match self {
             Self::Amx(conv) => conv.reads_on(),
+            // The head reads its inputs alone, Winograd's tiles pixels of the image and its border.
+            Self::Head(_) | Self::Winograd(_) => None,
             Self::Dot(conv) => conv.reads_on(),
         }
     }
@@ -120,6 +143,8 @@ impl ConvForm<Bf16> for Bf16Conv {
         unsafe {
             match self {
                 Self::Amx(conv) => conv.run(arena),
+                Self::Head(conv) => conv.run(arena),
+                Self::Winograd(conv) => conv.run(arena),
                 Self::Dot(conv) => conv.run(arena),
             }
         }

@@ -37,6 +37,7 @@ mod tests;
 mod tile;
 mod view;
 mod winograd;
+mod winograd_tiles;
 
 pub use engine::{Engine, Precision};
 pub use error::Error;

@@ -3,28 +3,33 @@
 use std::cell::RefCell;
 
 use crate::aligned::Aligned;
+#[cfg(target_arch = "x86_64")]
+use crate::element::Bf16;
+use crate::element::Plain;
 use crate::tile::Pixel;
 
 /// Buffers that only grow; each task overwrites what it takes.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    pub(crate) first: GrowingBuffer,
-    pub(crate) second: GrowingBuffer,
+    pub(crate) first: GrowingBuffer<f32>,
+    pub(crate) second: GrowingBuffer<f32>,
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) halves: GrowingBuffer<Bf16>,
     pub(crate) pixels: Vec<Pixel>,
 }
 
 /// Numbers as many as were ever asked for at once.
-pub(crate) struct GrowingBuffer(Aligned<f32>);
+pub(crate) struct GrowingBuffer<T>(Aligned<T>);
 
-impl Default for GrowingBuffer {
+impl<T: Plain> Default for GrowingBuffer<T> {
     fn default() -> Self {
         Self(Aligned::zeros(0))
     }
 }
 
-impl GrowingBuffer {
+impl<T: Plain> GrowingBuffer<T> {
     /// The first `len` numbers, whatever they are.
-    pub(crate) fn take(&mut self, len: usize) -> &mut [f32] {
+    pub(crate) fn take(&mut self, len: usize) -> &mut [T] {
         if self.0.len() < len {
             self.0 = Aligned::zeros(len);
         }

@@ -3,9 +3,6 @@
 //! y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs y (Lavin and Gray,
 //! "Fast Algorithms for Convolutional Neural Networks", 2016). The sums over channels of ⊙ are 36
 //! matrix products.
-//!
-//! A kernel dilated by r sees an image as r×r images, each every r-th row and column (phases): its tiles take
-//! every r-th pixel.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -17,6 +14,7 @@ use crate::dispatch::dispatch;
 use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::{Shared, View};
+use crate::winograd_tiles::{TileOrigin, Tiles};
 
 /// Outputs of a tile along one side.
 const OUT: usize = 4;
@@ -62,7 +60,7 @@ impl Winograd {
             return false;
         }
         // Products with the pixels that only fill up tiles, of which a phase of few pixels has many.
-        let products = AREA * Tiles::new(geometry).count();
+        let products = AREA * Tiles::new(geometry, OUT).count();
         channel_of.len().is_multiple_of(LANES) && 2 * products <= geometry.taps() * pixels
     }
 
@@ -109,7 +107,7 @@ impl Winograd {
     /// # Safety
     /// As [`crate::direct::Direct::run`].
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
-        let all = Tiles::new(&self.geometry).count();
+        let all = Tiles::new(&self.geometry, OUT).count();
         // Whole rounds for all threads, where there are few tasks.
         let rounds = all
             .div_ceil(self.tiles)
@@ -151,53 +149,6 @@ fn transformed_kernel(g: &[f64; 9]) -> [f64; AREA] {
     out
 }
 
-/// The tiles of all phases of an image.
-#[derive(Debug, Clone, Copy)]
-struct Tiles {
-    /// Of a phase.
-    across: usize,
-    /// Of a phase.
-    down: usize,
-    /// Pixels from one of a phase to the next.
-    step: usize,
-}
-
-/// A tile's first output pixel, and the step to the next.
-#[derive(Debug, Clone, Copy)]
-struct TileOrigin {
-    x: usize,
-    y: usize,
-    step: usize,
-}
-
-impl Tiles {
-    fn new(g: &Geometry) -> Self {
-        let of = |side: usize| side.div_ceil(g.dilation).div_ceil(OUT);
-        Self {
-            across: of(g.out.width),
-            down: of(g.out.height),
-            step: g.dilation,
-        }
-    }
-
-    fn count(self) -> usize {
-        self.across * self.down * self.step * self.step
-    }
-
-    fn of(self, tile: usize) -> TileOrigin {
-        let (phase, tile) = (
-            tile / (self.across * self.down),
-            tile % (self.across * self.down),
-        );
-        let along = |tile: usize, phase: usize| tile * OUT * self.step + phase;
-        TileOrigin {
-            x: along(tile % self.across, phase % self.step),
-            y: along(tile / self.across, phase / self.step),
-            step: self.step,
-        }
-    }
-}
-
 struct Task<'a> {
     conv: &'a Winograd,
     arena: Shared<'a, f32>,
@@ -223,7 +174,7 @@ impl WithSimd for Task<'_> {
             rows,
         } = self;
         let (count, columns) = (range.len(), conv.bias.len());
-        let places = Tiles::new(&conv.geometry);
+        let places = Tiles::new(&conv.geometry, OUT);
         for (i, part) in conv.parts.iter().enumerate() {
             let size = part.len();
             let input = View {
@@ -369,15 +320,13 @@ impl Winograd {
         simd: S,
         arena: Shared<f32>,
         from: &[f32],
-        TileOrigin { x, y, step }: TileOrigin,
+        origin @ TileOrigin { x, y, step }: TileOrigin,
     ) {
         let g = &self.geometry;
         let columns = self.bias.len();
         assert_eq!(from.len(), AREA * columns, "a tile's products");
         let from = from.as_ptr();
-        let within = |first: usize, side: usize| OUT.min(side.saturating_sub(first).div_ceil(step));
-        let across = within(x, g.out.width);
-        let down = within(y, g.out.height);
+        let (across, down) = origin.inside(g, OUT);
         if across == 0 || down == 0 {
             return;
         }

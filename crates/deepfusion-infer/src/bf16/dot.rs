@@ -9,7 +9,7 @@ use std::mem::transmute;
 use super::{Epilogue, OutputPixel};
 use crate::Conv;
 use crate::aligned::Aligned;
-use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
+use crate::conv::{Geometry, Runs, Tasks, padded_bias, pixels_from, weight};
 use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
 use crate::scratch::with_scratch;
@@ -17,11 +17,13 @@ use crate::tile::{GROUP, LANES};
 use crate::view::Shared;
 
 /// Inputs summed before the sums go back to memory: their weights stay in the first cache.
-const INPUTS_AT_ONCE: usize = 320;
+pub(super) const INPUTS_AT_ONCE: usize = 320;
 /// Output pixels of a task.
 const PIXELS_AT_ONCE: usize = 480;
-/// Pixels whose sums are kept in registers, at four vectors each.
-const ROWS: usize = 6;
+/// Pixels whose sums are kept in registers, at two vectors each.
+pub(super) const ROWS: usize = 6;
+/// The same of a single vector: fewer sums than an addition takes cycles would wait for each other.
+const NARROW_ROWS: usize = 2 * ROWS;
 
 /// A convolution ready to run.
 #[derive(Debug)]
@@ -75,32 +77,30 @@ impl ConvForm<Bf16> for Dot {
     /// As the trait says; the processor must have the instructions.
     unsafe fn run(&self, arena: Shared<Bf16>) {
         let groups = self.bias.len().div_ceil(GROUP);
-        Tasks::new(self.geometry.out.pixels(), PIXELS_AT_ONCE, ROWS, groups).run(
-            |pixels, groups| {
-                with_scratch(|scratch| {
-                    let sums = scratch
-                        .first
-                        .take(pixels.len().next_multiple_of(ROWS) * GROUP);
-                    for group in groups {
-                        // SAFETY: the caller's promise; each pixel and group belongs to one task.
-                        unsafe {
-                            self.sum(arena, group, pixels.clone(), sums);
-                            self.finish(arena, group, pixels.clone(), sums);
-                        }
+        Tasks::new(
+            self.geometry.out.pixels(),
+            PIXELS_AT_ONCE,
+            NARROW_ROWS,
+            groups,
+        )
+        .run(|pixels, groups| {
+            with_scratch(|scratch| {
+                let sums = scratch
+                    .first
+                    .take(pixels.len().next_multiple_of(NARROW_ROWS) * GROUP);
+                for group in groups {
+                    // SAFETY: the caller's promise; each pixel and group belongs to one task.
+                    unsafe {
+                        self.sum(arena, group, pixels.clone(), sums);
+                        self.finish(arena, group, pixels.clone(), sums);
                     }
-                });
-            },
-        );
+                }
+            });
+        });
     }
 }
 
 impl Dot {
-    /// Where a pixel's first tap lies.
-    fn input(&self, pixel: usize) -> usize {
-        let width = self.geometry.out.width;
-        self.geometry.first_tap(pixel % width, pixel / width)
-    }
-
     fn width(&self, group: usize) -> usize {
         GROUP.min(self.bias.len() - group * GROUP)
     }
@@ -117,17 +117,43 @@ impl Dot {
         pixels: std::ops::Range<usize>,
         sums: &mut [f32],
     ) {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if self.width(group) > LANES {
+                self.sum_by::<ROWS>(arena, group, pixels, sums);
+            } else {
+                self.sum_by::<NARROW_ROWS>(arena, group, pixels, sums);
+            }
+        }
+    }
+
+    /// The same, `R` pixels at a time.
+    ///
+    /// # Safety
+    /// As [`Self::sum`].
+    #[target_feature(enable = "avx512f,avx512bf16")]
+    unsafe fn sum_by<const R: usize>(
+        &self,
+        arena: Shared<Bf16>,
+        group: usize,
+        pixels: std::ops::Range<usize>,
+        sums: &mut [f32],
+    ) {
         let width = self.width(group);
         let panel = &self.panels[group * GROUP * self.runs.sources.len()..];
         let at_once = (INPUTS_AT_ONCE / self.runs.len).max(1);
         for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
-            let starts = pixels.clone().step_by(ROWS);
-            for (start, sums) in starts.zip(sums.chunks_mut(ROWS * GROUP)) {
-                // Too few pixels are filled up with the last; nobody reads those sums.
-                let rows: [*const Bf16; ROWS] = std::array::from_fn(|r| {
-                    let pixel = (start + r).min(pixels.end - 1);
-                    arena.at(self.input(pixel), self.runs.extent).cast_const()
-                });
+            let mut inputs = pixels_from(pixels.start, self.geometry.out.width)
+                .take(pixels.len())
+                .map(|(x, y)| arena.at(self.geometry.first_tap(x, y), self.runs.extent))
+                .peekable();
+            let Some(first) = inputs.peek() else { return };
+            let mut rows = [first.cast_const(); R];
+            for sums in sums.chunks_mut(R * GROUP).take(pixels.len().div_ceil(R)) {
+                // Too few pixels are filled up with those before them; nobody reads those sums.
+                for (row, input) in rows.iter_mut().zip(&mut inputs) {
+                    *row = input.cast_const();
+                }
                 for column in (0..width).step_by(2 * LANES) {
                     let tile = Tile {
                         rows,
@@ -137,10 +163,11 @@ impl Dot {
                         stride: 2 * width,
                         add: i > 0,
                         sums: sums[column..].as_mut_ptr(),
+                        pitch: GROUP,
                     };
                     // SAFETY: the runs lie within their extent, which is in the arena and which nobody writes (the
-                    // promise of `run`), but where the runs read on; the panel has a row for every pair of inputs,
-                    // the sums room for every pixel. The processor has the instructions.
+                    // promise of `run`), but where the runs read on; the panel has a row for every pair of inputs, the
+                    // sums room for every pixel. The processor has the instructions.
                     unsafe {
                         if width - column >= 2 * LANES {
                             tile.run::<2>();
@@ -165,8 +192,8 @@ impl Dot {
     ) {
         let g = &self.geometry;
         let finish = Epilogue::new(g, &self.bias, arena);
-        let place = |p: usize| OutputPixel::new(g, p % g.out.width, p / g.out.width);
         if g.out.result {
+            let place = |p: usize| OutputPixel::new(g, p % g.out.width, p / g.out.width);
             for first in pixels.clone().step_by(LANES) {
                 let inside = |p: &usize| *p < pixels.end;
                 let places = std::array::from_fn::<_, LANES, _>(|i| {
@@ -178,8 +205,9 @@ impl Dot {
             }
             return;
         }
-        let places = pixels.map(place);
-        for (place, sums) in places.zip(sums.chunks(GROUP)) {
+        let places = pixels_from(pixels.start, g.out.width).take(pixels.len());
+        for ((x, y), sums) in places.zip(sums.chunks(GROUP)) {
+            let place = OutputPixel::new(g, x, y);
             for c in (0..self.width(group)).step_by(LANES) {
                 let sums = &sums[c..][..LANES];
                 // SAFETY: sixteen sums; the rest as above, and the processor has the instructions.
@@ -189,35 +217,36 @@ impl Dot {
     }
 }
 
-/// [`ROWS`] pixels by a few vectors of output channels.
-struct Tile<'a> {
-    rows: [*const Bf16; ROWS],
-    runs: &'a [usize],
-    len: usize,
-    panel: *const Bf16,
+/// `R` pixels by a few vectors of output channels.
+pub(super) struct Tile<'a, const R: usize> {
+    pub(super) rows: [*const Bf16; R],
+    pub(super) runs: &'a [usize],
+    pub(super) len: usize,
+    pub(super) panel: *const Bf16,
     /// Elements of a row of the panel.
-    stride: usize,
+    pub(super) stride: usize,
     /// Whether the sums go on from what they are.
-    add: bool,
-    /// [`GROUP`] values from a pixel to the next.
-    sums: *mut f32,
+    pub(super) add: bool,
+    pub(super) sums: *mut f32,
+    /// Sums from a pixel to the next.
+    pub(super) pitch: usize,
 }
 
-impl Tile<'_> {
+impl<const R: usize> Tile<'_, R> {
     /// # Safety
     /// The runs must be readable, the panel as long as they are, the sums writable; the processor must have the
     /// instructions.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bf16")]
-    unsafe fn run<const V: usize>(self) {
-        let mut sums = [[_mm512_setzero_ps(); V]; ROWS];
+    pub(super) unsafe fn run<const V: usize>(self) {
+        let mut sums = [[_mm512_setzero_ps(); V]; R];
         // SAFETY: what is read and written is the caller's promise. A pair of bf16 is 32 bits; a vector of pairs and one
         // of integers are the same bits.
         unsafe {
             if self.add {
-                for r in 0..ROWS {
+                for r in 0..R {
                     for v in 0..V {
-                        sums[r][v] = _mm512_loadu_ps(self.sums.add(r * GROUP + v * LANES));
+                        sums[r][v] = _mm512_loadu_ps(self.sums.add(r * self.pitch + v * LANES));
                     }
                 }
             }
@@ -229,7 +258,7 @@ impl Tile<'_> {
                         weights[v] = _mm512_loadu_si512(panel.add(2 * v * LANES).cast());
                     }
                     panel = panel.add(self.stride);
-                    for r in 0..ROWS {
+                    for r in 0..R {
                         let pair = self.rows[r].add(k).cast::<i32>().read_unaligned();
                         let pair = _mm512_set1_epi32(pair);
                         for v in 0..V {
@@ -242,9 +271,9 @@ impl Tile<'_> {
                     }
                 }
             }
-            for r in 0..ROWS {
+            for r in 0..R {
                 for v in 0..V {
-                    _mm512_storeu_ps(self.sums.add(r * GROUP + v * LANES), sums[r][v]);
+                    _mm512_storeu_ps(self.sums.add(r * self.pitch + v * LANES), sums[r][v]);
                 }
             }
         }

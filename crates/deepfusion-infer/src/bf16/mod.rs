@@ -2,6 +2,8 @@
 
 mod amx;
 mod dot;
+mod head;
+mod winograd;
 
 use std::arch::x86_64::{
     __m256bh, __m256i, __m512, _mm256_loadu_si256, _mm256_storeu_si256, _mm512_add_ps,
@@ -20,6 +22,8 @@ use crate::view::Shared;
 
 pub(crate) use amx::Amx;
 pub(crate) use dot::Dot;
+pub(crate) use head::HeadDot;
+pub(crate) use winograd::WinogradDot;
 
 /// Whether the processor multiplies pairs of bf16 (AVX512-BF16).
 pub(crate) fn has_dot() -> bool {
@@ -77,12 +81,23 @@ impl<'a> Epilogue<'a> {
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     pub(crate) unsafe fn channels(&self, place: OutputPixel, c: usize, sums: *const f32) {
+        // SAFETY: sixteen values; the rest is the caller's promise.
+        unsafe { self.vector(place, c, _mm512_loadu_ps(sums)) };
+    }
+
+    /// The same of sums in a register.
+    ///
+    /// # Safety
+    /// As [`Self::channels`].
+    #[inline]
+    #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
+    pub(crate) unsafe fn vector(&self, place: OutputPixel, c: usize, sums: __m512) {
         let bias = &self.bias[c..][..LANES];
         // SAFETY: sixteen values of the bias and, as `at` checks, of the arena; the rest is the caller's promise.
         // Vectors of one size are arrays of the same numbers, whoever names them.
         unsafe {
             let bias = _mm512_loadu_ps(bias.as_ptr());
-            let mut sum = _mm512_add_ps(_mm512_loadu_ps(sums), bias);
+            let mut sum = _mm512_add_ps(sums, bias);
             if self.geometry.residual.is_some() {
                 let bits = _mm256_loadu_si256(self.arena.at(place.residual + c, LANES).cast());
                 let bits = _mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits));
@@ -100,6 +115,8 @@ impl<'a> Epilogue<'a> {
     ///
     /// # Safety
     /// As [`Self::channels`].
+    #[inline]
+    #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn results(&self, places: &[Option<OutputPixel>], sums: impl Fn(usize) -> f32) {
         let mut values = [0.0_f32; LANES];
         for (p, value) in values.iter_mut().enumerate().take(places.len()) {

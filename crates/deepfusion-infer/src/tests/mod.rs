@@ -13,10 +13,16 @@ mod transposed;
 
 use proptest::prelude::*;
 
+#[cfg(target_arch = "x86_64")]
+use crate::conv::{Geometry, Runs};
 use crate::conv_form::ConvForm;
 use crate::dispatch::tests::{Level, with_level};
 use crate::element::Element;
 use crate::engine::Typed;
+#[cfg(target_arch = "x86_64")]
+use crate::forms::Bf16Conv;
+#[cfg(target_arch = "x86_64")]
+use crate::view::Shared;
 use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 use build::{Builder, deviation, noise, noise_image};
 use oracle::run;
@@ -112,8 +118,10 @@ proptest! {
                 prop_assert!(off < 0.06, "amx off by {off}");
             }
             if crate::bf16::has_dot() {
-                let off = deviation(&output_of::<Bf16, crate::bf16::Dot>(graph, &image, width), exact);
+                let off = deviation(&output_of::<Bf16, crate::bf16::Dot>(graph.clone(), &image, width), exact);
                 prop_assert!(off < 0.06, "dot off by {off}");
+                let off = deviation(&output_of::<Bf16, WithoutMatrixUnit>(graph, &image, width), exact);
+                prop_assert!(off < 0.06, "without matrix unit off by {off}");
             }
         }
     }
@@ -162,6 +170,83 @@ fn both_bf16_forms_round_alike() {
     let (sum, most) = off.fold((0.0, 0.0_f32), |(sum, most), d| (sum + d, most.max(d)));
     let mean = sum / amx.len() as f32;
     assert!(mean < 1e-3 && most < 2e-2, "mean {mean}, most {most}");
+}
+
+/// What a processor without a matrix unit takes in bf16, also where there is one.
+#[cfg(target_arch = "x86_64")]
+#[derive(Debug)]
+struct WithoutMatrixUnit(Bf16Conv);
+
+#[cfg(target_arch = "x86_64")]
+impl ConvForm<crate::element::Bf16> for WithoutMatrixUnit {
+    fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
+        Self(Bf16Conv::without_matrix_unit(conv, geometry, channel_of))
+    }
+
+    fn overread(pitch: usize) -> usize {
+        Bf16Conv::overread(pitch)
+    }
+
+    fn name(&self) -> &'static str {
+        self.0.name()
+    }
+
+    fn geometry(&self) -> &Geometry {
+        self.0.geometry()
+    }
+
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+        self.0.reads_on()
+    }
+
+    unsafe fn run(&self, arena: Shared<crate::element::Bf16>) {
+        // SAFETY: the caller's promise.
+        unsafe { self.0.run(arena) };
+    }
+}
+
+/// Every kind of convolution that takes Winograd's form in bf16: dilated or not, both borders, a residual, channels that fill up a vector, images
+/// whose tiles reach over the edge.
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn winograd_in_bf16_is_as_near_the_truth_as_plain_sums() {
+    use crate::element::Bf16;
+    if !crate::bf16::has_dot() {
+        return;
+    }
+    let mut b = Builder {
+        graph: Graph::new([0.4; 3], [0.3; 3]),
+        noise: noise(21),
+    };
+    let first = b.conv(ValueId::IMAGE, 40, |c| c.border = Border::Reflect);
+    let dilated = b.conv(first, 70, |c| c.dilation = 3);
+    let deep = b.conv(dilated, 330, |c| {
+        (c.border, c.activation) = (Border::Reflect, Activation::Elu);
+    });
+    let back = b.conv(deep, 70, |c| c.residual = Some(dilated));
+    let head = b.conv(back, 1, |c| c.activation = Activation::Sigmoid);
+    b.graph.add_output(head);
+    let (width, height) = (49, 35);
+    let image = noise_image(9, width, height);
+    let values = run(&b.graph, &image, height, width);
+    let exact = &values[b.graph.outputs()[0].0];
+    let mut engine = Typed::<Bf16, WithoutMatrixUnit>::new(b.graph.clone(), width, height).unwrap();
+    let mut forms = Vec::new();
+    // An image may leave anything behind, and nothing of it may reach the next.
+    engine.poison();
+    engine.run(&image, |_, form| forms.push(form.to_owned()));
+    assert_eq!(forms.iter().filter(|form| *form == "winograd").count(), 3);
+    let mean = |values: &[f32]| {
+        let off = values.iter().zip(&exact.data);
+        off.map(|(a, b)| (f64::from(*a) - b).abs()).sum::<f64>() / values.len() as f64
+    };
+    let dot = output_of::<Bf16, crate::bf16::Dot>(b.graph, &image, width);
+    let (winograd, dot) = (mean(&engine.output(0)), mean(&dot));
+    // Its inputs are rounded once more than those of plain sums.
+    assert!(
+        winograd < 2.5 * dot,
+        "{winograd} where plain sums are off by {dot}"
+    );
 }
 
 #[test]

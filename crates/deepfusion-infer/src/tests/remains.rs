@@ -114,6 +114,7 @@ fn nothing_stale_is_read_in_bf16() {
     {
         if crate::bf16::has_dot() {
             nothing_stale_is_read::<Bf16, crate::bf16::Dot>();
+            nothing_stale_is_read::<Bf16, super::WithoutMatrixUnit>();
         }
         if crate::bf16::has_amx() {
             nothing_stale_is_read::<Bf16, crate::bf16::Amx>();
