@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use deepfusion_model::weights::{Weights, read_safetensors_under, write_safetensors};
 use deepfusion_model::{
     AveragedNetwork, Checkpoint, CheckpointKind, Error as ModelError, RunFolder, StoredNetwork,
+    UNCERTAINTY_PREFIX,
 };
 use deepfusion_runtime::{ModelSource, unpacked};
 use deepfusion_weights::Shipped;
@@ -22,8 +23,6 @@ use crate::{Error, NoMean, Result};
 
 /// The parts of a run's checkpoint beside the depth network that training goes on with.
 const OTHER_PARTS: [&str; 2] = ["pose.", "flow."];
-/// The head for uncertainty, which not all networks have.
-const UNCERTAINTY: &str = "uncertainty.";
 
 /// What [`average`] wrote.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,7 +86,12 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
     let depth = mean(&weights);
     let mut config = folder.read_settings()?;
     config.make_absolute();
-    let has_head = |weights: &Weights| weights.tensors.keys().any(|k| k.starts_with(UNCERTAINTY));
+    let has_head = |weights: &Weights| {
+        weights
+            .tensors
+            .keys()
+            .any(|k| k.starts_with(UNCERTAINTY_PREFIX))
+    };
     config.depth_net.uncertainty = has_head(&depth);
     let lost_uncertainty =
         !has_head(&depth) && networks.iter().any(|network| has_head(&network.weights));

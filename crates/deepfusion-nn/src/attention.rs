@@ -1,11 +1,12 @@
 //! Channel and spatial attention (the paper's Eq. 13–15), and the aggregation of a global feature.
 
 use burn::module::Module;
-use burn::tensor::activation::{relu, sigmoid};
+use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
 
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, global_mean};
+use crate::ops::sigmoid;
 use crate::{AttentionConfig, AttentionForm, Error};
 
 /// The masks of an [`Attention`], in (0, 1).

@@ -1,11 +1,11 @@
 //! The disparity decoder: five stages from the encoder's coarsest feature to full resolution.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, activation::sigmoid};
+use burn::tensor::{Device, Tensor};
 
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
-use crate::ops::{elu, upsample_concat};
+use crate::ops::{elu, sigmoid, upsample_concat};
 use crate::{DecoderConfig, Error};
 
 /// Number of scales at which disparity is predicted: 1, 1/2, 1/4, 1/8 of the input's size.

@@ -16,7 +16,7 @@ use crate::resample::doubled;
 use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
 use crate::{DepthNetConfig, Error};
-use deepfusion_model::DISP_NET_LEVELS;
+use deepfusion_model::{DISP_NET_LEVELS, UNCERTAINTY_PREFIX};
 
 /// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
 const FIRST_SCALE: f32 = 0.2;
@@ -44,9 +44,6 @@ pub struct DepthNet {
     /// the image's size; ln b is then enlarged.
     pub uncertainty: Option<Conv2d>,
 }
-
-/// Prefix of the tensor names of [`DepthNet::uncertainty`].
-const UNCERTAINTY: &str = "uncertainty.";
 
 /// The output of [`DepthNet::forward_with_uncertainty`].
 #[derive(Debug, Clone)]
@@ -272,7 +269,7 @@ impl DepthNet {
     /// # Errors
     /// As [`weights::apply`].
     pub fn with_weights(self, weights: &Weights) -> Result<(Self, bool), Error> {
-        weights::apply_but_for(self, weights, UNCERTAINTY)
+        weights::apply_but_for(self, weights, UNCERTAINTY_PREFIX)
     }
 
     /// What kind of network it is, for messages.

@@ -10,8 +10,7 @@ pub use depthwise::DepthwiseConv2d;
 
 use burn::module::{Flag, Module, ModuleMapper, Param, RunningState};
 use burn::tensor::activation::relu;
-use burn::tensor::ops::MaxPoolOptions;
-use burn::tensor::{Device, Tensor, TensorData, module::max_pool2d};
+use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::init::{WeightInit, WeightRng};
 use crate::ops::{self, ConvOptions};
@@ -309,19 +308,4 @@ pub fn freeze_statistics<M: Module>(module: M, frozen: bool) -> M {
         }
     }
     module.map(&mut SetTraining(!frozen))
-}
-
-/// ResNet's 3×3 maximum at stride 2, padded by one.
-///
-/// # Shapes
-/// - `x`: `[batch, channels, height, width]`
-/// - output: `[batch, channels, ⌈height / 2⌉, ⌈width / 2⌉]`
-#[must_use]
-pub fn max_pool_3x3_stride_2(x: Tensor<4>) -> Tensor<4> {
-    max_pool2d(
-        x,
-        MaxPoolOptions::new([3, 3])
-            .with_stride([2, 2])
-            .with_padding([1, 1]),
-    )
 }

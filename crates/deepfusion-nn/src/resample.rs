@@ -1,29 +1,26 @@
+use crate::ops;
 use burn::tensor::{Device, Tensor, TensorData};
 
-/// Differentiable bilinear enlargement with half-pixel centres, as two matrix products: out = A·X·Bᵀ.
+/// Differentiable bilinear enlargement with half-pixel centres: a kernel of its own on a GPU, elsewhere two matrix products, out = A·X·Bᵀ.
 ///
-/// The two matrices hold the weights of the bilinear filter; the products have a gradient on every
-/// backend, and for maps of a channel or two they are cheaper than gathering four neighbours.
+/// The two matrices hold the weights of the bilinear filter; for maps of a channel or two their products are cheaper than gathering four
+/// neighbours.
 #[derive(Debug, Clone)]
 pub struct BilinearResize {
-    rows: Tensor<3>,
-    columns: Tensor<3>,
+    from: [usize; 2],
     size: [usize; 2],
+    /// A and Bᵀ; none on a GPU.
+    matrices: Option<[Tensor<3>; 2]>,
 }
 
 impl BilinearResize {
     /// From `from` = [height, width] to `to`.
     #[must_use]
     pub fn new(from: [usize; 2], to: [usize; 2], device: &Device) -> Self {
-        let rows = weights(from[0], to[0]);
-        let columns = weights(from[1], to[1]);
-        let rows = Tensor::from_data(TensorData::new(rows, [1, to[0], from[0]]), device);
-        let columns: Tensor<3> =
-            Tensor::from_data(TensorData::new(columns, [1, to[1], from[1]]), device);
         Self {
-            rows,
-            columns: columns.swap_dims(1, 2),
+            from,
             size: to,
+            matrices: (!ops::is_gpu(device)).then(|| matrices_of(from, to, device)),
         }
     }
 
@@ -38,11 +35,27 @@ impl BilinearResize {
         if [h, w] == self.size {
             return x;
         }
-        let rows = self.rows.clone().expand([n, height, h]);
-        let columns = self.columns.clone().expand([n, w, width]);
+        if let Some(enlarged) = ops::enlarged_on_gpu(&x, self.size) {
+            return enlarged;
+        }
+        let matrices = self.matrices.clone();
+        let [rows, columns] =
+            matrices.unwrap_or_else(|| matrices_of(self.from, self.size, &x.device()));
+        let rows = rows.expand([n, height, h]);
+        let columns = columns.expand([n, w, width]);
         rows.matmul(x.reshape([n, h, w]).matmul(columns))
             .reshape([batch, channels, height, width])
     }
+}
+
+/// A and Bᵀ.
+fn matrices_of(from: [usize; 2], to: [usize; 2], device: &Device) -> [Tensor<3>; 2] {
+    let along = |axis: usize| {
+        let values = weights(from[axis], to[axis]);
+        Tensor::from_data(TensorData::new(values, [1, to[axis], from[axis]]), device)
+    };
+    let columns: Tensor<3> = along(1);
+    [along(0), columns.swap_dims(1, 2)]
 }
 
 /// Bilinear ×2 with half-pixel centres: each pixel becomes two along each axis, three quarters itself and a quarter its neighbour

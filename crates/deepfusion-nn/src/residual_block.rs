@@ -1,11 +1,12 @@
 //! The blocks that a ResNet's layers are made of.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, activation::relu};
+use burn::tensor::{Device, Tensor};
 
 use crate::ResNetDepth;
 use crate::init::WeightRng;
 use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig};
+use crate::ops;
 
 /// What a block is built from, beside its kind.
 #[derive(Debug, Clone, Copy)]
@@ -101,6 +102,6 @@ impl ResidualBlock {
             (Some(conv3), Some(bn3)) => bn3.forward(conv3.forward(self.bn2.forward_relu(y))),
             _ => self.bn2.forward(y),
         };
-        relu(y.add(shortcut))
+        ops::add_relu(y, shortcut)
     }
 }

@@ -4,7 +4,8 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use crate::init::WeightRng;
-use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig, freeze_statistics, max_pool_3x3_stride_2};
+use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig, freeze_statistics};
+use crate::ops::max_pool_3x3_stride_2;
 use crate::residual_block::{BlockConfig, ResidualBlock};
 use crate::{Error, InputNormalisation, ResNetConfig};
 

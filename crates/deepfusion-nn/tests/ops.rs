@@ -5,6 +5,7 @@
 use burn::tensor::DeviceKind;
 use burn::tensor::{Device, Distribution, Tensor};
 use deepfusion_kernels::AdamStep;
+use deepfusion_nn::BilinearResize;
 use deepfusion_nn::ops::{self, ConvOptions};
 
 /// Differences of two ways of summing the same few hundred products in f32.
@@ -148,6 +149,45 @@ fn convolution() {
     }
 }
 
+/// Each gradient where the other is not asked for, of tensors that are views.
+#[test]
+fn one_gradient_of_a_convolution_alone() {
+    let device = device();
+    let (x, w) = (
+        random([20, 8, 9, 2], &device),
+        random([8, 16, 3, 3], &device),
+    );
+    let options = ConvOptions {
+        padding: 1,
+        reflect: true,
+        ..ConvOptions::default()
+    };
+    let run = |ours: bool, of_input: bool| {
+        let device = device_of(ours);
+        let (x, w) = (on(&device, &x), on(&device, &w));
+        let (x, w) = if of_input {
+            (leaf(&x), w)
+        } else {
+            (x, leaf(&w))
+        };
+        let (image, kernels) = (x.clone().swap_dims(0, 3), w.clone().swap_dims(0, 1));
+        let f = if ours {
+            ops::conv2d
+        } else {
+            ops::composed_conv2d
+        };
+        let y = f(image, kernels, None, options);
+        let gradients = weigh(y).backward();
+        if of_input {
+            x.grad(&gradients).unwrap()
+        } else {
+            w.grad(&gradients).unwrap()
+        }
+    };
+    assert_close("x", run(true, true), run(false, true));
+    assert_close("weight", run(true, false), run(false, false));
+}
+
 /// Within `autocast` a convolution and its gradients see their numbers rounded to bf16, and nothing else changes; after it,
 /// and on a processor without bf16, or a GPU without tensor cores for it, they do not.
 #[test]
@@ -269,6 +309,101 @@ fn gelu() {
 }
 
 #[test]
+fn end_of_a_residual_block() {
+    let size = [2, 3, 40, 50];
+    let (x, y) = (random(size, &device()), random(size, &device()));
+    let run = |ours: bool| {
+        let device = device_of(ours);
+        let (x, y) = (leaf(&on(&device, &x)), leaf(&on(&device, &y)));
+        let f = if ours {
+            ops::add_relu
+        } else {
+            ops::composed_add_relu
+        };
+        let out = f(x.clone(), y.clone());
+        let gradients = weigh(out.clone()).backward();
+        let (gx, gy) = (x.grad(&gradients).unwrap(), y.grad(&gradients).unwrap());
+        (out.inner(), gx, gy)
+    };
+    let (a, b) = (run(true), run(false));
+    assert_close("sum", a.0, b.0);
+    assert_close("of the first", a.1, b.1);
+    assert_close("of the second", a.2, b.2);
+    // What is no number must be seen.
+    let none = x.clone().mul_scalar(f32::NAN);
+    for sum in [
+        ops::add_relu(none.clone(), y.clone()),
+        ops::add_relu(y, none),
+    ] {
+        assert!(sum.into_data().iter::<f32>().all(f32::is_nan));
+    }
+}
+
+#[test]
+fn sigmoid() {
+    let x = random([2, 1, 40, 50], &device()).mul_scalar(90.0);
+    let run = |ours: bool| {
+        let x = leaf(&on(&device_of(ours), &x));
+        let f = if ours {
+            ops::sigmoid
+        } else {
+            ops::composed_sigmoid
+        };
+        let y = f(x.clone());
+        let gradients = weigh(y.clone()).backward();
+        (y.inner(), x.grad(&gradients).unwrap())
+    };
+    let (a, b) = (run(true), run(false));
+    assert_close("sigmoid", a.0, b.0);
+    assert_close("sigmoid x", a.1, b.1);
+}
+
+/// Odd sizes, a single row, and many equal values, as behind a ReLU, of which the first has the gradient.
+#[test]
+fn max_pool() {
+    for size in [[2, 3, 12, 16], [1, 2, 7, 9], [1, 1, 1, 5], [1, 1, 2, 1]] {
+        let x = random(size, &device()).mul_scalar(3.0).round();
+        let run = |ours: bool| {
+            let x = leaf(&on(&device_of(ours), &x));
+            let f = if ours {
+                ops::max_pool_3x3_stride_2
+            } else {
+                ops::composed_max_pool_3x3_stride_2
+            };
+            let y = f(x.clone());
+            let gradients = weigh(y.clone()).backward();
+            (y.inner(), x.grad(&gradients).unwrap())
+        };
+        let (a, b) = (run(true), run(false));
+        assert_close(&format!("{size:?}"), a.0, b.0);
+        assert_close(&format!("{size:?} x"), a.1, b.1);
+    }
+}
+
+/// By the kernel of a GPU, against the matrix products of the processor.
+#[test]
+fn bilinear_enlargement() {
+    for (from, to) in [
+        ([6, 20], [48, 160]),
+        ([5, 7], [11, 29]),
+        ([1, 3], [4, 3]),
+        ([8, 8], [9, 8]),
+    ] {
+        let x = random([2, 3, from[0], from[1]], &device());
+        let run = |ours: bool| {
+            let device = device_of(ours);
+            let x = leaf(&on(&device, &x));
+            let y = BilinearResize::new(from, to, &device).apply(x.clone());
+            let gradients = weigh(y.clone()).backward();
+            (y.inner(), x.grad(&gradients).unwrap())
+        };
+        let (a, b) = (run(true), run(false));
+        assert_close(&format!("{from:?} {to:?}"), a.0, b.0);
+        assert_close(&format!("{from:?} {to:?} x"), a.1, b.1);
+    }
+}
+
+#[test]
 fn batch_normalisation() {
     let device = device();
     // The second has more pixels than a GPU's group has threads.
@@ -332,13 +467,21 @@ fn running_statistics() {
 fn adam_and_the_sum_of_squares() {
     let plain = device().inner();
     let (values, gradient) = (random([70_001], &plain), random([70_001], &plain));
-    let sum = ops::sum_of_squares(gradient.clone()).into_scalar::<f32>();
-    let exact: f64 = gradient
-        .to_data()
-        .iter::<f32>()
-        .map(|v| f64::from(v).powi(2))
-        .sum();
-    assert!((f64::from(sum) / exact - 1.0).abs() < 1e-5, "{sum} {exact}");
+    let mut tensors = vec![gradient.clone()];
+    for count in 1..=14_usize {
+        let sum = ops::sum_of_squares(&tensors).into_scalar::<f32>();
+        let squares = tensors.iter().map(|tensor| {
+            let squares = tensor.to_data();
+            let squares = squares.iter::<f32>().map(|v| f64::from(v).powi(2));
+            squares.sum::<f64>()
+        });
+        let exact: f64 = squares.sum();
+        assert!(
+            (f64::from(sum) / exact - 1.0).abs() < 1e-5,
+            "{count} tensors: {sum} {exact}"
+        );
+        tensors.push(random([31 * count], &plain));
+    }
 
     let run = |f: fn(&AdamStep, Tensor<1>, Tensor<1>, [Tensor<1>; 2]) -> _| {
         let moments = [values.zeros_like(), values.zeros_like()];

@@ -100,7 +100,7 @@ impl NamedGradients {
         for values in self.0.values() {
             match values {
                 Values::Host(values) => on_host += sum_of_squares(values),
-                Values::Device(values) => on_device.push(values),
+                Values::Device(values) => on_device.push(values.clone()),
             }
         }
         (on_host + on_device::sum_of_squares(&on_device)).sqrt()

@@ -1,9 +1,8 @@
 //! Whether two networks' weights mean the same, so that they have a mean.
 
-use deepfusion_model::{DepthNetConfig, StoredNetwork};
+use deepfusion_model::{StoredNetwork, UNCERTAINTY_PREFIX};
 use toml::Value;
 
-use super::UNCERTAINTY;
 use crate::NoMean;
 
 /// Focal lengths that differ by less are one camera's.
@@ -16,7 +15,8 @@ pub(super) fn hindrance(first: &StoredNetwork, other: &StoredNetwork) -> Option<
     }
     let settings = || {
         let canonical = |network: &StoredNetwork| table_of(network.config.canonical_focal_px);
-        difference("depth_net", &bare(first), &bare(other))
+        let layers = |network: &StoredNetwork| table_of(network.config.depth_net.of_the_weights());
+        difference("depth_net", &layers(first), &layers(other))
             .or_else(|| difference("canonical_focal_px", &canonical(first), &canonical(other)))
     };
     tensors(first, other).or_else(settings).or_else(|| {
@@ -45,22 +45,10 @@ fn tensors(first: &StoredNetwork, other: &StoredNetwork) -> Option<NoMean> {
     let mut names = a.keys().chain(b.keys());
     let differs = |name: &&String| match (a.get(*name), b.get(*name)) {
         (Some(a), Some(b)) => a.shape != b.shape,
-        _ => !name.starts_with(UNCERTAINTY),
+        _ => !name.starts_with(UNCERTAINTY_PREFIX),
     };
     let name = names.find(differs)?;
     Some(NoMean::Layers { name: name.clone() })
-}
-
-/// The settings of the depth network that give its weights their meaning.
-fn bare(network: &StoredNetwork) -> Option<Value> {
-    let mut config: DepthNetConfig = network.config.depth_net.clone();
-    config.uncertainty = false;
-    config.encoder.frozen_statistics = false;
-    if config.r_msfm.is_none() {
-        // A depth that new weights start at; R-MSFM adds to it for good.
-        config.initial_depth_m = None;
-    }
-    table_of(config)
 }
 
 fn table_of(value: impl serde::Serialize) -> Option<Value> {

@@ -360,17 +360,9 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned:
     }
 }
 
-/// Whether one network's weights are the other's, and mean the same depths: all but the depth that a new one starts at, whether
-/// its batch norms learn, and the head for uncertainty, which may be new or left aside.
+/// Whether one network's weights are the other's, and mean the same depths.
 fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
-    let bare = |config: &DepthNetConfig| {
-        let mut config = config.clone();
-        config.initial_depth_m = None;
-        config.encoder.frozen_statistics = false;
-        config.uncertainty = false;
-        config
-    };
-    bare(a) == bare(b)
+    a.of_the_weights() == b.of_the_weights()
 }
 
 /// The run that a path is, or is a checkpoint of, and which; `None` of other weights.
@@ -403,6 +395,10 @@ mod tests {
         assert!(same_layers(&other, &net(Preset::Light)));
         other.range.max_m = 60.0;
         assert!(!same_layers(&other, &net(Preset::Light)));
+        // R-MSFM refines from that depth for good.
+        let mut refined = net(Preset::RMsfm3);
+        refined.initial_depth_m = Some(33.0);
+        assert!(!same_layers(&refined, &net(Preset::RMsfm3)));
         let mut config = Preset::Light.config();
         config.with("attention").unwrap();
         assert!(!same_layers(&config.depth_net, &net(Preset::Light)));

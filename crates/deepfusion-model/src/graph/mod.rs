@@ -11,7 +11,7 @@ mod lite_mono;
 mod r_msfm;
 mod skips;
 
-use crate::network::BATCH_NORM_EPSILON;
+use crate::network::{BATCH_NORM_EPSILON, UNCERTAINTY_PREFIX};
 use crate::weights::Weights;
 use crate::{DepthNetConfig, NetworkError};
 
@@ -30,7 +30,7 @@ pub fn depth_graph(config: &DepthNetConfig, mut weights: Weights) -> Result<Grap
         ..config.clone()
     };
     if config.uncertainty {
-        let of_head = |name: &str| name.starts_with("uncertainty.");
+        let of_head = |name: &str| name.starts_with(UNCERTAINTY_PREFIX);
         weights.tensors.retain(|name, _| !of_head(name));
     }
     depth_graph_with_uncertainty(&alone, weights)

@@ -105,7 +105,23 @@ pub struct DepthNetConfig {
     pub uncertainty: bool,
 }
 
+/// What the tensor names of the head for uncertainty begin with, in a depth network's weights.
+pub const UNCERTAINTY_PREFIX: &str = "uncertainty.";
+
 impl DepthNetConfig {
+    /// Without what one network's weights may differ in from another's and mean the same depths: whether batch norms learn, the head for
+    /// uncertainty, and the depth that new weights start at, unless R-MSFM refines from it.
+    #[must_use]
+    pub fn of_the_weights(&self) -> Self {
+        let mut config = self.clone();
+        config.uncertainty = false;
+        config.encoder.frozen_statistics = false;
+        if config.r_msfm.is_none() {
+            config.initial_depth_m = None;
+        }
+        config
+    }
+
     /// The published ResNet with the decoder's full widths, 0.1 to 90 m, starting at 10 m.
     #[must_use]
     pub fn new(depth: ResNetDepth) -> Self {

@@ -19,7 +19,7 @@ mod resnet;
 pub use attention::{AttentionConfig, AttentionForm};
 pub use cost::ModuleCost;
 pub use decoder::DecoderConfig;
-pub use depth_net::{DepthNetConfig, DepthScale, InputSize, LOG_SCALE_BOUNDS};
+pub use depth_net::{DepthNetConfig, DepthScale, InputSize, LOG_SCALE_BOUNDS, UNCERTAINTY_PREFIX};
 pub use disp_net::{DISP_NET_DISPARITY, DISP_NET_KERNELS, DISP_NET_LEVELS, DispNetConfig};
 pub use error::NetworkError;
 pub use flow_decoder::FlowDecoderConfig;

@@ -6,13 +6,11 @@ mod transposed;
 pub use transposed::TransposedConv2d;
 
 use burn::module::{Module, Param};
-use burn::tensor::{
-    Device, Tensor,
-    activation::{relu, sigmoid},
-};
+use burn::tensor::{Device, Tensor, activation::relu};
 
 use crate::init::{WeightInit, WeightRng};
 use crate::layers::{Conv2d, Conv2dConfig};
+use crate::ops::sigmoid;
 use crate::resample::doubled;
 use crate::resnet::normalised;
 use crate::{DispNetConfig, Error, InputNormalisation};

@@ -1,10 +1,10 @@
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, activation::sigmoid};
+use burn::tensor::{Device, Tensor};
 
 use crate::LiteMonoConfig;
 use crate::init::{WeightInit, WeightRng};
 use crate::layers::{Conv2d, Conv2dConfig};
-use crate::ops::elu;
+use crate::ops::{elu, sigmoid};
 use crate::resample::doubled;
 
 /// Number of scales at which Lite-Mono predicts disparity: 1, 1/2, 1/4 of the input's size.

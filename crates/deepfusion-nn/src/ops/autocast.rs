@@ -20,7 +20,7 @@ impl Drop for PrecisionGuard {
 }
 
 /// Runs `work` with the convolutions of this thread in `precision`. Their backward passes use the same precision, even if they
-/// run later. As `torch.autocast`, except that all tensors stay f32: only the factors of the products are rounded.
+/// run later. As `torch.autocast`, except that all results stay f32: only the factors of the products are rounded.
 pub fn autocast<R>(precision: Precision, work: impl FnOnce() -> R) -> R {
     let _guard = PrecisionGuard(PRECISION.replace(Some(precision)));
     work()

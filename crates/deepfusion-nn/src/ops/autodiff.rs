@@ -10,21 +10,11 @@ use burn::backend::autodiff::{
 };
 use burn::backend::{AutodiffBackend, Backend, TensorMetadata, tensor::FloatTensor};
 
-/// Runs the forward pass and records the step: `$state` is built only where a gradient is needed.
-macro_rules! record {
-    ($op:expr, $C:ty, $nodes:expr, $output:expr, $state:expr) => {
-        match $op.prepare::<$C>($nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish($state, $output),
-            OpsKind::UnTracked(prep) => prep.finish($output),
-        }
-    };
-}
-
 #[derive(Debug)]
 struct Conv2d;
 
 impl<B: KernelBackward> Backward<B, 3> for Conv2d {
-    type State = (FloatTensor<B>, FloatTensor<B>, ConvOptions);
+    type State = (FloatTensor<B>, [usize; 4], FloatTensor<B>, ConvOptions);
 
     fn backward(
         self,
@@ -32,18 +22,18 @@ impl<B: KernelBackward> Backward<B, 3> for Conv2d {
         grads: &mut Gradients,
         _checkpointer: &mut Checkpointer,
     ) {
-        let (x, weight, options) = ops.state;
+        let (kept, size, weight, options) = ops.state;
         let [x_node, weight_node, bias_node] = ops.parents;
         let grad = grads.consume::<B>(&ops.node);
         if let Some(node) = bias_node {
             grads.register::<B>(node.id, B::conv2d_grad_bias(grad.clone()));
         }
-        if let Some(node) = weight_node {
-            let grad = B::conv2d_grad_weight(x.clone(), weight.clone(), grad.clone(), options);
-            grads.register::<B>(node.id, grad);
-        }
-        if let Some(node) = x_node {
-            grads.register::<B>(node.id, B::conv2d_grad_x(x, weight, grad, options));
+        let wanted = [x_node.is_some(), weight_node.is_some()];
+        let gradients = B::conv2d_grads(kept, size, weight, grad, options, wanted);
+        for (node, grad) in [x_node, weight_node].into_iter().zip(gradients) {
+            if let (Some(node), Some(grad)) = (node, grad) {
+                grads.register::<B>(node.id, grad);
+            }
         }
     }
 }
@@ -312,12 +302,15 @@ where
         bias: FloatTensor<Self>,
         has_bias: bool,
         options: ConvOptions,
-    ) -> FloatTensor<Self> {
+    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
         let ((x, x_node), (weight, weight_node)) = (x.into_parts(), weight.into_parts());
         let (bias, bias_node) = bias.into_parts();
-        let output = B::kernel_conv2d(x.clone(), weight.clone(), bias, has_bias, options);
+        let size = x.shape().dims();
+        let (output, kept) = B::kernel_conv2d(x, weight.clone(), bias, has_bias, options);
         let nodes = [x_node, weight_node, bias_node];
-        record!(Conv2d, C, nodes, output, (x, weight, options))
+        let state = (kept.clone(), size, weight, options);
+        let output = record!(Conv2d, C, nodes, output, state);
+        (output, Self::from_inner(kept))
     }
 
     fn kernel_batch_norm(

@@ -4,8 +4,8 @@
 use super::{BatchNormOutput, ConvOptions};
 use burn::tensor::{
     Bool, Int, Tensor,
-    module::avg_pool2d,
-    ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, PadMode},
+    module::{avg_pool2d, max_pool2d},
+    ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, MaxPoolOptions, PadMode},
 };
 use deepfusion_kernels::{AdamStep, MIN_DEPTH_M, NOWHERE};
 
@@ -107,6 +107,25 @@ pub fn elu(x: Tensor<4>) -> Tensor<4> {
         .exp()
         .sub_scalar(1.0);
     burn::tensor::activation::relu(x).add(below)
+}
+
+/// [`super::add_relu`].
+#[must_use]
+pub fn add_relu(a: Tensor<4>, b: Tensor<4>) -> Tensor<4> {
+    burn::tensor::activation::relu(a.add(b))
+}
+
+/// [`super::sigmoid`].
+#[must_use]
+pub fn sigmoid(x: Tensor<4>) -> Tensor<4> {
+    burn::tensor::activation::sigmoid(x)
+}
+
+/// [`super::max_pool_3x3_stride_2`].
+#[must_use]
+pub fn max_pool_3x3_stride_2(x: Tensor<4>) -> Tensor<4> {
+    let options = MaxPoolOptions::new([3, 3]);
+    max_pool2d(x, options.with_stride([2, 2]).with_padding([1, 1]))
 }
 
 /// [`super::upsample_concat`].

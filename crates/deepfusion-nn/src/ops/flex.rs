@@ -186,8 +186,9 @@ impl KernelOps for Flex {
         bias: Float,
         has_bias: bool,
         options: ConvOptions,
-    ) -> Float {
+    ) -> (Float, Float) {
         let shape = conv_shape(dims(&x), dims(&weight), options);
+        let kept = x.clone();
         let (x, weight, bias) = (Values::of(x), Values::of(weight), Values::of(bias));
         let bias = has_bias.then(|| bias.slice());
         // SAFETY: a kernel that takes a `Slot` writes every value.
@@ -202,7 +203,7 @@ impl KernelOps for Flex {
             shape.out_height(),
             shape.out_width(),
         ];
-        tensor(out, sizes)
+        (tensor(out, sizes), kept)
     }
 
     fn kernel_batch_norm(

@@ -16,10 +16,13 @@ pub(super) mod conv;
 mod correlation;
 mod depthwise;
 mod elu;
+pub(super) mod enlarge;
 mod gelu;
 mod grid;
+pub(super) mod max_pool;
 mod mirror;
 mod photometric;
+pub(super) mod pointwise;
 mod project;
 mod smoothness;
 mod sum;
@@ -88,8 +91,7 @@ impl KernelOps for CubeBackend {
         bias: CubeTensor,
         has_bias: bool,
         options: ConvOptions,
-    ) -> CubeTensor {
-        let (x, options) = mirror::padded(x, options);
+    ) -> (CubeTensor, CubeTensor) {
         conv::forward(x, weight, has_bias.then_some(bias), options)
     }
 

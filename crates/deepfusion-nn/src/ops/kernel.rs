@@ -47,14 +47,15 @@ pub(super) trait KernelOps: Backend {
     /// See [`super::upsample_concat`].
     fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// See [`super::conv2d`]; `bias` is not read unless `has_bias`.
+    /// See [`super::conv2d`]; `bias` is not read unless `has_bias`. The second result is what the gradient of the weights reads of `x`: `x`
+    /// itself, or that as the products take it.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
         has_bias: bool,
         options: ConvOptions,
-    ) -> FloatTensor<Self>;
+    ) -> (FloatTensor<Self>, FloatTensor<Self>);
 
     /// See [`super::batch_norm`]: output, mean, variance.
     fn kernel_batch_norm(
@@ -136,21 +137,16 @@ pub(super) trait KernelBackward: Backend {
     /// Gradients of x and skip of [`KernelOps::kernel_upsample_concat`]; `channels` are those of x.
     fn upsample_concat_grad(grad: FloatTensor<Self>, channels: usize) -> [FloatTensor<Self>; 2];
 
-    /// Gradient of the input of [`KernelOps::kernel_conv2d`].
-    fn conv2d_grad_x(
-        x: FloatTensor<Self>,
+    /// Gradients of the input of [`KernelOps::kernel_conv2d`], of `size`, and of its weights, each where it is wanted. `kept` is the second
+    /// result.
+    fn conv2d_grads(
+        kept: FloatTensor<Self>,
+        size: [usize; 4],
         weight: FloatTensor<Self>,
         grad: FloatTensor<Self>,
         options: ConvOptions,
-    ) -> FloatTensor<Self>;
-
-    /// Gradient of its weights.
-    fn conv2d_grad_weight(
-        x: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        grad: FloatTensor<Self>,
-        options: ConvOptions,
-    ) -> FloatTensor<Self>;
+        wanted: [bool; 2],
+    ) -> [Option<FloatTensor<Self>>; 2];
 
     /// Gradient of its bias.
     fn conv2d_grad_bias(grad: FloatTensor<Self>) -> FloatTensor<Self>;

@@ -3,7 +3,18 @@
 //! In single precision they run on the kernels of `deepfusion-kernels` on the CPU (Burn's Flex backend), with
 //! backward passes of their own, and on kernels in CubeCL's language on a GPU (feature `gpu`); elsewhere they
 //! are composed of Burn's operations and mean the same. `kernel` declares them to Burn's dispatch, `flex` and
-//! `gpu` run them, `autodiff` derives them, and `composed` holds the other form.
+//! `gpu` run them, `autodiff` derives them, and `composed` holds the other form. A few have kernels on a GPU alone, and are declared and
+//! derived beside them.
+
+/// Runs the forward pass and records the step: `$state` is built only where a gradient is needed.
+macro_rules! record {
+    ($op:expr, $C:ty, $nodes:expr, $output:expr, $state:expr) => {
+        match $op.prepare::<$C>($nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish($state, $output),
+            OpsKind::UnTracked(prep) => prep.finish($output),
+        }
+    };
+}
 
 mod autocast;
 mod autodiff;
@@ -20,12 +31,14 @@ use kernel::KernelOps;
 
 pub use autocast::{autocast, supports};
 pub use composed::{
-    adam as composed_adam, batch_norm as composed_batch_norm, conv2d as composed_conv2d,
-    depthwise as composed_depthwise, elu as composed_elu, gelu as composed_gelu,
-    local_correlation as composed_local_correlation,
+    adam as composed_adam, add_relu as composed_add_relu, batch_norm as composed_batch_norm,
+    conv2d as composed_conv2d, depthwise as composed_depthwise, elu as composed_elu,
+    gelu as composed_gelu, local_correlation as composed_local_correlation,
+    max_pool_3x3_stride_2 as composed_max_pool_3x3_stride_2,
     photometric_error as composed_photometric_error, project as composed_project,
-    running_statistics as composed_running_statistics, smoothness as composed_smoothness,
-    upsample_concat as composed_upsample_concat, warp as composed_warp,
+    running_statistics as composed_running_statistics, sigmoid as composed_sigmoid,
+    smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
+    warp as composed_warp,
 };
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
@@ -44,14 +57,24 @@ pub fn has_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
     is_cpu(&tensor.device()) && tensor.dtype() == DType::F32
 }
 
+/// Whether it is a GPU with kernels.
+pub(crate) fn is_gpu(device: &Device) -> bool {
+    #[cfg(feature = "gpu")]
+    return matches!(
+        device.clone().inner().as_dispatch(),
+        DispatchDevice::Cube(_)
+    );
+    #[cfg(not(feature = "gpu"))]
+    {
+        let _ = device;
+        false
+    }
+}
+
 /// Whether the kernels for GPUs run for this tensor.
 #[cfg(feature = "gpu")]
 fn on_gpu<const D: usize>(tensor: &Tensor<D>) -> bool {
-    let is_cube = matches!(
-        tensor.device().inner().as_dispatch(),
-        DispatchDevice::Cube(_)
-    );
-    is_cube && tensor.dtype() == DType::F32
+    is_gpu(&tensor.device()) && tensor.dtype() == DType::F32
 }
 
 /// Whether there are kernels for this tensor: on the CPU or, with the feature `gpu`, on a GPU, in single precision.
@@ -72,7 +95,7 @@ fn runs_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
 /// - output: `[N, O, H', W']`, H' = ⌊(H + 2·padding − dilation·(kh − 1) − 1) / stride⌋ + 1
 ///
 /// # Panics
-/// When the shapes do not fit each other, as Burn's own operations do.
+/// When the shapes do not fit each other, as Burn's own operations do, or an image is too small to be mirrored as far as the padding goes.
 #[must_use]
 pub fn conv2d(
     x: Tensor<4>,
@@ -88,14 +111,15 @@ pub fn conv2d(
     assert_eq!(channels, expected, "the input's channels are the weight's");
     let has_bias = bias.is_some();
     // The kernel does not read the bias where there is none.
-    let bias = bias.unwrap_or_else(|| Tensor::zeros([out], &x.device().inner()));
-    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_conv2d(
+    let bias = bias.unwrap_or_else(|| Tensor::empty([out], &x.device().inner()));
+    let (output, _) = <Dispatch as KernelOps>::kernel_conv2d(
         x.into_dispatch(),
         weight.into_dispatch(),
         bias.into_dispatch(),
         has_bias,
         autocast::within(options),
-    ))
+    );
+    Tensor::from_dispatch(output)
 }
 
 /// The output of [`batch_norm`].
@@ -204,6 +228,75 @@ pub fn elu(x: Tensor<4>) -> Tensor<4> {
         return composed::elu(x);
     }
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_elu(x.into_dispatch()))
+}
+
+/// max(a + b, 0): the end of a residual block.
+///
+/// # Shapes
+/// - `a`, `b`, output: `[N, C, H, W]`
+///
+/// # Panics
+/// When the shapes differ.
+#[must_use]
+pub fn add_relu(a: Tensor<4>, b: Tensor<4>) -> Tensor<4> {
+    assert_eq!(a.dims(), b.dims(), "both have the same size");
+    #[cfg(feature = "gpu")]
+    if on_gpu(&a) {
+        return Tensor::from_dispatch(<Dispatch as gpu::pointwise::PointwiseOps>::kernel_add_relu(
+            a.into_dispatch(),
+            b.into_dispatch(),
+        ));
+    }
+    composed::add_relu(a, b)
+}
+
+/// 1 / (1 + e⁻ˣ).
+#[must_use]
+pub fn sigmoid(x: Tensor<4>) -> Tensor<4> {
+    #[cfg(feature = "gpu")]
+    if on_gpu(&x) {
+        return Tensor::from_dispatch(<Dispatch as gpu::pointwise::PointwiseOps>::kernel_sigmoid(
+            x.into_dispatch(),
+        ));
+    }
+    composed::sigmoid(x)
+}
+
+/// ResNet's 3×3 maximum at stride 2, padded by one. Of equal values the first, row by row, has the gradient.
+///
+/// # Shapes
+/// - `x`: `[N, C, H, W]`
+/// - output: `[N, C, ⌈H / 2⌉, ⌈W / 2⌉]`
+#[must_use]
+pub fn max_pool_3x3_stride_2(x: Tensor<4>) -> Tensor<4> {
+    #[cfg(feature = "gpu")]
+    if on_gpu(&x) {
+        return Tensor::from_dispatch(<Dispatch as gpu::max_pool::MaxPoolOps>::kernel_max_pool(
+            x.into_dispatch(),
+        ));
+    }
+    composed::max_pool_3x3_stride_2(x)
+}
+
+/// Bilinear enlargement with half-pixel centres on a GPU, in one pass; `None` elsewhere.
+///
+/// # Shapes
+/// - `x`: `[N, C, h, w]`
+/// - output: `[N, C, H, W]`, no side less than the input's
+#[must_use]
+pub(crate) fn enlarged_on_gpu(x: &Tensor<4>, size: [usize; 2]) -> Option<Tensor<4>> {
+    #[cfg(feature = "gpu")]
+    if on_gpu(x) {
+        return Some(Tensor::from_dispatch(
+            <Dispatch as gpu::enlarge::EnlargeOps>::kernel_enlarge(
+                x.clone().into_dispatch(),
+                size[0],
+                size[1],
+            ),
+        ));
+    }
+    let _ = (x, size);
+    None
 }
 
 /// Every pixel repeated twice in both directions, then the skip feature behind it.
@@ -392,13 +485,16 @@ pub fn adam(
     composed::adam(step, values, gradient, [first, second])
 }
 
-/// The sum of the squares of flat values, without autodiff: one value, where they are.
+/// The sum of the squares of all values of flat tensors on one device, without autodiff: one value, where they are.
+///
+/// # Panics
+/// Without any tensor.
 #[must_use]
-pub fn sum_of_squares(values: Tensor<1>) -> Tensor<1> {
+pub fn sum_of_squares(tensors: &[Tensor<1>]) -> Tensor<1> {
     #[cfg(feature = "gpu")]
-    if on_gpu(&values) {
-        let shares = <Dispatch as gpu::adam::AdamOps>::kernel_squares(values.into_dispatch());
-        return Tensor::<1>::from_dispatch(shares).sum();
+    if on_gpu(&tensors[0]) {
+        return gpu::adam::sum_of_squares(tensors);
     }
-    (values.clone() * values).sum()
+    let squares = tensors.iter().map(|t| (t.clone() * t.clone()).sum());
+    Tensor::cat(squares.collect(), 0).sum()
 }

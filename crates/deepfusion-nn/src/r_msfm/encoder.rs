@@ -2,7 +2,8 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use crate::init::WeightRng;
-use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig, max_pool_3x3_stride_2};
+use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig};
+use crate::ops::max_pool_3x3_stride_2;
 use crate::residual_block::ResidualBlock;
 use crate::resnet::{layer, normalised, run};
 use crate::{InputNormalisation, ResNetConfig, ResNetDepth};

@@ -1,9 +1,10 @@
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, activation::sigmoid};
+use burn::tensor::{Device, Tensor};
 
 use super::strip::Strip;
 use crate::R_MSFM_STATE;
 use crate::init::WeightRng;
+use crate::ops::sigmoid;
 
 /// A gated recurrent unit of 1×3 or 3×1 convolutions.
 #[derive(Module, Debug)]

@@ -14,9 +14,10 @@ pub use strip::Strip;
 pub use update::{ConvexWeights, Update};
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, activation::sigmoid};
+use burn::tensor::{Device, Tensor};
 
 use crate::init::WeightRng;
+use crate::ops::sigmoid;
 use crate::{Error, InputNormalisation, RMsfmConfig};
 
 /// Encoder, gated unit and refinement.

@@ -5,12 +5,11 @@ use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops;
 
 /// The sum of squares of all values: one number is read from the device, whatever their count.
-pub(super) fn sum_of_squares(values: &[&Tensor<1>]) -> f64 {
+pub(super) fn sum_of_squares(values: &[Tensor<1>]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
-    let all = Tensor::cat(values.iter().map(|&v| v.clone()).collect(), 0);
-    f64::from(ops::sum_of_squares(all).into_scalar::<f32>())
+    f64::from(ops::sum_of_squares(values).into_scalar::<f32>())
 }
 
 /// [`deepfusion_kernels::adam`] of one parameter, which comes back ready to learn again, with its moments.

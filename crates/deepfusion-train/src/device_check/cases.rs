@@ -1,7 +1,6 @@
 //! The operations that networks and losses are made of, small enough for any device.
 
 use burn::module::{Module, Param};
-use burn::tensor::activation::sigmoid;
 use burn::tensor::{Gradients, Tensor};
 use deepfusion_nn::ops::{self, ConvOptions, Precision};
 use deepfusion_nn::{
@@ -97,7 +96,15 @@ pub(super) fn all() -> Vec<Case> {
         ),
         case("batch normalisation", NeededBy::Network, batch_norm),
         case("ELU", NeededBy::Network, |on| pointwise(ops::elu, on)),
-        case("sigmoid", NeededBy::Network, |on| pointwise(sigmoid, on)),
+        case("sigmoid", NeededBy::Network, |on| {
+            pointwise(ops::sigmoid, on)
+        }),
+        case("maximum 3x3 at stride 2", NeededBy::Network, |on| {
+            pointwise(ops::max_pool_3x3_stride_2, on)
+        }),
+        case("end of a residual block", NeededBy::Network, |on| {
+            pointwise(|x| ops::add_relu(x.clone().neg(), x.mul_scalar(3.0)), on)
+        }),
         case(
             "enlarging, with a skip feature",
             NeededBy::Network,

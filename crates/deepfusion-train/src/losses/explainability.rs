@@ -1,7 +1,8 @@
 //! The loss of SfMLearner (Zhou et al., CVPR 2017, Sec. 3.3): every source counts, as far as the pose network says that it can explain the pixel.
 
-use burn::tensor::activation::{log_sigmoid, sigmoid};
+use burn::tensor::activation::log_sigmoid;
 use burn::tensor::{Bool, Tensor};
+use deepfusion_nn::ops::sigmoid;
 
 use super::{ReprojectionOutput, View};
 

@@ -62,26 +62,33 @@ impl KernelBackward for Flex {
         [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
     }
 
-    fn conv2d_grad_x(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
-        let sizes: [usize; 4] = dims(&x);
-        let shape = conv_shape(sizes, dims(&weight), options);
+    fn conv2d_grads(
+        kept: Float,
+        size: [usize; 4],
+        weight: Float,
+        grad: Float,
+        options: ConvOptions,
+        [wants_input, wants_weight]: [bool; 2],
+    ) -> [Option<Float>; 2] {
+        let weight_sizes: [usize; 4] = dims(&weight);
+        let shape = conv_shape(size, weight_sizes, options);
         let (weight, grad) = (Values::of(weight), Values::of(grad));
-        // SAFETY: a kernel that takes a `Slot` writes every value.
-        let (out, ()) = unsafe {
-            written(shape.in_len(), |out| {
-                kernels::conv2d_backward_input(&shape, weight.slice(), grad.slice(), out);
-            })
-        };
-        tensor(out, sizes)
-    }
-
-    fn conv2d_grad_weight(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
-        let sizes: [usize; 4] = dims(&weight);
-        let shape = conv_shape(dims(&x), sizes, options);
-        let (x, grad) = (Values::of(x), Values::of(grad));
-        let mut out = zeros(&sizes);
-        kernels::conv2d_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
-        tensor(out, sizes)
+        let of_weight = wants_weight.then(|| {
+            let x = Values::of(kept);
+            let mut out = zeros(&weight_sizes);
+            kernels::conv2d_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
+            tensor(out, weight_sizes)
+        });
+        let of_input = wants_input.then(|| {
+            // SAFETY: a kernel that takes a `Slot` writes every value.
+            let (out, ()) = unsafe {
+                written(shape.in_len(), |out| {
+                    kernels::conv2d_backward_input(&shape, weight.slice(), grad.slice(), out);
+                })
+            };
+            tensor(out, size)
+        });
+        [of_input, of_weight]
     }
 
     fn conv2d_grad_bias(grad: Float) -> Float {

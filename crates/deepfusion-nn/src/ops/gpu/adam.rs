@@ -2,8 +2,9 @@
 
 use super::sum::over_group;
 use super::{SUM_THREADS, input, output, room, summing, values};
+use burn::backend::Dispatch;
 use burn::backend::{Backend, TensorMetadata, backend_extension, tensor::FloatTensor};
-use burn::tensor::DType;
+use burn::tensor::{DType, Tensor};
 use burn_cubecl::CubeBackend;
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
@@ -23,25 +24,83 @@ pub(in super::super) trait AdamOps: Backend {
         step: AdamStep,
     ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
 
-    /// Sums of squares, each of a share of the values, which are flat.
-    fn kernel_squares(values: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// Sums of squares, each of a share of the values of six flat tensors, added to such sums of others. Of the tensors that many count.
+    fn kernel_squares(
+        others: FloatTensor<Self>,
+        a: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+        c: FloatTensor<Self>,
+        d: FloatTensor<Self>,
+        e: FloatTensor<Self>,
+        f: FloatTensor<Self>,
+        count: usize,
+    ) -> FloatTensor<Self>;
 }
 
 /// Groups that share the values out.
 const GROUPS: u32 = 512;
+/// Tensors of a launch.
+const AT_ONCE: usize = 6;
 
-#[cube(launch)]
-fn squares(values: &[f32], shares: &mut [f32], #[comptime] threads: u32) {
+#[cube]
+fn squares_of(values: &[f32], #[comptime] threads: u32) -> f32 {
     let mut sum = 0.0f32;
     let mut at = ABSOLUTE_POS;
     while at < values.len() {
         sum += values[at] * values[at];
         at += (CUBE_COUNT_X * threads) as usize;
     }
+    sum
+}
+
+#[cube(launch)]
+fn squares(
+    others: &[f32],
+    a: &[f32],
+    b: &[f32],
+    c: &[f32],
+    d: &[f32],
+    e: &[f32],
+    f: &[f32],
+    shares: &mut [f32],
+    #[comptime] count: usize,
+    #[comptime] threads: u32,
+) {
+    let mut sum = squares_of(a, threads);
+    if comptime!(count > 1) {
+        sum += squares_of(b, threads);
+    }
+    if comptime!(count > 2) {
+        sum += squares_of(c, threads);
+    }
+    if comptime!(count > 3) {
+        sum += squares_of(d, threads);
+    }
+    if comptime!(count > 4) {
+        sum += squares_of(e, threads);
+    }
+    if comptime!(count > 5) {
+        sum += squares_of(f, threads);
+    }
     let total = over_group(sum, threads);
     if UNIT_POS == 0 {
-        shares[CUBE_POS_X as usize] = total;
+        let own = CUBE_POS_X as usize;
+        shares[own] = others[own] + total;
     }
+}
+
+/// The sum of the squares of all values: a launch for six tensors, which a network has more than a hundred of.
+pub(in super::super) fn sum_of_squares(tensors: &[Tensor<1>]) -> Tensor<1> {
+    let mut shares = Tensor::<1>::zeros([GROUPS as usize], &tensors[0].device());
+    for some in tensors.chunks(AT_ONCE) {
+        // What is missing is not read.
+        let [a, b, c, d, e, f] =
+            std::array::from_fn(|i| some.get(i).unwrap_or(&some[0]).clone().into_dispatch());
+        let own = shares.into_dispatch();
+        let sums = <Dispatch as AdamOps>::kernel_squares(own, a, b, c, d, e, f, some.len());
+        shares = Tensor::from_dispatch(sums);
+    }
+    shares.sum()
 }
 
 #[cube(launch)]
@@ -76,15 +135,31 @@ fn adam(
 }
 
 impl AdamOps for CubeBackend {
-    fn kernel_squares(values: CubeTensor) -> CubeTensor {
-        let shares = room(&values, [GROUPS as usize]);
-        let (count, dim) = summing(GROUPS, 1);
+    fn kernel_squares(
+        others: CubeTensor,
+        a: CubeTensor,
+        b: CubeTensor,
+        c: CubeTensor,
+        d: CubeTensor,
+        e: CubeTensor,
+        f: CubeTensor,
+        count: usize,
+    ) -> CubeTensor {
+        let shares = room(&others, [GROUPS as usize]);
+        let (groups, dim) = summing(GROUPS, 1);
         squares::launch(
             &shares.client,
-            count,
+            groups,
             dim,
-            input(values),
+            input(others),
+            input(a),
+            input(b),
+            input(c),
+            input(d),
+            input(e),
+            input(f),
             output(&shares),
+            count,
             SUM_THREADS,
         );
         shares

@@ -2,8 +2,8 @@
 
 use super::super::kernel::{ConvOptions, KernelBackward};
 use super::{
-    batch_norm, conv, correlation, depthwise, dims, elu, gelu, mirror, photometric, project,
-    smoothness, upsample, warp,
+    batch_norm, conv, correlation, depthwise, elu, gelu, photometric, project, smoothness,
+    upsample, warp,
 };
 use burn_cubecl::CubeBackend;
 use burn_cubecl::tensor::CubeTensor;
@@ -30,31 +30,15 @@ impl KernelBackward for CubeBackend {
         upsample::backward(grad, channels)
     }
 
-    fn conv2d_grad_x(
-        x: CubeTensor,
+    fn conv2d_grads(
+        kept: CubeTensor,
+        size: [usize; 4],
         weight: CubeTensor,
         grad: CubeTensor,
         options: ConvOptions,
-    ) -> CubeTensor {
-        let [_, _, height, width] = dims(&x);
-        if !mirror::is_needed(options) {
-            return conv::grad_input(weight, grad, [height, width], options);
-        }
-        let margin = options.padding;
-        let size = [height + 2 * margin, width + 2 * margin];
-        let padded = conv::grad_input(weight, grad, size, mirror::without(options));
-        mirror::backward(padded, margin)
-    }
-
-    fn conv2d_grad_weight(
-        x: CubeTensor,
-        weight: CubeTensor,
-        grad: CubeTensor,
-        options: ConvOptions,
-    ) -> CubeTensor {
-        let [_, _, height, width] = dims(&weight);
-        let (x, options) = mirror::padded(x, options);
-        conv::grad_weight(x, grad, [height, width], options)
+        wanted: [bool; 2],
+    ) -> [Option<CubeTensor>; 2] {
+        conv::backward(kept, size, weight, grad, options, wanted)
     }
 
     fn conv2d_grad_bias(grad: CubeTensor) -> CubeTensor {

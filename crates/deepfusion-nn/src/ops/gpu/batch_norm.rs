@@ -70,7 +70,8 @@ fn normalise(
     let scale = gamma[channel] / (variance[channel] + epsilon).sqrt();
     let value = (x[at] - mean[channel]) * scale + beta[channel];
     if comptime!(relu) {
-        out[at] = value.max(0.0f32);
+        // So NaN stays NaN, which a maximum would hide.
+        out[at] = select(value <= 0.0f32, 0.0f32, value);
     } else {
         out[at] = value;
     }

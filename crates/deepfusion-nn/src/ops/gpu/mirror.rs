@@ -7,8 +7,9 @@ use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::tensor::CubeTensor;
 
+/// The pixel along an axis of `size` that one outside mirrors, or that it is.
 #[cube]
-fn source(at: i32, size: i32) -> i32 {
+pub(super) fn source(at: i32, size: i32) -> i32 {
     let last = size - 1;
     let ahead = select(at < 0, 0 - at, at);
     select(ahead > last, 2 * last - ahead, ahead)
@@ -67,12 +68,12 @@ fn mirror_backward(grad: &[f32], out: &mut [f32], height: i32, width: i32, margi
 }
 
 /// Whether a convolution's padding mirrors.
-pub(super) fn is_needed(options: ConvOptions) -> bool {
+fn is_needed(options: ConvOptions) -> bool {
     options.reflect && options.padding > 0
 }
 
 /// The same convolution of an image that is padded already.
-pub(super) fn without(options: ConvOptions) -> ConvOptions {
+fn without(options: ConvOptions) -> ConvOptions {
     ConvOptions {
         padding: 0,
         reflect: false,
@@ -80,12 +81,20 @@ pub(super) fn without(options: ConvOptions) -> ConvOptions {
     }
 }
 
-/// An image as a convolution without mirroring sees it.
-pub(super) fn padded(x: CubeTensor, options: ConvOptions) -> (CubeTensor, ConvOptions) {
+/// How wide a margin is mirrored, and the same convolution of an image that has it.
+pub(super) fn margin(options: ConvOptions) -> (usize, ConvOptions) {
     if is_needed(options) {
-        (forward(x, options.padding), without(options))
+        (options.padding, without(options))
     } else {
-        (x, options)
+        (0, options)
+    }
+}
+
+/// An image with a margin that mirrors it, where that has any width.
+pub(super) fn padded(x: CubeTensor, margin: usize) -> CubeTensor {
+    match margin {
+        0 => x,
+        _ => forward(x, margin),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The two factors of a product, as a group of threads brings them to shared memory, and where its result goes.
+//! The two factors of a product in single precision, as a group of threads brings them to shared memory, and where its result goes.
 
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
@@ -14,9 +14,12 @@ pub(super) enum Product {
 }
 
 impl Product {
-    /// Whether neighbouring threads bring neighbouring terms of the right factor; of the left one they always do.
-    pub(super) fn right_by_terms(self) -> bool {
-        self == Self::WeightGradient
+    /// Terms that are worth a group of threads of their own, where there are few groups.
+    pub(super) fn least_terms(self) -> usize {
+        match self {
+            Self::Output | Self::InputGradient => 512,
+            Self::WeightGradient => 256,
+        }
     }
 }
 
@@ -86,41 +89,6 @@ fn channel_and_tap(
     }
 }
 
-/// Where a term of a row or column lies in shared memory.
-#[cube]
-fn place(
-    term: usize,
-    line: usize,
-    #[comptime] lines: usize,
-    #[comptime] neighbours_are_terms: bool,
-    #[comptime] tile: Tile,
-) -> usize {
-    let stride = comptime!(tile.stride(lines, neighbours_are_terms));
-    if comptime!(tile.by_terms(neighbours_are_terms)) {
-        line * stride + term
-    } else {
-        term * stride + line
-    }
-}
-
-/// A value as it lies in shared memory: on tensor cores the nearest number of bf16, of two as near the even one; NaN stays NaN. A
-/// conversion alone cuts the digits off on some devices, which makes every sum too small.
-#[cube]
-fn shared<S: Float>(value: f32, #[comptime] tile: Tile) -> S {
-    if comptime!(tile.tensor_cores) {
-        let bits = u32::reinterpret(value);
-        let is_nan = (bits & 0x7fff_ffffu32) > 0x7f80_0000u32;
-        let nearest = (bits + 0x7fffu32 + ((bits >> 16u32) & 1u32)) & 0xffff_0000u32;
-        S::cast_from(f32::reinterpret(select(
-            is_nan,
-            bits | 0x0040_0000u32,
-            nearest,
-        )))
-    } else {
-        S::cast_from(value)
-    }
-}
-
 /// Where a weight of a left factor's row is in a layer's weights.
 #[cube]
 fn weight_place(
@@ -161,9 +129,9 @@ pub(super) fn weights_by_taps(
 
 /// The terms `start` to `end` of the left factor's rows.
 #[cube]
-pub(super) fn bring_left<S: Float>(
+pub(super) fn bring_left(
     values: &[f32],
-    into: &mut Shared<[S]>,
+    into: &mut Shared<[f32]>,
     first_row: usize,
     start: usize,
     end: usize,
@@ -191,7 +159,7 @@ pub(super) fn bring_left<S: Float>(
             };
             value = values[at];
         }
-        into[place(own, line, tile.rows, true, tile)] = shared::<S>(value, tile);
+        into[own * comptime!(tile.rows + 1) + line] = value;
     }
 }
 
@@ -240,9 +208,9 @@ fn source(
 /// Tap by tap, a block of 16 terms (for the gradient of the weights: all columns of a tile) has one tap, so that from one to the next it is
 /// a plane of the image; else every value has to be found by itself.
 #[cube]
-pub(super) fn bring_right<S: Float>(
+pub(super) fn bring_right(
     values: &[f32],
-    into: &mut Shared<[S]>,
+    into: &mut Shared<[f32]>,
     own: &Pixel,
     first_column: usize,
     start: usize,
@@ -253,7 +221,7 @@ pub(super) fn bring_right<S: Float>(
     #[comptime] tile: Tile,
 ) {
     let thread = UNIT_POS as usize;
-    if comptime!(product.right_by_terms()) {
+    if comptime!(product == Product::WeightGradient) {
         let own_term = thread % tile.depth;
         let term = start + own_term;
         let pixel = pixel_of(term, sizes, product, window);
@@ -271,8 +239,7 @@ pub(super) fn bring_right<S: Float>(
                 if exists {
                     value = values[first.at + line * plane];
                 }
-                let at = place(own_term, first_line + line, tile.columns, true, tile);
-                into[at] = shared::<S>(value, tile);
+                into[own_term * comptime!(tile.columns + 1) + first_line + line] = value;
             }
         } else {
             #[unroll]
@@ -285,8 +252,7 @@ pub(super) fn bring_right<S: Float>(
                 if found.exists && column < sizes.columns && term < end {
                     value = values[found.at];
                 }
-                let at = place(own_term, line, tile.columns, true, tile);
-                into[at] = shared::<S>(value, tile);
+                into[own_term * comptime!(tile.columns + 1) + line] = value;
             }
         }
     } else {
@@ -312,8 +278,7 @@ pub(super) fn bring_right<S: Float>(
                     if exists {
                         value = values[first.at + term * plane];
                     }
-                    let at = place(own_term + term, line, tile.columns, false, tile);
-                    into[at] = shared::<S>(value, tile);
+                    into[(own_term + term) * comptime!(tile.columns + 1) + line] = value;
                 }
             }
         } else {
@@ -326,8 +291,7 @@ pub(super) fn bring_right<S: Float>(
                 if found.exists && in_matrix && start + own_term < end {
                     value = values[found.at];
                 }
-                let at = place(own_term, line, tile.columns, false, tile);
-                into[at] = shared::<S>(value, tile);
+                into[own_term * comptime!(tile.columns + 1) + line] = value;
             }
         }
     }

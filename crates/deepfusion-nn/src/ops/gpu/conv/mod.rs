@@ -7,40 +7,76 @@
 //! | gradient of the input | input channels | input pixels of all images | weights that read a channel |
 //! | gradient of the weights | output channels | weights of a channel | output pixels of all images |
 //!
-//! A group of 256 threads computes a tile: both factors are brought to shared memory some terms at a time (`factors`), and multiplied there,
-//! in single precision (`products`) or rounded to bf16 on tensor cores (`tensor_cores`).
+//! A group of 256 threads computes a tile: both factors are brought to shared memory some terms at a time and multiplied there, in single
+//! precision (`factors`, `products`) or on tensor cores (`quads`, `tensor_cores`), for which the tensors are rounded to bf16 and arranged
+//! before (`rounded`).
 
 mod factors;
 mod products;
+mod quads;
+mod rounded;
 pub(in super::super) mod tensor_cores;
 mod tile;
 
 use super::super::kernel::ConvOptions;
 use super::sum::over_group;
-use super::{SUM_GROUPS, SUM_THREADS, dims, input, output, room, summing, values};
+use super::{SUM_GROUPS, SUM_THREADS, dims, input, mirror, output, room, summing, values};
 use burn::backend::ops::FloatTensorOps;
 use burn_cubecl::CubeBackend;
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
-use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 use deepfusion_kernels::Precision;
 use factors::{Product, SizesLaunch, weights_by_taps};
 use products::product_in_f32;
+use quads::DivisorsLaunch;
+use rounded::{channels_last, left_factor};
 use tensor_cores::product_in_bf16;
 use tile::{SIDE, THREADS, Tile, Window};
 
 /// A convolution's tensors by their sizes.
 struct Convolution {
     channels: usize,
+    /// With the margin.
     size: [usize; 2],
+    /// Pixels on each side of the image in which it is mirrored.
+    margin: usize,
     out_channels: usize,
     out_size: [usize; 2],
     window: Window,
-    precision: Precision,
 }
 
 impl Convolution {
+    /// Of images of `channels` and `size`.
+    fn of(
+        channels: usize,
+        size: [usize; 2],
+        weight: [usize; 4],
+        out_size: [usize; 2],
+        options: ConvOptions,
+    ) -> Self {
+        let [out_channels, _, rows, columns] = weight;
+        let (margin, inner) = mirror::margin(options);
+        assert!(
+            margin == 0 || size.iter().all(|side| margin < *side),
+            "an image is mirrored no farther than it goes"
+        );
+        Self {
+            channels,
+            size: size.map(|side| side + 2 * margin),
+            margin,
+            out_channels,
+            out_size,
+            window: Window::of([rows, columns], inner),
+        }
+    }
+
+    /// Whether it runs on tensor cores, in this precision and on a tensor's device.
+    fn is_on_tensor_cores(&self, precision: Precision, beside: &CubeTensor) -> bool {
+        precision.is_bf16_for(self.channels, self.out_channels)
+            && tensor_cores::are_on(&beside.client)
+    }
+
     fn sizes(&self, [rows, columns, depth]: [usize; 3]) -> SizesLaunch {
         let [height, width] = self.size;
         let [out_height, out_width] = self.out_size;
@@ -57,21 +93,42 @@ impl Convolution {
         )
     }
 
-    /// The product of both factors, of `rows` times `columns` sums of `depth` terms, as a tensor of `shape`. Sums are shared out in
-    /// parts of `least` terms at least.
-    fn product(
+    /// Rows, columns and terms of a product over `images`.
+    fn matrix(&self, product: Product, images: usize) -> [usize; 3] {
+        let taps = self.window.taps();
+        let (channels, out_channels) = (self.channels, self.out_channels);
+        let pixels = |[height, width]: [usize; 2]| images * height * width;
+        match product {
+            Product::Output => [out_channels, pixels(self.out_size), channels * taps],
+            Product::InputGradient => [channels, pixels(self.size), out_channels * taps],
+            Product::WeightGradient => [out_channels, channels * taps, pixels(self.out_size)],
+        }
+    }
+
+    /// The shape of a product's result.
+    fn shape(&self, product: Product, images: usize) -> [usize; 4] {
+        let of = |channels: usize, [height, width]: [usize; 2]| [images, channels, height, width];
+        match product {
+            Product::Output => of(self.out_channels, self.out_size),
+            Product::InputGradient => of(self.channels, self.size),
+            Product::WeightGradient => {
+                let Window { height, width, .. } = self.window;
+                [self.out_channels, self.channels, height, width]
+            }
+        }
+    }
+
+    /// The product of two factors in single precision: weights and image, or gradient and image.
+    fn in_f32(
         &self,
         product: Product,
+        images: usize,
         [left, right]: [CubeTensor; 2],
         bias: Option<CubeTensor>,
-        matrix @ [rows, columns, depth]: [usize; 3],
-        least: usize,
-        shape: [usize; 4],
     ) -> CubeTensor {
-        let [left, right] = [left, right].map(into_contiguous);
-        let on_tensor_cores = self.precision.is_bf16_for(self.channels, self.out_channels)
-            && tensor_cores::are_on(&left.client);
-        let tile = Tile::of(rows, columns, on_tensor_cores);
+        let matrix = self.matrix(product, images);
+        let [rows, columns, depth] = matrix;
+        let tile = Tile::of(rows, columns, false);
         let tile = match product {
             Product::Output => tile.tap_by_tap(self.channels, SIDE),
             Product::InputGradient => tile.tap_by_tap(self.out_channels, SIDE),
@@ -83,34 +140,71 @@ impl Convolution {
             _ if self.window.taps() == 1 && product == Product::Output => left,
             _ => self.weights_by_taps(product, left, matrix, tile),
         };
-        let (parts, per_part) = tile.parts(rows, columns, depth, least);
-        let [first, others @ ..] = shape;
-        let out = room(&left, [parts * first, others[0], others[1], others[2]]);
-        let client = out.client.clone();
+        let right = match product {
+            Product::InputGradient => right,
+            Product::Output | Product::WeightGradient => mirror::padded(right, self.margin),
+        };
+        let (parts, per_part) = tile.parts(rows, columns, depth, product.least_terms());
+        let shape = self.shape(product, images);
+        let out = room_for_parts(&left, parts, shape);
         let has_bias = bias.is_some();
         // Without one a buffer that is not read.
         let bias = bias.unwrap_or_else(|| left.clone());
-        let (count, dim) = (
-            tile.grid(rows, columns, parts),
-            CubeDim::new_1d(THREADS as u32),
-        );
-        let launch = if on_tensor_cores {
-            product_in_bf16::launch_unchecked
-        } else {
-            product_in_f32::launch_unchecked
-        };
         // SAFETY: every place is compared with the sizes before it is read or written; what is taken tap by tap comes in whole blocks, or
         // for the gradient of the weights whole tiles, of which the first place is compared.
         unsafe {
-            launch(
-                &client,
-                count,
-                dim,
+            product_in_f32::launch_unchecked(
+                &out.client,
+                tile.grid(rows, columns, parts),
+                CubeDim::new_1d(THREADS as u32),
                 input(left),
                 input(right),
                 input(bias),
                 output(&out),
                 self.sizes(matrix),
+                per_part,
+                product,
+                self.window,
+                has_bias,
+                tile,
+            );
+        }
+        summed(out, parts, shape)
+    }
+
+    /// The same on tensor cores, of factors that [`rounded`] arranged.
+    fn in_bf16(
+        &self,
+        product: Product,
+        images: usize,
+        [left, right]: [&CubeTensor; 2],
+        bias: Option<CubeTensor>,
+    ) -> CubeTensor {
+        let matrix = self.matrix(product, images);
+        let [rows, columns, depth] = matrix;
+        let tile = Tile::of(rows, columns, true);
+        let (parts, per_part) = tile.parts(rows, columns, depth, product.least_terms());
+        let shape = self.shape(product, images);
+        let out = room_for_parts(left, parts, shape);
+        let (read, [height, width]) = match product {
+            Product::Output | Product::WeightGradient => (self.channels, self.out_size),
+            Product::InputGradient => (self.out_channels, self.size),
+        };
+        let has_bias = bias.is_some();
+        // Without one a buffer that is not read.
+        let bias = bias.unwrap_or_else(|| out.clone());
+        // SAFETY: every place is compared with the sizes before it is read or written, and channels come in blocks of sixteen.
+        unsafe {
+            product_in_bf16::launch_unchecked(
+                &out.client,
+                tile.grid(rows, columns, parts),
+                CubeDim::new_1d(THREADS as u32),
+                output(left),
+                output(right),
+                input(bias),
+                output(&out),
+                self.sizes(matrix),
+                DivisorsLaunch::new(read, height * width, width),
                 per_part,
                 product,
                 self.window,
@@ -150,6 +244,12 @@ impl Convolution {
     }
 }
 
+/// Room for a result in f32, one for each part of its sums.
+fn room_for_parts(beside: &CubeTensor, parts: usize, shape: [usize; 4]) -> CubeTensor {
+    let [first, others @ ..] = shape;
+    room(beside, [parts * first, others[0], others[1], others[2]])
+}
+
 /// The sum of a result's parts.
 fn summed(all: CubeTensor, parts: usize, sizes: [usize; 4]) -> CubeTensor {
     let all = match parts {
@@ -163,98 +263,68 @@ fn summed(all: CubeTensor, parts: usize, sizes: [usize; 4]) -> CubeTensor {
     CubeBackend::float_reshape(all, sizes.into())
 }
 
-/// Of images that are padded already where the padding mirrors.
+/// The output, and what the gradient of the weights will read of the input.
 pub(super) fn forward(
     x: CubeTensor,
     weight: CubeTensor,
     bias: Option<CubeTensor>,
     options: ConvOptions,
-) -> CubeTensor {
+) -> (CubeTensor, CubeTensor) {
     let [images, channels, height, width] = dims(&x);
-    let [out_channels, _, rows, columns] = dims(&weight);
-    let window = Window::of([rows, columns], options);
-    let out_size @ [out_height, out_width] = window.output([height, width]);
-    let convolution = Convolution {
-        channels,
-        size: [height, width],
-        out_channels,
-        out_size,
-        window,
-        precision: options.precision,
-    };
-    let matrix = [
-        out_channels,
-        images * out_height * out_width,
-        channels * window.taps(),
-    ];
-    let shape = [images, out_channels, out_height, out_width];
-    convolution.product(Product::Output, [weight, x], bias, matrix, 512, shape)
+    let shape @ [_, _, rows, columns] = dims(&weight);
+    let out_size = Window::of([rows, columns], options).output([height, width]);
+    let convolution = Convolution::of(channels, [height, width], shape, out_size, options);
+    let product = Product::Output;
+    if convolution.is_on_tensor_cores(options.precision, &x) {
+        let image = channels_last(x, convolution.margin);
+        let left = left_factor(weight, product);
+        let out = convolution.in_bf16(product, images, [&left, &image], bias);
+        (out, image)
+    } else {
+        let out = convolution.in_f32(product, images, [weight, x.clone()], bias);
+        (out, x)
+    }
 }
 
-/// The gradient of an input of `[N, C, height, width]`.
-pub(super) fn grad_input(
+/// The gradients of the input, of `[N, C, height, width]`, and of the weights: each where it is wanted.
+pub(super) fn backward(
+    kept: CubeTensor,
+    size @ [_, channels, height, width]: [usize; 4],
     weight: CubeTensor,
     grad: CubeTensor,
-    size @ [height, width]: [usize; 2],
     options: ConvOptions,
-) -> CubeTensor {
-    let [out_channels, channels, rows, columns] = dims(&weight);
-    let window = Window::of([rows, columns], options);
-    let [images, _, out_height, out_width] = dims(&grad);
-    let convolution = Convolution {
-        channels,
-        size,
-        out_channels,
-        out_size: [out_height, out_width],
-        window,
-        precision: options.precision,
+    [wants_input, wants_weight]: [bool; 2],
+) -> [Option<CubeTensor>; 2] {
+    let [images, ..] = size;
+    let shape = dims(&weight);
+    let [_, _, out_height, out_width] = dims(&grad);
+    let out_size = [out_height, out_width];
+    let convolution = Convolution::of(channels, [height, width], shape, out_size, options);
+    let (of_input, of_weights) = (Product::InputGradient, Product::WeightGradient);
+    let [grad_of_input, grad_of_weights] = if !(wants_input || wants_weight) {
+        [None, None]
+    } else if convolution.is_on_tensor_cores(options.precision, &grad) {
+        let grad = channels_last(grad, 0);
+        let grad_of_input = wants_input.then(|| {
+            let left = left_factor(weight, of_input);
+            convolution.in_bf16(of_input, images, [&left, &grad], None)
+        });
+        let grad_of_weights =
+            wants_weight.then(|| convolution.in_bf16(of_weights, images, [&grad, &kept], None));
+        [grad_of_input, grad_of_weights]
+    } else {
+        let grad_of_weights = wants_weight
+            .then(|| convolution.in_f32(of_weights, images, [grad.clone(), kept], None));
+        let grad_of_input =
+            wants_input.then(|| convolution.in_f32(of_input, images, [weight, grad], None));
+        [grad_of_input, grad_of_weights]
     };
-    let matrix = [
-        channels,
-        images * height * width,
-        out_channels * window.taps(),
-    ];
-    convolution.product(
-        Product::InputGradient,
-        [weight, grad],
-        None,
-        matrix,
-        512,
-        [images, channels, height, width],
-    )
-}
-
-/// The gradient of weights of `[O, C, kernel height, kernel width]`.
-pub(super) fn grad_weight(
-    x: CubeTensor,
-    grad: CubeTensor,
-    kernel: [usize; 2],
-    options: ConvOptions,
-) -> CubeTensor {
-    let window = Window::of(kernel, options);
-    let [images, channels, height, width] = dims(&x);
-    let [_, out_channels, out_height, out_width] = dims(&grad);
-    let convolution = Convolution {
-        channels,
-        size: [height, width],
-        out_channels,
-        out_size: [out_height, out_width],
-        window,
-        precision: options.precision,
-    };
-    let matrix = [
-        out_channels,
-        channels * window.taps(),
-        images * out_height * out_width,
-    ];
-    convolution.product(
-        Product::WeightGradient,
-        [grad, x],
-        None,
-        matrix,
-        256,
-        [out_channels, channels, kernel[0], kernel[1]],
-    )
+    // Of the image with its margin, which mirrors the pixels beside it.
+    let grad_of_input = grad_of_input.map(|grad| match convolution.margin {
+        0 => grad,
+        margin => mirror::backward(grad, margin),
+    });
+    [grad_of_input, grad_of_weights]
 }
 
 /// Each group's share of a channel's sum.

@@ -51,9 +51,8 @@ pub(super) fn product_in_f32(
     #[comptime] has_bias: bool,
     #[comptime] tile: Tile,
 ) {
-    let mut left = Shared::<[f32]>::new_slice(comptime!(tile.room(tile.rows, true)));
-    let mut right =
-        Shared::<[f32]>::new_slice(comptime!(tile.room(tile.columns, product.right_by_terms())));
+    let mut left = Shared::<[f32]>::new_slice(comptime!(tile.room(tile.rows)));
+    let mut right = Shared::<[f32]>::new_slice(comptime!(tile.room(tile.columns)));
     let mut sums = Array::<f32>::new(comptime!(tile.own_rows * tile.own_columns));
     #[unroll]
     for i in 0..tile.own_rows * tile.own_columns {
@@ -65,7 +64,7 @@ pub(super) fn product_in_f32(
     let own = pixel_of(column, &sizes, product, window);
     let mut start = share.start;
     while start < share.end {
-        bring_left::<f32>(
+        bring_left(
             left_values,
             &mut left,
             share.first_row,
@@ -76,7 +75,7 @@ pub(super) fn product_in_f32(
             window,
             tile,
         );
-        bring_right::<f32>(
+        bring_right(
             right_values,
             &mut right,
             &own,

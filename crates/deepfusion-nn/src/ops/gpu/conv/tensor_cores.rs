@@ -7,11 +7,10 @@ use burn_cubecl::cubecl::cmma::{MatrixIdent, MatrixLayout};
 use burn_cubecl::cubecl::features::MmaConfig;
 use burn_cubecl::cubecl::ir::{ElemType, FloatKind};
 use burn_cubecl::cubecl::prelude::*;
-use half::bf16;
 
-use super::factors::{
-    Product, Sizes, bring_left, bring_right, pixel_of, result_place, share_of_group,
-};
+use super::factors::{Product, Sizes, result_place, share_of_group};
+use super::quads::{Divisors, Lines, columns_of_thread, load_left, load_right, store};
+use super::rounded::{QUAD, Quad};
 use super::tile::{SIDE, THREADS, Tile, Window};
 
 /// Threads that multiply together.
@@ -40,35 +39,103 @@ pub(super) fn are_on(client: &Client) -> bool {
     planes == [PLANE as u32; 2] && properties.features.matmul.cmma.contains(&square)
 }
 
-/// How a factor lies in shared memory.
-fn layout(tile: Tile, neighbours_are_terms: bool, is_left: bool) -> MatrixLayout {
-    // A left factor's line is a row, a right one's a column.
-    if tile.by_terms(neighbours_are_terms) == is_left {
-        MatrixLayout::RowMajor
-    } else {
+/// How a factor lies in shared memory, as the library names it: a left factor's lines are rows, a right one's columns, unless lines are
+/// terms.
+fn layout(product: Product, is_left: bool) -> MatrixLayout {
+    if (product == Product::WeightGradient) == is_left {
         MatrixLayout::ColMajor
+    } else {
+        MatrixLayout::RowMajor
     }
 }
 
-/// Of a part of the terms: the parts are summed afterwards.
+/// Where a square begins in shared memory, in quads.
+#[cube]
+fn square(
+    line: usize,
+    term: usize,
+    #[comptime] lines: Lines,
+    #[comptime] product: Product,
+) -> usize {
+    let stride = comptime!(lines.stride / QUAD);
+    if comptime!(product == Product::WeightGradient) {
+        term * stride + line / QUAD
+    } else {
+        line * stride + term / QUAD
+    }
+}
+
+/// Adds the products of the terms in shared memory to the sums of 32 threads' squares, whose first row and column are given.
+#[cube]
+fn multiply(
+    left: &Shared<[Quad]>,
+    right: &Shared<[Quad]>,
+    sums: &Sequence<cmma::Matrix<f32>>,
+    row: usize,
+    column: usize,
+    #[comptime] product: Product,
+    #[comptime] tile: Tile,
+) {
+    let left_lines = comptime!(Lines::left(product, tile));
+    let right_lines = comptime!(Lines::right(product, tile));
+    #[unroll]
+    for step in 0..tile.depth / SIDE {
+        let term = comptime!(step * SIDE);
+        let mut factors = Sequence::<cmma::Matrix<Quad>>::new();
+        #[unroll]
+        for j in 0..tile.own_columns {
+            let from = square(column + comptime!(j * SIDE), term, right_lines, product);
+            factors.push(cmma::Matrix::<Quad>::from_slice(
+                MatrixIdent::B,
+                SIDE,
+                SIDE,
+                SIDE,
+                comptime!(layout(product, false)),
+                &right[from..right_lines.room()],
+                comptime!(right_lines.stride as u32),
+            ));
+        }
+        #[unroll]
+        for i in 0..tile.own_rows {
+            let from = square(row + comptime!(i * SIDE), term, left_lines, product);
+            let factor = cmma::Matrix::<Quad>::from_slice(
+                MatrixIdent::A,
+                SIDE,
+                SIDE,
+                SIDE,
+                comptime!(layout(product, true)),
+                &left[from..left_lines.room()],
+                comptime!(left_lines.stride as u32),
+            );
+            #[unroll]
+            for j in 0..tile.own_columns {
+                let sum = sums.index(comptime!(i * tile.own_columns + j));
+                cmma::execute(&factor, factors.index(j), sum, sum);
+            }
+        }
+    }
+}
+
+/// Of a part of the terms: the parts are summed afterwards. The next terms are on their way from the tensors while those in shared memory are
+/// multiplied.
 #[cube(launch_unchecked)]
 pub(super) fn product_in_bf16(
-    left_values: &[f32],
-    right_values: &[f32],
+    left_values: &[Quad],
+    right_values: &[Quad],
     bias: &[f32],
     out: &mut [f32],
     sizes: Sizes,
+    divisors: Divisors,
     per_part: usize,
     #[comptime] product: Product,
     #[comptime] window: Window,
     #[comptime] has_bias: bool,
     #[comptime] tile: Tile,
 ) {
-    let by_terms = comptime!(product.right_by_terms());
-    let left_room = comptime!(tile.room(tile.rows, true));
-    let right_room = comptime!(tile.room(tile.columns, by_terms));
-    let mut left = Shared::<[bf16]>::new_aligned_slice(left_room, 16usize);
-    let mut right = Shared::<[bf16]>::new_aligned_slice(right_room, 16usize);
+    let left_lines = comptime!(Lines::left(product, tile));
+    let right_lines = comptime!(Lines::right(product, tile));
+    let mut left = Shared::<[Quad]>::new_aligned_slice(comptime!(left_lines.room()), 16usize);
+    let mut right = Shared::<[Quad]>::new_aligned_slice(comptime!(right_lines.room()), 16usize);
     let staged = comptime!(THREADS / PLANE * SIDE * SIDE);
     let mut stage = Shared::<[f32]>::new_aligned_slice(staged, 16usize);
     let mut sums = Sequence::<cmma::Matrix<f32>>::new();
@@ -89,81 +156,45 @@ pub(super) fn product_in_bf16(
     let across = comptime!(tile.columns / SIDE / tile.own_columns);
     let own_row = plane / across * comptime!(tile.own_rows * SIDE);
     let own_column = plane % across * comptime!(tile.own_columns * SIDE);
-    // From a row and from a term to the next of the left factor, and from a term and a column of the right one.
-    let left_stride = comptime!(tile.stride(tile.rows, true));
-    let right_stride = comptime!(tile.stride(tile.columns, by_terms));
     let share = share_of_group(&sizes, per_part, tile);
-    let column = share.first_column + thread % tile.columns;
-    let own = pixel_of(column, &sizes, product, window);
+    let columns = columns_of_thread(&share, &sizes, &divisors, product, window, tile);
+
     let mut start = share.start;
+    let first_left = load_left(left_values, &share, start, &sizes, product, tile);
+    let first_right = load_right(
+        right_values,
+        &columns,
+        &share,
+        start,
+        &sizes,
+        &divisors,
+        product,
+        window,
+        tile,
+    );
+    store(&first_left, &mut left, left_lines);
+    store(&first_right, &mut right, right_lines);
+    sync_cube();
     while start < share.end {
-        bring_left::<bf16>(
-            left_values,
-            &mut left,
-            share.first_row,
-            start,
-            share.end,
-            &sizes,
-            product,
-            window,
-            tile,
-        );
-        bring_right::<bf16>(
-            right_values,
-            &mut right,
-            &own,
-            share.first_column,
-            start,
-            share.end,
-            &sizes,
-            product,
-            window,
-            tile,
-        );
-        sync_cube();
-        #[unroll]
-        for step in 0..tile.depth / SIDE {
-            let term = comptime!(step * SIDE);
-            let mut factors = Sequence::<cmma::Matrix<bf16>>::new();
-            #[unroll]
-            for j in 0..tile.own_columns {
-                let line = own_column + comptime!(j * SIDE);
-                let from = if comptime!(by_terms) {
-                    line * right_stride + term
-                } else {
-                    line + comptime!(term * right_stride)
-                };
-                factors.push(cmma::Matrix::<bf16>::from_slice(
-                    MatrixIdent::B,
-                    SIDE,
-                    SIDE,
-                    SIDE,
-                    comptime!(layout(tile, by_terms, false)),
-                    &right[from..right_room],
-                    comptime!(right_stride as u32),
-                ));
-            }
-            #[unroll]
-            for i in 0..tile.own_rows {
-                let from = (own_row + comptime!(i * SIDE)) * left_stride + term;
-                let factor = cmma::Matrix::<bf16>::from_slice(
-                    MatrixIdent::A,
-                    SIDE,
-                    SIDE,
-                    SIDE,
-                    comptime!(layout(tile, true, true)),
-                    &left[from..left_room],
-                    comptime!(left_stride as u32),
-                );
-                #[unroll]
-                for j in 0..tile.own_columns {
-                    let sum = sums.index(comptime!(i * tile.own_columns + j));
-                    cmma::execute(&factor, factors.index(j), sum, sum);
-                }
-            }
-        }
-        sync_cube();
         start += tile.depth;
+        // Beyond the end there are zeros, which are not multiplied.
+        let next_left = load_left(left_values, &share, start, &sizes, product, tile);
+        let next_right = load_right(
+            right_values,
+            &columns,
+            &share,
+            start,
+            &sizes,
+            &divisors,
+            product,
+            window,
+            tile,
+        );
+        multiply(&left, &right, &sums, own_row, own_column, product, tile);
+        sync_cube();
+        store(&next_left, &mut left, left_lines);
+        store(&next_right, &mut right, right_lines);
+        sync_cube();
     }
     // Square by square through shared memory, as which thread holds which value of a square is the device's secret.
     let lane = thread % PLANE;

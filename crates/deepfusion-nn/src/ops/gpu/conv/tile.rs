@@ -22,7 +22,6 @@ pub(super) struct Tile {
     pub(super) own_columns: usize,
     /// Terms in shared memory at a time.
     pub(super) depth: usize,
-    pub(super) tensor_cores: bool,
     /// Whether weights are taken tap by tap, all channels of each, and not channel by channel.
     pub(super) tap_by_tap: bool,
 }
@@ -36,8 +35,7 @@ impl Tile {
             own_rows: if tensor_cores { squares[0] } else { own[0] },
             own_columns: if tensor_cores { squares[1] } else { own[1] },
             depth: if tensor_cores { 32 } else { 16 },
-            tensor_cores,
-            tap_by_tap: false,
+            tap_by_tap: tensor_cores,
         };
         let small = tile(64, 64, [4, 4], [1, 2]);
         let [large, small] = match rows {
@@ -92,30 +90,10 @@ impl Tile {
         CubeCount::Static(count[0], count[1], count[2])
     }
 
-    /// Whether a factor lies in shared memory term by term within a row or column, and not the other way round: on tensor cores, where
-    /// neighbouring threads bring neighbouring terms.
-    pub(super) fn by_terms(self, neighbours_are_terms: bool) -> bool {
-        self.tensor_cores && neighbours_are_terms
-    }
-
-    /// From a term, or a row or column, to the next in shared memory: with room that keeps threads out of each other's banks, of 16
-    /// bytes where tensor cores ask for that.
-    pub(super) fn stride(self, lines: usize, neighbours_are_terms: bool) -> usize {
-        if self.by_terms(neighbours_are_terms) {
-            self.depth + 8
-        } else {
-            lines + if self.tensor_cores { 8 } else { 1 }
-        }
-    }
-
-    /// Values of a factor in shared memory.
-    pub(super) fn room(self, lines: usize, neighbours_are_terms: bool) -> usize {
-        let count = if self.by_terms(neighbours_are_terms) {
-            lines
-        } else {
-            self.depth
-        };
-        count * self.stride(lines, neighbours_are_terms)
+    /// Values of a factor of so many rows or columns in shared memory, term after term; one more than there are keeps threads out of
+    /// each other's banks.
+    pub(super) fn room(self, lines: usize) -> usize {
+        self.depth * (lines + 1)
     }
 }
 
