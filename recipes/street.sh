@@ -7,7 +7,7 @@
 # About four hours on two cores. Stopped, the same command goes on where it was. From the third stage on it learns in bf16; on a
 # processor that has none (`train` then says so), PRECISION=f32 takes about twice as long.
 #
-# It makes a network of the same kind, not the same bits as the embedded one, whose stages went a little differently:
+# Stages, steps and learning rates are those of the embedded network; two things were changed while it learned, so that the bits differ:
 # docs/reference/shipped-weights.md ("How far the recipe repeats it"). The whole chain has been run from end to end at two steps a stage
 # only.
 set -euo pipefail
@@ -54,7 +54,7 @@ done
 
 "$deepfusion" weights pack --model "$out/street-uncertainty" --checkpoint last --name street --simulated-only --out "$out/packed" \
     --recipe "recipes/street.sh" \
-    --note "depth on simulated views: 11,700 steps at 320x96 and two sizes like it, 4,450 at 640x192 and three others; then 60 of the head for uncertainty alone"
+    --note "depth on simulated views: 11,716 steps at 320x96 and two sizes like it, 4,450 at 640x192 and three others; then 60 of the head for uncertainty alone"
 
 train tiny --init none --set "precision=$precision"
 "$deepfusion" weights pack --model "$out/tiny" --checkpoint last --name tiny --simulated-only --recipe recipes/tiny.toml --out "$out/packed"

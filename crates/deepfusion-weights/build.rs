@@ -16,7 +16,7 @@ fn main() -> ExitCode {
     let out = folder("OUT_DIR").join("embedded.rs");
     let written = scan::scan(&weights).and_then(|pairs| {
         let list = scan::list(&pairs)?;
-        std::fs::write(&out, list).map_err(|e| format!("{}: {e}", out.display()))
+        std::fs::write(&out, list).map_err(|source| scan::ScanError::Io { path: out, source })
     });
     match written {
         Ok(()) => ExitCode::SUCCESS,

@@ -126,7 +126,7 @@ pub struct Warnings {
 impl Warnings {
     pub fn add(&mut self, warning: SampleWarning) {
         match warning {
-            SampleWarning::Skipped(reason) => self.skipped.push(reason),
+            SampleWarning::Skipped(reason) => self.skipped.push(reason.to_string()),
             other => self.others.push(other.to_string()),
         }
     }
@@ -259,7 +259,7 @@ impl Listener {
     }
 
     /// Writes the run's files from now on.
-    pub fn keep_log(&mut self, trainer: &Trainer) -> deepfusion::jobs::Result<()> {
+    pub fn keep_log(&mut self, trainer: &Trainer) -> Result<(), Failure> {
         self.log = Some(RunLog::open(trainer.folder(), trainer.step())?);
         Ok(())
     }
@@ -289,7 +289,7 @@ impl Listener {
 
     /// Whether to go on.
     fn handle(&mut self, event: TrainEvent) -> PyResult<bool> {
-        self.record(&event).map_err(raise)?;
+        self.record(&event)?;
         let Some(callback) = &self.callback else {
             return Ok(true);
         };
@@ -301,7 +301,7 @@ impl Listener {
     }
 
     /// Keeps an event's figures, and what the run's files have of it.
-    fn record(&mut self, event: &TrainEvent) -> deepfusion::jobs::Result<()> {
+    fn record(&mut self, event: &TrainEvent) -> PyResult<()> {
         match event {
             TrainEvent::Step {
                 losses,
@@ -312,7 +312,7 @@ impl Listener {
             _ => {}
         }
         match &mut self.log {
-            Some(log) => log.write(event),
+            Some(log) => log.write(event).map_err(raise),
             None => Ok(()),
         }
     }

@@ -1,4 +1,5 @@
 use crate::Board;
+use deepfusion_geometry::NoDistortion;
 use deepfusion_hint::{Hint, count_of};
 
 /// Why there is no calibration.
@@ -79,8 +80,26 @@ pub enum Error {
     #[error("the views do not determine the camera: {problem}")]
     Undetermined {
         /// In what respect.
-        problem: String,
+        problem: Undetermined,
     },
+}
+
+/// What the views leave open.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Undetermined {
+    /// No camera's numbers fit them.
+    #[error("no camera explains them")]
+    NoCamera,
+    /// The camera that fits them would have a board behind it.
+    #[error("a board would be behind the camera")]
+    Behind,
+    /// A longer lens farther away would show the same.
+    #[error("the focal length and the boards' distances explain each other")]
+    Distance,
+    /// The lens that fits them is none.
+    #[error(transparent)]
+    Lens(#[from] NoDistortion),
 }
 
 /// A result with this crate's [`Error`].

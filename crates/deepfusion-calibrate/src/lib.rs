@@ -46,7 +46,7 @@ pub use board::Board;
 pub use calibration::{Calibration, StandardErrors, View, ViewFit};
 pub use coverage::Coverage;
 pub use detect::{BoardDetection, find_board};
-pub use error::{Error, Result};
+pub use error::{Error, Result, Undetermined};
 pub use model::LensModel;
 pub use pick::{Candidate, pick, sharpness};
 pub use solve::{LEAST_VIEWS, calibrate};

@@ -4,7 +4,8 @@ use crate::model::Camera;
 use crate::refine::{Fit, Pose};
 use crate::zhang::beginnings;
 use crate::{
-    Board, Calibration, Coverage, Error, LensModel, Result, StandardErrors, View, ViewFit,
+    Board, Calibration, Coverage, Error, LensModel, Result, StandardErrors, Undetermined, View,
+    ViewFit,
 };
 use deepfusion_hint::count_of;
 use nalgebra::{Vector2, Vector3};
@@ -96,7 +97,7 @@ fn fit(
     best.and_then(|(fit, _)| fit.refined(views, board, None))
         .map(|(fit, _)| fit)
         .filter(|fit| plausible(&fit.camera, size))
-        .ok_or_else(|| undetermined("no camera explains them"))
+        .ok_or_else(|| undetermined(Undetermined::NoCamera))
 }
 
 /// Numbers that a camera of this image size can have, with room to spare.
@@ -108,10 +109,8 @@ fn plausible(camera: &Camera, size: (u32, u32)) -> bool {
     focal(fx) && focal(fy) && within(cx, size.0) && within(cy, size.1)
 }
 
-fn undetermined(problem: &str) -> Error {
-    Error::Undetermined {
-        problem: problem.to_owned(),
-    }
+fn undetermined(problem: Undetermined) -> Error {
+    Error::Undetermined { problem }
 }
 
 /// Root mean square error of a view in pixels.
@@ -146,12 +145,12 @@ fn calibration(
     let model = fit.camera.model;
     let cost = fit
         .cost(&seen, board)
-        .ok_or_else(|| undetermined("a board would be behind the camera"))?;
+        .ok_or_else(|| undetermined(Undetermined::Behind))?;
     let corners = (seen.len() * board.len()) as f64;
     let free = 2.0 * corners - (model.numbers() + 6 * seen.len()) as f64;
-    let covariance = fit.camera_covariance(&seen, board).ok_or_else(|| {
-        undetermined("the focal length and the boards' distances explain each other")
-    })?;
+    let covariance = fit
+        .camera_covariance(&seen, board)
+        .ok_or_else(|| undetermined(Undetermined::Distance))?;
     let error = |i: usize| (covariance[(i, i)] * cost / free).sqrt();
     let standard_errors = StandardErrors {
         fx: error(0),

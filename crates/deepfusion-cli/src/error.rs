@@ -60,12 +60,6 @@ pub(crate) enum CliError {
         /// What was given.
         word: String,
     },
-    /// Logs whose clocks have nothing to do with each other.
-    #[error("{}: its clock is of another kind than the first log's", path.display())]
-    OtherClock {
-        /// The second log.
-        path: PathBuf,
-    },
     /// An option of `doctor` that says nothing of what is looked at.
     #[error("{}: {option} does not apply to {}", path.display(), if *is_log { "a log of speeds by itself" } else { "a recording" })]
     OutOfPlace {
@@ -136,20 +130,6 @@ pub(crate) enum CliError {
         /// The output's name.
         path: PathBuf,
     },
-    /// An exported file that is not the network.
-    #[error(
-        "{}: {engine} is {deviation:.1e} away from the network (max |difference| / max |value|), more than {:.0e}; not kept",
-        path.display(),
-        deepfusion_onnx::check::TOLERANCE
-    )]
-    Deviates {
-        /// The file that would have been written.
-        path: std::path::PathBuf,
-        /// What ran it.
-        engine: String,
-        /// How far it is from the network.
-        deviation: f64,
-    },
     /// An engine for processors on another device.
     #[error("only `--engine burn` computes on other devices than the processor")]
     OnlyOnCpu,
@@ -197,14 +177,6 @@ pub(crate) enum CliError {
         /// The first remedy that one of the failures knows.
         hint: Option<String>,
     },
-    /// Settings of the perception that cannot be read.
-    #[error("{}: {problem}", path.display())]
-    PerceptionFile {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: String,
-    },
     /// Nothing but what was written there before.
     #[error("{input}: no image that is not an output of this program in the folder of the outputs")]
     OutputsAlone {
@@ -238,14 +210,15 @@ pub(crate) enum CliError {
         go_on: String,
     },
     /// An option that is not what a resumed run has.
+    #[cfg(feature = "train")]
     #[error("`{option}`: {asked} contradicts the run, which {run}")]
     Contradicts {
         /// The option.
         option: String,
         /// What it asks for.
         asked: String,
-        /// What the run has or is, in words that follow on "which".
-        run: String,
+        /// What the run has or is.
+        run: deepfusion_jobs::training::resume::RunHas,
     },
     /// A recording of a resumed run that is not where it was.
     #[error("{}: no such file or folder, and {} learns from it", path.display(), run.display())]
@@ -255,7 +228,7 @@ pub(crate) enum CliError {
         /// The run's folder.
         run: PathBuf,
         /// The option that says where it is now; none for a data set's.
-        option: Option<&'static str>,
+        option: Option<String>,
     },
     /// An adapted network that is worse than the one it began from.
     #[cfg(feature = "train")]
@@ -308,12 +281,6 @@ pub(crate) enum CliError {
         "`--save video` shows the frames of a recording one after the other, and a shard sees only some"
     )]
     VideoShard,
-    /// A cloud without a camera.
-    #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
-    NoCamera,
-    /// `--save sigma` or `confidence` of a network, or an engine, that does not say how sure it is.
-    #[error("this network, or the engine that runs it, does not say how sure it is of its depth")]
-    NoUncertainty,
 }
 
 impl Reportable for CliError {
@@ -364,9 +331,6 @@ impl Reportable for CliError {
             Self::NoRos2Writer { .. } => {
                 Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
             }
-            Self::Deviates { .. } => {
-                Some("this is a fault of the program or of the library that ran the file; please report it".into())
-            }
             Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
             Self::OnlyOrt => Some("add --engine ort, or leave out --ort-lib".into()),
             Self::OnlyFused => Some("give --engine fused --device cpu, or leave out --precision".into()),
@@ -383,11 +347,11 @@ impl Reportable for CliError {
                 None => format!("mend them, then {}", again(*resumes)),
             }),
             Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
-            Self::PerceptionFile { .. } => Some("mend what is named there, or leave the line out: each setting has a default".into()),
             Self::OutputsAlone { .. } => Some("give the images themselves, or another folder for the outputs".into()),
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
+            #[cfg(feature = "train")]
             Self::Contradicts { .. } => {
                 Some("leave it out to go on with the run, or start a new one in another folder".into())
             }
@@ -415,7 +379,6 @@ impl Reportable for CliError {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
             }
             Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as the log has them".into()),
-            Self::OtherClock { .. } => Some("give the log that has both speeds and turns, or the first alone".into()),
             Self::OutOfPlace { is_log: true, .. } => Some(
                 "leave it out; a log by itself takes --time, --speed, --unit and --dbc, and becomes a recording by deepfusion data import".into(),
             ),
@@ -424,11 +387,6 @@ impl Reportable for CliError {
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
-            Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
-            Self::NoUncertainty => Some(
-                "leave out sigma and confidence of --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
-                    .into(),
-            ),
         }
     }
 }

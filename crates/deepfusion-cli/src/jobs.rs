@@ -45,6 +45,9 @@ impl Reportable for Error {
             Self::Exists { .. } => {
                 Some("allow it with --overwrite, or choose another folder".into())
             }
+            Self::LiveFrameExists { .. } => Some(
+                "replace all of its live frames with --overwrite, or choose another folder".into(),
+            ),
             Self::Stale { .. } => Some(
                 "--overwrite replaces what was made differently; or choose another folder".into(),
             ),
@@ -56,6 +59,12 @@ impl Reportable for Error {
             }
             Self::Incomplete { .. } => Some(
                 "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
+            ),
+            Self::CameraOf { source, .. } => source.remedy(),
+            Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
+            Self::NoUncertainty => Some(
+                "leave out sigma and confidence of --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
+                    .into(),
             ),
             Self::NothingToPack { .. } => {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
@@ -95,9 +104,13 @@ fn wrapped(error: &Error) -> Option<&dyn Reportable> {
         Error::Simulator(error) => Some(error),
         Error::Runtime(error) => Some(error),
         #[cfg(feature = "train")]
-        Error::Train(error) => Some(error),
+        Error::Onnx(error) => Some(error),
         #[cfg(feature = "train")]
+        Error::Network(error) => Some(error),
+        #[cfg(feature = "train")]
+        Error::Train(error) => Some(error),
         Error::Render(error) => Some(error),
+        Error::Instances(error) => Some(error),
         Error::Perception(error) => Some(error),
         _ => None,
     }

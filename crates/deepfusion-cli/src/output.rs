@@ -50,14 +50,6 @@ pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     Ok(written.map_err(|e| deepfusion_data::Error::file(path, e))?)
 }
 
-/// The same without waiting for the disk: one of many files that something written later calls done.
-pub(crate) fn write_unsynced(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
-    let failed = |e| deepfusion_data::Error::file(path, e);
-    Ok(deepfusion_fs::write_unsynced(path, failed, |out| {
-        out.write_all(bytes.as_ref()).map_err(failed)
-    })?)
-}
-
 /// Makes a folder for outputs, where it is not there.
 pub(crate) fn make_folder(folder: &Path) -> Result<()> {
     if folder.is_file() {

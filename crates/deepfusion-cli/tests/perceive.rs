@@ -325,6 +325,9 @@ fn what_is_wrong_is_named() {
         "{}",
         run_.stderr
     );
+    // The parser's words once, and not again as the cause of themselves.
+    assert_eq!(run_.stderr.matches("unknown field").count(), 1);
+    assert!(!run_.stderr.contains("because:"), "{}", run_.stderr);
     // A drive without labelled boxes.
     std::fs::remove_file(at.join(DRIVE).join("tracklet_labels.xml")).unwrap();
     let run_ = run(at, "eval-targets --data street --depth truth");

@@ -1,6 +1,6 @@
 //! `dataset.toml`: what a recording's own files do not say.
 
-use crate::{Error, OpenOptions, Result};
+use crate::{ConfigProblem, Error, ExpectedValue, OpenOptions, Result};
 use deepfusion_geometry::{HFOV_DEG, Se3};
 use deepfusion_motion::{Bicycle, ImuConfig, ImuMount, MotionConfig, SPEED_SCALES};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -114,27 +114,30 @@ pub(crate) struct Clock {
 }
 
 /// What is wrong with a `vehicle.speed_scale`.
-pub(crate) fn bad_speed_scale(scale: f64) -> String {
-    let (least, most) = (SPEED_SCALES.start(), SPEED_SCALES.end());
-    format!(
-        "vehicle.speed_scale is {scale}, expected {least} to {most} (a unit is converted, not scaled)"
-    )
+pub(crate) fn bad_speed_scale(scale: f64) -> ConfigProblem {
+    ConfigProblem::Value {
+        key: "vehicle.speed_scale",
+        value: scale,
+        expected: ExpectedValue::SpeedScale,
+    }
 }
 
 /// What is wrong with a clock or a scale of the speed, if something is.
 pub(crate) fn check_clock_and_scale(
     clock: Clock,
     speed_scale: Option<f64>,
-) -> std::result::Result<(), String> {
+) -> std::result::Result<(), ConfigProblem> {
     let scale = speed_scale.unwrap_or(1.0);
     if !SPEED_SCALES.contains(&scale) {
         return Err(bad_speed_scale(scale));
     }
     match clock.camera_ahead_s {
         ahead if ahead.is_finite() => Ok(()),
-        ahead => Err(format!(
-            "clock.camera_ahead_s is {ahead}, it is a time in seconds"
-        )),
+        value => Err(ConfigProblem::Value {
+            key: "clock.camera_ahead_s",
+            value,
+            expected: ExpectedValue::Time,
+        }),
     }
 }
 
@@ -150,7 +153,7 @@ pub(crate) fn read_or_default<T: serde::de::DeserializeOwned>(path: &Path) -> Re
     };
     toml::from_str(&text).map_err(|e| Error::Config {
         path: path.to_owned(),
-        problem: e.to_string().trim_end().to_owned(),
+        problem: e.into(),
     })
 }
 
@@ -172,31 +175,27 @@ impl FolderConfig {
         ];
         for (key, value) in numbers {
             if let Some(bad) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(config.error(format!("{key} is {bad}, it must be above 0")));
+                return Err(config.bad(key, bad, ExpectedValue::Positive));
             }
         }
         if let Some(bad) = config.max_gap_s.filter(|v| *v > MOST_GAP_S) {
-            return Err(config.error(format!(
-                "max_gap_s is {bad}, at most {MOST_GAP_S} s can be bridged"
-            )));
+            return Err(config.bad("max_gap_s", bad, ExpectedValue::GapUpTo(MOST_GAP_S)));
         }
         if config.intrinsics.is_some() && config.hfov_deg.is_some() {
-            return Err(config
-                .error("both intrinsics and hfov_deg say what the camera is: keep one".into()));
+            return Err(config.error(ConfigProblem::IntrinsicsAndView));
         }
         let (least, most) = HFOV_DEG;
         if let Some(bad) = config.hfov_deg.filter(|v| !(*v > least && *v < most)) {
-            return Err(config.error(format!(
-                "hfov_deg is {bad}, it must be above {least} and below {most} degrees"
-            )));
+            return Err(config.bad("hfov_deg", bad, ExpectedValue::Between(least, most)));
         }
         let place = config.vehicle_from_imu.unwrap_or_default();
         let mut numbers = place.translation.iter().chain(&place.rotation);
         if !numbers.all(|x| x.is_finite()) {
-            return Err(config.error("vehicle_from_imu holds a number that is not finite".into()));
+            let key = "vehicle_from_imu";
+            return Err(config.error(ConfigProblem::NotFinite { key }));
         }
         if let Some(bad) = config.start_s.filter(|v| v.is_nan() || v.abs() > 9e9) {
-            return Err(config.error(format!("start_s is {bad}, it is a time in seconds")));
+            return Err(config.bad("start_s", bad, ExpectedValue::Time));
         }
         match check_clock_and_scale(config.clock, config.vehicle.speed_scale) {
             Ok(()) => Ok(config),
@@ -236,11 +235,19 @@ impl FolderConfig {
     }
 
     /// An error about this file.
-    pub(crate) fn error(&self, problem: String) -> Error {
+    pub(crate) fn error(&self, problem: ConfigProblem) -> Error {
         Error::Config {
             path: self.path.clone(),
             problem,
         }
+    }
+
+    fn bad(&self, key: &'static str, value: f64, expected: ExpectedValue) -> Error {
+        self.error(ConfigProblem::Value {
+            key,
+            value,
+            expected,
+        })
     }
 
     /// The folder that it lies in.
@@ -255,7 +262,7 @@ impl FolderConfig {
     pub(crate) fn find(
         &self,
         folder: &Path,
-        key: &str,
+        key: &'static str,
         named: Option<&PathBuf>,
         usual: &[&str],
     ) -> Result<Option<PathBuf>> {
@@ -264,7 +271,7 @@ impl FolderConfig {
             return if path.exists() {
                 Ok(Some(path))
             } else {
-                Err(self.error(format!("{key}: there is no {}", path.display())))
+                Err(self.error(ConfigProblem::NoFile { key, path }))
             };
         }
         let mut paths = usual.iter().map(|name| folder.join(name));

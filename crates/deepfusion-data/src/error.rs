@@ -4,7 +4,39 @@ use crate::{CalibrationSource, DatasetKind, FoundInstead, GtKind, NamedTopic};
 use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 
+mod absent;
+mod array;
+mod calibration_file;
+mod camera;
+mod can;
+mod columns;
+mod config;
+mod frames;
 mod hint;
+mod kitti;
+mod line;
+mod picture;
+mod pose;
+mod table;
+mod topic;
+mod tracklets;
+
+pub use self::absent::{NoFramesReason, NoTrackReason};
+pub use self::array::{ArrayProblem, SegmentProblem};
+pub use self::calibration_file::CalibrationFileProblem;
+pub use self::camera::{CameraInfoProblem, CameraProblem, NoLens};
+pub use self::can::CanProblem;
+pub(crate) use self::can::{HIGHEST_EXTENDED, HIGHEST_STANDARD};
+pub use self::columns::{ColumnsProblem, Quantity};
+pub use self::config::{ConfigProblem, ExpectedValue};
+pub use self::frames::FramesProblem;
+pub use self::kitti::{CalibrationProblem, OxtsField, OxtsProblem};
+pub use self::line::{SplitProblem, TimeStampProblem};
+pub use self::picture::ImageProblem;
+pub use self::pose::{PoseField, PoseFileProblem, PoseProblem};
+pub use self::table::{ExpectedCell, JsonProblem, TableProblem};
+pub use self::topic::TopicProblem;
+pub use self::tracklets::{TrackletPart, TrackletPlace, TrackletsProblem};
 
 /// What can go wrong with a recording.
 #[derive(Debug, thiserror::Error)]
@@ -69,9 +101,8 @@ pub enum Error {
         /// The image.
         path: PathBuf,
         /// Why not.
-        problem: String,
-        /// Whether the file ends early.
-        truncated: bool,
+        #[source]
+        problem: ImageProblem,
     },
     /// An image has another size than its camera's calibration.
     #[error(
@@ -105,10 +136,9 @@ pub enum Error {
     CameraFile {
         /// The file, or who else says the camera.
         by: CalibrationSource,
-        /// The field and what is wrong with it.
-        problem: String,
-        /// What to do.
-        remedy: String,
+        /// Why not.
+        #[source]
+        problem: CameraProblem,
     },
     /// Nothing says what the camera of images in files is.
     #[error("{}: missing, it holds the camera's fx, fy, cx, cy", path.display())]
@@ -144,7 +174,8 @@ pub enum Error {
         /// The field.
         field: String,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: JsonProblem,
     },
     /// A root holds several sets of tables, of which some tell of the same drives.
     #[error("{}: holds {}", path.display(), versions.join(", "))]
@@ -161,10 +192,11 @@ pub enum Error {
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
-        /// Which number of the line, or `pose`.
-        field: String,
+        /// Which number of the line, or all of it.
+        field: PoseField,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: PoseProblem,
     },
     /// A `dataset.toml` cannot be used.
     #[error("{}: {problem}", path.display())]
@@ -172,7 +204,8 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: ConfigProblem,
     },
     /// A value of a table cannot be used.
     #[error("{}:{line}: column {column}: {problem}", path.display())]
@@ -184,7 +217,8 @@ pub enum Error {
         /// The column's name, or its number counted from 1.
         column: String,
         /// What is wrong with the value.
-        problem: String,
+        #[source]
+        problem: TableProblem,
     },
     /// A log of a vehicle's, a receiver's or an app's cannot be used.
     #[error(transparent)]
@@ -195,9 +229,8 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        problem: String,
-        /// What to do.
-        remedy: String,
+        #[source]
+        problem: ColumnsProblem,
     },
     /// Two clocks have no time in common.
     #[error(
@@ -213,14 +246,13 @@ pub enum Error {
         frames_s: (f64, f64),
     },
     /// A layout without speeds cannot give ego-motion.
-    #[error("{drive}: {why}")]
+    #[error("{drive}: {reason}")]
     NoTrack {
         /// The drive.
         drive: String,
         /// What is missing.
-        why: String,
-        /// What to do.
-        remedy: String,
+        #[source]
+        reason: NoTrackReason,
     },
     /// Nobody measured where the camera went.
     #[error("{drive}: a recording of this layout ({layout}) holds no path of the camera")]
@@ -246,10 +278,9 @@ pub enum Error {
     Topic {
         /// The bag.
         path: PathBuf,
-        /// The topic and what is wrong with it.
-        problem: String,
-        /// What to do.
-        remedy: String,
+        /// Why not.
+        #[source]
+        problem: Box<TopicProblem>,
         /// A role and a topic that it could be named for, as a caller may too ([`crate::OpenOptions::topics`]).
         choice: Option<NamedTopic>,
     },
@@ -277,9 +308,8 @@ pub enum Error {
         /// The bag.
         path: PathBuf,
         /// What contradicts what.
-        problem: String,
-        /// What to do.
-        remedy: String,
+        #[source]
+        problem: FramesProblem,
     },
     /// A vehicle's sensors make no motion.
     #[error("{}: {source}", path.display())]
@@ -318,28 +348,15 @@ pub enum Error {
         path: PathBuf,
     },
     /// A recording that has streams, but no images.
-    #[error("{}: {why}", path.display())]
+    #[error("{}: {reason}", path.display())]
     NoFrames {
         /// The recording.
         path: PathBuf,
         /// Why it has none.
-        why: String,
-        /// What to do.
-        remedy: String,
+        #[source]
+        reason: NoFramesReason,
     },
-    /// A program that is run for it failed, or is not there.
-    #[error("{}: {program} {problem}", path.display())]
-    Program {
-        /// The file it should have read.
-        path: PathBuf,
-        /// The program.
-        program: &'static str,
-        /// What happened.
-        problem: String,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// Another failure of a video's.
+    /// A video cannot be read, or ffmpeg is not there to read it.
     #[error(transparent)]
     Video(deepfusion_video::Error),
     /// A calibration file lacks a field or has a bad one.
@@ -350,7 +367,8 @@ pub enum Error {
         /// The field, such as `P_rect_02`.
         field: String,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: CalibrationProblem,
     },
     /// A line of a time stamp file cannot be read.
     #[error("{}:{line}: {problem}", path.display())]
@@ -360,7 +378,8 @@ pub enum Error {
         /// The line, counted from 1.
         line: usize,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: TimeStampProblem,
     },
     /// A frame has no line in the time stamp file.
     #[error(
@@ -380,20 +399,22 @@ pub enum Error {
     Oxts {
         /// The packet's file.
         path: PathBuf,
-        /// The field, such as `vf (value 9 of 30)`.
-        field: String,
+        /// The field.
+        field: OxtsField,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: OxtsProblem,
     },
     /// A file of tracklets cannot be read.
     #[error("{}: {place}: {problem}", path.display())]
     Tracklets {
         /// The file.
         path: PathBuf,
-        /// The tracklet, pose and field (counted from 0), or the byte where the text stops being XML.
-        place: String,
-        /// What is wrong with it.
-        problem: String,
+        /// Where in it.
+        place: TrackletPlace,
+        /// What is wrong there.
+        #[source]
+        problem: TrackletsProblem,
     },
     /// A split file's line cannot be read.
     #[error("{}:{line}: {problem}", path.display())]
@@ -403,7 +424,8 @@ pub enum Error {
         /// The line, counted from 1.
         line: usize,
         /// What is wrong with it.
-        problem: String,
+        #[source]
+        problem: SplitProblem,
     },
     /// A split selects no frame of the recording.
     #[error(
@@ -480,7 +502,8 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What went wrong.
-        problem: String,
+        #[source]
+        problem: ArrayProblem,
     },
     /// A recording has no scan to make ground truth from.
     #[error("{}: no velodyne scan belongs to any of its frames ({frames})", path.display())]
@@ -521,17 +544,6 @@ impl From<deepfusion_video::Error> for Error {
         use deepfusion_video::Error as Video;
         match error {
             Video::File { path, source } => Self::file(&path, source),
-            Video::Program {
-                path,
-                program,
-                problem,
-                remedy,
-            } => Self::Program {
-                path,
-                program,
-                problem,
-                remedy,
-            },
             other => Self::Video(other),
         }
     }

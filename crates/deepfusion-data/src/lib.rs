@@ -19,21 +19,25 @@ mod logs;
 mod pictures;
 mod truth;
 
-pub use camera::{
-    CalibrationSource, CameraCalibration, Lens, NoLens, calibration_near, camera_info_yaml,
-};
+pub use camera::{CalibrationSource, CameraCalibration, Lens, calibration_near, camera_info_yaml};
 pub use convert::{
     Converted, VELOCITY, convert_to_bag, convert_to_kitti, export_gt, ground_truth_names,
 };
 pub use dataset::{
     CalibrationPlace, Camera, CameraPath, Cameras, ClockOffset, Dataset, DatasetKind, DatasetParts,
     DriveInspection, Ego, EgoMotion, Frame, FrameImage, Heading, Inspection, IntrinsicsSummary,
-    Mount, NamedTopic, NoMotion, OpenOptions, PLAUSIBLE_HEIGHT_M, Receiver, Recording, SeenTurn,
-    Snippet, Source, SpeedRange, SpeedWarning, Split, SplitCoverage, SplitEntry, Stream, TopicRole,
-    grey_image, hold_out, road_camera_height, speed_unit_warning,
+    Mount, NamedTopic, NoMotion, NoNamedTopic, NoSuchCamera, OpenOptions, PLAUSIBLE_HEIGHT_M,
+    Receiver, Recording, SeenTurn, Snippet, Source, SpeedRange, SpeedWarning, Split, SplitCoverage,
+    SplitEntry, Stream, TopicRole, grey_image, hold_out, road_camera_height, speed_unit_warning,
 };
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
-pub use error::{Error, Result};
+pub use error::{
+    ArrayProblem, CalibrationFileProblem, CalibrationProblem, CameraInfoProblem, CameraProblem,
+    CanProblem, ColumnsProblem, ConfigProblem, Error, ExpectedCell, ExpectedValue, FramesProblem,
+    ImageProblem, JsonProblem, NoFramesReason, NoLens, NoTrackReason, OxtsField, OxtsProblem,
+    PoseField, PoseFileProblem, PoseProblem, Quantity, Result, SegmentProblem, SplitProblem,
+    TableProblem, TimeStampProblem, TopicProblem, TrackletPart, TrackletPlace, TrackletsProblem,
+};
 pub use formats::kitti;
 pub use formats::{
     DopplerEgo, FileKind, FoundInstead, ego_velocity, ground_radial, inspect, inspect_with,
@@ -45,5 +49,6 @@ pub use pictures::{
     save_png, to_chw, to_network_input, write_depth_png,
 };
 pub use truth::{
-    DynamicAgreement, GtKind, LidarMotion, MovingLabels, MovingPixels, MovingSource, ScanTruth,
+    DynamicAgreement, GtKind, LidarMotion, MovingLabels, MovingPixels, MovingSource, NoSuchDepth,
+    ScanTruth,
 };

@@ -62,7 +62,8 @@ fn either_camera_or_both() {
     assert_eq!(cameras(Cameras::Right), [Camera::Right]);
     assert_eq!(cameras(Cameras::Both), [Camera::Left, Camera::Right]);
     assert_eq!("both".parse(), Ok(Cameras::Both));
-    assert!("4".parse::<Cameras>().unwrap_err().contains("2, 3 or both"));
+    let refused = "4".parse::<Cameras>().unwrap_err().to_string();
+    assert!(refused.contains("2, 3 or both"), "{refused}");
     fs::remove_dir_all(drive.join("image_02")).unwrap();
     let text = refusal(&drive);
     assert!(

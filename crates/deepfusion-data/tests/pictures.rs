@@ -1,6 +1,8 @@
 //! Images: resized as PIL does, truncated ones refused.
 
-use deepfusion_data::{Error, image_size, load_rgb, resize_rgb, to_chw, to_network_input};
+use deepfusion_data::{
+    Error, ImageProblem, image_size, load_rgb, resize_rgb, to_chw, to_network_input,
+};
 use deepfusion_hint::Hint;
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
@@ -101,7 +103,7 @@ fn every_truncation_is_refused() {
                     matches!(
                         error,
                         Error::Image {
-                            truncated: true,
+                            problem: ImageProblem::Truncated,
                             ..
                         }
                     ),

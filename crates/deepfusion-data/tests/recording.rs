@@ -2,8 +2,8 @@
 
 use deepfusion_data::{
     CalibrationPlace, Camera, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind,
-    MovingLabels, MovingPixels, MovingSource, Recording, Result, RgbImage, Stream, VehicleTrack,
-    speed_unit_warning,
+    MovingLabels, MovingPixels, MovingSource, NoTrackReason, Recording, Result, RgbImage, Stream,
+    VehicleTrack, speed_unit_warning,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use std::path::{Path, PathBuf};
@@ -46,8 +46,10 @@ impl Recording for Messages {
     fn no_motion(&self) -> Error {
         Error::NoTrack {
             drive: "a".into(),
-            why: "no topic of speeds".into(),
-            remedy: "record one".into(),
+            reason: NoTrackReason::Other {
+                why: "no topic of speeds".into(),
+                remedy: "record one".into(),
+            },
         }
     }
 

@@ -1,11 +1,11 @@
 //! The camera's clock against the vehicle's.
 
-use super::camera_ahead;
+use super::camera_ahead::{self, NoCameraAhead};
 use super::clock_offset::{rates, settled};
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Remedy, Severity};
 use super::survey::Survey;
-use deepfusion_motion::{OffsetConfig, Signal, TimeOffset};
+use deepfusion_motion::{NoTimeOffset, OffsetConfig, Signal, TimeOffset};
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
 const MOST_S: f64 = 0.020;
@@ -18,7 +18,7 @@ const SURE_S: f64 = 0.05;
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     let Estimate { offset, least_s } = match estimate(survey, pairs) {
         Ok(estimate) => estimate,
-        Err(why) => return Outcome::skipped("clock", why),
+        Err(why) => return Outcome::skipped("clock", why.to_string()),
     };
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
     let mut outcome = Outcome::new("clock");
@@ -52,24 +52,37 @@ pub(super) struct Estimate {
     least_s: f64,
 }
 
+/// Why there is no estimate.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum NoEstimate {
+    #[error("no speed and yaw rate to compare the picture with")]
+    NoRates,
+    /// The line is the drive's own.
+    #[error("{}", .0.reason())]
+    ByCourse(NoCameraAhead),
+    #[error(transparent)]
+    NotFound(#[from] NoTimeOffset),
+    #[error("the estimate {value_s:.2} s has a standard error of {error_s:.2} s")]
+    Unsure { value_s: f64, error_s: f64 },
+}
+
 /// The offset of the clocks; else why there is none.
-pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Estimate, String> {
+pub(super) fn estimate(
+    survey: &Survey<'_>,
+    pairs: &[EpipolarPair],
+) -> Result<Estimate, NoEstimate> {
     let rates = rates(survey.dataset).filter(|rates| rates.yaw_rate_radps.is_some());
-    let rates = rates.ok_or("no speed and yaw rate to compare the picture with")?;
+    let rates = rates.ok_or(NoEstimate::NoRates)?;
     if !survey.dataset.yaw_known() {
         // A course takes more pictures and other settings than a yaw rate.
-        // The line is the drive's own.
-        let offset = camera_ahead::offset(survey.dataset).map_err(|why| why.reason())?;
+        let offset = camera_ahead::offset(survey.dataset).map_err(NoEstimate::ByCourse)?;
         let least_s = MOST_BY_COURSE_S;
         return Ok(Estimate { offset, least_s });
     }
-    let offset = settled(survey, pairs, &rates, &OffsetConfig::default());
-    let offset = offset.map_err(|why| why.to_string())?;
-    let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
-    if error.is_nan() || error >= SURE_S {
-        Err(format!(
-            "the estimate {value:.2} s has a standard error of {error:.2} s"
-        ))
+    let offset = settled(survey, pairs, &rates, &OffsetConfig::default())?;
+    let (value_s, error_s) = (offset.vehicle_minus_camera_s, offset.std_error_s);
+    if error_s.is_nan() || error_s >= SURE_S {
+        Err(NoEstimate::Unsure { value_s, error_s })
     } else {
         // A stream is not placed better than its own interval (KITTI's oxts, at 10 Hz, come out 60 ms late).
         let interval_s = rates.speed_mps.as_ref().and_then(Signal::interval_s);

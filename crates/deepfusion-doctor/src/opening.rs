@@ -33,7 +33,7 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         outcome.find(
             Severity::Error,
             Some(*number),
-            problem.clone(),
+            problem.to_string(),
             "copy the recording again, or leave the frame out",
         );
     }

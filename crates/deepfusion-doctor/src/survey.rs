@@ -32,7 +32,7 @@ pub(crate) struct Survey<'a> {
     /// The camera of the small images.
     pub(crate) intrinsics: Intrinsics,
     /// Numbers of frames whose image cannot be read, and why.
-    pub(crate) unreadable: Vec<(u64, String)>,
+    pub(crate) unreadable: Vec<(u64, Box<deepfusion_data::Error>)>,
 }
 
 /// A frame that was read.
@@ -153,11 +153,11 @@ impl SeenFrame {
         index: usize,
         width: u32,
         height: u32,
-    ) -> Result<Self, (u64, String)> {
+    ) -> Result<Self, (u64, Box<deepfusion_data::Error>)> {
         let frame = &dataset.frames()[index];
         let image = dataset
             .load_image(index)
-            .map_err(|e| (frame.number, e.to_string()))?;
+            .map_err(|e| (frame.number, Box::new(e)))?;
         let small = grey_image(&image, width, height);
         let coarse = frame.time_s.and_then(|time_s| {
             let width = COARSE_WIDTH.min(width);

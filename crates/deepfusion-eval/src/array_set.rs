@@ -7,7 +7,7 @@ use ndarray::{ArrayD, Axis};
 use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt, ReadNpzError};
 
 use crate::error::first_names;
-use crate::{Error, Grid, Result};
+use crate::{ArrayName, ArrayProblem, Error, Grid, Result};
 
 /// Before the names of the velocities that `data export-gt` writes beside depths: they are no depths.
 const VELOCITY: &str = "velocity_mps/";
@@ -55,8 +55,8 @@ impl ArraySet {
         file.by_ref().take(6).read_to_end(&mut magic).map_err(io)?;
         file.seek(SeekFrom::Start(0)).map_err(io)?;
         let source = if magic.starts_with(b"PK") {
-            let mut reader = NpzReader::new(file).map_err(|e| unreadable_archive(path, &e))?;
-            let names = reader.names().map_err(|e| unreadable_archive(path, &e))?;
+            let mut reader = NpzReader::new(file).map_err(|e| unreadable_archive(path, e))?;
+            let names = reader.names().map_err(|e| unreadable_archive(path, e))?;
             let depths = names.into_iter().enumerate();
             let depths = depths.filter(|(_, name)| !name.starts_with(VELOCITY));
             let (places, names) = depths.unzip();
@@ -75,15 +75,12 @@ impl ArraySet {
             };
             Source::Stack(stack(
                 path,
-                array.map_err(|e| unreadable(path, "the array", e))?,
+                array.map_err(|e| unreadable(path, ArrayName::Only, e))?,
             )?)
         } else {
             return Err(Error::ArrayFile {
                 path: path.to_owned(),
-                what: "is neither an .npz nor an .npy file".into(),
-                remedy: Some(
-                    "write it with numpy.savez (arrays with names) or numpy.save (N×H×W in split order)",
-                ),
+                reason: ArrayProblem::NotArrays,
             });
         };
         let set = Self {
@@ -93,8 +90,7 @@ impl ArraySet {
         if set.is_empty() {
             return Err(Error::ArrayFile {
                 path: path.to_owned(),
-                what: "has no arrays".into(),
-                remedy: None,
+                reason: ArrayProblem::Empty,
             });
         }
         Ok(set)
@@ -139,14 +135,13 @@ impl ArraySet {
         if index >= len {
             return Err(Error::ArrayFile {
                 path: self.path.clone(),
-                what: format!("has {len} arrays, number {index} was asked for"),
-                remedy: None,
+                reason: ArrayProblem::NoSuchArray { count: len, index },
             });
         }
         match &mut self.source {
             Source::Stack(array) => grid(
                 &self.path,
-                &format!("array {index}"),
+                ArrayName::Number(index),
                 array.index_axis(Axis(0), index).to_owned(),
             ),
             Source::Npz {
@@ -162,12 +157,13 @@ impl ArraySet {
                         .map(|a| a.mapv(f64::from)),
                     other => other,
                 };
-                let label = format!("array `{name}`");
-                let array = array.map_err(|e| match e {
-                    ReadNpzError::Npy(e) => unreadable(&self.path, &label, e),
-                    ReadNpzError::Zip(_) => unreadable_archive(&self.path, &e),
-                })?;
-                grid(&self.path, &label, array)
+                match array {
+                    Ok(array) => grid(&self.path, ArrayName::Named(name), array),
+                    Err(ReadNpzError::Npy(e)) => {
+                        Err(unreadable(&self.path, ArrayName::Named(name), e))
+                    }
+                    Err(e @ ReadNpzError::Zip(_)) => Err(unreadable_archive(&self.path, e)),
+                }
             }
         }
     }
@@ -228,58 +224,56 @@ fn stack(path: &Path, array: ArrayD<f64>) -> Result<ArrayD<f64>> {
     match array.ndim() {
         2 => Ok(array.insert_axis(Axis(0))),
         3 | 4 => Ok(array),
-        _ => Err(wrong_shape(path, "the array", array.shape(), "N×H×W")),
+        _ => Err(wrong_shape(path, ArrayName::Only, array.shape(), "N×H×W")),
     }
 }
 
-fn grid(path: &Path, label: &str, mut array: ArrayD<f64>) -> Result<Grid> {
+fn grid(path: &Path, name: ArrayName, mut array: ArrayD<f64>) -> Result<Grid> {
     let shape = array.shape().to_owned();
     while array.ndim() > 2 {
         match array.shape().iter().position(|n| *n == 1) {
             Some(axis) => array = array.index_axis_move(Axis(axis), 0),
-            None => return Err(wrong_shape(path, label, &shape, "H×W")),
+            None => return Err(wrong_shape(path, name, &shape, "H×W")),
         }
     }
     let &[height, width] = array.shape() else {
-        return Err(wrong_shape(path, label, &shape, "H×W"));
+        return Err(wrong_shape(path, name, &shape, "H×W"));
     };
     // Iterates in logical order, whatever the memory order was (NumPy may write Fortran order).
     Grid::new(width, height, array.iter().copied().collect())
-        .map_err(|_| wrong_shape(path, label, &shape, "H×W, not empty"))
+        .map_err(|_| wrong_shape(path, name, &shape, "H×W, not empty"))
 }
 
-fn wrong_shape(path: &Path, label: &str, shape: &[usize], expected: &str) -> Error {
+fn wrong_shape(path: &Path, array: ArrayName, shape: &[usize], expected: &'static str) -> Error {
     Error::ArrayFile {
         path: path.to_owned(),
-        what: format!("{label} has shape {shape:?}, expected {expected}"),
-        remedy: Some("one H×W array an image; different sizes need an .npz"),
+        reason: ArrayProblem::Shape {
+            array,
+            found: shape.to_owned(),
+            expected,
+        },
     }
 }
 
-fn unreadable(path: &Path, label: &str, error: ReadNpyError) -> Error {
-    let (what, remedy) = match error {
-        ReadNpyError::WrongDescriptor(found) => (
-            format!("{label} holds values of type {found}, expected float32 or float64"),
-            Some(
-                "convert with .astype(numpy.float32); pickled object arrays: numpy.savez(file, **{name: array, …})",
-            ),
-        ),
-        other => (
-            format!("{label} cannot be read: {other}"),
-            Some("the file may be cut off: write it again"),
-        ),
-    };
+fn unreadable(path: &Path, array: ArrayName, error: ReadNpyError) -> Error {
     Error::ArrayFile {
         path: path.to_owned(),
-        what,
-        remedy,
+        reason: match error {
+            ReadNpyError::WrongDescriptor(found) => ArrayProblem::Numbers {
+                array,
+                found: found.to_string(),
+            },
+            other => ArrayProblem::Unreadable {
+                array,
+                source: Box::new(other),
+            },
+        },
     }
 }
 
-fn unreadable_archive(path: &Path, error: &ReadNpzError) -> Error {
+fn unreadable_archive(path: &Path, error: ReadNpzError) -> Error {
     Error::ArrayFile {
         path: path.to_owned(),
-        what: format!("cannot be read: {error}"),
-        remedy: Some("the file may be cut off: write it again"),
+        reason: ArrayProblem::Archive(Box::new(error)),
     }
 }

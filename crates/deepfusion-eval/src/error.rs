@@ -1,6 +1,13 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+mod arrays;
+mod intervals;
+
+pub use self::arrays::{ArrayName, ArrayProblem};
+pub(crate) use self::intervals::ENDS_M;
+pub use self::intervals::{IntervalsProblem, LEVELS};
+
 /// What can go wrong while arrays are read and compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -63,7 +70,7 @@ pub enum Error {
     #[error("factors of intervals: {reason}")]
     Intervals {
         /// What is wrong.
-        reason: String,
+        reason: IntervalsProblem,
     },
     /// A file that cannot be opened or read.
     #[error("cannot read {path}")]
@@ -74,14 +81,13 @@ pub enum Error {
         source: std::io::Error,
     },
     /// An array file whose content is not what was expected.
-    #[error("{path}: {what}")]
+    #[error("{path}: {reason}")]
     ArrayFile {
         /// The file.
         path: PathBuf,
         /// What is wrong, and with which array.
-        what: String,
-        /// What to do about it, if there is something.
-        remedy: Option<&'static str>,
+        #[source]
+        reason: ArrayProblem,
     },
     /// Ground truth without prediction, or the other way round.
     #[error("{path} has no array for {count} of {of}: {names}")]
@@ -138,7 +144,7 @@ impl Hint for Error {
                 std::io::ErrorKind::PermissionDenied => Some("check the permissions of the file".into()),
                 _ => None,
             },
-            Self::ArrayFile { remedy, .. } => remedy.map(str::to_owned),
+            Self::ArrayFile { reason, .. } => reason.remedy().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(
                     "arrays are matched by name, and this file names its arrays like `{name}`; the same names are needed in both"

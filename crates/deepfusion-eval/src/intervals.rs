@@ -6,13 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Result};
-
-/// Shares of the pixels that intervals are to hold.
-pub const LEVELS: [f64; 3] = [0.5, 0.8, 0.95];
-
-/// Where the ranges of predicted depth end, metres; the last goes on.
-const ENDS_M: [f64; 3] = [10.0, 20.0, 40.0];
+use crate::error::ENDS_M;
+use crate::{Error, IntervalsProblem, LEVELS, Result};
 
 /// A range with fewer pixels than this takes the factors of all ranges together.
 const FEWEST: usize = 200;
@@ -159,16 +154,16 @@ impl IntervalFactors {
     /// # Errors
     /// [`Error::Intervals`] for other levels or ranges than this program's, or factors that are no positive numbers.
     pub fn validate(&self) -> Result<()> {
-        let fail = |reason: String| Err(Error::Intervals { reason });
+        let fail = |reason| Err(Error::Intervals { reason });
         if self.levels != LEVELS {
-            return fail(format!("levels {:?}, expected {LEVELS:?}", self.levels));
+            return fail(IntervalsProblem::Levels { found: self.levels });
         }
         if !self.ranges.iter().map(|r| r.to_m).eq(ends()) {
-            return fail(format!("ranges other than those ending at {ENDS_M:?} m"));
+            return fail(IntervalsProblem::Ranges);
         }
         let mut factors = self.ranges.iter().flat_map(|r| r.factors);
         match factors.find(|q| !(q.is_finite() && *q >= 0.0)) {
-            Some(wrong) => fail(format!("a factor of {wrong}")),
+            Some(factor) => fail(IntervalsProblem::Factor { factor }),
             None => Ok(()),
         }
     }

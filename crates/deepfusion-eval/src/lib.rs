@@ -33,11 +33,11 @@ mod table;
 pub mod verdict;
 
 pub use array_set::{ArraySet, match_names};
-pub use error::{Error, Result};
+pub use error::{ArrayName, ArrayProblem, Error, IntervalsProblem, LEVELS, Result};
 pub use evaluator::{Evaluator, ImageScore, Sample};
 pub use grid::{Grid, Prediction};
 pub use intervals::{
-    FactorRange, IntervalFactors, IntervalRange, IntervalRow, IntervalSample, Intervals, LEVELS,
+    FactorRange, IntervalFactors, IntervalRange, IntervalRow, IntervalSample, Intervals,
 };
 pub use mean_depth_baseline::MeanDepthBaseline;
 pub use metrics::Metrics;

@@ -1,9 +1,40 @@
+use deepfusion_hint::Hint;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Horizontal fields of view that a camera can be given by, in degrees, both ends left out: beyond them no pinhole camera is
 /// usable, and a wider lens needs its distortion known.
 pub const HFOV_DEG: (f64, f64) = (1.0, 170.0);
+
+/// Why numbers are not a valid camera.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImplausibleCamera {
+    /// A focal length is not positive, or not finite.
+    #[error("{name} is {value}, a focal length is positive")]
+    Focal {
+        /// `fx` or `fy`.
+        name: &'static str,
+        /// Its value, in pixels.
+        value: f64,
+    },
+    /// The principal point lies outside of the image.
+    #[error("{name} is {value:.1} in an image of {size} pixels")]
+    Centre {
+        /// `cx` or `cy`.
+        name: &'static str,
+        /// Its value, in pixels.
+        value: f64,
+        /// The image's side along it, in pixels.
+        size: u32,
+    },
+}
+
+impl Hint for ImplausibleCamera {
+    fn hint(&self) -> Option<String> {
+        Some("fx, fy, cx, cy are in pixels of the image".into())
+    }
+}
 
 /// A pinhole camera without distortion, in pixels of the image it belongs to.
 ///
@@ -150,15 +181,15 @@ impl Intrinsics {
     /// Why these numbers are not a valid camera, or `None` if they are: focal lengths that are not
     /// positive and finite, or a principal point outside the image.
     #[must_use]
-    pub fn implausible(&self) -> Option<String> {
-        for (name, f) in [("fx", self.fx), ("fy", self.fy)] {
-            if !(f.is_finite() && f > 0.0) {
-                return Some(format!("{name} is {f}, a focal length is positive"));
+    pub fn implausible(&self) -> Option<ImplausibleCamera> {
+        for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Some(ImplausibleCamera::Focal { name, value });
             }
         }
-        for (name, c, size) in [("cx", self.cx, self.width), ("cy", self.cy, self.height)] {
-            if !(c >= 0.0 && c < f64::from(size)) {
-                return Some(format!("{name} is {c:.1} in an image of {size} pixels"));
+        for (name, value, size) in [("cx", self.cx, self.width), ("cy", self.cy, self.height)] {
+            if !(value >= 0.0 && value < f64::from(size)) {
+                return Some(ImplausibleCamera::Centre { name, value, size });
             }
         }
         None
@@ -211,12 +242,16 @@ mod tests {
     fn implausible_cameras_are_named() {
         assert_eq!(kitti().implausible(), None);
         let wrong = Intrinsics { fx: 0.0, ..kitti() };
-        assert!(wrong.implausible().unwrap().contains("fx"));
+        let (name, value) = ("fx", 0.0);
+        let focal = ImplausibleCamera::Focal { name, value };
+        assert_eq!(wrong.implausible(), Some(focal));
+        assert_eq!(focal.to_string(), "fx is 0, a focal length is positive");
         let wrong = Intrinsics {
             cy: 400.0,
             ..kitti()
         };
-        assert!(wrong.implausible().unwrap().contains("cy"));
+        let text = wrong.implausible().unwrap().to_string();
+        assert_eq!(text, "cy is 400.0 in an image of 375 pixels");
     }
 
     proptest! {

@@ -17,6 +17,6 @@ mod trajectory;
 pub use depth_map::DepthMap;
 pub use depth_range::DepthRange;
 pub use distortion::{Distortion, NoDistortion};
-pub use intrinsics::{HFOV_DEG, Intrinsics};
+pub use intrinsics::{HFOV_DEG, ImplausibleCamera, Intrinsics};
 pub use se3::Se3;
 pub use trajectory::{StampedPose, Trajectory};

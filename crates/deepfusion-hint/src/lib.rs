@@ -1,7 +1,8 @@
 //! What to do about an error, in one line.
 //!
-//! An error's message says what is wrong and where. [`Hint`] adds what its reader can do about it. Every public error of this
-//! project implements it, so a program that shows errors needs one rule for all of them:
+//! An error's message says what is wrong and where. [`Hint`] adds what its reader can do about it. Every error type of this
+//! project that a public function gives back implements it. Where an error holds a reason of a type of its own, the error's hint
+//! speaks for the reason too. So a program that shows errors needs one rule for all of them:
 //!
 //! ```
 //! use deepfusion_hint::Hint;

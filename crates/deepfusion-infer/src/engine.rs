@@ -54,6 +54,37 @@ enum Runner {
     Int8(Typed<Bf16, Int8Conv>),
 }
 
+/// A network laid out and packed for images of one size, without buffers: any number of engines run on it, on any threads.
+#[derive(Debug, Clone)]
+pub struct EnginePlan {
+    packed: PackedFor,
+    size: (usize, usize),
+}
+
+#[derive(Debug, Clone)]
+enum PackedFor {
+    F32(Arc<Packed<F32Conv>>),
+    Bf16(Arc<Packed<Bf16Conv>>),
+    Int8(Arc<Packed<Int8Conv>>),
+}
+
+impl EnginePlan {
+    /// An engine on it, with buffers of its own.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if there is no memory for them.
+    pub fn engine(&self) -> Result<Engine, Error> {
+        let size @ (width, height) = self.size;
+        let full = || Error::Memory { width, height };
+        let runner = match &self.packed {
+            PackedFor::F32(packed) => Runner::F32(Typed::on(packed).ok_or_else(full)?),
+            PackedFor::Bf16(packed) => Runner::Bf16(Typed::on(packed).ok_or_else(full)?),
+            PackedFor::Int8(packed) => Runner::Int8(Typed::on(packed).ok_or_else(full)?),
+        };
+        Ok(Engine { runner, size })
+    }
+}
+
 impl Engine {
     /// Packs the graph for images of this size.
     ///
@@ -102,17 +133,21 @@ impl Engine {
     /// # Errors
     /// [`Error::Memory`] if there is no memory for them.
     pub fn another(&self) -> Result<Self, Error> {
-        let (width, height) = self.size;
-        let full = || Error::Memory { width, height };
-        let runner = match &self.runner {
-            Runner::F32(runner) => Runner::F32(runner.another().ok_or_else(full)?),
-            Runner::Bf16(runner) => Runner::Bf16(runner.another().ok_or_else(full)?),
-            Runner::Int8(runner) => Runner::Int8(runner.another().ok_or_else(full)?),
+        self.plan().engine()
+    }
+
+    /// What it shares with its like: the packed weights, without its buffers.
+    #[must_use]
+    pub fn plan(&self) -> EnginePlan {
+        let packed = match &self.runner {
+            Runner::F32(runner) => PackedFor::F32(Arc::clone(&runner.packed)),
+            Runner::Bf16(runner) => PackedFor::Bf16(Arc::clone(&runner.packed)),
+            Runner::Int8(runner) => PackedFor::Int8(Arc::clone(&runner.packed)),
         };
-        Ok(Self {
-            runner,
+        EnginePlan {
+            packed,
             size: self.size,
-        })
+        }
     }
 
     /// Width and height of the images, in pixels.
@@ -203,12 +238,20 @@ impl Engine {
     }
 }
 
+/// What engines share.
+#[derive(Debug)]
+pub(crate) struct Packed<C> {
+    plan: Plan<C>,
+    /// Values of the arena that each engine has.
+    arena: usize,
+    normalisation: Normalisation,
+}
+
 /// An engine whose values are stored as `E`.
 #[derive(Debug)]
 pub(crate) struct Typed<E, C> {
-    plan: Arc<Plan<C>>,
+    packed: Arc<Packed<C>>,
     arena: Aligned<E>,
-    normalisation: Normalisation,
 }
 
 impl<E: Element, C: ConvForm<E>> Typed<E, C> {
@@ -218,19 +261,19 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
             std: graph.std(),
         };
         let (plan, arena) = Plan::new(graph, width, height)?;
-        Ok(Self {
-            plan: Arc::new(plan),
-            arena,
+        let packed = Arc::new(Packed {
+            plan,
+            arena: arena.len(),
             normalisation,
-        })
+        });
+        Ok(Self { packed, arena })
     }
 
-    /// On the same plan; `None` where memory has no room for another arena.
-    pub(crate) fn another(&self) -> Option<Self> {
+    /// On a plan; `None` where memory has no room for another arena.
+    fn on(packed: &Arc<Packed<C>>) -> Option<Self> {
         Some(Self {
-            plan: Arc::clone(&self.plan),
-            arena: Aligned::try_zeros(self.arena.len())?,
-            normalisation: self.normalisation,
+            packed: Arc::clone(packed),
+            arena: Aligned::try_zeros(packed.arena)?,
         })
     }
 
@@ -259,17 +302,17 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         mut after: impl FnMut(&str, &str),
     ) {
         // An image may overflow and leave NaN in the arena; nothing of that may reach the next one.
-        for places in &self.plan.stale {
+        for places in &self.packed.plan.stale {
             self.arena[places.clone()].fill(E::default());
         }
         let arena = Shared::new(&mut self.arena);
-        for (name, step) in &self.plan.steps {
+        for (name, step) in &self.packed.plan.steps {
             before(name, step, arena);
             // SAFETY: the plan's views lie in the arena, which is borrowed here alone; steps run one after the other,
             // and the output of each lies apart from what it reads.
             unsafe {
                 match step {
-                    Step::Image(to) => self.normalisation.run(image, arena, to),
+                    Step::Image(to) => self.packed.normalisation.run(image, arena, to),
                     Step::Border { view, reach, kind } => match kind {
                         Border::Zero => movement::zero_border(arena, view, *reach),
                         Border::Reflect => movement::reflect_border(arena, view, *reach),
@@ -326,7 +369,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
     }
 
     pub(crate) fn read_output(&self, index: usize, out: &mut Vec<f32>) {
-        let (view, places) = &self.plan.outputs[index];
+        let (view, places) = &self.packed.plan.outputs[index];
         out.clear();
         out.reserve(places.len() * view.pixels());
         let value = |at: usize| {

@@ -1,7 +1,13 @@
 use deepfusion_hint::Hint;
 
+use crate::RangesProblem;
+
+mod graph;
+
+pub use self::graph::{GraphProblem, Misfit};
+
 /// What can go wrong before a network runs; running it cannot fail.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A graph that means no network.
@@ -12,7 +18,7 @@ pub enum Error {
         /// The node's name.
         name: String,
         /// What is wrong with it.
-        reason: String,
+        reason: GraphProblem,
     },
     /// An image size that the graph cannot work on.
     #[error(
@@ -48,7 +54,7 @@ pub enum Error {
     #[error("int8: {reason}")]
     Ranges {
         /// What is wrong with them.
-        reason: String,
+        reason: RangesProblem,
     },
 }
 

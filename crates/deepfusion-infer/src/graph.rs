@@ -1,43 +1,10 @@
 //! A network as a list of operations with their weights, for the engine and for export.
 
 use crate::layout::channels_in_memory;
-use crate::ranges::InputRanges;
+use crate::ranges::{InputRanges, RangesProblem};
 use crate::shape::shape_after;
 use crate::tile::LANES;
-use crate::{Border, Error, Node, Op};
-
-/// A value in a [`Graph`]: 0 is the normalised image, `i + 1` is the output of node `i`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ValueId(pub usize);
-
-impl ValueId {
-    /// The normalised image.
-    pub const IMAGE: Self = Self(0);
-}
-
-/// Shape of a value, relative to the image's size.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ValueShape {
-    /// Channels.
-    pub channels: usize,
-    /// The image's width and height are divided by 2 this many times, rounding up.
-    pub halvings: u32,
-    /// Whether it is a single pixel instead, a mean over the image; `halvings` is then 0.
-    pub pooled: bool,
-}
-
-impl ValueShape {
-    /// Width and height for an image of this size.
-    #[must_use]
-    pub fn size(&self, width: usize, height: usize) -> (usize, usize) {
-        if self.pooled {
-            (1, 1)
-        } else {
-            let halved = |side: usize| side.div_ceil(1 << self.halvings);
-            (halved(width), halved(height))
-        }
-    }
-}
+use crate::{Border, Error, GraphProblem, Node, Op, ValueId, ValueShape};
 
 /// A network from an RGB image to one or more outputs.
 ///
@@ -84,12 +51,15 @@ impl Graph {
             let node = nodes.position(|node| node.name == *name);
             let node = node.filter(|node| computed[*node]);
             let node = node.ok_or_else(|| Error::Ranges {
-                reason: format!("`{name}` is no convolution of this network that int8 computes"),
+                reason: RangesProblem::NoSuchConvolution { name: name.clone() },
             })?;
             // The width too: two ends may each be a number, and their distance none.
             if !((high - low).is_finite() && low <= high) {
                 return Err(Error::Ranges {
-                    reason: format!("{low} to {high} is no range of what `{name}` reads"),
+                    reason: RangesProblem::NoRange {
+                        name: name.clone(),
+                        ends: [*low, *high],
+                    },
                 });
             }
             found[node] = Some([*low, *high]);
@@ -132,7 +102,7 @@ impl Graph {
         match &self.input_ranges {
             Some(ranges) if ranges.len() == self.nodes.len() => Ok(()),
             _ => Err(Error::Ranges {
-                reason: "the network was not calibrated".into(),
+                reason: RangesProblem::NotCalibrated,
             }),
         }
     }
@@ -193,7 +163,7 @@ impl Graph {
             Some(node) => Err(Error::Graph {
                 node,
                 name: self.nodes[node].name.clone(),
-                reason: "its residual or operand is a concatenation, an extent or the image".into(),
+                reason: GraphProblem::Operand,
             }),
         }
     }

@@ -35,12 +35,14 @@ mod stale;
 #[cfg(test)]
 mod tests;
 mod tile;
+mod value;
 mod view;
 mod winograd;
 mod winograd_tiles;
 
-pub use engine::{Engine, Precision};
-pub use error::Error;
-pub use graph::{Graph, ValueId, ValueShape};
+pub use engine::{Engine, EnginePlan, Precision};
+pub use error::{Error, GraphProblem, Misfit};
+pub use graph::Graph;
 pub use op::{Activation, Border, Conv, Depthwise, Node, Op};
-pub use ranges::{InputRanges, SeenInputs};
+pub use ranges::{InputRanges, RangesProblem, SeenInputs};
+pub use value::{ValueId, ValueShape};

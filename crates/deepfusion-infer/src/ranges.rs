@@ -5,6 +5,29 @@ use std::collections::BTreeMap;
 use crate::element::Element;
 use crate::view::{Shared, View};
 
+/// Why ranges are not those of a network.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RangesProblem {
+    /// There are none.
+    #[error("the network was not calibrated")]
+    NotCalibrated,
+    /// A name that no convolution has, or none that int8 computes.
+    #[error("`{name}` is no convolution of this network that int8 computes")]
+    NoSuchConvolution {
+        /// The name.
+        name: String,
+    },
+    /// Two numbers that are no range.
+    #[error("{} to {} is no range of what `{name}` reads", ends[0], ends[1])]
+    NoRange {
+        /// The convolution.
+        name: String,
+        /// The two ends.
+        ends: [f32; 2],
+    },
+}
+
 /// For each convolution, by its name, the ends of the range of its input that is divided into steps; what lies beyond is held at them.
 pub type InputRanges = BTreeMap<String, [f32; 2]>;
 

@@ -1,12 +1,15 @@
 //! The output shape of an operation, and checks of its inputs.
 
-use crate::{Conv, Depthwise, Op, ValueId, ValueShape};
+use crate::{Conv, Depthwise, GraphProblem, Misfit, Op, ValueId, ValueShape};
+
+/// What a shape is, or why there is none.
+type Shape = Result<ValueShape, GraphProblem>;
 
 /// The shape that `op` gives where these are the values before it; else why it does not fit them.
-pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, String> {
+pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Shape {
     let shape = |value: ValueId| {
         let known = shapes.get(value.0).copied();
-        known.ok_or_else(|| format!("value {} does not exist yet", value.0))
+        known.ok_or(GraphProblem::NoSuchValue { value: value.0 })
     };
     match op {
         Op::Conv(conv) => {
@@ -17,13 +20,13 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
         Op::Enlarge { input } => {
             let input = image(shape(*input)?)?;
             let halvings = input.halvings.checked_sub(1);
-            let halvings = halvings.ok_or("larger than the image")?;
+            let halvings = halvings.ok_or(GraphProblem::LargerThanImage)?;
             Ok(ValueShape { halvings, ..input })
         }
         Op::DepthToSpace { input } => after_depth_to_space(image(shape(*input)?)?),
         Op::ChannelNorm { input, epsilon } => {
             if !(*epsilon > 0.0 && epsilon.is_finite()) {
-                return Err(format!("an epsilon of {epsilon}, expected above 0"));
+                return Err(GraphProblem::Epsilon { epsilon: *epsilon });
             }
             image(shape(*input)?)
         }
@@ -31,7 +34,7 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
             let (input, heads) = (image(shape(*input)?)?, temperature.len());
             if heads == 0 || !input.channels.is_multiple_of(3 * heads) {
                 let channels = input.channels;
-                return Err(format!("{channels} channels for 3 times {heads} heads"));
+                return Err(GraphProblem::Heads { channels, heads });
             }
             Ok(ValueShape {
                 channels: input.channels / 3,
@@ -41,7 +44,9 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
         Op::Position { per_axis, halvings } => {
             // More channels are no network's, and would not fit in memory.
             if !(1..=1024).contains(per_axis) {
-                return Err(format!("{per_axis} channels an axis, expected 1 to 1024"));
+                return Err(GraphProblem::PositionChannels {
+                    per_axis: *per_axis,
+                });
             }
             Ok(ValueShape {
                 channels: 2 * per_axis,
@@ -59,7 +64,7 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
         Op::UpsampleConcat { input, skip } => {
             let input = image(shape(*input)?)?;
             let halvings = input.halvings.checked_sub(1);
-            let halvings = halvings.ok_or("larger than the image")?;
+            let halvings = halvings.ok_or(GraphProblem::LargerThanImage)?;
             let large = ValueShape { halvings, ..input };
             match skip.map(shape).transpose()? {
                 Some(skip) => appended(large, skip),
@@ -67,7 +72,7 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
             }
         }
         Op::Concat { inputs } => {
-            let (first, rest) = inputs.split_first().ok_or("nothing to concatenate")?;
+            let (first, rest) = inputs.split_first().ok_or(GraphProblem::NoInput)?;
             rest.iter()
                 .try_fold(shape(*first)?, |all, next| appended(all, shape(*next)?))
         }
@@ -94,17 +99,23 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
                     ..input
                 })
             {
-                return Err(format!("a spatial mask of {spatial:?} on {input:?}"));
+                return Err(Misfit::SpatialMask {
+                    mask: spatial,
+                    input,
+                }
+                .into());
             }
             with_pixel(input, shape(*channel)?)
         }
         Op::AddPixel { input, pixel } => with_pixel(image(shape(*input)?)?, shape(*pixel)?),
-        Op::Multiply { inputs } => alike(inputs.map(shape)),
+        Op::Multiply {
+            inputs: [first, second],
+        } => alike(shape(*first)?, [shape(*second)?]),
         Op::Blend {
             state,
             candidate,
             share,
-        } => alike([*state, *candidate, *share].map(shape)),
+        } => alike(shape(*state)?, [shape(*candidate)?, shape(*share)?]),
         Op::ConvexUpsample {
             input,
             weights,
@@ -114,72 +125,65 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
 }
 
 /// The shape of all of them.
-fn alike<const N: usize>(shapes: [Result<ValueShape, String>; N]) -> Result<ValueShape, String> {
-    let mut shapes = shapes.into_iter();
-    let first = image(shapes.next().ok_or("nothing to combine")??)?;
-    for other in shapes {
-        let other = other?;
-        if other != first {
-            return Err(format!("{other:?} combined with {first:?}"));
-        }
+fn alike<const N: usize>(first: ValueShape, others: [ValueShape; N]) -> Shape {
+    let first = image(first)?;
+    match others.into_iter().find(|other| *other != first) {
+        Some(other) => Err(Misfit::Combined { other, first }.into()),
+        None => Ok(first),
     }
-    Ok(first)
 }
 
-fn after_convex(
-    input: ValueShape,
-    weights: ValueShape,
-    halvings: u32,
-) -> Result<ValueShape, String> {
+fn after_convex(input: ValueShape, weights: ValueShape, halvings: u32) -> Shape {
     if !(1..=3).contains(&halvings) {
-        return Err(format!(
-            "an enlargement by 2 to the {halvings}, expected 1 to 3"
-        ));
+        return Err(GraphProblem::Enlargement { halvings });
     }
     if input.channels != 1 {
-        return Err(format!(
-            "{} channels enlarged, expected one",
-            input.channels
-        ));
+        return Err(GraphProblem::EnlargedChannels {
+            channels: input.channels,
+        });
     }
     let expected = ValueShape {
         channels: 9 << (2 * halvings),
         ..input
     };
     if weights != expected {
-        return Err(format!("weights of {weights:?}, expected {expected:?}"));
+        return Err(Misfit::ConvexWeights {
+            expected,
+            found: weights,
+        }
+        .into());
     }
     let large = input.halvings.checked_sub(halvings);
     Ok(ValueShape {
-        halvings: large.ok_or("larger than the image")?,
+        halvings: large.ok_or(GraphProblem::LargerThanImage)?,
         ..input
     })
 }
 
-fn after_depth_to_space(input: ValueShape) -> Result<ValueShape, String> {
+fn after_depth_to_space(input: ValueShape) -> Shape {
     if !input.channels.is_multiple_of(4) || input.channels == 0 {
-        return Err(format!("{} channels for 2×2 pixels", input.channels));
+        return Err(GraphProblem::ChannelsForPixels {
+            channels: input.channels,
+        });
     }
     let halvings = input.halvings.checked_sub(1);
     Ok(ValueShape {
         channels: input.channels / 4,
-        halvings: halvings.ok_or("larger than the image")?,
+        halvings: halvings.ok_or(GraphProblem::LargerThanImage)?,
         ..input
     })
 }
 
-fn after_depthwise(op: &Depthwise, input: ValueShape) -> Result<ValueShape, String> {
+fn after_depthwise(op: &Depthwise, input: ValueShape) -> Shape {
     let input = image(input)?;
     let area = op.kernel.checked_mul(op.kernel);
     let weights = area.and_then(|area| area.checked_mul(input.channels));
-    let weights = weights.ok_or("more weights than any memory holds")?;
+    let weights = weights.ok_or(GraphProblem::TooManyWeights)?;
     if op.weight.len() != weights || op.bias.len() != input.channels {
-        return Err(format!(
-            "{weights} weights and {} biases expected, {} and {} given",
-            input.channels,
-            op.weight.len(),
-            op.bias.len()
-        ));
+        return Err(GraphProblem::Weights {
+            expected: [weights, input.channels],
+            found: [op.weight.len(), op.bias.len()],
+        });
     }
     check_window(op.kernel, op.stride, op.dilation)?;
     Ok(ValueShape {
@@ -188,51 +192,44 @@ fn after_depthwise(op: &Depthwise, input: ValueShape) -> Result<ValueShape, Stri
     })
 }
 
-fn check_window(kernel: usize, stride: usize, dilation: usize) -> Result<(), String> {
+fn check_window(kernel: usize, stride: usize, dilation: usize) -> Result<(), GraphProblem> {
     if kernel.is_multiple_of(2) {
-        return Err("kernels are odd, and there is at least one output".into());
+        return Err(GraphProblem::EvenKernelOrNoOutput);
     }
     if !matches!(stride, 1 | 2) {
-        return Err(format!("stride {stride}, expected 1 or 2"));
+        return Err(GraphProblem::Stride { stride });
     }
     // A border as wide as this is no network's; wider ones would not fit in memory.
     if dilation == 0 || dilation > 256 {
-        return Err(format!("dilation {dilation}, expected 1 to 256"));
+        return Err(GraphProblem::Dilation { dilation });
     }
     Ok(())
 }
 
-fn after_conv(
-    conv: &Conv,
-    input: ValueShape,
-    residual: Option<ValueShape>,
-) -> Result<ValueShape, String> {
+fn after_conv(conv: &Conv, input: ValueShape, residual: Option<ValueShape>) -> Shape {
     if conv.channels_in != input.channels {
-        return Err(format!(
-            "{} channels expected, its input has {}",
-            conv.channels_in, input.channels
-        ));
+        return Err(GraphProblem::Channels {
+            expected: conv.channels_in,
+            found: input.channels,
+        });
     }
     let parts = [conv.channels_in, conv.kernel, conv.kernel];
     let weights = parts
         .into_iter()
         .try_fold(conv.channels_out, usize::checked_mul);
-    let weights = weights.ok_or("more weights than any memory holds")?;
+    let weights = weights.ok_or(GraphProblem::TooManyWeights)?;
     if conv.weight.len() != weights || conv.bias.len() != conv.channels_out {
-        return Err(format!(
-            "{} weights and {} biases expected, {} and {} given",
-            weights,
-            conv.channels_out,
-            conv.weight.len(),
-            conv.bias.len()
-        ));
+        return Err(GraphProblem::Weights {
+            expected: [weights, conv.channels_out],
+            found: [conv.weight.len(), conv.bias.len()],
+        });
     }
     if conv.channels_out == 0 {
-        return Err("kernels are odd, and there is at least one output".into());
+        return Err(GraphProblem::EvenKernelOrNoOutput);
     }
     check_window(conv.kernel, conv.stride, conv.dilation)?;
     if input.pooled && (conv.kernel > 1 || conv.stride > 1) {
-        return Err("a single pixel takes a 1×1 kernel at stride 1".into());
+        return Err(GraphProblem::WindowOnPixel);
     }
     let output = ValueShape {
         channels: conv.channels_out,
@@ -241,33 +238,31 @@ fn after_conv(
     };
     match residual {
         Some(residual) if residual.pooled => with_pixel(output, residual),
-        Some(residual) if residual != output => {
-            Err(format!("a residual of {residual:?} on {output:?}"))
-        }
+        Some(residual) if residual != output => Err(Misfit::Residual { residual, output }.into()),
         _ => Ok(output),
     }
 }
 
 /// A value of which there is more than a pixel.
-fn image(shape: ValueShape) -> Result<ValueShape, String> {
+fn image(shape: ValueShape) -> Shape {
     if shape.pooled {
-        return Err("a single pixel where an image is expected".into());
+        return Err(GraphProblem::SinglePixel);
     }
     Ok(shape)
 }
 
 /// A value that a single pixel acts on.
-fn with_pixel(input: ValueShape, pixel: ValueShape) -> Result<ValueShape, String> {
+fn with_pixel(input: ValueShape, pixel: ValueShape) -> Shape {
     if !pixel.pooled || pixel.channels != input.channels {
-        return Err(format!("{pixel:?} at every pixel of {input:?}"));
+        return Err(Misfit::Pixel { pixel, input }.into());
     }
     Ok(input)
 }
 
 /// The channels of one value behind those of another.
-fn appended(first: ValueShape, second: ValueShape) -> Result<ValueShape, String> {
+fn appended(first: ValueShape, second: ValueShape) -> Shape {
     if (first.halvings, first.pooled) != (second.halvings, second.pooled) {
-        return Err(format!("{second:?} appended to {first:?}"));
+        return Err(Misfit::Appended { second, first }.into());
     }
     Ok(ValueShape {
         channels: first.channels + second.channels,
@@ -276,10 +271,10 @@ fn appended(first: ValueShape, second: ValueShape) -> Result<ValueShape, String>
 }
 
 /// One halving more; no image is so large that it could be halved more often.
-fn halved(halvings: u32, again: bool) -> Result<u32, String> {
+fn halved(halvings: u32, again: bool) -> Result<u32, GraphProblem> {
     const MOST: u32 = 20;
     match halvings + u32::from(again) {
         n if n <= MOST => Ok(n),
-        n => Err(format!("the {n}th halving of the image")),
+        halvings => Err(GraphProblem::Halvings { halvings }),
     }
 }

@@ -1,6 +1,8 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+use crate::ShapeProblem;
+
 /// What can go wrong with a model of instances.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -27,7 +29,7 @@ pub enum Error {
         /// The model.
         path: PathBuf,
         /// What it has.
-        reason: String,
+        reason: ShapeProblem,
     },
     /// A class that the model does not know.
     #[error("{}: no class `{class}`", path.display())]
@@ -47,13 +49,11 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::File { .. } => Some("a model is a file that a training framework exported as ONNX".into()),
+            Self::File { .. } => {
+                Some("a model is a file that a training framework exported as ONNX".into())
+            }
             Self::Runtime { source, .. } => source.hint(),
-            Self::Shape { .. } => Some(
-                "known are exports of one picture (1x3xHxW, f32) with the outputs of YOLO-seg (v5, v8 and later, with or without NMS), of YOLO boxes, \
-                 and of YOLOX"
-                    .into(),
-            ),
+            Self::Shape { reason, .. } => reason.hint(),
             Self::Class { known, .. } if known.is_empty() => {
                 Some("the file names no classes: ask for none, and all are taken".into())
             }

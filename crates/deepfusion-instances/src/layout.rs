@@ -1,9 +1,72 @@
 //! Recognises the kind of a model from the shapes of its outputs.
 
+use deepfusion_hint::Hint;
+use deepfusion_onnx::runtime::TensorInfo;
+
 /// Pixels of the input that a cell of each of the three grids covers.
 pub(crate) const STRIDES: [usize; 3] = [8, 16, 32];
 /// Most rows of a model that has suppressed its candidates itself.
 const MOST_FINAL_ROWS: usize = 1000;
+
+/// Why a model's inputs and outputs are none that are known.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeProblem {
+    /// Several inputs, or none.
+    #[error("{found} inputs, expected one picture")]
+    Inputs {
+        /// How many.
+        found: usize,
+    },
+    /// An input that is no picture.
+    #[error("input `{}` is {}{}", input.name, sizes(&input.shape), if input.f32 { "" } else { ", no 32-bit float" })]
+    Input {
+        /// As the model describes it.
+        input: TensorInfo,
+    },
+    /// An output of other numbers.
+    #[error("output `{name}` is no 32-bit float")]
+    OutputNumbers {
+        /// Its name.
+        name: String,
+    },
+    /// Outputs of no known kind of model.
+    #[error("outputs {} of an input {}x{}", shapes(outputs), input[1], input[0])]
+    Outputs {
+        /// Height and width of the input.
+        input: [usize; 2],
+        /// The dimensions of each output.
+        outputs: Vec<Vec<usize>>,
+    },
+    /// Outputs of another kind than those of the image before.
+    #[error("the shapes of its outputs change from image to image")]
+    Changing,
+}
+
+impl Hint for ShapeProblem {
+    fn hint(&self) -> Option<String> {
+        Some(
+            "known are exports of one picture (1x3xHxW, f32) with the outputs of YOLO-seg (v5, v8 and later, with or without NMS), of YOLO boxes, \
+             and of YOLOX"
+                .into(),
+        )
+    }
+}
+
+/// Dimensions in a line, `?` for one that is left open.
+fn sizes(shape: &[Option<usize>]) -> String {
+    let size = |d: &Option<usize>| d.map_or("?".into(), |d| d.to_string());
+    shape.iter().map(size).collect::<Vec<String>>().join("x")
+}
+
+/// The same of several arrays.
+fn shapes(all: &[Vec<usize>]) -> String {
+    let shape = |shape: &Vec<usize>| {
+        let open: Vec<_> = shape.iter().copied().map(Some).collect();
+        sizes(&open)
+    };
+    all.iter().map(shape).collect::<Vec<String>>().join(", ")
+}
 
 /// A model's output format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,20 +99,11 @@ impl Layout {
     /// The layout of a model with an input of this height and width.
     ///
     /// # Errors
-    /// A sentence that names the shapes found.
-    pub fn of(input: [usize; 2], outputs: &[Vec<usize>]) -> Result<Self, String> {
-        let found = || {
-            let shape = |s: &Vec<usize>| {
-                let sizes: Vec<String> = s.iter().map(ToString::to_string).collect();
-                sizes.join("x")
-            };
-            let all: Vec<String> = outputs.iter().map(shape).collect();
-            format!(
-                "outputs {} of an input {}x{}",
-                all.join(", "),
-                input[1],
-                input[0]
-            )
+    /// [`ShapeProblem::Outputs`] with the shapes found.
+    pub fn of(input: [usize; 2], outputs: &[Vec<usize>]) -> Result<Self, ShapeProblem> {
+        let found = || ShapeProblem::Outputs {
+            input,
+            outputs: outputs.to_vec(),
         };
         let prototypes = outputs.iter().find_map(|shape| match shape[..] {
             [1, count, height, width] => Some([count, height, width]),
@@ -137,7 +191,7 @@ mod tests {
             &[],
         ];
         for outputs in strangers {
-            let found = of(outputs).unwrap_err();
+            let found = of(outputs).unwrap_err().to_string();
             assert!(found.contains("640x640"), "{found}");
         }
     }

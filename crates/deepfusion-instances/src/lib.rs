@@ -20,7 +20,7 @@ mod names;
 pub use candidate::{Candidate, suppress};
 pub use decode::decode;
 pub use error::{Error, Result};
-pub use layout::{Kind, Layout};
+pub use layout::{Kind, Layout, ShapeProblem};
 pub use letterbox::{Colours, Letterbox};
 pub use mask::{Mask, Prototypes, in_size};
 pub use model::{Instance, InstanceModel, Limits};

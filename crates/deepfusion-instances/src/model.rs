@@ -5,7 +5,10 @@ use image::RgbImage;
 
 use crate::mask::in_size;
 use crate::names::{name_of, of_note};
-use crate::{Colours, Error, Kind, Layout, Letterbox, Mask, Prototypes, Result, decode, suppress};
+use crate::{
+    Colours, Error, Kind, Layout, Letterbox, Mask, Prototypes, Result, ShapeProblem, decode,
+    suppress,
+};
 
 /// Height and width of the input where a model leaves them open.
 const OPEN_SIZE: usize = 640;
@@ -88,10 +91,9 @@ impl InstanceModel {
         };
         let input = input_size(&model.inputs()).map_err(shape)?;
         if let Some(output) = model.outputs().iter().find(|o| !o.f32) {
-            return Err(shape(format!(
-                "output `{}` is no 32-bit float",
-                output.name
-            )));
+            return Err(shape(ShapeProblem::OutputNumbers {
+                name: output.name.clone(),
+            }));
         }
         // Exports often leave dimensions open: only a run says them.
         let grey = vec![0.5; 3 * input[0] * input[1]];
@@ -154,7 +156,7 @@ impl InstanceModel {
             .filter(|layout| layout.kind == self.layout.kind)
             .ok_or_else(|| Error::Shape {
                 path: self.path.clone(),
-                reason: "the shapes of its outputs change from image to image".into(),
+                reason: ShapeProblem::Changing,
             })?;
         let of_rank = |rank: usize| outputs.iter().find(|tensor| tensor.shape.len() == rank);
         let values = of_rank(3).map_or(&[][..], |tensor| &tensor.data);
@@ -193,27 +195,18 @@ impl InstanceModel {
 }
 
 /// Height and width of the one input, a picture of three planes.
-fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], String> {
+fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], ShapeProblem> {
     let [input] = inputs else {
-        return Err(format!("{} inputs, expected one picture", inputs.len()));
-    };
-    let found = || {
-        let sizes = input
-            .shape
-            .iter()
-            .map(|d| d.map_or("?".into(), |d| d.to_string()));
-        let sizes: Vec<String> = sizes.collect();
-        format!(
-            "input `{}` is {}{}",
-            input.name,
-            sizes.join("x"),
-            if input.f32 { "" } else { ", no 32-bit float" }
-        )
+        return Err(ShapeProblem::Inputs {
+            found: inputs.len(),
+        });
     };
     match input.shape[..] {
         [None | Some(1), None | Some(3), height, width] if input.f32 => {
             Ok([height.unwrap_or(OPEN_SIZE), width.unwrap_or(OPEN_SIZE)])
         }
-        _ => Err(found()),
+        _ => Err(ShapeProblem::Input {
+            input: input.clone(),
+        }),
     }
 }

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deepfusion_calibrate::{
-    Board, BoardDetection, Candidate, Error as BoardError, View, find_board, pick, sharpness,
+    Board, BoardDetection, Candidate, Error as BoardError, LEAST_VIEWS, View, find_board, pick,
+    sharpness,
 };
 use deepfusion_data::{OpenOptions, load_photo, load_rgb};
 use deepfusion_video::VideoFrames;
@@ -116,6 +117,34 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 }
 
 impl BoardViews {
+    /// That there are views enough to calibrate by.
+    ///
+    /// # Errors
+    /// [`BoardError::NoBoard`] or [`BoardError::TooFewViews`], with the grid that was seen instead.
+    pub fn require_enough(&self, board: &Board) -> Result<()> {
+        let (found, pictures, board) = (self.views.len(), self.looked_at, *board);
+        if found >= LEAST_VIEWS {
+            return Ok(());
+        }
+        let seen = self.other_grid();
+        Err(if found == 0 {
+            BoardError::NoBoard {
+                board,
+                pictures,
+                seen,
+            }
+        } else {
+            BoardError::TooFewViews {
+                board,
+                found,
+                pictures,
+                needed: LEAST_VIEWS,
+                seen,
+            }
+        }
+        .into())
+    }
+
     fn add_pictures(
         &mut self,
         files: &[PathBuf],

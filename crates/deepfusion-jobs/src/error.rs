@@ -5,6 +5,10 @@ use deepfusion_records::Difference;
 
 use crate::bulk::Shard;
 
+mod camera;
+
+pub use self::camera::UnfitCamera;
+
 /// What can go wrong with work over recordings and folders.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -15,14 +19,25 @@ pub enum Error {
         /// What was given.
         input: String,
     },
+    /// A point cloud without a camera.
+    #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
+    NoCamera,
+    /// The error of a prediction asked for of a network, or an engine, that does not say it.
+    #[error("this network, or the engine that runs it, does not say how sure it is of its depth")]
+    NoUncertainty,
     /// A pattern of file names that is none.
     #[error(transparent)]
     Pattern(#[from] glob::PatternError),
     /// Intrinsics that cannot be the image's.
-    #[error("the intrinsics do not fit the image: {why}")]
-    Camera {
-        /// Why.
-        why: String,
+    #[error("the intrinsics do not fit the image: {0}")]
+    Camera(UnfitCamera),
+    /// The same of one image among others.
+    #[error("{}", path.display())]
+    CameraOf {
+        /// The image.
+        path: PathBuf,
+        /// Why it cannot be its camera, or what is wrong with the file that says it.
+        source: Box<Error>,
     },
     /// A split of which not everything could be used, where everything has to be.
     #[error("{}: {found} of its {expected} frames {what}", split.display())]
@@ -45,6 +60,36 @@ pub enum Error {
     /// Something that would be overwritten.
     #[error("{}: already exists", path.display())]
     Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file of KITTI's object frames cannot be read.
+    #[error("{}: {problem}", path.display())]
+    ObjectFrame {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: crate::labelled::ObjectFrameProblem,
+    },
+    /// Settings of the perception that cannot be read.
+    #[error("{}: {problem}", path.display())]
+    PerceptionFile {
+        /// The file.
+        path: PathBuf,
+        /// What the parser says.
+        problem: deepfusion_model::TomlProblem,
+    },
+    /// Settings of the perception that contradict one another.
+    #[error("{}: {source}", path.display())]
+    PerceptionSettings {
+        /// The file.
+        path: PathBuf,
+        /// In what.
+        source: deepfusion_perception::Error,
+    },
+    /// A frame of an earlier live run.
+    #[error("{}: already exists", path.display())]
+    LiveFrameExists {
         /// The file.
         path: PathBuf,
     },
@@ -197,12 +242,49 @@ pub enum Error {
         /// Why not.
         source: serde_json::Error,
     },
+    /// A file that was written and cannot be read again.
+    #[cfg(feature = "train")]
+    #[error("cannot read {} back", path.display())]
+    ReadBack {
+        /// Where it would have gone.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// An exported file that is not the network.
+    #[cfg(feature = "train")]
+    #[error(
+        "{}: {engine} is {deviation:.1e} away from the network (max |difference| / max |value|), more than {:.0e}; not kept",
+        path.display(),
+        deepfusion_onnx::check::TOLERANCE
+    )]
+    Deviates {
+        /// The file that would have been written.
+        path: PathBuf,
+        /// What ran it.
+        engine: String,
+        /// How far it is from the network.
+        deviation: f64,
+    },
+    /// Something asked of a run that goes on, and that is not what it has.
+    #[cfg(feature = "train")]
+    #[error(transparent)]
+    Contradiction(crate::training::resume::Contradiction),
     /// Something that has no TOML form.
     #[error(transparent)]
     Toml(#[from] toml::ser::Error),
     /// Something that has no JSON form.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
+    /// A picture that cannot be encoded.
+    #[error(transparent)]
+    Picture(#[from] image::ImageError),
+    /// A map whose values do not fill it.
+    #[error(transparent)]
+    Shape(#[from] ndarray::ShapeError),
+    /// A map that cannot be written as NumPy's.
+    #[error(transparent)]
+    Npy(#[from] ndarray_npy::WriteNpyError),
     /// A video.
     #[error(transparent)]
     Video(#[from] deepfusion_video::Error),
@@ -239,14 +321,24 @@ pub enum Error {
     /// A network, or what runs it.
     #[error(transparent)]
     Runtime(#[from] deepfusion_runtime::Error),
+    /// An ONNX file, or what runs it.
+    #[cfg(feature = "train")]
+    #[error(transparent)]
+    Onnx(#[from] deepfusion_onnx::Error),
+    /// Weights of another project.
+    #[cfg(feature = "train")]
+    #[error(transparent)]
+    Network(#[from] deepfusion_model::NetworkError),
     /// Samples that cannot be learned from.
     #[cfg(feature = "train")]
     #[error(transparent)]
     Train(#[from] deepfusion_train::Error),
-    /// A panel that cannot be drawn.
-    #[cfg(feature = "train")]
+    /// A picture that cannot be drawn.
     #[error(transparent)]
     Render(#[from] deepfusion_render::Error),
+    /// A user's model that tells things apart.
+    #[error(transparent)]
+    Instances(#[from] deepfusion_instances::Error),
     /// A depth image that nothing can be found in.
     #[error(transparent)]
     Perception(#[from] deepfusion_perception::Error),
@@ -351,9 +443,10 @@ impl Hint for Error {
             Self::NoImages { .. } => Some(
                 "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
             ),
-            Self::Camera { .. } => {
+            Self::Camera(_) => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
             }
+            Self::CameraOf { source, .. } => source.hint(),
             Self::Incomplete { .. } => {
                 Some("give the folder that holds every drive that the split names".into())
             }
@@ -362,6 +455,14 @@ impl Hint for Error {
             ),
             Self::Exists { .. } | Self::Stale { .. } => {
                 Some("allow overwriting, or choose another folder".into())
+            }
+            Self::PerceptionFile { .. } => Some(
+                "mend what is named there, or leave the line out: each setting has a default".into(),
+            ),
+            Self::PerceptionSettings { source, .. } => source.hint(),
+            Self::ObjectFrame { .. } => Some("correct the file, or leave its frame out".into()),
+            Self::LiveFrameExists { .. } => {
+                Some("allow replacing all of the folder's live frames, or choose another folder".into())
             }
             Self::OtherJob { .. } => {
                 Some("start every shard with the same inputs and options, or choose another folder".into())
@@ -417,8 +518,25 @@ impl Hint for Error {
                 Some("give the folder that the adapted network was written to".into())
             }
             #[cfg(feature = "train")]
+            Self::ReadBack { .. } => None,
+            #[cfg(feature = "train")]
+            Self::Deviates { .. } => {
+                Some("this is a fault of the program or of the library that ran the file; please report it".into())
+            }
+            #[cfg(feature = "train")]
+            Self::Contradiction(_) => {
+                Some("leave it out to go on with the run, or start a new one in another folder".into())
+            }
+            #[cfg(feature = "train")]
             Self::NoResult { .. } => Some("delete it to run this row again".into()),
+            Self::NoCamera => Some("give fx, fy, cx, cy or a calibration".into()),
+            Self::NoUncertainty => Some(
+                "leave out sigma and confidence, or use a network trained with depth_net.uncertainty = true".into(),
+            ),
             Self::Pattern(_)
+            | Self::Picture(_)
+            | Self::Shape(_)
+            | Self::Npy(_)
             | Self::Kept { .. }
             | Self::NoTomlForm { .. }
             | Self::Toml(_)
@@ -437,9 +555,13 @@ impl Hint for Error {
             Self::Weights(error) => error.hint(),
             Self::Simulator(error) => error.hint(),
             #[cfg(feature = "train")]
-            Self::Train(error) => error.hint(),
+            Self::Onnx(error) => error.hint(),
             #[cfg(feature = "train")]
+            Self::Network(error) => error.hint(),
+            #[cfg(feature = "train")]
+            Self::Train(error) => error.hint(),
             Self::Render(error) => error.hint(),
+            Self::Instances(error) => error.hint(),
             Self::Perception(error) => error.hint(),
         }
     }

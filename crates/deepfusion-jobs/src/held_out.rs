@@ -6,7 +6,12 @@ mod of_run;
 use std::path::Path;
 
 use deepfusion_data::{Dataset, DatasetKind};
+use deepfusion_model::TrainConfig;
+use deepfusion_runtime::ModelSource;
 use deepfusion_weights::Card;
+
+use crate::Result;
+use crate::evaluation::ImageRef;
 
 #[cfg(feature = "train")]
 pub use of_run::{held_out, unseen_frames};
@@ -30,14 +35,32 @@ pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
     card.simulated_only && datasets.iter().all(surely_real)
 }
 
+/// Whether a network learned from none of the evaluated images; `None` where that is not known. `config`: its run's.
+///
+/// # Errors
+/// A run's findings that cannot be read.
+pub fn learned_from_none(
+    model: &ModelSource,
+    config: &TrainConfig,
+    datasets: &[Dataset],
+    places: &[ImageRef],
+) -> Result<Option<bool>> {
+    Ok(match model {
+        ModelSource::Run { folder, .. } => {
+            held_out(config, &folder.read_findings()?.averaged, datasets, places)
+        }
+        ModelSource::Packed { network, .. } => unseen(&network.card, datasets).then_some(true),
+    })
+}
+
 /// What training took of a run's recordings is not known to a build without it.
 #[cfg(not(feature = "train"))]
 #[must_use]
 pub fn held_out(
-    _: &deepfusion_model::TrainConfig,
+    _: &TrainConfig,
     _: &[deepfusion_model::AveragedNetwork],
     _: &[Dataset],
-    _: &[crate::evaluation::ImageRef],
+    _: &[ImageRef],
 ) -> Option<bool> {
     None
 }
@@ -46,7 +69,7 @@ pub fn held_out(
 #[cfg(not(feature = "train"))]
 #[must_use]
 pub fn unseen_frames(
-    _: &deepfusion_model::TrainConfig,
+    _: &TrainConfig,
     _: &[deepfusion_model::AveragedNetwork],
     _: &[Dataset],
 ) -> crate::verdict::Unseen {

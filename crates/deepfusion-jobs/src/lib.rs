@@ -4,18 +4,26 @@
 //! |---|---|
 //! | [`evaluation`] | predictions against ground truth, beside the mean-depth baseline; how far a pixel can be trusted |
 //! | [`intervals`] | whether the intervals hold of a network that says how sure it is, and by how much they are stretched |
+//! | [`TargetFinder`] | frame after frame to 3D targets, followed over time |
 //! | [`labelled`] | 3D targets against labelled boxes |
 //! | [`bulk`] | images in, outputs exactly once, on any number of machines |
+//! | [`outputs`] | what is written of an image: depth in many forms, targets drawn, the sidecar |
+//! | [`live`] | a camera or a stream: always the newest frame |
 //! | [`scene`] | how the camera moved from frame to frame, and whether metres still are what they were |
 //! | [`verdict`] | what a drive with speeds says of a network's depth, without ground truth |
 //! | [`board`] | the board of a calibration in pictures and videos |
 //! | [`int8`] | the ranges of what a network's convolutions read, for int8 |
 //! | [`averaging`] | the mean of several runs' weights |
 //! | [`packing`] | a run's network as a file of its own, with its card |
+//! | [`bench`] | how fast a network is, and every stage around it |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
     feature = "train",
     doc = "| [`samples`] | the samples that a configuration is trained and validated with |"
+)]
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`importing`], [`export`] | other projects' weights as a run; a network as an ONNX file, compared with it |"
 )]
 #![cfg_attr(
     feature = "train",
@@ -29,26 +37,35 @@
 //! Nothing here prints. What a person should know is returned, or passed to a callback.
 
 pub mod averaging;
+pub mod bench;
 pub mod board;
 pub mod bulk;
 pub mod dates;
 mod error;
 pub mod evaluation;
+#[cfg(feature = "train")]
+pub mod export;
 mod figures;
 mod files;
 pub mod held_out;
+#[cfg(feature = "train")]
+pub mod importing;
 mod inputs;
 pub mod int8;
 pub mod intervals;
 pub mod labelled;
+pub mod live;
 mod model_facts;
 #[cfg(feature = "train")]
 pub mod odometry;
+pub mod outputs;
 pub mod packing;
+mod perception_settings;
 pub mod recordings;
 #[cfg(feature = "train")]
 pub mod samples;
 pub mod scene;
+mod target_finder;
 #[cfg(feature = "train")]
 pub mod training;
 pub mod verdict;
@@ -56,3 +73,5 @@ pub mod verdict;
 pub use error::{Error, NoMean, OtherJob, Result, StaleReason};
 pub use inputs::{Input, find_inputs};
 pub use model_facts::{ModelFacts, name_of};
+pub use perception_settings::perception_settings;
+pub use target_finder::{PerceivedFrame, StartedFrame, TargetFinder, TargetSettings};

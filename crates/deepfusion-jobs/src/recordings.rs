@@ -1,8 +1,11 @@
 //! The recordings that a configuration names.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Camera, Cameras, Dataset, Heading, NamedTopic, OpenOptions, Split};
+use deepfusion_data::{
+    Camera, Cameras, Dataset, Heading, NamedTopic, NoNamedTopic, OpenOptions, Split,
+};
 use deepfusion_doctor::{heading, seen_turns};
 use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig, ViewMotion};
 
@@ -232,10 +235,10 @@ fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
 /// One that is not written as [`NamedTopic`].
 pub fn named_topics(topics: &[String]) -> Result<Vec<NamedTopic>> {
     let read = |text: &String| {
-        text.parse().map_err(|expected| {
+        text.parse().map_err(|expected: NoNamedTopic| {
             ModelError::Config {
                 field: "data.topics",
-                expected,
+                expected: expected.to_string(),
                 found: text.clone(),
             }
             .into()
@@ -268,6 +271,20 @@ fn open_options(
         assumed_camera: config.assumed_camera.map(|camera| camera.intrinsics()),
         ..OpenOptions::default()
     })
+}
+
+/// Writes a part of a drive's frames as a split file.
+///
+/// # Errors
+/// A file that cannot be written.
+///
+/// # Panics
+/// Where the part reaches beyond the frames.
+pub fn write_split(drive: &Dataset, part: Range<usize>, path: &Path) -> Result<()> {
+    let line =
+        |frame: &deepfusion_data::Frame| format!("{} {:010} l\n", drive.split_name(), frame.number);
+    let text: String = drive.frames()[part].iter().map(line).collect();
+    Ok(crate::files::write(path, text)?)
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub enum SampleWarning {
     /// The speeds of a drive, by its name, do not fit its images.
     Speed(String, SpeedWarning),
     /// A drive that gives no samples, and why.
-    Skipped(String),
+    Skipped(deepfusion_train::Skipped),
     /// Validation frames that are sources of training samples.
     Neighbours(SharedFrames),
 }

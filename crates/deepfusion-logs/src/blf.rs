@@ -6,6 +6,7 @@
 //! CAN frames are passed over.
 
 use crate::error::{Error, Result};
+use crate::problem::BlfProblem;
 use deepfusion_motion::can::CanId;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -29,6 +30,9 @@ const LOG_CONTAINER: u32 = 10;
 const CAN_MESSAGE2: u32 = 86;
 const CAN_FD_MESSAGE: u32 = 100;
 const CAN_FD_MESSAGE_64: u32 = 101;
+
+/// What reading a part of a file gives.
+type Parsed<T> = std::result::Result<T, BlfProblem>;
 
 /// A CAN frame of a file.
 pub(crate) struct BlfFrame<'a> {
@@ -64,17 +68,16 @@ pub(crate) fn read(path: &Path, mut found: impl FnMut(BlfFrame<'_>)) -> Result<O
         let begun = rest.len();
         inflate(&object, &mut rest).map_err(|why| file.bad(offset, "LOG_CONTAINER", why))?;
         let used = objects(&rest, &mut found).map_err(|(at, why)| {
-            let place = format!(
-                "at byte {} of what it holds: {why}",
-                at as i64 - begun as i64
-            );
-            file.bad(offset, "LOG_CONTAINER", place)
+            let within = BlfProblem::Within {
+                at: at as i64 - begun as i64,
+                problem: Box::new(why),
+            };
+            file.bad(offset, "LOG_CONTAINER", within)
         })?;
         rest.drain(..used);
     }
     if rest.iter().any(|byte| *byte != 0) {
-        let why = "the file ends within an object".to_owned();
-        return Err(file.bad(length, "LOG_CONTAINER", why));
+        return Err(file.bad(length, "LOG_CONTAINER", BlfProblem::ObjectCut));
     }
     Ok(start_ns)
 }
@@ -88,21 +91,20 @@ struct Objects<'a> {
 }
 
 impl Objects<'_> {
-    fn bad(&self, offset: u64, field: &str, problem: String) -> Error {
+    fn bad(&self, offset: u64, field: &'static str, problem: BlfProblem) -> Error {
         Error::Bytes {
             path: self.path.to_owned(),
             offset,
-            field: field.to_owned(),
-            problem,
+            field,
+            problem: problem.into(),
         }
     }
 
     /// The next `count` bytes.
-    fn take(&mut self, field: &str, count: usize, into: &mut Vec<u8>) -> Result<()> {
+    fn take(&mut self, field: &'static str, count: usize, into: &mut Vec<u8>) -> Result<()> {
         let left = self.length.saturating_sub(self.at);
         if (count as u64) > left {
-            let why = format!("the file ends after {left} of {count} bytes");
-            return Err(self.bad(self.at, field, why));
+            return Err(self.bad(self.at, field, BlfProblem::Cut { left, count }));
         }
         let before = into.len();
         into.resize(before + count, 0);
@@ -118,30 +120,24 @@ impl Objects<'_> {
         let mut header = Vec::new();
         self.take("LOGG", HEADER, &mut header)?;
         if header[..4] != MARK {
-            return Err(self.bad(0, "LOGG", "no binary log of Vector's begins so".into()));
+            return Err(self.bad(0, "LOGG", BlfProblem::NoLog));
         }
         let size = u32_at(&header, 4) as usize;
         if !(HEADER..=MOST).contains(&size) {
-            return Err(self.bad(4, "LOGG", format!("a header of {size} bytes")));
+            return Err(self.bad(4, "LOGG", BlfProblem::Header(size)));
         }
         // A recorder that was switched off left the size of the header alone.
-        let whole = u64_at(&header, 16);
-        if whole > self.length {
-            let why = format!(
-                "the header says {whole} bytes, the file has {}",
-                self.length
-            );
-            return Err(self.bad(self.length, "LOGG", why));
+        let (stated, bytes) = (u64_at(&header, 16), self.length);
+        if stated > bytes {
+            return Err(self.bad(bytes, "LOGG", BlfProblem::Length { stated, bytes }));
         }
         self.take("LOGG", size - HEADER, &mut header)?;
         let date: [u16; 8] = std::array::from_fn(|i| u16_at(&header, 40 + 2 * i));
         if date == [0; 8] {
             return Ok(None);
         }
-        let ns = start_of(date).ok_or_else(|| {
-            let why = format!("{date:?} is no date (year, month, day of the week, day, hour, minute, second, millisecond)");
-            self.bad(40, "measurement start", why)
-        })?;
+        let ns = start_of(date)
+            .ok_or_else(|| self.bad(40, "measurement start", BlfProblem::Date(date)))?;
         Ok(Some(ns))
     }
 
@@ -157,7 +153,7 @@ impl Objects<'_> {
                 let mut end = Vec::new();
                 self.take("LOBJ", left as usize, &mut end)?;
                 if object.iter().chain(&end).any(|byte| *byte != 0) {
-                    return Err(self.bad(begun, "LOBJ", "the file ends within an object".into()));
+                    return Err(self.bad(begun, "LOBJ", BlfProblem::ObjectCut));
                 }
                 return Ok(None);
             }
@@ -166,7 +162,7 @@ impl Objects<'_> {
                 break;
             }
             if object[0] != 0 {
-                return Err(self.bad(self.at - 4, "LOBJ", "no object begins here".into()));
+                return Err(self.bad(self.at - 4, "LOBJ", BlfProblem::NoObject));
             }
             object.remove(0);
             begun += 1;
@@ -174,7 +170,7 @@ impl Objects<'_> {
         self.take("LOBJ", BASE - 4, &mut object)?;
         let size = u32_at(&object, 8) as usize;
         if !(BASE..=MOST).contains(&size) {
-            return Err(self.bad(begun, "LOBJ", format!("an object of {size} bytes")));
+            return Err(self.bad(begun, "LOBJ", BlfProblem::Object(size)));
         }
         self.take("LOBJ", size - BASE, &mut object)?;
         Ok(Some((begun, object)))
@@ -182,12 +178,12 @@ impl Objects<'_> {
 }
 
 /// Adds what a container holds.
-fn inflate(object: &[u8], into: &mut Vec<u8>) -> std::result::Result<(), String> {
+fn inflate(object: &[u8], into: &mut Vec<u8>) -> Parsed<()> {
     let (Some(head), Some(bytes)) = (
         object.get(BASE..BASE + CONTAINER),
         object.get(BASE + CONTAINER..),
     ) else {
-        return Err(format!("{} bytes", object.len()));
+        return Err(BlfProblem::Container(object.len()));
     };
     let (method, size) = (u16_at(head, 0), u32_at(head, 8) as usize);
     let before = into.len();
@@ -197,25 +193,20 @@ fn inflate(object: &[u8], into: &mut Vec<u8>) -> std::result::Result<(), String>
             into.extend_from_slice(bytes);
             return Ok(());
         }
-        2 if size > MOST => return Err(format!("it says that it holds {size} bytes")),
+        2 if size > MOST => return Err(BlfProblem::TooLarge(size)),
         2 => {
             // One more than it should be tells a longer one.
             let mut inflated = flate2::read::ZlibDecoder::new(bytes).take(size as u64 + 1);
-            inflated
-                .read_to_end(into)
-                .map_err(|e| format!("zlib: {e}"))?;
+            inflated.read_to_end(into).map_err(BlfProblem::Zlib)?;
         }
-        other => {
-            return Err(format!(
-                "compression {other}; 0 (none) and 2 (zlib) are known"
-            ));
-        }
+        other => return Err(BlfProblem::Compression(other)),
     }
-    let found = into.len() - before;
-    if found == size {
+    let bytes = into.len() - before;
+    if bytes == size {
         Ok(())
     } else {
-        Err(format!("it holds {found} bytes and says {size}"))
+        let stated = size;
+        Err(BlfProblem::ContainerSize { bytes, stated })
     }
 }
 
@@ -223,7 +214,7 @@ fn inflate(object: &[u8], into: &mut Vec<u8>) -> std::result::Result<(), String>
 fn objects(
     bytes: &[u8],
     found: &mut impl FnMut(BlfFrame<'_>),
-) -> std::result::Result<usize, (usize, String)> {
+) -> std::result::Result<usize, (usize, BlfProblem)> {
     let mut at = 0;
     loop {
         let mut begin = at;
@@ -235,11 +226,11 @@ fn objects(
             return Ok(begin.min(bytes.len()));
         };
         if head[..4] != OBJECT {
-            return Err((begin, "no object begins here".into()));
+            return Err((begin, BlfProblem::NoObject));
         }
         let size = u32_at(head, 8) as usize;
         if !(BASE..=MOST).contains(&size) {
-            return Err((begin, format!("an object of {size} bytes")));
+            return Err((begin, BlfProblem::Object(size)));
         }
         let Some(object) = bytes.get(begin..begin + size) else {
             return Ok(begin);
@@ -250,7 +241,7 @@ fn objects(
 }
 
 /// Hands over an object's CAN frame, where it is one.
-fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Result<(), String> {
+fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> Parsed<()> {
     let kind = u32_at(object, 12);
     if !matches!(
         kind,
@@ -258,7 +249,7 @@ fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Re
     ) {
         return Ok(());
     }
-    let short = || format!("a CAN frame of {} bytes", object.len());
+    let short = || BlfProblem::Frame(object.len());
     let header = usize::from(u16_at(object, 4));
     if header < TIMED || object.len() < header + 8 {
         return Err(short());
@@ -266,16 +257,12 @@ fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Re
     let unit_ns = match u32_at(object, 16) & 3 {
         1 => 10_000,
         2 => 1,
-        other => {
-            return Err(format!(
-                "a time in unit {other}; 1 (10 µs) and 2 (1 ns) are known"
-            ));
-        }
+        other => return Err(BlfProblem::TimeUnit(other)),
     };
     let ticks = i64::try_from(u64_at(object, 24)).ok();
     let ns = ticks
         .and_then(|ticks| ticks.checked_mul(unit_ns))
-        .ok_or("a time of more than 292 years")?;
+        .ok_or(BlfProblem::TooLate)?;
     let body = &object[header..];
     let identifier = u32_at(body, 4);
     let channel = match kind {
@@ -303,7 +290,7 @@ fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Re
     } else if identifier < 0x800 {
         CanId::Standard(identifier as u16)
     } else {
-        return Err(format!("identifier {identifier:X} has more than 11 bits"));
+        return Err(BlfProblem::LongIdentifier(identifier));
     };
     found(BlfFrame {
         ns,

@@ -2,14 +2,17 @@
 
 use crate::blf;
 use crate::error::{BadLine, Error, Result};
-use crate::log::{Clock, DriveLog, Format, Speed};
-use crate::read_options::ReadOptions;
+use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed};
+use crate::problem::{FrameProblem, SignalProblem, SpeedProblem};
 use crate::rows::{enough, text_of};
 use crate::units::SpeedUnit;
 use deepfusion_hint::count_of;
 use deepfusion_motion::can::{CanId, Dbc};
 use std::io::Read;
 use std::path::Path;
+
+/// What reading a part of a frame gives.
+type Parsed<T> = std::result::Result<T, FrameProblem>;
 
 /// A frame of a trace.
 struct Frame {
@@ -27,29 +30,22 @@ pub(crate) fn is_candump(line: &str) -> bool {
 
 /// The signal over the trace.
 pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
-    let missing = |problem: &str| Error::Signal {
+    let missing = |problem| Error::Signal {
         path: path.to_owned(),
-        problem: problem.to_owned(),
+        problem,
     };
     let dbc = options
         .dbc
         .as_deref()
-        .ok_or_else(|| missing("nothing says what its frames hold: a DBC file does"))?;
+        .ok_or_else(|| missing(SignalProblem::NoDbc))?;
     let dbc = Dbc::open(dbc)?;
     let name = options.speed.as_deref().ok_or_else(|| {
-        let names: Vec<String> = dbc
+        let candidates = dbc
             .names()
             .filter(|n| n.to_lowercase().contains("speed"))
             .take(12)
             .collect();
-        missing(&if names.is_empty() {
-            "nothing says which signal is the speed".to_owned()
-        } else {
-            format!(
-                "nothing says which signal is the speed; by their names: {}",
-                names.join(", ")
-            )
-        })
+        missing(SignalProblem::NoName { candidates })
     })?;
     let signal = dbc.signal(name)?;
     let written = dbc.unit(name).unwrap_or("");
@@ -58,9 +54,10 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         .ok()
         .or(options.unit)
         .ok_or_else(|| {
-            missing(&format!(
-                "the DBC file's unit of {name}, '{written}', is not one of speed"
-            ))
+            missing(SignalProblem::Unit {
+                signal: name.to_owned(),
+                unit: written.to_owned(),
+            })
         })?;
     let Trace {
         mut frames,
@@ -87,7 +84,10 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     if of_signal == 0 {
         return Err(Error::NoSpeed {
             path: path.to_owned(),
-            problem: format!("none of its {all} frames carries {name}"),
+            problem: SpeedProblem::NoFrame {
+                frames: all,
+                signal: name.to_owned(),
+            },
         });
     }
     enough(path, &speeds)?;
@@ -225,7 +225,7 @@ fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
 }
 
 /// `None` for a line without a frame, such as an empty one, or a frame without data.
-fn candump(line: &str) -> Option<std::result::Result<Frame, String>> {
+fn candump(line: &str) -> Option<Parsed<Frame>> {
     let rest = line.trim().strip_prefix('(')?;
     let (time, rest) = rest.split_once(')')?;
     let mut words = rest.split_whitespace();
@@ -240,7 +240,7 @@ fn candump(line: &str) -> Option<std::result::Result<Frame, String>> {
     let parsed = || {
         let ns = seconds(time)?;
         let number =
-            u32::from_str_radix(id, 16).map_err(|_| format!("'{id}' is not an identifier"))?;
+            u32::from_str_radix(id, 16).map_err(|_| FrameProblem::Identifier(id.to_owned()))?;
         // The tool writes 3 digits of a standard identifier, 8 of an extended one; the top bit marks errors.
         let id = can_id(number, id.len() > 3)?;
         Ok(Frame {
@@ -254,7 +254,7 @@ fn candump(line: &str) -> Option<std::result::Result<Frame, String>> {
 }
 
 /// `   0.012345 1  1A2x  Rx   d 8 00 01 …`: time, channel, identifier (x: extended), direction, `d`, length, data; CAN FD has other words.
-fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> {
+fn asc(line: &str, decimal: bool) -> Option<Parsed<Frame>> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let time = *words.first()?;
     if !time.starts_with(|c: char| c.is_ascii_digit()) {
@@ -284,44 +284,41 @@ fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> 
             None => (id, false),
         };
         let number = u32::from_str_radix(digits, radix)
-            .map_err(|_| format!("'{id}' is not an identifier"))?;
-        let bytes = data
-            .get(..length)
-            .ok_or_else(|| format!("{} bytes, its length says {length}", data.len()))?;
+            .map_err(|_| FrameProblem::Identifier(id.to_owned()))?;
+        let bytes = data.get(..length).ok_or(FrameProblem::Length {
+            bytes: data.len(),
+            length,
+        })?;
         let byte = |word: &&str| {
-            u8::from_str_radix(word, radix).map_err(|_| format!("'{word}' is not a byte"))
+            u8::from_str_radix(word, radix).map_err(|_| FrameProblem::Byte((*word).to_owned()))
         };
         Ok(Frame {
             ns: seconds(time)?,
             channel: channel.to_owned(),
             id: can_id(number, extended)?,
-            data: bytes
-                .iter()
-                .map(byte)
-                .collect::<std::result::Result<_, _>>()?,
+            data: bytes.iter().map(byte).collect::<Parsed<_>>()?,
         })
     };
     Some(parsed())
 }
 
-fn can_id(number: u32, extended: bool) -> std::result::Result<CanId, String> {
+fn can_id(number: u32, extended: bool) -> Parsed<CanId> {
     match (extended, u16::try_from(number)) {
         (true, _) => Ok(CanId::Extended {
             extended: number & 0x1fff_ffff,
         }),
         (false, Ok(standard)) if standard < 0x800 => Ok(CanId::Standard(standard)),
-        _ => Err(format!("identifier {number:X} has more than 11 bits")),
+        _ => Err(FrameProblem::LongIdentifier(number)),
     }
 }
 
-fn seconds(word: &str) -> std::result::Result<i64, String> {
+fn seconds(word: &str) -> Parsed<i64> {
     let style = crate::dates::TimeStyle::Number(1_000_000_000);
-    crate::dates::nanoseconds(word, style, None)
-        .ok_or_else(|| format!("'{word}' is not a time in seconds"))
+    crate::dates::nanoseconds(word, style, None).ok_or_else(|| FrameProblem::Time(word.to_owned()))
 }
 
-fn hex(digits: &str) -> std::result::Result<Vec<u8>, String> {
-    let bad = || format!("'{digits}' are not bytes");
+fn hex(digits: &str) -> Parsed<Vec<u8>> {
+    let bad = || FrameProblem::Bytes(digits.to_owned());
     if !digits.is_ascii() || !digits.len().is_multiple_of(2) {
         return Err(bad());
     }

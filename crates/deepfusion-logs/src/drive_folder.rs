@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Speed};
 use deepfusion_fs::write_atomically;
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// What a drive's folder is made of.
@@ -93,6 +93,36 @@ impl DriveFolder<'_> {
         }
         save(config, &self.config(out, start_ns)?)?;
         Ok(notes)
+    }
+
+    /// Writes the folder, has `measure` find in it how far the camera's clock is ahead of the log's, in seconds, and writes it again with that.
+    /// Where that is not found, nothing is left that looks finished: `dataset.toml`, which makes the folder a recording, goes first.
+    ///
+    /// # Errors
+    /// As [`Self::write`], and those of `measure`.
+    pub fn write_measured<E: From<Error>>(
+        &mut self,
+        out: &Path,
+        measure: impl FnOnce(&Path) -> std::result::Result<Option<f64>, E>,
+    ) -> std::result::Result<Vec<String>, E> {
+        self.check(out)?;
+        let made = !out.exists();
+        self.write(out)?;
+        let measured = measure(out);
+        for file in Self::FILES.iter().rev().map(|name| out.join(name)) {
+            match std::fs::remove_file(&file) {
+                Err(e) if e.kind() != ErrorKind::NotFound => {
+                    return Err(Error::file(&file, e).into());
+                }
+                _ => {}
+            }
+        }
+        if measured.is_err() && made {
+            // Frames that were decoded stay for the next try.
+            let _ = std::fs::remove_dir(out);
+        }
+        self.camera_ahead_s = measured?;
+        Ok(self.write(out)?)
     }
 
     /// When the first frame was taken, where the log's clock or the user says it.

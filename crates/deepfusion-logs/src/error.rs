@@ -1,3 +1,4 @@
+use crate::problem::{BytesProblem, LineField, LineProblem, SignalProblem, SpeedProblem};
 use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
@@ -21,9 +22,9 @@ pub enum Error {
         /// The line, counted from 1.
         line: u64,
         /// The column, element or sentence.
-        field: String,
+        field: LineField,
         /// What is wrong with it.
-        problem: String,
+        problem: LineProblem,
     },
     /// Bytes of a binary log cannot be read.
     #[error("{}: byte {offset}: {field}: {problem}", path.display())]
@@ -33,9 +34,9 @@ pub enum Error {
         /// Where, counted from 0.
         offset: u64,
         /// The box, key or object.
-        field: String,
+        field: &'static str,
         /// What is wrong with it.
-        problem: String,
+        problem: BytesProblem,
     },
     /// Nothing says which column is meant, or none is there.
     #[error("{}: {problem}; its columns: {}", path.display(), columns.join(", "))]
@@ -53,7 +54,7 @@ pub enum Error {
         /// The file or folder.
         path: PathBuf,
         /// What was looked for.
-        problem: String,
+        problem: SpeedProblem,
     },
     /// A camera's own track, which has no speed.
     #[error("{}: {why}", path.display())]
@@ -69,7 +70,7 @@ pub enum Error {
         /// The trace.
         path: PathBuf,
         /// What is missing.
-        problem: String,
+        problem: SignalProblem,
     },
     /// Nothing connects the log's clock with the video's.
     #[error(
@@ -84,6 +85,12 @@ pub enum Error {
     #[error("{}: already exists", path.display())]
     Exists {
         /// The file.
+        path: PathBuf,
+    },
+    /// Logs whose clocks have nothing to do with each other.
+    #[error("{}: its clock is of another kind than the first log's", path.display())]
+    OtherClock {
+        /// The second log.
         path: PathBuf,
     },
     /// A DBC file or a signal of it cannot be used.
@@ -138,6 +145,9 @@ impl Hint for Error {
             Self::Signal { .. } => "give the DBC file, and the speed's signal as Message.Signal",
             Self::NoStart { .. } => "say when the first frame was taken, on the log's clock",
             Self::Exists { .. } => "choose another folder, or take the file away",
+            Self::OtherClock { .. } => {
+                "give the log that has both speeds and turns, or the first alone"
+            }
         };
         Some(text.to_owned())
     }
@@ -179,12 +189,16 @@ impl Error {
 /// What is wrong in a text, before the file's name is known.
 pub(crate) struct BadLine {
     pub(crate) line: u64,
-    pub(crate) field: String,
-    pub(crate) problem: String,
+    pub(crate) field: LineField,
+    pub(crate) problem: LineProblem,
 }
 
 impl BadLine {
-    pub(crate) fn new(line: u64, field: impl Into<String>, problem: impl Into<String>) -> Self {
+    pub(crate) fn new(
+        line: u64,
+        field: impl Into<LineField>,
+        problem: impl Into<LineProblem>,
+    ) -> Self {
         Self {
             line,
             field: field.into(),

@@ -1,8 +1,8 @@
 //! A phone's export folder: a table for each sensor, as Sensor Logger and phyphox write them.
 
 use crate::error::{Error, Result};
-use crate::log::{DriveLog, Format};
-use crate::read_options::ReadOptions;
+use crate::log::{DriveLog, Format, ReadOptions};
+use crate::problem::SpeedProblem;
 use crate::rows::text_of;
 use crate::table::Table;
 use crate::turns::{Heading, Sensor, yaw_rates};
@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 /// Files of positions, the better first.
-const LOCATIONS: [&str; 4] = [
+static LOCATIONS: [&str; 4] = [
     "LocationGps.csv",
     "Location.csv",
     "GPS.csv",
@@ -36,7 +36,9 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
     let Some(location) = table(&LOCATIONS)? else {
         return Err(Error::NoSpeed {
             path: folder.to_owned(),
-            problem: format!("an export folder has one of {}", LOCATIONS.join(", ")),
+            problem: SpeedProblem::NoLocations {
+                expected: &LOCATIONS,
+            },
         });
     };
     let mut log = wide_table::read(&location, options)?;
@@ -73,7 +75,7 @@ fn axes(table: &Table, options: &ReadOptions) -> Result<Vec<Sensor>> {
             ..options.clone()
         },
     )?;
-    let axis = |letter: &str| {
+    let axis = |letter: &'static str| {
         let fits = |name: &str| name == letter || name.ends_with(&format!(" {letter}"));
         table
             .columns
@@ -81,7 +83,7 @@ fn axes(table: &Table, options: &ReadOptions) -> Result<Vec<Sensor>> {
             .find(|c| fits(&c.name))
             .ok_or_else(|| Error::NoSpeed {
                 path: table.path.clone(),
-                problem: format!("no column of the axis {letter}"),
+                problem: SpeedProblem::NoAxis { axis: letter },
             })
     };
     let (x, y, z) = (axis("x")?, axis("y")?, axis("z")?);

@@ -3,7 +3,9 @@
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::numbers::{Cell, cell};
+use crate::problem::{LineField, SpeedProblem, TableProblem};
 use crate::rows::{enough, left_out};
+use crate::table::short;
 use std::path::Path;
 
 const HEADER: &str = "# Fix,";
@@ -23,11 +25,11 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
         .map(|c| c.trim().to_lowercase())
         .collect();
     // Older versions wrote other names.
-    let find = |names: [&str; 2]| {
+    let find = |names: [&'static str; 2]| {
         let place = columns.iter().position(|c| names.contains(&c.as_str()));
         place.ok_or_else(|| Error::NoSpeed {
             path: path.to_owned(),
-            problem: format!("the Fix rows have no column {}", names[0]),
+            problem: SpeedProblem::NoFixColumn { column: names[0] },
         })
     };
     let (provider, speed) = (
@@ -65,8 +67,9 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
                 Cell::Absent => Ok(None),
                 Cell::Number(n) => Ok(Some(n)),
                 Cell::Other => {
-                    let problem = format!("'{}' is not a number", crate::table::short(word));
-                    Err(BadLine::new(line, format!("Fix, {}", columns[index]), problem).of(path))
+                    let field = LineField::FixColumn(columns[index].clone());
+                    let text = short(word);
+                    Err(BadLine::new(line, field, TableProblem::NotANumber { text }).of(path))
                 }
             }
         };
@@ -77,7 +80,8 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
         let ns = (ms * 1e6).round() as i64;
         match speeds.last() {
             Some(last) if ns < last.ns => {
-                let problem = format!("{} s before the fix above", (last.ns - ns) as f64 * 1e-9);
+                let back_s = (last.ns - ns) as f64 * 1e-9;
+                let problem = TableProblem::FixBackwards { back_s };
                 return Err(BadLine::new(line, "Fix, UnixTimeMillis", problem).of(path));
             }
             Some(last) if ns == last.ns => {

@@ -4,6 +4,7 @@
 use crate::error::{Error, NoGps, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::mp4::{Broken, Sample, samples};
+use crate::problem::{GpmfProblem, SpeedProblem};
 use crate::turns::{Heading, Sensor, yaw_rates};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -39,7 +40,7 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     let Some(payloads) = samples(&bytes, b"gpmd").map_err(broken)? else {
         return Err(Error::NoSpeed {
             path: path.to_owned(),
-            problem: "a video without a track of GoPro's metadata (gpmd)".into(),
+            problem: SpeedProblem::NoTrack,
         });
     };
     let mut found = Found::default();
@@ -228,15 +229,15 @@ pub(crate) fn entries(bytes: &[u8], base: usize) -> std::result::Result<Vec<Entr
         let size = usize::from(bytes[at + 5]);
         let length = size * usize::from(u16::from_be_bytes([bytes[at + 6], bytes[at + 7]]));
         let Some(value) = bytes.get(at + 8..at + 8 + length) else {
-            let key = String::from_utf8_lossy(&key).into_owned();
-            let problem = format!(
-                "{key}: {length} bytes, where {} are left",
-                bytes.len() - at - 8
-            );
+            let problem = GpmfProblem::Length {
+                key: String::from_utf8_lossy(&key).into_owned(),
+                length,
+                left: bytes.len() - at - 8,
+            };
             return Err(Broken {
                 offset: base + at,
                 field: "GPMF",
-                problem,
+                problem: problem.into(),
             });
         };
         all.push(Entry {
@@ -282,12 +283,12 @@ fn width(kind: u8) -> Option<usize> {
 }
 
 impl Entry<'_> {
-    fn broken(&self, problem: String) -> Broken {
+    fn broken(&self, problem: impl FnOnce(String) -> GpmfProblem) -> Broken {
         let key = String::from_utf8_lossy(&self.key).into_owned();
         Broken {
             offset: self.offset,
             field: "GPMF",
-            problem: format!("{key}: {problem}"),
+            problem: problem(key).into(),
         }
     }
 
@@ -306,10 +307,8 @@ impl Entry<'_> {
     /// All numbers of an entry of one kind.
     pub(crate) fn numbers(&self) -> std::result::Result<Vec<f64>, Broken> {
         let Some(width) = width(self.kind) else {
-            return Err(self.broken(format!(
-                "values of kind '{}' are not numbers",
-                char::from(self.kind)
-            )));
+            let kind = char::from(self.kind);
+            return Err(self.broken(|key| GpmfProblem::NoNumbers { key, kind }));
         };
         Ok(self
             .value
@@ -326,7 +325,7 @@ impl Entry<'_> {
     ) -> std::result::Result<Vec<Vec<f64>>, Broken> {
         let kinds: Vec<u8> = match (self.kind, complex) {
             (b'?', Some(kinds)) => kinds.iter().copied().filter(|k| *k != 0).collect(),
-            (b'?', None) => return Err(self.broken("no TYPE before it".into())),
+            (b'?', None) => return Err(self.broken(|key| GpmfProblem::NoType { key })),
             (kind, _) => match width(kind) {
                 Some(width) => vec![kind; self.size / width],
                 None => Vec::new(),
@@ -336,10 +335,8 @@ impl Entry<'_> {
         let Some(widths) =
             widths.filter(|w| w.len() >= least && w.iter().sum::<usize>() == self.size)
         else {
-            return Err(self.broken(format!(
-                "readings of {} bytes, expected {least} numbers",
-                self.size
-            )));
+            let bytes = self.size;
+            return Err(self.broken(|key| GpmfProblem::Readings { key, bytes, least }));
         };
         let row = |bytes: &[u8]| {
             let mut at = 0;

@@ -2,6 +2,7 @@
 
 use crate::error::{BadLine, Result};
 use crate::log::{DriveLog, Format};
+use crate::problem::GpxProblem;
 use crate::track::{TimedFix, log_of_fixes};
 use deepfusion_motion::Fix;
 use quick_xml::Reader;
@@ -30,7 +31,7 @@ fn fixes(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
         let position = (position as usize).clamp(counted, bytes.len());
         line += memchr::memchr_iter(b'\n', &bytes[counted..position]).count() as u64;
         counted = position;
-        let event = event.map_err(|e| BadLine::new(line, "XML", e.to_string()))?;
+        let event = event.map_err(|e| BadLine::new(line, "XML", GpxProblem::from(e)))?;
         match event {
             Event::Start(tag) => {
                 known |= tag.local_name().as_ref() == b"gpx";
@@ -62,10 +63,10 @@ fn fixes(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
                 }
             }
             Event::Eof if point.is_some() => {
-                return Err(BadLine::new(line, "trkpt", "the file ends within it"));
+                return Err(BadLine::new(line, "trkpt", GpxProblem::Cut));
             }
             Event::Eof if !known => {
-                return Err(BadLine::new(1, "gpx", "no such element: it is no GPX file"));
+                return Err(BadLine::new(1, "gpx", GpxProblem::NoGpx));
             }
             Event::Eof => return Ok(fixes),
             _ => {}
@@ -81,21 +82,16 @@ struct Point {
 }
 
 fn place(tag: &BytesStart, line: u64) -> std::result::Result<Fix, BadLine> {
-    let degrees = |name: &str, most: f64| {
+    let degrees = |name: &'static str, most: f64| {
         let attribute = tag
             .try_get_attribute(name)
-            .map_err(|e| BadLine::new(line, name, e.to_string()))?;
-        let attribute = attribute.ok_or_else(|| BadLine::new(line, name, "the point has none"))?;
-        let word = String::from_utf8_lossy(&attribute.value).into_owned();
-        let value: Option<f64> = word.trim().parse().ok();
+            .map_err(|e| BadLine::new(line, name, GpxProblem::from(e)))?;
+        let attribute =
+            attribute.ok_or_else(|| BadLine::new(line, name, GpxProblem::NoCoordinate))?;
+        let text = String::from_utf8_lossy(&attribute.value).into_owned();
+        let value: Option<f64> = text.trim().parse().ok();
         let inside = value.filter(|v| v.abs() <= most);
-        inside.ok_or_else(|| {
-            BadLine::new(
-                line,
-                name,
-                format!("'{word}' is no angle up to {most} degrees"),
-            )
-        })
+        inside.ok_or_else(|| BadLine::new(line, name, GpxProblem::Angle { text, most }))
     };
     Ok(Fix {
         time_s: 0.0,
@@ -108,13 +104,20 @@ fn place(tag: &BytesStart, line: u64) -> std::result::Result<Fix, BadLine> {
 /// An ISO 8601 date with its zone, in nanoseconds since 1970.
 fn date(word: &str, line: u64) -> std::result::Result<i64, BadLine> {
     let stamp: std::result::Result<jiff::Timestamp, _> = word.parse();
-    let stamp = stamp.map_err(|e| BadLine::new(line, "time", format!("'{word}': {e}")))?;
-    i64::try_from(stamp.as_nanosecond())
-        .map_err(|_| BadLine::new(line, "time", format!("'{word}' is beyond 2262")))
+    let bad = |problem: GpxProblem| BadLine::new(line, "time", problem);
+    let text = || word.to_owned();
+    let stamp = stamp.map_err(|source| {
+        let text = text();
+        bad(GpxProblem::Time { text, source })
+    })?;
+    i64::try_from(stamp.as_nanosecond()).map_err(|_| bad(GpxProblem::TooLate { text: text() }))
 }
 
 fn speed(word: &str, line: u64) -> std::result::Result<f64, BadLine> {
     let value: Option<f64> = word.parse().ok();
     let value = value.filter(|v| v.is_finite() && (0.0..200.0).contains(v));
-    value.ok_or_else(|| BadLine::new(line, "speed", format!("'{word}' is no speed in m/s")))
+    value.ok_or_else(|| {
+        let text = word.to_owned();
+        BadLine::new(line, "speed", GpxProblem::Speed { text })
+    })
 }

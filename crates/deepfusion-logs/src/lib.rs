@@ -30,8 +30,8 @@ mod gpx;
 mod log;
 mod mp4;
 mod numbers;
+mod problem;
 mod read;
-mod read_options;
 mod receiver;
 mod rows;
 mod table;
@@ -45,7 +45,10 @@ pub use dates::time_on_clock;
 pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, NoGps, Result};
 pub use gopro_lens::GoproLens;
-pub use log::{Clock, DriveLog, Format, Speed, YawRate};
-pub use read::{is_gps_track, may_hold_log, read};
-pub use read_options::ReadOptions;
+pub use log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
+pub use problem::{
+    BlfProblem, BytesProblem, FrameProblem, GpmfProblem, GpxProblem, LineField, LineProblem,
+    Mp4Problem, NmeaProblem, SignalProblem, SpeedProblem, TableProblem,
+};
+pub use read::{is_gps_track, may_hold_log, read, read_all};
 pub use units::{SpeedUnit, UnknownUnit};

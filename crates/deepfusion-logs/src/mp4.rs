@@ -1,6 +1,7 @@
 //! As much of MP4 as it takes to get at a track of metadata: where its samples lie, and when each begins.
 
 use crate::error::Error;
+use crate::problem::{BytesProblem, Mp4Problem};
 use std::ops::Range;
 use std::path::Path;
 
@@ -17,7 +18,7 @@ pub(crate) struct Sample {
 pub(crate) struct Broken {
     pub(crate) offset: usize,
     pub(crate) field: &'static str,
-    pub(crate) problem: String,
+    pub(crate) problem: BytesProblem,
 }
 
 impl Broken {
@@ -26,7 +27,7 @@ impl Broken {
         Error::Bytes {
             path: path.to_owned(),
             offset: self.offset as u64,
-            field: self.field.into(),
+            field: self.field,
             problem: self.problem,
         }
     }
@@ -58,7 +59,7 @@ pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample
         return Err(Broken {
             offset: file.len(),
             field: "moov",
-            problem: "no such box: the recording was cut off, or this is no MP4 file".into(),
+            problem: Mp4Problem::NoMovie.into(),
         });
     };
     for track in movie.all(b"trak")? {
@@ -77,7 +78,7 @@ pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample
         }
         let scale = match media.first(b"mdhd")? {
             Some(header) => header.timescale()?,
-            None => return Err(track.broken("mdhd", "no such box")),
+            None => return Err(track.broken("mdhd", Mp4Problem::NoBox)),
         };
         return table.samples(scale).map(Some);
     }
@@ -85,7 +86,7 @@ pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample
 }
 
 impl BoxContent<'_> {
-    fn broken(&self, field: &'static str, problem: &str) -> Broken {
+    fn broken(&self, field: &'static str, problem: Mp4Problem) -> Broken {
         Broken {
             offset: self.range.start,
             field,
@@ -101,7 +102,7 @@ impl BoxContent<'_> {
             .filter(|r| r.end <= self.range.end);
         bytes
             .and_then(|r| self.file.get(r))
-            .ok_or_else(|| self.broken("box", "it ends early"))
+            .ok_or_else(|| self.broken("box", Mp4Problem::Cut))
     }
 
     fn u32(&self, at: usize) -> Result<u32, Broken> {
@@ -128,11 +129,11 @@ impl BoxContent<'_> {
             let Some(end) = end.filter(|end| *end <= length && size >= header as u64) else {
                 let offset = self.range.start + at;
                 let name = String::from_utf8_lossy(self.bytes(at + 4, 4)?).into_owned();
-                let problem = format!("{name}: {size} bytes, where {} are left", length - at);
+                let left = length - at;
                 return Err(Broken {
                     offset,
                     field: "box",
-                    problem,
+                    problem: Mp4Problem::Size { name, size, left }.into(),
                 });
             };
             if self.bytes(at + 4, 4)? == kind {
@@ -175,7 +176,7 @@ impl BoxContent<'_> {
     fn timescale(&self) -> Result<u32, Broken> {
         let at = if self.bytes(0, 1)?[0] == 1 { 20 } else { 12 };
         match self.u32(at)? {
-            0 => Err(self.broken("mdhd", "a timescale of 0")),
+            0 => Err(self.broken("mdhd", Mp4Problem::Timescale)),
             scale => Ok(scale),
         }
     }
@@ -184,7 +185,7 @@ impl BoxContent<'_> {
     fn samples(&self, scale: u32) -> Result<Vec<Sample>, Broken> {
         let needed = |kind: &'static [u8; 4], name| {
             self.first(kind)?
-                .ok_or_else(|| self.broken(name, "no such box"))
+                .ok_or_else(|| self.broken(name, Mp4Problem::NoBox))
         };
         let (sizes, durations, runs) = (
             needed(b"stsz", "stsz")?,
@@ -195,7 +196,7 @@ impl BoxContent<'_> {
         let one_size = sizes.u32(4)?;
         // Each sample takes a byte of the file at least, so a count cannot ask for more memory than the file has.
         if count > self.file.len() {
-            return Err(sizes.broken("stsz", "more samples than bytes"));
+            return Err(sizes.broken("stsz", Mp4Problem::Samples));
         }
         let size = |i: usize| match one_size {
             0 => sizes.u32(12 + 4 * i),
@@ -230,14 +231,11 @@ impl BoxContent<'_> {
                 let end = at + u64::from(size(index)?);
                 let bytes = usize::try_from(at).ok().zip(usize::try_from(end).ok());
                 let Some((from, to)) = bytes.filter(|(_, to)| *to <= self.file.len()) else {
-                    return Err(self.broken(
-                        "stco",
-                        "a sample lies beyond the file's end: it was cut off",
-                    ));
+                    return Err(self.broken("stco", Mp4Problem::Beyond));
                 };
                 let ns = begins
                     .next()
-                    .ok_or_else(|| durations.broken("stts", "fewer samples than stsz"))?;
+                    .ok_or_else(|| durations.broken("stts", Mp4Problem::Times))?;
                 samples.push(Sample {
                     bytes: from..to,
                     ns,

@@ -1,12 +1,11 @@
-//! What a file is: by its name, and by what stands in it.
+//! What a file is: by its name, by what stands in it, and by what a user says of it.
 
 use crate::error::Result;
-use crate::log::DriveLog;
-use crate::read_options::ReadOptions;
+use crate::log::{DriveLog, ReadOptions};
 use crate::rows::text_of;
 use crate::table::Table;
 use crate::{can_trace, export_folder, gnss_logger, gpmf, gpx, receiver, tall_table, wide_table};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Whether a file is named like a GPS track: `.gpx` or `.nmea`.
 #[must_use]
@@ -18,6 +17,30 @@ pub fn is_gps_track(path: &Path) -> bool {
 #[must_use]
 pub fn may_hold_log(path: &Path) -> bool {
     ["mp4", "mov", "360", "lrv"].contains(&extension(path).as_str())
+}
+
+/// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. `zone_s`: how far the clocks of
+/// logs that name none are ahead of UTC, in seconds. `None` for no log at all.
+///
+/// # Errors
+/// As [`read`]; [`crate::Error::OtherClock`] where the turns are on a clock of another kind than the speeds.
+pub fn read_all(paths: &[PathBuf], options: &ReadOptions, zone_s: i64) -> Result<Option<DriveLog>> {
+    let mut merged: Option<DriveLog> = None;
+    for path in paths {
+        let log = read(path, options)?.in_zone(zone_s);
+        match &mut merged {
+            None => merged = Some(log),
+            Some(first) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
+                if first.clock != log.clock {
+                    return Err(crate::Error::OtherClock { path: path.clone() });
+                }
+                first.yaw_rates = log.yaw_rates;
+                first.notes.extend(log.notes);
+            }
+            Some(_) => {}
+        }
+    }
+    Ok(merged)
 }
 
 /// Reads a log.

@@ -2,6 +2,7 @@
 
 use crate::error::{BadLine, Result};
 use crate::log::{DriveLog, Format};
+use crate::problem::NmeaProblem;
 use crate::track::{TimedFix, log_of_fixes};
 use deepfusion_motion::Fix;
 use nmea::sentences::rmc::{RmcStatusOfFix, parse_rmc};
@@ -37,17 +38,14 @@ fn sentences(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
         if &text[3..6] != "RMC" {
             continue;
         }
-        let sentence = nmea::parse_nmea_sentence(text)
-            .map_err(|e| BadLine::new(number, "RMC", e.to_string()))?;
-        if sentence.checksum != sentence.calc_checksum() {
-            let problem = format!(
-                "the checksum is {:02X}, not {:02X}",
-                sentence.calc_checksum(),
-                sentence.checksum
-            );
-            return Err(BadLine::new(number, "RMC", problem));
+        let bad = |problem: NmeaProblem| BadLine::new(number, "RMC", problem);
+        let refused = |e: nmea::Error<'_>| bad(NmeaProblem::Sentence(e.to_string()));
+        let sentence = nmea::parse_nmea_sentence(text).map_err(refused)?;
+        let (found, said) = (sentence.calc_checksum(), sentence.checksum);
+        if found != said {
+            return Err(bad(NmeaProblem::Checksum { found, said }));
         }
-        let rmc = parse_rmc(sentence).map_err(|e| BadLine::new(number, "RMC", e.to_string()))?;
+        let rmc = parse_rmc(sentence).map_err(refused)?;
         if rmc.status_of_fix == RmcStatusOfFix::Invalid {
             continue;
         }
@@ -57,7 +55,7 @@ fn sentences(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
             continue;
         };
         let ns = date.and_time(time).and_utc().timestamp_nanos_opt();
-        let ns = ns.ok_or_else(|| BadLine::new(number, "RMC", "its date is beyond 2262"))?;
+        let ns = ns.ok_or_else(|| bad(NmeaProblem::TooLate))?;
         fixes.push(TimedFix {
             ns,
             fix: Fix {
@@ -73,6 +71,6 @@ fn sentences(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
     if known {
         Ok(fixes)
     } else {
-        Err(BadLine::new(1, "NMEA", "no sentence in it ($GPRMC,…)"))
+        Err(BadLine::new(1, "NMEA", NmeaProblem::NoSentence))
     }
 }

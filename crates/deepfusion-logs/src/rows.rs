@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::log::Speed;
-use deepfusion_hint::count_of;
+use crate::problem::{LineProblem, SpeedProblem};
 use std::path::Path;
 
 /// A file's text: UTF-8, with a byte order mark or without.
@@ -19,11 +19,10 @@ pub(crate) fn text_of(path: &Path) -> Result<String> {
             line,
             field: "any".into(),
             problem: if utf16 {
-                "UTF-16 text, save it as UTF-8"
+                LineProblem::Utf16
             } else {
-                "not UTF-8 text, and no binary log that is known"
-            }
-            .into(),
+                LineProblem::NoText
+            },
         }
     })
 }
@@ -45,12 +44,9 @@ pub(crate) fn left_out(notes: &mut Vec<String>, rows: usize, absent: usize, repe
 /// An error where there are not two speeds.
 pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
     match speeds.len() {
-        0 | 1 => Err(Error::NoSpeed {
+        rows @ (0 | 1) => Err(Error::NoSpeed {
             path: path.to_owned(),
-            problem: format!(
-                "{} with a time and a speed, at least two are needed",
-                count_of(speeds.len(), "row")
-            ),
+            problem: SpeedProblem::TooFewRows { rows },
         }),
         _ => Ok(()),
     }

@@ -4,6 +4,7 @@
 use crate::columns::Column;
 use crate::error::{BadLine, ColumnProblem, Error, Result};
 use crate::numbers::{Cell, cell};
+use crate::problem::{LineField, TableProblem};
 use std::path::{Path, PathBuf};
 
 /// A table's header and rows.
@@ -40,7 +41,7 @@ impl Table {
             .from_reader(text.as_bytes());
         let refused = |error: csv::Error| {
             let line = error.position().map_or(1, csv::Position::line) + first_line - 1;
-            BadLine::new(line, "any", error.to_string()).of(path)
+            BadLine::new(line, "any", TableProblem::from(error)).of(path)
         };
         let header = reader.headers().map_err(refused)?.clone();
         let named = (0..header.len())
@@ -69,7 +70,8 @@ impl Table {
             }
             let surplus = words.iter().skip(named).any(|w| !w.is_empty());
             if words.len() < named || surplus {
-                let problem = format!("{} values, the header has {named}", words.len());
+                let values = words.len();
+                let problem = TableProblem::Values { values, named };
                 return Err(BadLine::new(line, "any", problem).of(path));
             }
             table.rows.push(Row {
@@ -103,7 +105,8 @@ impl Table {
             Cell::Absent => Ok(None),
             Cell::Number(value) => Ok(Some(value)),
             Cell::Other => {
-                Err(self.bad(row, column, &format!("'{}' is not a number", short(word))))
+                let text = short(word);
+                Err(self.bad(row, column, TableProblem::NotANumber { text }))
             }
         }
     }
@@ -120,8 +123,9 @@ impl Table {
     }
 
     /// An error about a cell.
-    pub(crate) fn bad(&self, row: usize, column: &Column, problem: &str) -> Error {
-        BadLine::new(self.line(row), format!("column {}", column.header), problem).of(&self.path)
+    pub(crate) fn bad(&self, row: usize, column: &Column, problem: TableProblem) -> Error {
+        let field = LineField::Column(column.header.clone());
+        BadLine::new(self.line(row), field, problem).of(&self.path)
     }
 
     /// An error about the choice of columns.

@@ -2,8 +2,8 @@
 
 use crate::columns::{Column, speed_rank};
 use crate::error::{ColumnProblem, Error, Result};
-use crate::log::{DriveLog, Format, Speed};
-use crate::read_options::ReadOptions;
+use crate::log::{DriveLog, Format, ReadOptions, Speed};
+use crate::problem::SpeedProblem;
 use crate::rows::{enough, left_out};
 use crate::table::Table;
 use crate::units::SpeedUnit;
@@ -82,25 +82,29 @@ fn chosen(
         let own = unit.and_then(|c| table.word(row, c).parse().ok());
         found.entry(table.word(row, quantity)).or_insert(own);
     }
-    let named = |name: &str| found.get(name).map(|unit| (name.to_owned(), *unit));
-    let missing = |problem: String| Error::NoSpeed {
+    let missing = |problem| Error::NoSpeed {
         path: table.path.clone(),
-        problem: format!(
-            "{problem}; measured are: {}",
-            found.keys().copied().collect::<Vec<_>>().join(", ")
-        ),
+        problem,
     };
+    let measured = || found.keys().map(|name| (*name).to_owned()).collect();
     if let Some(name) = &options.speed {
-        return named(name).ok_or_else(|| missing(format!("nothing is called '{name}'")));
+        return match found.get_key_value(name.as_str()) {
+            Some((name, unit)) => Ok(((*name).to_owned(), *unit)),
+            None => Err(missing(SpeedProblem::NotMeasured {
+                name: name.clone(),
+                measured: measured(),
+            })),
+        };
     }
     // A speed in another language is known by its unit alone, if it is the only one.
     let ranked = found.iter().filter_map(|(name, unit)| {
-        Some((unit.is_none(), speed_rank(&name.to_lowercase())?, *name))
+        let rank = speed_rank(&name.to_lowercase())?;
+        Some(((unit.is_none(), rank, *name), *unit))
     });
-    match ranked.min() {
-        Some((_, _, name)) => named(name).ok_or_else(|| missing("no speed".into())),
-        None => Err(missing(
-            "nothing measured looks like the vehicle's speed".into(),
-        )),
+    match ranked.min_by_key(|(rank, _)| *rank) {
+        Some(((_, _, name), unit)) => Ok((name.to_owned(), unit)),
+        None => Err(missing(SpeedProblem::NoneMeasured {
+            measured: measured(),
+        })),
     }
 }

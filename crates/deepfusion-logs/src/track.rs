@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
+use crate::problem::SpeedProblem;
 use deepfusion_hint::count_of;
 use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
 use std::path::Path;
@@ -27,10 +28,7 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
     if smoothed.len() < 2 {
         return Err(Error::NoSpeed {
             path: path.to_owned(),
-            problem: format!(
-                "{} with a time, at least two in ten seconds are needed",
-                count_of(fixes.len(), "fix")
-            ),
+            problem: SpeedProblem::TooFewFixes { fixes: fixes.len() },
         });
     }
     let measured = fixes.iter().all(|f| f.speed_mps.is_some());

@@ -3,8 +3,8 @@
 use crate::columns::{Column, TIMES};
 use crate::dates::{TimeStyle, clock_of, nanoseconds, style_of};
 use crate::error::{ColumnProblem, Error, Result};
-use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
-use crate::read_options::ReadOptions;
+use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
+use crate::problem::{SpeedProblem, TableProblem};
 use crate::rows::{enough, left_out};
 use crate::table::{Table, short};
 use crate::track::{self, TimedFix};
@@ -39,7 +39,7 @@ impl<'a> Times<'a> {
         let Some(first) = words.first() else {
             return Err(Error::NoSpeed {
                 path: table.path.clone(),
-                problem: "no row below the header has a time".into(),
+                problem: SpeedProblem::NoTime,
             });
         };
         // A number's column may be named for its unit: "seconds", "UnixTimeMillis".
@@ -50,7 +50,10 @@ impl<'a> Times<'a> {
         });
         let style = style_of(&words, unit).ok_or_else(|| match first.parse::<f64>() {
             Ok(_) => table.lacks(ColumnProblem::NoTimeUnit(column.header.clone())),
-            Err(_) => table.bad(0, column, &format!("'{}' is not a time", short(first))),
+            Err(_) => {
+                let text = short(first);
+                table.bad(0, column, TableProblem::NotATime { text })
+            }
         })?;
         Ok(Self {
             column,
@@ -63,20 +66,16 @@ impl<'a> Times<'a> {
     pub(crate) fn ns(&self, table: &Table, row: usize, after: Option<i64>) -> Result<i64> {
         let word = table.plain_word(row, self.column);
         let ns = nanoseconds(&word, self.style, after).ok_or_else(|| {
-            table.bad(
-                row,
-                self.column,
-                &format!("'{}' is not a time", short(&word)),
-            )
+            let text = short(&word);
+            table.bad(row, self.column, TableProblem::NotATime { text })
         })?;
         match after {
             Some(after) if ns < after => {
-                let back = (after - ns) as f64 * 1e-9;
-                Err(table.bad(
-                    row,
-                    self.column,
-                    &format!("'{}' is {back} s before the row above", short(&word)),
-                ))
+                let problem = TableProblem::Backwards {
+                    text: short(&word),
+                    back_s: (after - ns) as f64 * 1e-9,
+                };
+                Err(table.bad(row, self.column, problem))
             }
             _ => Ok(ns),
         }
@@ -270,9 +269,12 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<Dri
         };
         fixes.push(TimedFix { ns, fix });
     }
-    if let (true, Some((row, north, east))) = (fixes.is_empty(), beyond.first()) {
-        let problem = format!("{north}, {east} are no degrees of latitude and longitude");
-        return Err(table.bad(*row, latitude, &problem));
+    if let (true, Some(&(row, north, east))) = (fixes.is_empty(), beyond.first()) {
+        let problem = TableProblem::NoDegrees {
+            latitude: north,
+            longitude: east,
+        };
+        return Err(table.bad(row, latitude, problem));
     }
     if !beyond.is_empty() {
         notes.push(format!(

@@ -3,6 +3,12 @@ use std::path::PathBuf;
 
 use crate::NetworkError;
 
+mod run;
+mod setting;
+
+pub use self::run::{CHECKPOINT_VERSION, CheckpointLacks, NoRun};
+pub use self::setting::{SettingProblem, TomlProblem};
+
 /// What can go wrong with a configuration, or with a run on disk.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -37,7 +43,7 @@ pub enum Error {
         /// What was asked for: KEY=VALUE.
         assignment: String,
         /// What is wrong with it.
-        reason: String,
+        reason: SettingProblem,
     },
     /// A configuration file that cannot be read as one.
     #[error("{path}: not a training configuration: {reason}")]
@@ -45,7 +51,8 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What the parser says, with the line.
-        reason: String,
+        #[source]
+        reason: TomlProblem,
     },
     /// A file that cannot be read or written.
     #[error("{path}: cannot {action}: {source}")]
@@ -57,15 +64,24 @@ pub enum Error {
         /// What the system says.
         source: std::io::Error,
     },
-    /// A checkpoint that does not fit the program or the configuration.
-    #[error("{path}: {reason}")]
+    /// What TOML cannot hold.
+    #[error("{path}: cannot be written as TOML: {source}")]
+    NotToml {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// Why not.
+        source: toml::ser::Error,
+    },
+    /// A checkpoint of another version than [`CHECKPOINT_VERSION`].
+    #[error(
+        "{path}: checkpoint format {found}, this program reads {}",
+        CHECKPOINT_VERSION
+    )]
     Checkpoint {
         /// The file.
         path: PathBuf,
-        /// Why it cannot be used.
-        reason: String,
-        /// What to do about it.
-        remedy: String,
+        /// Its version.
+        found: usize,
     },
     /// No run where one should be.
     #[error("{path}: {reason}")]
@@ -73,7 +89,7 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
         /// What it lacks.
-        reason: &'static str,
+        reason: NoRun,
     },
     /// Weights that this program did not write.
     #[error("{path}: no checkpoint of this program: `{key}` is missing from its metadata")]
@@ -89,7 +105,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What it lacks.
-        reason: &'static str,
+        reason: CheckpointLacks,
     },
     /// A folder that already holds a run.
     #[error("{path}: there is a run here already")]
@@ -140,7 +156,8 @@ impl Hint for Error {
                 }
                 _ => None,
             },
-            Self::Checkpoint { remedy, .. } => Some(remedy.clone()),
+            Self::NotToml { .. } => None,
+            Self::Checkpoint { .. } => Some("use the version of the program that wrote it".into()),
             Self::NotARun { .. } => Some("give the folder of a run".into()),
             Self::Foreign { .. } => {
                 Some("weights of other programs are imported: deepfusion-nn".into())

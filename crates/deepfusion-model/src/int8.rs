@@ -1,12 +1,13 @@
 //! What a network was calibrated to for int8: the ranges of what its convolutions read.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use deepfusion_hint::Hint;
 use deepfusion_infer::InputRanges;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+use crate::{Error, TomlProblem};
 
 /// The file in a run's folder.
 const FILE: &str = "int8.toml";
@@ -25,15 +26,34 @@ pub struct Int8Calibration {
     pub ranges: InputRanges,
 }
 
+/// Why a calibration cannot be read.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationProblem {
+    /// The system does not give it, or it is no text.
+    #[error("{0}")]
+    Unread(#[source] Arc<std::io::Error>),
+    /// A text or a table that is none.
+    #[error("{0}")]
+    NotOne(#[source] TomlProblem),
+}
+
+impl From<toml::de::Error> for CalibrationProblem {
+    fn from(error: toml::de::Error) -> Self {
+        Self::NotOne(error.into())
+    }
+}
+
 /// A calibration that cannot be read: of no account until int8 is asked for.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[error("{origin}: {reason}")]
 #[non_exhaustive]
 pub struct UnreadableCalibration {
     /// The file, or the network's name.
     pub origin: String,
     /// Why not.
-    pub reason: String,
+    #[source]
+    pub reason: CalibrationProblem,
 }
 
 impl Hint for UnreadableCalibration {
@@ -52,7 +72,7 @@ impl Int8Calibration {
             .try_into()
             .map_err(|e: toml::de::Error| UnreadableCalibration {
                 origin: name.to_owned(),
-                reason: e.to_string(),
+                reason: e.into(),
             })
     }
 
@@ -62,28 +82,28 @@ impl Int8Calibration {
     /// A file that holds none, or cannot be read.
     pub fn of_run(folder: &Path, step: usize) -> Result<Option<Self>, UnreadableCalibration> {
         let path = folder.join(FILE);
-        let unreadable = |reason: String| UnreadableCalibration {
+        let unreadable = |reason: CalibrationProblem| UnreadableCalibration {
             origin: path.display().to_string(),
             reason,
         };
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(unreadable(e.to_string())),
+            Err(e) => return Err(unreadable(CalibrationProblem::Unread(e.into()))),
         };
-        let found: Self = toml::from_str(&text).map_err(|e| unreadable(e.to_string()))?;
+        let found: Self = toml::from_str(&text).map_err(|e| unreadable(e.into()))?;
         Ok(Some(found).filter(|found| found.step == step))
     }
 
     /// Writes it into a run's folder; returns the file.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::NotToml`] where TOML cannot hold it, [`Error::Io`].
     pub fn write(&self, folder: &Path) -> Result<std::path::PathBuf, Error> {
         let path = folder.join(FILE);
-        let table = toml::to_string(self).map_err(|e| Error::ConfigFile {
+        let table = toml::to_string(self).map_err(|source| Error::NotToml {
             path: path.clone(),
-            reason: e.to_string(),
+            source,
         })?;
         let text = format!(
             "# The range of what each convolution reads, for inference in int8. Written by `weights calibrate`.\n{table}"

@@ -15,10 +15,10 @@ mod stored;
 mod training;
 pub mod weights;
 
-pub use error::Error;
+pub use error::{CHECKPOINT_VERSION, CheckpointLacks, Error, NoRun, SettingProblem, TomlProblem};
 pub use graph::{depth_graph, depth_graph_with_uncertainty};
-pub use int8::{Int8Calibration, UnreadableCalibration};
+pub use int8::{CalibrationProblem, Int8Calibration, UnreadableCalibration};
 pub use network::*;
-pub use run_folder::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
+pub use run_folder::{Checkpoint, CheckpointKind, RunFolder};
 pub use stored::StoredNetwork;
 pub use training::*;

@@ -4,10 +4,7 @@ use std::path::{Path, PathBuf};
 use deepfusion_geometry::Intrinsics;
 
 use crate::weights::{Weights, read_safetensors_under};
-use crate::{Error, TrainConfig, TrainFindings};
-
-/// The version of the checkpoint's layout; files of another version are refused.
-pub const CHECKPOINT_VERSION: u32 = 1;
+use crate::{CHECKPOINT_VERSION, Error, NoRun, TrainConfig, TrainFindings};
 
 /// Metadata: the lowest value that `best` was chosen by. Files of before are without it: what was chosen by then held
 /// terms that depth cannot change, and is not to be compared with.
@@ -104,9 +101,9 @@ impl RunFolder {
         let folder = folder.unwrap_or(Path::new("."));
         if !folder.join("config.toml").is_file() {
             let reason = if folder.exists() {
-                "this is no run: it has no config.toml"
+                NoRun::NoConfig
             } else {
-                "no such run"
+                NoRun::Missing
             };
             return Err(Error::NotARun {
                 path: path.to_owned(),
@@ -192,7 +189,7 @@ impl RunFolder {
         let read = TrainConfig::from_run_text(&text);
         let (_, findings) = read.map_err(|e| Error::ConfigFile {
             path,
-            reason: e.to_string(),
+            reason: e.into(),
         })?;
         Ok(findings)
     }
@@ -269,10 +266,7 @@ impl Checkpoint {
         if version != CHECKPOINT_VERSION as usize {
             return Err(Error::Checkpoint {
                 path: path.to_owned(),
-                reason: format!(
-                    "checkpoint format {version}, this program reads {CHECKPOINT_VERSION}"
-                ),
-                remedy: "use the version of the program that wrote it".into(),
+                found: version,
             });
         }
         Ok(Self {

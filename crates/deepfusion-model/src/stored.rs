@@ -69,7 +69,7 @@ impl StoredNetwork {
         let read = TrainConfig::from_run_table(config);
         let (config, findings) = read.map_err(|e| Error::ConfigFile {
             path: origin.into(),
-            reason: e.to_string(),
+            reason: e.into(),
         })?;
         Ok(Self {
             camera: findings.camera_of(&config, set),

@@ -1,5 +1,13 @@
+//! What can go wrong while a vehicle's sensors are read and fused.
+
+mod array;
+mod signal;
+
+pub use self::array::{ArrayProblem, TimesArray};
+pub use self::signal::SignalProblem;
+
 use deepfusion_hint::Hint;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What can go wrong while a vehicle's sensors are read and fused.
 #[derive(Debug, thiserror::Error)]
@@ -76,13 +84,15 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        problem: String,
+        problem: ArrayProblem,
     },
     /// A DBC file cannot be understood.
-    #[error("DBC: {problem}")]
+    #[error("DBC: {}{source}", of_file(path.as_deref()))]
     Dbc {
-        /// What is wrong with it, with the line where it is known.
-        problem: String,
+        /// The file; `None` for a text without one.
+        path: Option<PathBuf>,
+        /// What the parser said, with the line where it is known.
+        source: Box<can_dbc::DbcError>,
     },
     /// There is no such signal.
     #[error("signal `{name}`: {problem}")]
@@ -90,7 +100,7 @@ pub enum Error {
         /// The name asked for, "Message.Signal".
         name: String,
         /// What there is instead.
-        problem: String,
+        problem: SignalProblem,
     },
     /// A signal's layout does not fit into a frame.
     #[error("signal `{name}`: {field} is {value}, expected {expected}")]
@@ -110,12 +120,16 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    pub(crate) fn file(path: &std::path::Path, source: std::io::Error) -> Self {
+    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
         Self::File {
             path: path.to_owned(),
             source,
         }
     }
+}
+
+fn of_file(path: Option<&Path>) -> String {
+    path.map_or_else(String::new, |path| format!("{}: ", path.display()))
 }
 
 impl Hint for Error {

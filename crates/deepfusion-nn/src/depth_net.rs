@@ -15,7 +15,7 @@ use crate::r_msfm::RMsfm;
 use crate::resample::doubled;
 use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
-use crate::{DepthNetConfig, Error};
+use crate::{ArchitectureProblem, DepthNetConfig, Error};
 use deepfusion_model::{DISP_NET_LEVELS, UNCERTAINTY_PREFIX};
 
 /// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
@@ -323,7 +323,7 @@ impl DepthNet {
             .take()
             .ok_or_else(|| Error::UnknownArchitecture {
                 origin: path.display().to_string(),
-                reason: format!("its weights are a ResNet's, and the network to start is {kind}"),
+                reason: ArchitectureProblem::ResNetForOther { network: kind },
             })?;
         self.encoder = Some(weights::load_torchvision_resnet(encoder, path)?);
         Ok(self)

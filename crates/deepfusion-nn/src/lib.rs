@@ -27,10 +27,10 @@ pub mod weights;
 pub use attention::{Attention, AttentionMasks, GlobalAggregation};
 pub use decoder::{DecoderStage, DisparityDecoder, SCALES};
 pub use deepfusion_model::{
-    AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale, DispNetConfig,
-    FlowDecoderConfig, HceConfig, InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize,
-    NetworkError as Error, PoseNetConfig, R_MSFM_STATE, RMsfmConfig, RefinementInput, ResNetConfig,
-    ResNetDepth,
+    ArchitectureProblem, AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale,
+    DispNetConfig, FlowDecoderConfig, HceConfig, InputNormalisation, InputSize, LiteMonoConfig,
+    LiteMonoSize, NetworkError as Error, PoseNetConfig, R_MSFM_STATE, RMsfmConfig, RefinementInput,
+    ResNetConfig, ResNetDepth,
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
 pub use disp_net::DispNet;

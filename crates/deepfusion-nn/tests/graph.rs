@@ -122,8 +122,9 @@ fn check(config: &DepthNetConfig, width: usize, height: usize) {
         span.1 - span.0 > 0.05,
         "a flat answer would prove nothing: {span:?}"
     );
+    // Sums in another order; the paper's product of masks makes the most of it: 1.0e-4 with AVX2's.
     let (f32_off, _) = off(Precision::F32);
-    assert!(f32_off < 1e-4, "f32 off by {f32_off}");
+    assert!(f32_off < 2e-4, "f32 off by {f32_off}");
     if Engine::has_bf16() {
         // Rounding to eight bits in each of some sixty layers; processors' dot products round differently. The paper's product
         // of masks makes the most of it: 0.009 in the mean square, the others up to 0.0025 (AMD's AVX-512 BF16).

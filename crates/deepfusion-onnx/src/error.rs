@@ -1,6 +1,8 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+use crate::{LibraryProblem, ModelProblem, NodeProblem};
+
 /// What can go wrong when a model is written, read or run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -16,7 +18,7 @@ pub enum Error {
         /// Its operator.
         op: String,
         /// What is wrong with it.
-        reason: String,
+        reason: NodeProblem,
     },
     /// A part of the model other than a node.
     #[error("ONNX model, {part}: {reason}")]
@@ -24,7 +26,7 @@ pub enum Error {
         /// Which part.
         part: &'static str,
         /// What is wrong with it.
-        reason: String,
+        reason: ModelProblem,
     },
     /// A network that does not fit together, or an image size that it cannot work on.
     #[error(transparent)]
@@ -49,15 +51,16 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// Why.
-        reason: String,
+        #[source]
+        reason: LibraryProblem,
     },
     /// What ONNX Runtime itself refuses.
-    #[error("ONNX Runtime cannot {action}: {reason}")]
+    #[error("ONNX Runtime cannot {action}: {source}")]
     Runtime {
         /// What was tried.
         action: &'static str,
         /// What it says.
-        reason: String,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// An image or a buffer of another size than the model's.
     #[error("{what} of {found} values, expected {expected}")]

@@ -8,6 +8,7 @@
 pub mod check;
 mod error;
 mod model;
+mod problem;
 mod proto;
 mod read;
 pub mod reference;
@@ -17,6 +18,7 @@ mod write;
 
 pub use error::Error;
 pub use model::{DepthMaps, DepthModel, FocalLength};
+pub use problem::{FormatVersion, LibraryProblem, ModelProblem, NodeProblem, OperatorSet};
 pub use read::read;
 pub use write::write;
 

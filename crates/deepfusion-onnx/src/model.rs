@@ -1,7 +1,7 @@
 use deepfusion_geometry::DepthRange;
 use deepfusion_infer::Graph;
 
-use crate::Error;
+use crate::{Error, ModelProblem};
 
 /// The focal lengths of a camera, in pixels of the images that a network was trained on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,30 +45,22 @@ impl DepthModel {
     /// borders; [`Error::Model`] for an invalid range or other outputs.
     pub fn validate(&self) -> Result<(), Error> {
         self.graph.check_size(self.width, self.height)?;
-        let fail = |part: &'static str, reason: String| Err(Error::Model { part, reason });
+        let fail = |part: &'static str, reason| Err(Error::Model { part, reason });
         let DepthRange { min_m, max_m } = self.range;
         if !(min_m > 0.0 && max_m > min_m && max_m.is_finite()) {
-            let reason =
-                format!("{min_m} m to {max_m} m, expected 0 < nearest < farthest, both finite");
-            return fail("depth range", reason);
+            return fail("depth range", ModelProblem::Range { range: self.range });
         }
         match self.graph.outputs() {
             [output] => {
                 let shape = self.graph.shape(*output);
                 if (shape.channels, shape.halvings, shape.pooled) != (1, 0, false) {
-                    let reason = format!(
-                        "{} channels at {}, expected one at the image's size",
-                        shape.channels,
-                        if shape.pooled {
-                            "a single pixel".to_owned()
-                        } else {
-                            format!("1/{} of the image's size", 1_u64 << shape.halvings)
-                        }
-                    );
-                    return fail("outputs", reason);
+                    return fail("outputs", ModelProblem::Output { shape });
                 }
             }
-            others => return fail("outputs", format!("{}, expected one", others.len())),
+            others => {
+                let found = others.len();
+                return fail("outputs", ModelProblem::Outputs { found });
+            }
         }
         Ok(())
     }

@@ -10,7 +10,9 @@ use prost::Message;
 
 use crate::proto::{GraphProto, ModelProto, NodeProto, TensorProto};
 use crate::write::encode;
-use crate::{DepthModel, Error, FocalLength};
+use crate::{
+    DepthModel, Error, FocalLength, FormatVersion, ModelProblem, NodeProblem, OperatorSet,
+};
 
 /// The model in an ONNX file that [`write`](crate::write()) wrote.
 ///
@@ -24,7 +26,7 @@ pub fn read(bytes: &[u8]) -> Result<DepthModel, Error> {
     let graph = proto
         .graph
         .as_ref()
-        .ok_or_else(|| part("graph", "missing"))?;
+        .ok_or_else(|| part("graph", ModelProblem::Missing))?;
     let width = side(graph, 2)?;
     let model = DepthModel {
         graph: Reader::new(graph).network(width)?,
@@ -40,19 +42,16 @@ pub fn read(bytes: &[u8]) -> Result<DepthModel, Error> {
     Ok(model)
 }
 
-fn part(part: &'static str, reason: impl Into<String>) -> Error {
-    Error::Model {
-        part,
-        reason: reason.into(),
-    }
+fn part(part: &'static str, reason: ModelProblem) -> Error {
+    Error::Model { part, reason }
 }
 
 fn number(proto: &ModelProto, key: &'static str) -> Result<f64, Error> {
     let entry = proto.metadata_props.iter().find(|entry| entry.key == key);
-    let text = entry.ok_or_else(|| part("metadata", format!("`{key}` is missing")))?;
+    let text = entry.ok_or_else(|| part("metadata", ModelProblem::MissingKey { key }))?;
     text.value.parse().map_err(|_| {
-        let reason = format!("`{key}` is `{}`, expected a number", text.value);
-        part("metadata", reason)
+        let value = text.value.clone();
+        part("metadata", ModelProblem::NoNumber { key, value })
     })
 }
 
@@ -77,30 +76,30 @@ fn side(graph: &GraphProto, axis: usize) -> Result<usize, Error> {
     let dims = graph.input.first().and_then(|input| input.dims());
     let side = dims.as_ref().and_then(|dims| dims.get(axis));
     side.and_then(|side| usize::try_from(*side).ok())
-        .ok_or_else(|| part("input", "no 1×H×W×3 picture of a fixed size"))
+        .ok_or_else(|| part("input", ModelProblem::NoSize))
 }
 
 /// That the file is what would be written for what was read; versions of the program and words may differ.
 fn compare(found: &ModelProto, graph: &GraphProto, expected: &ModelProto) -> Result<(), Error> {
     if found.ir_version != expected.ir_version || found.opset_import != expected.opset_import {
-        let reason = format!(
-            "file layout {} with operators {:?}, expected {} with {:?}",
-            found.ir_version, found.opset_import, expected.ir_version, expected.opset_import
-        );
-        return Err(part("version", reason));
+        let problem = ModelProblem::Version {
+            found: version(found),
+            expected: version(expected),
+        };
+        return Err(part("version", problem));
     }
     let Some(wanted) = &expected.graph else {
-        return Err(part("graph", "missing"));
+        return Err(part("graph", ModelProblem::Missing));
     };
     for (i, node) in graph.node.iter().enumerate() {
         if wanted.node.get(i) != Some(node) {
-            return Err(node_error(node, "not as this program writes it"));
+            return Err(node_error(node, NodeProblem::Differs));
         }
     }
     for (i, tensor) in graph.initializer.iter().enumerate() {
         if wanted.initializer.get(i) != Some(tensor) {
-            let reason = format!("`{}` is not as this program writes it", tensor.name);
-            return Err(part("constants", reason));
+            let name = tensor.name.clone();
+            return Err(part("constants", ModelProblem::Constant { name }));
         }
     }
     let types = |values: &[crate::proto::ValueInfoProto]| -> Vec<_> {
@@ -108,25 +107,39 @@ fn compare(found: &ModelProto, graph: &GraphProto, expected: &ModelProto) -> Res
         typed.collect()
     };
     if types(&graph.input) != types(&wanted.input) {
-        return Err(part("input", "no 1×H×W×3 picture of bytes named `image`"));
+        return Err(part("input", ModelProblem::NoPicture));
     }
     if types(&graph.output) != types(&wanted.output) {
-        return Err(part("outputs", "not `depth` and `disparity` of 1×1×H×W"));
+        return Err(part("outputs", ModelProblem::NoDepth));
     }
     // The rest of what was expected, where the file ends earlier.
     let counts = |g: &GraphProto| [g.node.len(), g.initializer.len()];
     if counts(graph) != counts(wanted) {
-        let reason = format!("{:?}, expected {:?}", counts(graph), counts(wanted));
-        return Err(part("count of nodes and constants", reason));
+        let problem = ModelProblem::Counts {
+            found: counts(graph),
+            expected: counts(wanted),
+        };
+        return Err(part("count of nodes and constants", problem));
     }
     Ok(())
 }
 
-fn node_error(node: &NodeProto, reason: impl Into<String>) -> Error {
+fn version(proto: &ModelProto) -> FormatVersion {
+    let sets = proto.opset_import.iter().map(|set| OperatorSet {
+        domain: set.domain.clone(),
+        version: set.version,
+    });
+    FormatVersion {
+        layout: proto.ir_version,
+        operators: sets.collect(),
+    }
+}
+
+fn node_error(node: &NodeProto, reason: NodeProblem) -> Error {
     Error::Node {
         name: node.name.clone(),
         op: node.op_type.clone(),
-        reason: reason.into(),
+        reason,
     }
 }
 
@@ -213,7 +226,7 @@ impl<'a> Reader<'a> {
                     let (input, pixel) = (self.input(node, 0)?, self.input(node, 1)?);
                     (&node.name, Op::AddPixel { input, pixel }, node)
                 }
-                _ => return Err(node_error(node, "not an operation that is expected here")),
+                _ => return Err(node_error(node, NodeProblem::NotExpected)),
             };
             let value = graph.push(name, op)?;
             self.values.insert(output(last)?.as_str(), value);
@@ -225,14 +238,14 @@ impl<'a> Reader<'a> {
         let input = self.input(first, 0)?;
         let (border, node) = if first.op_type == "Pad" {
             let node = self.after(first, &["Conv"]);
-            let node = node.ok_or_else(|| node_error(first, "no Conv after it"))?;
+            let node = node.ok_or_else(|| node_error(first, NodeProblem::NoConv))?;
             (Border::Reflect, node)
         } else {
             (Border::Zero, first)
         };
         let weight = self.constant(node, 1)?;
         let [channels_out, channels_in, kernel, _] = weight.dims[..] else {
-            return Err(node_error(node, "weights that have not four dimensions"));
+            return Err(node_error(node, NodeProblem::WeightDimensions));
         };
         let size = |n: i64| usize::try_from(n).unwrap_or(0);
         let strides = node.attribute.iter().find(|a| a.name == "strides");
@@ -289,7 +302,7 @@ impl<'a> Reader<'a> {
     fn depthwise(&self, node: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
         let weight = self.constant(node, 1)?;
         let [_, _, kernel, _] = weight.dims[..] else {
-            return Err(node_error(node, "weights that have not four dimensions"));
+            return Err(node_error(node, NodeProblem::WeightDimensions));
         };
         let first = |name: &str| {
             let found = node.attribute.iter().find(|a| a.name == name);
@@ -318,7 +331,7 @@ impl<'a> Reader<'a> {
             let side = code.dims.get(axis).copied();
             side.and_then(|side| usize::try_from(side).ok())
                 .filter(|side| *side > 0)
-                .ok_or_else(|| node_error(node, "no 1×C×H×W array of constants"))
+                .ok_or_else(|| node_error(node, NodeProblem::NoPositions))
         };
         let op = Op::Position {
             per_axis: side(1)? / 2,
@@ -339,7 +352,7 @@ impl<'a> Reader<'a> {
         let add = self.expect("Add")?;
         let epsilon = floats(add, self.constant(add, 1)?)?;
         let epsilon = epsilon.first().copied();
-        let epsilon = epsilon.ok_or_else(|| node_error(add, "expected a number"))?;
+        let epsilon = epsilon.ok_or_else(|| node_error(add, NodeProblem::NoNumber))?;
         self.expect("Sqrt")?;
         let last = self.expect("Div")?;
         Ok((&last.name, Op::ChannelNorm { input, epsilon }, last))
@@ -455,15 +468,15 @@ impl<'a> Reader<'a> {
     fn next(&mut self) -> Result<&'a NodeProto, Error> {
         self.nodes
             .next()
-            .ok_or_else(|| part("nodes", "they end before the depth"))
+            .ok_or_else(|| part("nodes", ModelProblem::EndsEarly))
     }
 
-    fn expect(&mut self, op: &str) -> Result<&'a NodeProto, Error> {
+    fn expect(&mut self, op: &'static str) -> Result<&'a NodeProto, Error> {
         let node = self.next()?;
         if node.op_type == op {
             return Ok(node);
         }
-        Err(node_error(node, format!("expected {op} here")))
+        Err(node_error(node, NodeProblem::Expected { op }))
     }
 
     /// The next node, where it is one of `ops` and goes on with what `before` gives.
@@ -485,13 +498,19 @@ impl<'a> Reader<'a> {
     fn input(&self, node: &NodeProto, index: usize) -> Result<ValueId, Error> {
         let name = node.input.get(index).map_or("", String::as_str);
         let value = self.values.get(name).copied();
-        value.ok_or_else(|| node_error(node, format!("its input `{name}` is unknown")))
+        value.ok_or_else(|| {
+            let name = name.to_owned();
+            node_error(node, NodeProblem::UnknownInput { name })
+        })
     }
 
     fn constant(&self, node: &NodeProto, index: usize) -> Result<&'a TensorProto, Error> {
         let name = node.input.get(index).map_or("", String::as_str);
         let tensor = self.constants.get(name).copied();
-        tensor.ok_or_else(|| node_error(node, format!("its constant `{name}` is missing")))
+        tensor.ok_or_else(|| {
+            let name = name.to_owned();
+            node_error(node, NodeProblem::MissingConstant { name })
+        })
     }
 
     /// A number for red, green and blue.
@@ -499,14 +518,14 @@ impl<'a> Reader<'a> {
         let values = floats(node, self.constant(node, 1)?)?;
         values
             .try_into()
-            .map_err(|_| node_error(node, "expected three numbers"))
+            .map_err(|_| node_error(node, NodeProblem::NoColours))
     }
 }
 
 fn floats(node: &NodeProto, tensor: &TensorProto) -> Result<Vec<f32>, Error> {
     tensor.as_floats().ok_or_else(|| {
-        let reason = format!("`{}` does not hold the f32 values it says", tensor.name);
-        node_error(node, reason)
+        let name = tensor.name.clone();
+        node_error(node, NodeProblem::Values { name })
     })
 }
 
@@ -518,5 +537,5 @@ fn is_linear(node: &NodeProto) -> bool {
 
 fn output(node: &NodeProto) -> Result<&String, Error> {
     let first = node.output.first();
-    first.ok_or_else(|| node_error(node, "it gives nothing"))
+    first.ok_or_else(|| node_error(node, NodeProblem::NoOutput))
 }

@@ -10,7 +10,7 @@ use crate::proto::{
     AttributeProto, FLOAT, GraphProto, ModelProto, NodeProto, OperatorSetIdProto,
     StringStringEntryProto, TensorProto, UINT8, ValueInfoProto,
 };
-use crate::{DepthModel, Error, OPSET};
+use crate::{DepthModel, Error, NodeProblem, OPSET};
 
 /// Version of the file layout; the first that holds [`OPSET`].
 pub(crate) const IR_VERSION: i64 = 8;
@@ -158,7 +158,7 @@ impl Writer {
             return Err(Error::Node {
                 name: name.into(),
                 op: op.into(),
-                reason: "every node needs a name of its own".into(),
+                reason: NodeProblem::Name,
             });
         }
         self.nodes.push(NodeProto {
@@ -179,7 +179,7 @@ impl Writer {
             return Err(Error::Node {
                 name: node.into(),
                 op: "constant".into(),
-                reason: format!("its `{name}` is the name of something else too"),
+                reason: NodeProblem::ConstantName { name },
             });
         }
         self.initializers.push(tensor);

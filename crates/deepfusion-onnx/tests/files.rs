@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use crate::support::model;
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 use deepfusion_onnx::check::{deviation, pictures, relative};
-use deepfusion_onnx::{DepthMaps, DepthModel, Error, read, reference, write};
+use deepfusion_onnx::{DepthMaps, DepthModel, Error, ModelProblem, OPSET, read, reference, write};
 use proptest::prelude::*;
 
 proptest! {
@@ -110,10 +110,32 @@ fn other_networks_are_refused_by_the_node() {
     let Err(Error::Model { part, reason }) = range else {
         panic!("{range:?}");
     };
-    assert_eq!(
-        (part, reason.as_str()),
-        ("metadata", "`depth_min_m` is missing")
+    assert_eq!(part, "metadata");
+    assert_eq!(reason, ModelProblem::MissingKey { key: "depth_min_m" });
+    assert_eq!(reason.to_string(), "`depth_min_m` is missing");
+}
+
+#[test]
+fn another_version_is_refused_by_both() {
+    let mut bytes = write(&single(|_| ())).unwrap();
+    // The layout's version is the file's first field.
+    assert_eq!(bytes[..2], [8, 8]);
+    bytes[1] = 9;
+    let error = read(&bytes).unwrap_err();
+    let operators = format!("[OperatorSet {{ domain: \"\", version: {OPSET} }}]");
+    let text = format!(
+        "ONNX model, version: file layout 9 with operators {operators}, expected 8 with {operators}"
     );
+    assert_eq!(error.to_string(), text);
+    let Error::Model {
+        reason: ModelProblem::Version { found, expected },
+        ..
+    } = error
+    else {
+        panic!("{error:?}");
+    };
+    assert_eq!((found.layout, expected.layout), (9, 8));
+    assert_eq!(found.operators, expected.operators);
 }
 
 /// An image of odd sides, halved rounding up, and enlarged again by channels that become pixels.

@@ -1,3 +1,4 @@
+use deepfusion_geometry::ImplausibleCamera;
 use deepfusion_hint::Hint;
 
 /// What can go wrong with a depth image.
@@ -37,7 +38,7 @@ pub enum Error {
     },
     /// The intrinsics are no camera's.
     #[error("camera: {0}")]
-    Camera(String),
+    Camera(#[from] ImplausibleCamera),
 }
 
 /// A result with this crate's [`Error`].
@@ -51,7 +52,7 @@ impl Hint for Error {
             ),
             Self::Instance { .. } => Some("masks are taken in the depth image's size".into()),
             Self::Config { .. } => Some("leave it out for its default".into()),
-            Self::Camera(_) => Some("fx, fy, cx, cy are in pixels of the image".into()),
+            Self::Camera(problem) => problem.hint(),
         }
     }
 }

@@ -116,7 +116,7 @@ impl Perception {
         instances: &[Instance],
     ) -> Result<Surroundings> {
         if let Some(problem) = k.implausible() {
-            return Err(Error::Camera(problem));
+            return Err(problem.into());
         }
         let size = (k.width as usize, k.height as usize);
         for map in [Some(depth), sigma].into_iter().flatten() {

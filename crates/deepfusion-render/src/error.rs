@@ -18,16 +18,31 @@ pub enum Error {
     #[error("a picture of the report cannot be encoded")]
     Encode(#[from] image::ImageError),
     /// A run's log that cannot be shown.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {problem}", path.display())]
     Log {
         /// The file.
         path: std::path::PathBuf,
         /// What is wrong with it.
-        what: String,
+        problem: LogProblem,
     },
     /// A file cannot be read or written.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
+}
+
+/// Why a file is not the log of a run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogProblem {
+    /// It is no table: what the parser said.
+    #[error(transparent)]
+    Csv(#[from] csv::Error),
+    /// It lacks a column.
+    #[error("no column `{0}`")]
+    NoColumn(&'static str),
+    /// A line before the last is not whole.
+    #[error("line {0}: no step, or too few cells")]
+    Line(u64),
 }
 
 /// A result of this crate.

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use crate::{Error, Result};
+use crate::error::{Error, LogProblem, Result};
 
 /// The learning curve of a run: its `log.csv`, column by column. Any columns besides `step` and `split` are accepted, so
 /// that logs of other versions are shown too.
@@ -26,20 +26,20 @@ impl LearningLog {
     pub fn read(path: &Path) -> Result<Self> {
         let text =
             std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
-        Self::parse(&text).map_err(|what| Error::Log {
+        Self::parse(&text).map_err(|problem| Error::Log {
             path: path.to_owned(),
-            what,
+            problem,
         })
     }
 
-    fn parse(text: &str) -> std::result::Result<Self, String> {
+    fn parse(text: &str) -> std::result::Result<Self, LogProblem> {
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
             .from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|e| e.to_string())?.clone();
-        let place = |name: &str| {
+        let header = reader.headers()?.clone();
+        let place = |name: &'static str| {
             let found = header.iter().position(|c| c == name);
-            found.ok_or_else(|| format!("no column `{name}`"))
+            found.ok_or(LogProblem::NoColumn(name))
         };
         let (step, split) = (place("step")?, place("split")?);
         let columns: Vec<usize> = (0..header.len())
@@ -48,9 +48,9 @@ impl LearningLog {
         let mut rows = Vec::new();
         let mut broken = None;
         for record in reader.records() {
-            let record = record.map_err(|e| e.to_string())?;
+            let record = record?;
             if let Some(line) = broken {
-                return Err(format!("line {line}: no step, or too few cells"));
+                return Err(LogProblem::Line(line));
             }
             let number = |c: usize| record.get(c).and_then(|cell| cell.parse::<f64>().ok());
             match (number(step), record.get(split)) {
@@ -143,12 +143,11 @@ mod tests {
             LearningLog::parse(LOG).unwrap()
         );
         let error = LearningLog::parse(&format!("{cut}\n4,train,0.1,0,1\n")).unwrap_err();
-        assert!(error.contains("line 5"), "{error}");
-        assert!(
-            LearningLog::parse("a,b\n1,2\n")
-                .unwrap_err()
-                .contains("step")
-        );
+        assert!(matches!(error, LogProblem::Line(5)), "{error}");
+        assert_eq!(error.to_string(), "line 5: no step, or too few cells");
+        let error = LearningLog::parse("a,b\n1,2\n").unwrap_err();
+        assert!(matches!(error, LogProblem::NoColumn("step")), "{error}");
+        assert_eq!(error.to_string(), "no column `step`");
         assert!(LearningLog::parse("").is_err());
     }
 

@@ -29,7 +29,7 @@ pub use depth_panel::{DepthPanel, depth_panel};
 pub use depth_picture::{
     depth_legend, depth_picture, disparity_picture, side_by_side, with_depth_legend,
 };
-pub use error::{Error, Result};
+pub use error::{Error, LogProblem, Result};
 pub use error_picture::{error_picture, sparse_depth_picture};
 pub use feature_picture::{feature_picture, feature_range};
 pub use flow_picture::flow_picture;

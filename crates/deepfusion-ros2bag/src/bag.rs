@@ -1,5 +1,6 @@
 use crate::mcap::McapFile;
 use crate::metadata;
+use crate::problem::StorageProblem;
 use crate::storage::{self, Storage, hull};
 use deepfusion_rosbag::{
     Connection, Error, Message, MessageIter, MessageSource, Result, Selection, Time, TopicInfo,
@@ -117,16 +118,8 @@ fn open_file(path: &Path) -> Result<Box<dyn Storage>> {
     match Kind::of(path) {
         Some(Kind::Mcap) => Ok(Box::new(McapFile::open(path)?)),
         Some(Kind::Sqlite) => open_database(path),
-        Some(Kind::Packed) => Err(storage::error(
-            path,
-            "the whole file is compressed (zstd), so that nothing in it can be found",
-            "unpack it first: zstd -d FILE; `ros2 bag record --compression-mode message` keeps files open to reading",
-        )),
-        None => Err(storage::error(
-            path,
-            "neither .mcap nor .db3",
-            "give the recording's folder, or one of its .mcap or .db3 files",
-        )),
+        Some(Kind::Packed) => Err(StorageProblem::Packed.of(path)),
+        None => Err(StorageProblem::Ending.of(path)),
     }
 }
 

@@ -15,8 +15,13 @@
 mod bag;
 mod mcap;
 mod metadata;
+mod problem;
 #[cfg(feature = "ros2-sqlite")]
 mod sqlite;
 mod storage;
 
 pub use bag::{Ros2Bag, is_ros2_bag};
+pub use mcap::{ChunkProblem, RecordProblem};
+#[cfg(feature = "ros2-sqlite")]
+pub use problem::PackedProblem;
+pub use problem::StorageProblem;

@@ -1,13 +1,12 @@
 //! `metadata.yaml`: the list of files in a recording's folder. Their content is described by the files themselves.
 
-use crate::storage::error;
+use crate::problem::{KEY, StorageProblem};
 use deepfusion_rosbag::{Error, Result};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// The file that makes a folder a bag.
 pub(crate) const NAME: &str = "metadata.yaml";
-const KEY: &str = "rosbag2_bagfile_information";
 
 #[derive(Deserialize)]
 struct Root {
@@ -32,15 +31,8 @@ pub(crate) fn is_bag(folder: &Path) -> bool {
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let path = folder.join(NAME);
     let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
-    let root: Root = serde_saphyr::from_str(&text).map_err(|e| {
-        let first = e.to_string();
-        let first = first.lines().next().unwrap_or_default().to_owned();
-        error(
-            &path,
-            format!("{KEY}: {first}"),
-            "`ros2 bag reindex FOLDER` writes it anew",
-        )
-    })?;
+    let root: Root = serde_saphyr::from_str(&text)
+        .map_err(|e| StorageProblem::Metadata(Box::new(e)).of(&path))?;
     let files = root.rosbag2_bagfile_information.relative_file_paths;
     Ok(files.iter().map(|file| place(folder, file)).collect())
 }

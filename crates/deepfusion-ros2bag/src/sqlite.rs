@@ -2,7 +2,8 @@
 
 mod rows;
 
-use crate::storage::{COPY_AGAIN, Channel, MOST_BYTES, Storage, error, hull};
+use crate::problem::StorageProblem;
+use crate::storage::{Channel, MOST_BYTES, Storage, hull};
 use deepfusion_rosbag::{Error, MessageIter, Result, Selection, Time};
 use rows::{Key, Rows};
 use rusqlite::limits::Limit;
@@ -21,7 +22,7 @@ pub(crate) struct SqliteFile {
     places: HashMap<i64, usize>,
     /// Every message in time order, if the database cannot order them itself: its index is missing, or it is damaged.
     listed: Option<Vec<Key>>,
-    damage: Option<String>,
+    damage: Option<rusqlite::Error>,
 }
 
 impl SqliteFile {
@@ -31,7 +32,7 @@ impl SqliteFile {
     /// [`Error::Storage`] for a file that is not a recorder's database.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
-        let failed = |e: rusqlite::Error| failed(path, &e);
+        let failed = |e: rusqlite::Error| failed(path, e);
         let database = connect(path).map_err(failed)?;
         let mut file = Self {
             path: path.to_owned(),
@@ -49,7 +50,7 @@ impl SqliteFile {
                     .execute_batch("PRAGMA writable_schema = ON")
                     .map_err(failed)?;
                 drop(database);
-                file.damage = Some(e.to_string());
+                file.damage = Some(e);
                 file.read_topics().map_err(failed)?;
             }
             other => other.map_err(failed)?,
@@ -106,17 +107,15 @@ impl SqliteFile {
                         }
                         return Ok(());
                     }
-                    Err(e) if !is_damage(&e) => return Err(failed(&self.path, &e)),
-                    Err(e) => self.damage = Some(e.to_string()),
+                    Err(e) if !is_damage(&e) => return Err(failed(&self.path, e)),
+                    Err(e) => self.damage = Some(e),
                 }
                 rows::all(&self.database())
             } else {
                 rows::all(&database)
             }
         };
-        if let Some(broken) = broken.filter(|_| self.damage.is_none()) {
-            self.damage = Some(broken.to_string());
-        }
+        self.damage = self.damage.take().or(broken);
         let known = keys.into_iter().filter_map(|mut key| {
             key.topic = i64::try_from(*self.places.get(&key.topic)?).ok()?;
             Some(key)
@@ -125,13 +124,6 @@ impl SqliteFile {
         keys.sort_by_key(|key| (key.time, key.id));
         for key in &keys {
             self.channels[key.topic as usize].add(Time::from_nanos(key.time));
-        }
-        if let Some(problem) = &mut self.damage {
-            let found = match keys.len() {
-                1 => "1 message was found".to_owned(),
-                n => format!("{n} messages were found"),
-            };
-            *problem = format!("the database is damaged ({problem}); {found}");
         }
         self.listed = Some(keys);
         Ok(())
@@ -181,28 +173,8 @@ fn is_damage(e: &rusqlite::Error) -> bool {
     e.sqlite_error_code() == Some(ErrorCode::DatabaseCorrupt)
 }
 
-fn failed(path: &Path, e: &rusqlite::Error) -> Error {
-    let (problem, remedy) = match e.sqlite_error_code() {
-        Some(ErrorCode::NotADatabase) => (
-            "not an SQLite database".to_owned(),
-            "give the recording's own .db3 file",
-        ),
-        Some(ErrorCode::DatabaseCorrupt) => (
-            format!("the database is damaged: {e}"),
-            "copy the file again",
-        ),
-        Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen) => (
-            format!("cannot be opened: {e}"),
-            "its recorder was stopped: copy the file with its -wal or -journal to where it can be written, and open it \
-             once with sqlite3",
-        ),
-        None | Some(ErrorCode::Unknown) => (
-            format!("no recorder's database: {e}"),
-            "a bag has the tables `topics` and `messages`, as rosbag2 writes them",
-        ),
-        _ => (e.to_string(), COPY_AGAIN),
-    };
-    error(path, problem, remedy)
+fn failed(path: &Path, e: rusqlite::Error) -> Error {
+    StorageProblem::Sqlite(e).of(path)
 }
 
 impl Storage for SqliteFile {
@@ -215,7 +187,12 @@ impl Storage for SqliteFile {
     }
 
     fn damage(&self) -> Option<String> {
-        self.damage.clone()
+        let damage = self.damage.as_ref()?;
+        let found = match self.listed.as_ref().map_or(0, Vec::len) {
+            1 => "1 message was found".to_owned(),
+            n => format!("{n} messages were found"),
+        };
+        Some(format!("the database is damaged ({damage}); {found}"))
     }
 
     fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a> {

@@ -1,10 +1,7 @@
 //! The common interface of both kinds of file.
 
-use deepfusion_rosbag::{
-    Connection, Error, MessageIter, Selection, Serialization, Time, TopicInfo,
-};
+use deepfusion_rosbag::{Connection, MessageIter, Selection, Serialization, Time, TopicInfo};
 use std::fmt;
-use std::path::Path;
 
 /// The largest chunk or message that is read, in bytes: what a damaged or hostile file can make one take.
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
@@ -20,7 +17,7 @@ pub(crate) trait Storage: fmt::Debug + Send + Sync {
     /// The times of the first and the last message.
     fn range(&self) -> Option<(Time, Time)>;
 
-    /// What of it cannot be read.
+    /// What of it cannot be read, in a sentence.
     fn damage(&self) -> Option<String>;
 
     /// The messages of the channels that are `wanted`, by place, in time order.
@@ -109,13 +106,4 @@ pub(crate) fn topics<'a>(channels: impl Iterator<Item = &'a Channel>) -> Vec<Top
     }
     topics.sort_by(|a, b| a.name.cmp(&b.name));
     topics
-}
-
-/// An error of a file, with what to do.
-pub(crate) fn error(path: &Path, problem: impl Into<String>, remedy: &'static str) -> Error {
-    Error::Storage {
-        path: path.to_owned(),
-        problem: problem.into(),
-        remedy: Some(remedy),
-    }
 }

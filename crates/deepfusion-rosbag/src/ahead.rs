@@ -2,8 +2,8 @@
 
 use crate::buffer::Pool;
 use crate::content::{self, Opened};
-use crate::error::Fault;
 use crate::index::ChunkInfo;
+use crate::problem::Fault;
 use crate::source::Source;
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 use crate::connection::Connection;
-use crate::error::Fault;
 use crate::index::{BagHeader, ChunkInfo, Index};
 use crate::messages::Messages;
-use crate::scan::{Damage, Scan, scan};
+use crate::problem::Fault;
+use crate::scan::{Damage, Scan, ScanReason, scan};
 use crate::source::Source;
 use crate::topic::{self, TopicInfo};
 use crate::{Error, Result, Selection, Time};
@@ -241,10 +241,14 @@ fn rescue(
     let Ok(header) = header else {
         // Without a bag header nothing says where records begin.
         let fault = header.err().cloned();
-        return (
-            Index::default(),
-            fault.map(|fault| damage(fault, "the bag header: ", None, 0)),
-        );
+        let damage = fault.map(|fault| Damage {
+            offset: fault.offset,
+            reason: ScanReason::BagHeader,
+            problem: Some(fault.problem),
+            chunks_lost: None,
+            messages_without_connection: 0,
+        });
+        return (Index::default(), damage);
     };
     let Scan {
         index,
@@ -258,31 +262,21 @@ fn rescue(
     if asked_for {
         return (index, None);
     }
-    let why = match (&wrong, finished) {
-        (Some(fault), _) => format!("the index cannot be read ({}): ", fault.problem),
-        (None, true) => String::new(),
-        (None, false) => "the recorder did not finish the bag, it has no index: ".to_owned(),
+    let reason = match (wrong, finished) {
+        (Some(fault), _) => ScanReason::Index(fault.problem),
+        (None, true) => ScanReason::AskedFor,
+        (None, false) => ScanReason::NoIndex,
     };
-    let end = || Fault::new(source.len(), "every record up to the end was read");
-    let damage = damage(
-        broken.unwrap_or_else(end),
-        &why,
-        lost,
+    let (offset, problem) = match broken {
+        Some(fault) => (fault.offset, Some(fault.problem)),
+        None => (source.len() as u64, None),
+    };
+    let damage = Damage {
+        offset,
+        reason,
+        problem,
+        chunks_lost: lost,
         messages_without_connection,
-    );
+    };
     (index, Some(damage))
-}
-
-fn damage(
-    fault: Fault,
-    why: &str,
-    chunks_lost: Option<u64>,
-    messages_without_connection: u64,
-) -> Damage {
-    Damage {
-        offset: fault.offset,
-        what: format!("{why}{}", fault.problem),
-        chunks_lost,
-        messages_without_connection,
-    }
 }

@@ -2,8 +2,9 @@
 
 use crate::buffer::Buffer;
 use crate::compression::Compression;
-use crate::error::Fault;
-use crate::record::{Record, op};
+use crate::op;
+use crate::problem::{ChunkProblem, Fault};
+use crate::record::Record;
 
 /// A chunk as it lies in the file.
 pub(crate) struct Chunk<'a> {
@@ -34,11 +35,11 @@ impl<'a> Chunk<'a> {
     }
 
     fn from_record(record: &Record<'a>) -> Result<Self, Fault> {
-        record.expect_op(op::CHUNK, "a chunk")?;
+        record.expect_op(op::CHUNK)?;
         let name = record.fields.get("compression").unwrap_or(b"none");
         let compression = Compression::from_name(name).ok_or_else(|| {
-            let name = name.escape_ascii();
-            record.fault(format!("compression {name}; none, lz4 and bz2 are read"))
+            let name = name.escape_ascii().to_string();
+            record.fault(ChunkProblem::Compression { name })
         })?;
         Ok(Self {
             compression,
@@ -50,22 +51,22 @@ impl<'a> Chunk<'a> {
 
     /// The bytes of a compressed chunk. Memory grows with what comes out, never beyond `limit` or the size that the
     /// header promises; what came out before an error is left in `out`.
-    pub(crate) fn decompress(&self, limit: usize, out: &mut Buffer) -> Result<(), String> {
-        if self.size != usize::MAX && self.size > limit {
-            return Err(format!(
-                "{} bytes decompressed, the limit is {limit} (max_chunk_bytes)",
-                self.size
-            ));
+    pub(crate) fn decompress(&self, limit: usize, out: &mut Buffer) -> Result<(), ChunkProblem> {
+        let stated = self.size;
+        if stated != usize::MAX && stated > limit {
+            let bytes = stated;
+            return Err(ChunkProblem::Limit { bytes, limit });
         }
-        let most = self.size.min(limit);
-        let done = self.compression.decompress(self.stored, most, out);
-        done.map_err(|error| format!("{}: {error}", self.compression.name()))?;
-        if self.size != usize::MAX && out.len() < self.size {
-            return Err(format!(
-                "{} bytes decompressed, its header says {}",
-                out.len(),
-                self.size
-            ));
+        let compression = self.compression;
+        compression
+            .decompress(self.stored, stated.min(limit), out)
+            .map_err(|source| ChunkProblem::Decompress {
+                compression,
+                source,
+            })?;
+        let bytes = out.len();
+        if stated != usize::MAX && bytes < stated {
+            return Err(ChunkProblem::Length { bytes, stated });
         }
         Ok(())
     }

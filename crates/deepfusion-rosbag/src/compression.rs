@@ -2,6 +2,7 @@
 
 use crate::buffer::Buffer;
 use crate::lz4_frame;
+use crate::problem::DecompressProblem;
 use bzip2::bufread::MultiBzDecoder;
 use bzip2::write::BzEncoder;
 use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
@@ -39,7 +40,12 @@ impl Compression {
 
     /// Appends what `stored` holds to `out`, up to `most` bytes: more is an error. Memory grows with what comes out, and
     /// what came out before an error stays.
-    pub(crate) fn decompress(self, stored: &[u8], most: usize, out: &mut Buffer) -> io::Result<()> {
+    pub(crate) fn decompress(
+        self,
+        stored: &[u8],
+        most: usize,
+        out: &mut Buffer,
+    ) -> Result<(), DecompressProblem> {
         match self {
             Compression::None => extend(out, stored, most),
             Compression::Lz4 => lz4_frame::decompress(stored, most, out),
@@ -70,18 +76,20 @@ pub(crate) fn compress(compression: Compression, content: &[u8]) -> io::Result<C
     }
 }
 
-fn extend(out: &mut Buffer, bytes: &[u8], most: usize) -> io::Result<()> {
+fn extend(out: &mut Buffer, bytes: &[u8], most: usize) -> Result<(), DecompressProblem> {
     if bytes.len() > most - out.len() {
-        return Err(io::Error::other(format!(
-            "more than the {most} bytes expected"
-        )));
+        return Err(DecompressProblem::TooLong { most });
     }
     out.extend(bytes);
     Ok(())
 }
 
 /// Whatever a decoder gives, a mebibyte at a time.
-fn read_all(mut decoder: impl Read, most: usize, out: &mut Buffer) -> io::Result<()> {
+fn read_all(
+    mut decoder: impl Read,
+    most: usize,
+    out: &mut Buffer,
+) -> Result<(), DecompressProblem> {
     const STEP: usize = 1 << 20;
     loop {
         // One byte more than promised is asked for, so that a longer stream is noticed.
@@ -89,13 +97,11 @@ fn read_all(mut decoder: impl Read, most: usize, out: &mut Buffer) -> io::Result
         match decoder.read(out.split(room).1) {
             Ok(0) => return Ok(()),
             Ok(count) if count > most - out.len() => {
-                return Err(io::Error::other(format!(
-                    "more than the {most} bytes expected"
-                )));
+                return Err(DecompressProblem::TooLong { most });
             }
             Ok(count) => out.advance(count),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
+            Err(error) => return Err(DecompressProblem::Decoder(error.to_string())),
         }
     }
 }

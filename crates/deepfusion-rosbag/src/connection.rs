@@ -1,4 +1,4 @@
-use crate::error::Fault;
+use crate::problem::Fault;
 use crate::record::{Fields, Record};
 
 /// A connection: a topic as published by one node.

@@ -3,8 +3,8 @@
 use crate::buffer::{Buffer, Pool};
 use crate::chunk::Chunk;
 use crate::compression::Compression;
-use crate::error::Fault;
 use crate::index::ChunkInfo;
+use crate::problem::{ChunkProblem, Fault};
 use crate::source::Source;
 use std::sync::Arc;
 
@@ -48,20 +48,19 @@ pub(crate) fn open(
     } else {
         Chunk::read(source, info.position)?
     };
-    let fault = |problem| Fault {
+    let fault = |problem: ChunkProblem| Fault {
         offset: info.position,
-        problem,
+        problem: problem.into(),
     };
     let mut broken = None;
     let content = match chunk.compression {
         Compression::None => {
             let from = chunk.end - chunk.stored.len();
             if chunk.size != chunk.stored.len() && !info.scanned {
-                return Err(fault(format!(
-                    "{} bytes, its header says {}",
-                    chunk.stored.len(),
-                    chunk.size
-                )));
+                return Err(fault(ChunkProblem::StoredLength {
+                    bytes: chunk.stored.len(),
+                    stated: chunk.size,
+                }));
             }
             Content::Stored {
                 from,

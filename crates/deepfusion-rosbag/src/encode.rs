@@ -1,7 +1,7 @@
 //! Encodes records; [`record`](crate::record) reads them.
 
 use crate::Time;
-use crate::record::op;
+use crate::op;
 
 /// The bag header takes 4 KiB with its padding, so that it can be written again with the index's place.
 const BAG_HEADER_BYTES: usize = 4096;

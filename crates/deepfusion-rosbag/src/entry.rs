@@ -2,9 +2,10 @@
 
 use crate::Time;
 use crate::connection::Connection;
-use crate::error::Fault;
 use crate::index::ChunkInfo;
-use crate::record::{self, Record, op, u32_at};
+use crate::op;
+use crate::problem::{ChunkProblem, Fault, IndexProblem, IndexRecord};
+use crate::record::{self, Record, u32_at};
 use std::collections::HashMap;
 
 /// A message within a chunk.
@@ -30,27 +31,28 @@ pub(crate) fn indexed(
     for _ in 0..info.counts.len() {
         let record = Record::read(bytes, at)?;
         at = record.end();
-        record.expect_op(op::INDEX_DATA, "index data of the chunk")?;
+        record.expect_op(op::INDEX_DATA)?;
         match record.u32("ver")? {
             1 => {}
             version => {
-                return Err(record.fault(format!("index data of version {version}, expected 1")));
+                return Err(record.fault(IndexProblem::Version {
+                    record: IndexRecord::IndexData,
+                    version,
+                }));
             }
         }
         let (id, count) = (record.u32("conn")?, record.u32("count")? as usize);
         let place = places.get(&id).copied();
         let promised = info.counts.iter().find(|(p, _)| Some(*p) == place);
         let Some(&(place, promised)) = promised else {
-            return Err(record.fault(format!(
-                "index data of connection {id}, which the chunk should not hold"
-            )));
+            return Err(record.fault(IndexProblem::StrayData { connection: id }));
         };
         if record.data.len() as u64 != 12 * count as u64 || promised as usize != count {
-            let problem = format!(
-                "index data of {count} messages in {} bytes, the index says {promised}",
-                record.data.len()
-            );
-            return Err(record.fault(problem));
+            return Err(record.fault(IndexProblem::Data {
+                count,
+                bytes: record.data.len(),
+                promised,
+            }));
         }
         if wanted(place) {
             entries.extend(record.data.chunks_exact(12).map(|entry| Entry {
@@ -102,7 +104,7 @@ fn step(content: &[u8], at: usize, walk: &mut Walk) -> Result<usize, Fault> {
         Some(op::CONNECTION) => walk.connections.push(Connection::read(&record)?),
         _ => {
             let (connection, time) = record.message()?;
-            let offset = u32::try_from(at).map_err(|_| record.fault("a chunk beyond 4 GiB"))?;
+            let offset = u32::try_from(at).map_err(|_| record.fault(ChunkProblem::TooLong))?;
             walk.messages.push((connection, time, offset));
         }
     }
@@ -133,11 +135,12 @@ pub(crate) fn message<'a>(content: &'a [u8], entry: &Entry, id: u32) -> Result<&
     }
     let (connection, time) = record.message()?;
     if (connection, time) != (id, entry.time) {
-        let problem = format!(
-            "the index has a message of connection {id} at {}, the chunk one of {connection} at {time}",
-            entry.time
-        );
-        return Err(record.fault(problem));
+        return Err(record.fault(IndexProblem::OtherMessage {
+            connection: id,
+            time: entry.time,
+            found: connection,
+            found_time: time,
+        }));
     }
     Ok(record.data)
 }

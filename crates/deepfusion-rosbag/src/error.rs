@@ -1,4 +1,4 @@
-use crate::{MessageError, Time};
+use crate::{BagProblem, MessageError, Time};
 use deepfusion_hint::{Hint, count_of};
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,7 @@ pub enum Error {
         /// Where in the file.
         offset: u64,
         /// What is wrong there.
-        problem: String,
+        problem: BagProblem,
     },
     /// A chunk's messages cannot be read; those of other chunks can.
     #[error("{}: chunk at byte {offset} ({}): {problem}", path.display(), count_of(*messages, "message"))]
@@ -64,7 +64,7 @@ pub enum Error {
         /// How many messages the index says it holds, of all topics.
         messages: u64,
         /// What is wrong with it.
-        problem: String,
+        problem: BagProblem,
     },
     /// No connection has the topic asked for.
     #[error("{}: no topic {topic}; there are {}", path.display(), list(topics))]
@@ -107,8 +107,8 @@ pub enum Error {
     TooLarge {
         /// The bag being written.
         path: PathBuf,
-        /// What is too large.
-        what: String,
+        /// What is too large, with its article.
+        what: &'static str,
         /// Its size.
         bytes: u64,
         /// The largest size there is.
@@ -127,10 +127,8 @@ pub enum Error {
     Storage {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
-        problem: String,
-        /// What to do about it, in one line.
-        remedy: Option<&'static str>,
+        /// What is wrong with it, as an error of the crate that reads this format.
+        problem: Box<dyn Hint + Send + Sync>,
     },
     /// A recording of a kind whose reader is compiled in only with a feature, which is off.
     #[error("{}: it is {kind}, and this program was built without the feature `{feature}`", path.display())]
@@ -200,28 +198,12 @@ impl Hint for Error {
             Self::Message { source, .. } => return source.hint(),
             Self::TooLarge { .. } => "split it over several messages",
             Self::NoSuchConnection { .. } => "use what `add_connection` of this writer returned",
-            Self::Storage { remedy, .. } => return remedy.map(str::to_owned),
+            Self::Storage { problem, .. } => return problem.hint(),
             Self::Feature { feature, .. } => {
                 return Some(format!("build with the feature `{feature}` to read it"));
             }
             Self::EmptySet => return None,
         };
         Some(text.to_owned())
-    }
-}
-
-/// Something wrong at an offset, before the file's name is known.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Fault {
-    pub offset: u64,
-    pub problem: String,
-}
-
-impl Fault {
-    pub(crate) fn new(offset: usize, problem: impl Into<String>) -> Self {
-        Self {
-            offset: offset as u64,
-            problem: problem.into(),
-        }
     }
 }

@@ -1,9 +1,9 @@
 //! The index at the end of a finished bag: its connections, and of each chunk the time range and message counts.
 
-use crate::Time;
 use crate::connection::Connection;
-use crate::error::Fault;
-use crate::record::{Record, op, u32_at};
+use crate::problem::{Fault, IndexProblem, IndexRecord};
+use crate::record::{Record, u32_at};
+use crate::{Time, op};
 use std::collections::HashMap;
 
 /// The bag header record, the first of the file.
@@ -20,7 +20,7 @@ pub(crate) struct BagHeader {
 impl BagHeader {
     pub(crate) fn read(bytes: &[u8], at: usize) -> Result<Self, Fault> {
         let record = Record::read(bytes, at)?;
-        record.expect_op(op::BAG_HEADER, "the bag header")?;
+        record.expect_op(op::BAG_HEADER)?;
         Ok(Self {
             index_pos: record.u64("index_pos")?,
             connections: record.u32("conn_count")?,
@@ -65,15 +65,12 @@ impl Index {
         let mut index = Self::default();
         let mut at = usize::try_from(header.index_pos).unwrap_or(usize::MAX);
         if at < header.end || at > bytes.len() {
-            let problem = format!(
-                "the index should be at byte {at}, the file has {}",
-                bytes.len()
-            );
-            return Err(Fault::new(bytes.len(), problem));
+            let bytes = bytes.len();
+            return Err(Fault::new(bytes, IndexProblem::Place { at, bytes }));
         }
         for _ in 0..header.connections {
             let record = Record::read(bytes, at)?;
-            record.expect_op(op::CONNECTION, "a connection of the index")?;
+            record.expect_op(op::CONNECTION)?;
             index.add_connection(Connection::read(&record)?);
             at = record.end();
         }
@@ -104,37 +101,32 @@ impl Index {
     }
 
     fn chunk_info(&self, record: &Record<'_>, header: &BagHeader) -> Result<ChunkInfo, Fault> {
-        record.expect_op(op::CHUNK_INFO, "a chunk's entry of the index")?;
+        record.expect_op(op::CHUNK_INFO)?;
         match record.u32("ver")? {
             1 => {}
             version => {
-                return Err(record.fault(format!(
-                    "chunk information of version {version}, expected 1"
-                )));
+                return Err(record.fault(IndexProblem::Version {
+                    record: IndexRecord::ChunkInformation,
+                    version,
+                }));
             }
         }
         let position = record.u64("chunk_pos")?;
         if position < header.end as u64 || position >= header.index_pos {
-            return Err(record.fault(format!(
-                "a chunk at byte {position}, outside of the bag's chunks"
-            )));
+            return Err(record.fault(IndexProblem::ChunkPlace { at: position }));
         }
         let count = record.u32("count")? as usize;
         if record.data.len() as u64 != 8 * count as u64 {
-            let problem = format!(
-                "{count} connections of 8 bytes, but {} bytes",
-                record.data.len()
-            );
-            return Err(record.fault(problem));
+            let bytes = record.data.len();
+            return Err(record.fault(IndexProblem::Connections { count, bytes }));
         }
         let mut counts = Vec::with_capacity(count);
         for pair in record.data.chunks_exact(8) {
             let (id, messages) = (u32_at(pair, 0).unwrap_or(0), u32_at(pair, 4).unwrap_or(0));
-            let place = self.places.get(&id).ok_or_else(|| {
-                record.fault(format!(
-                    "connection {id} is not among the bag's connections"
-                ))
-            })?;
+            let place = self
+                .places
+                .get(&id)
+                .ok_or_else(|| record.fault(IndexProblem::NoConnection { connection: id }))?;
             counts.push((*place, messages));
         }
         Ok(ChunkInfo {

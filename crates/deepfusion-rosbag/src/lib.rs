@@ -27,6 +27,8 @@ mod message;
 mod message_source;
 mod messages;
 pub mod msg;
+mod op;
+mod problem;
 mod record;
 mod scan;
 mod selection;
@@ -43,8 +45,12 @@ pub use error::{Error, Result};
 pub use message::{Message, Serialization};
 pub use message_source::{MessageIter, MessageSource};
 pub use messages::Messages;
-pub use msg::{MessageError, RosMessage};
-pub use scan::Damage;
+pub use msg::{LayoutProblem, MessageError, MessagePart, RosMessage};
+pub use problem::{
+    BagProblem, ChunkProblem, DecompressProblem, FramePart, IndexProblem, IndexRecord, RecordPart,
+    RecordProblem,
+};
+pub use scan::{Damage, ScanReason};
 pub use selection::Selection;
 pub use time::Time;
 pub use topic::TopicInfo;

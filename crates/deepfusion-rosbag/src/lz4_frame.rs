@@ -4,9 +4,12 @@
 //! destination.
 
 use crate::buffer::Buffer;
+use crate::problem::{DecompressProblem, FramePart};
 use lz4_flex::block::{decompress_into, decompress_into_with_dict};
-use std::io;
 use twox_hash::XxHash32;
+
+/// What the steps of decompressing give back.
+type Result<T> = std::result::Result<T, DecompressProblem>;
 
 const MAGIC: u32 = 0x184d_2204;
 /// How far back a block may refer.
@@ -14,7 +17,7 @@ const WINDOW: usize = 1 << 16;
 
 /// Appends what the frames in `stored` hold to `out`, up to `most` bytes in all: more is an error. Memory grows with the
 /// blocks; those before an error stay in `out`.
-pub(crate) fn decompress(stored: &[u8], most: usize, out: &mut Buffer) -> io::Result<()> {
+pub(crate) fn decompress(stored: &[u8], most: usize, out: &mut Buffer) -> Result<()> {
     let mut rest = Rest(stored);
     while !rest.0.is_empty() {
         let start = out.len();
@@ -41,17 +44,15 @@ struct Block<'a> {
 }
 
 impl Header {
-    fn read(rest: &mut Rest<'_>) -> io::Result<Self> {
+    fn read(rest: &mut Rest<'_>) -> Result<Self> {
         if rest.u32()? != MAGIC {
-            return Err(invalid("no LZ4 frame begins here"));
+            return Err(DecompressProblem::NoFrame);
         }
         let descriptor = rest.0;
         let [flags, sizes] = rest.array()?;
         let bit = |bit: u8| flags >> bit & 1 == 1;
         if flags >> 6 != 1 || bit(0) {
-            return Err(invalid(
-                "an LZ4 frame of another version, or with a dictionary",
-            ));
+            return Err(DecompressProblem::Frame);
         }
         let content_size = if bit(3) {
             Some(u64::from_le_bytes(rest.array()?))
@@ -61,11 +62,11 @@ impl Header {
         let descriptor = &descriptor[..descriptor.len() - rest.0.len()];
         let [checksum] = rest.array()?;
         if checksum != (XxHash32::oneshot(0, descriptor) >> 8) as u8 {
-            return Err(invalid("the frame header's checksum is wrong"));
+            return Err(wrong_checksum(FramePart::Header));
         }
         let block_most = match sizes >> 4 & 7 {
             code @ 4..=7 => 1 << (8 + 2 * code),
-            _ => return Err(invalid("an unknown block size")),
+            _ => return Err(DecompressProblem::BlockSize),
         };
         Ok(Self {
             linked: !bit(5),
@@ -77,31 +78,25 @@ impl Header {
     }
 
     /// The next block; none at the frame's end mark.
-    fn block<'a>(&self, rest: &mut Rest<'a>) -> io::Result<Option<Block<'a>>> {
+    fn block<'a>(&self, rest: &mut Rest<'a>) -> Result<Option<Block<'a>>> {
         let length = rest.u32()?;
         if length == 0 {
             return Ok(None);
         }
         let bytes = rest.take((length & 0x7fff_ffff) as usize)?;
         if self.block_checksums && rest.u32()? != XxHash32::oneshot(0, bytes) {
-            return Err(invalid("a block's checksum is wrong"));
+            return Err(wrong_checksum(FramePart::Block));
         }
         let packed = length >> 31 == 0;
         Ok(Some(Block { bytes, packed }))
     }
 
-    fn unpack(
-        &self,
-        block: &Block<'_>,
-        start: usize,
-        most: usize,
-        out: &mut Buffer,
-    ) -> io::Result<()> {
+    fn unpack(&self, block: &Block<'_>, start: usize, most: usize, out: &mut Buffer) -> Result<()> {
         let filled = out.len();
         let room = self.block_most.min(most - filled);
         if !block.packed {
             if block.bytes.len() > room {
-                return Err(too_long(most));
+                return Err(DecompressProblem::BrokenOrTooLong { most });
             }
             out.extend(block.bytes);
             return Ok(());
@@ -119,22 +114,20 @@ impl Header {
                 out.advance(length);
                 Ok(())
             }
-            Err(_) if room == most - filled => Err(too_long(most)),
-            Err(error) => Err(invalid(&error.to_string())),
+            Err(_) if room == most - filled => Err(DecompressProblem::BrokenOrTooLong { most }),
+            Err(error) => Err(DecompressProblem::Decoder(error.to_string())),
         }
     }
 
-    fn check(&self, rest: &mut Rest<'_>, content: &[u8]) -> io::Result<()> {
+    fn check(&self, rest: &mut Rest<'_>, content: &[u8]) -> Result<()> {
         if self
             .content_size
             .is_some_and(|size| size != content.len() as u64)
         {
-            return Err(invalid(
-                "the content has another size than the frame header says",
-            ));
+            return Err(DecompressProblem::ContentSize);
         }
         if self.content_checksum && rest.u32()? != XxHash32::oneshot(0, content) {
-            return Err(invalid("the content's checksum is wrong"));
+            return Err(wrong_checksum(FramePart::Content));
         }
         Ok(())
     }
@@ -144,35 +137,28 @@ impl Header {
 struct Rest<'a>(&'a [u8]);
 
 impl<'a> Rest<'a> {
-    fn take(&mut self, count: usize) -> io::Result<&'a [u8]> {
+    fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let (taken, rest) = self
             .0
             .split_at_checked(count)
-            .ok_or(io::ErrorKind::UnexpectedEof)?;
+            .ok_or(DecompressProblem::Cut)?;
         self.0 = rest;
         Ok(taken)
     }
 
-    fn array<const N: usize>(&mut self) -> io::Result<[u8; N]> {
-        let (taken, rest) = self
-            .0
-            .split_first_chunk()
-            .ok_or(io::ErrorKind::UnexpectedEof)?;
+    fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk().ok_or(DecompressProblem::Cut)?;
         self.0 = rest;
         Ok(*taken)
     }
 
-    fn u32(&mut self) -> io::Result<u32> {
+    fn u32(&mut self) -> Result<u32> {
         self.array().map(u32::from_le_bytes)
     }
 }
 
-fn invalid(problem: &str) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, problem)
-}
-
-fn too_long(most: usize) -> io::Error {
-    io::Error::other(format!("broken, or more than the {most} bytes expected"))
+fn wrong_checksum(part: FramePart) -> DecompressProblem {
+    DecompressProblem::Checksum { part }
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@ use crate::ahead::{Ahead, Ticket};
 use crate::bag::Bag;
 use crate::content::Content;
 use crate::entry::{self, Entry};
-use crate::error::Fault;
 use crate::index::ChunkInfo;
 use crate::message::{Message, Payload, Serialization};
+use crate::problem::{Fault, IndexProblem};
 use crate::{Error, Result, Selection, Time};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
@@ -152,13 +152,13 @@ impl<'bag> Messages<'bag> {
         };
         // A chunk that begins before the index says has come too late to keep the order.
         if let Some(early) = entries.iter().find(|e| e.time < info.first) {
-            let problem = format!(
-                "a message at {}, the index says the first is at {}",
-                early.time, info.first
-            );
+            let problem = IndexProblem::Early {
+                time: early.time,
+                first: info.first,
+            };
             return Err(Fault {
                 offset: info.position,
-                problem,
+                problem: problem.into(),
             });
         }
         entries.retain(|e| wanted(e.connection) && self.selection.contains(e.time));
@@ -175,7 +175,7 @@ impl<'bag> Messages<'bag> {
         let problem = if fault.offset == info.position {
             fault.problem
         } else {
-            format!("byte {}: {}", fault.offset, fault.problem)
+            fault.elsewhere()
         };
         Error::Chunk {
             path: self.bag.path().to_owned(),
@@ -211,7 +211,7 @@ fn read_message<'bag>(
     let failed = |fault: Fault| Error::Record {
         path: bag.path().to_owned(),
         offset: position,
-        problem: format!("in the chunk, byte {}: {}", fault.offset, fault.problem),
+        problem: fault.within(),
     };
     let payload = match content {
         Content::Stored { from, to } => {

@@ -1,18 +1,8 @@
 //! The format's one building block: `<header length><header><data length><data>`, the header being fields
 //! `<length><name>=<value>`; all lengths are little-endian u32. <http://wiki.ros.org/Bags/Format/2.0>
 
-use crate::Time;
-use crate::error::Fault;
-
-/// What a record is, its field `op`.
-pub(crate) mod op {
-    pub(crate) const MESSAGE: u8 = 2;
-    pub(crate) const BAG_HEADER: u8 = 3;
-    pub(crate) const INDEX_DATA: u8 = 4;
-    pub(crate) const CHUNK: u8 = 5;
-    pub(crate) const CHUNK_INFO: u8 = 6;
-    pub(crate) const CONNECTION: u8 = 7;
-}
+use crate::problem::{BagProblem, Fault, RecordPart, RecordProblem};
+use crate::{Time, op};
 
 /// A record as it lies in `bytes`; nothing is copied or allocated, whatever its lengths claim.
 #[derive(Clone, Copy)]
@@ -32,33 +22,29 @@ impl<'a> Record<'a> {
     pub(crate) fn read(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
         let record = Self::read_header(bytes, at)?;
         if record.data.len() < record.data_len {
-            let problem = format!(
-                "a record's data should have {} bytes, {} are left",
-                record.data_len,
-                record.data.len()
-            );
-            return Err(Fault::new(at, problem));
+            return Err(record.fault(RecordProblem::DataCut {
+                stated: record.data_len,
+                left: record.data.len(),
+            }));
         }
         Ok(record)
     }
 
     /// The record at `at` with the part of its data that is there.
     pub(crate) fn read_header(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
-        let cut = |what: &str| {
-            Fault::new(
-                at,
-                format!("{what} goes beyond the end ({} bytes)", bytes.len()),
-            )
+        let cut = |part| {
+            let bytes = bytes.len();
+            Fault::new(at, RecordProblem::BeyondEnd { part, bytes })
         };
-        let header_len = u32_at(bytes, at).ok_or_else(|| cut("a record's header length"))? as usize;
+        let header_len = u32_at(bytes, at).ok_or_else(|| cut(RecordPart::HeaderLength))? as usize;
         let header_at = at + 4;
         let header = bytes
             .get(header_at..)
             .and_then(|rest| rest.get(..header_len))
-            .ok_or_else(|| cut(&format!("a record's header of {header_len} bytes")))?;
+            .ok_or_else(|| cut(RecordPart::Header { bytes: header_len }))?;
         let length_at = header_at + header_len;
         let data_len =
-            u32_at(bytes, length_at).ok_or_else(|| cut("a record's data length"))? as usize;
+            u32_at(bytes, length_at).ok_or_else(|| cut(RecordPart::DataLength))? as usize;
         let data_at = length_at + 4;
         let left = bytes.len() - data_at;
         Ok(Self {
@@ -76,7 +62,7 @@ impl<'a> Record<'a> {
     }
 
     /// A fault of this record.
-    pub(crate) fn fault(&self, problem: impl Into<String>) -> Fault {
+    pub(crate) fn fault(&self, problem: impl Into<BagProblem>) -> Fault {
         Fault::new(self.at, problem)
     }
 
@@ -87,43 +73,43 @@ impl<'a> Record<'a> {
         }
     }
 
-    pub(crate) fn expect_op(&self, op: u8, what: &str) -> Result<(), Fault> {
+    pub(crate) fn expect_op(&self, expected: u8) -> Result<(), Fault> {
         match self.op() {
-            Some(found) if found == op => Ok(()),
-            Some(found) => Err(self.fault(format!("expected {what} (op {op}), found op {found}"))),
-            None => Err(self.fault(format!("expected {what} (op {op}), found no field op"))),
+            Some(found) if found == expected => Ok(()),
+            found => Err(self.fault(RecordProblem::Kind { expected, found })),
         }
     }
 
-    pub(crate) fn u32(&self, name: &str) -> Result<u32, Fault> {
+    pub(crate) fn u32(&self, name: &'static str) -> Result<u32, Fault> {
         self.fixed(name).map(u32::from_le_bytes)
     }
 
-    pub(crate) fn u64(&self, name: &str) -> Result<u64, Fault> {
+    pub(crate) fn u64(&self, name: &'static str) -> Result<u64, Fault> {
         self.fixed(name).map(u64::from_le_bytes)
     }
 
-    pub(crate) fn time(&self, name: &str) -> Result<Time, Fault> {
+    pub(crate) fn time(&self, name: &'static str) -> Result<Time, Fault> {
         self.fixed(name).map(time)
     }
 
-    pub(crate) fn text(&self, name: &str) -> Result<String, Fault> {
+    pub(crate) fn text(&self, name: &'static str) -> Result<String, Fault> {
         let value = self.fields.get(name).ok_or_else(|| self.missing(name))?;
         Ok(String::from_utf8_lossy(value).into_owned())
     }
 
-    fn fixed<const N: usize>(&self, name: &str) -> Result<[u8; N], Fault> {
+    fn fixed<const N: usize>(&self, name: &'static str) -> Result<[u8; N], Fault> {
         let value = self.fields.get(name).ok_or_else(|| self.missing(name))?;
         value.try_into().map_err(|_| {
-            self.fault(format!(
-                "field {name} has {} bytes, expected {N}",
-                value.len()
-            ))
+            self.fault(RecordProblem::FieldLength {
+                field: name,
+                bytes: value.len(),
+                expected: N,
+            })
         })
     }
 
-    fn missing(&self, name: &str) -> Fault {
-        self.fault(format!("field {name} is missing"))
+    fn missing(&self, name: &'static str) -> Fault {
+        self.fault(RecordProblem::NoField { field: name })
     }
 
     /// Connection and time of a message's record, in one pass over its fields: this runs for every message.
@@ -140,7 +126,7 @@ impl<'a> Record<'a> {
         }
         match (op, connection, stamp) {
             (Some(&op::MESSAGE), Some(connection), Some(stamp)) => Ok((connection, stamp)),
-            _ => Err(self.fault("expected a message (op 2, conn, time)")),
+            _ => Err(self.fault(RecordProblem::NoMessage)),
         }
     }
 }
@@ -210,7 +196,9 @@ mod tests {
         assert_eq!(record.data, b"xyz");
         assert_eq!(record.end(), bytes.len());
         let missing = record.u32("conn").unwrap_err();
-        assert!(missing.problem.contains("conn"), "{missing:?}");
+        let problem = RecordProblem::NoField { field: "conn" };
+        assert_eq!(missing.problem, problem.into());
+        assert_eq!(missing.problem.to_string(), "field conn is missing");
     }
 
     #[test]
@@ -222,7 +210,7 @@ mod tests {
             match Record::read(&bytes, 0) {
                 // A field that lies about its length ends the fields; the record's frame is still sound.
                 Ok(record) => assert!(at == 4 && record.op().is_none()),
-                Err(fault) => assert!(fault.problem.contains(what), "{fault:?}"),
+                Err(fault) => assert!(fault.problem.to_string().contains(what), "{fault:?}"),
             }
         }
         assert!(Record::read(&sound, sound.len()).is_err());

@@ -6,9 +6,10 @@ use crate::chunk::Chunk;
 use crate::connection::Connection;
 use crate::content::{self, Content};
 use crate::entry::{Walk, walk};
-use crate::error::Fault;
 use crate::index::{ChunkInfo, Index};
-use crate::record::{Record, op};
+use crate::op;
+use crate::problem::{BagProblem, ChunkProblem, Fault, RecordProblem};
+use crate::record::Record;
 use crate::source::Source;
 use rayon::prelude::*;
 use std::fmt;
@@ -19,8 +20,10 @@ use std::sync::Arc;
 pub struct Damage {
     /// The byte of the file where its records end, or the first one that cannot be read.
     pub offset: u64,
-    /// The problem there.
-    pub what: String,
+    /// Why it was scanned.
+    pub reason: ScanReason,
+    /// What is wrong at that byte; `None` where every record up to the end was read.
+    pub problem: Option<BagProblem>,
     /// Number of chunks in the bag's header beyond those found; `None` if the recorder never wrote the count.
     pub chunks_lost: Option<u64>,
     /// Number of messages found that cannot be assigned, because the record of their connection is lost. Messages
@@ -28,9 +31,39 @@ pub struct Damage {
     pub messages_without_connection: u64,
 }
 
+/// Why a bag was scanned instead of opened by its index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ScanReason {
+    /// The index was to be ignored.
+    AskedFor,
+    /// Its header cannot be read, so that nothing says where records begin.
+    BagHeader,
+    /// Its index cannot be read.
+    Index(BagProblem),
+    /// The recorder was stopped before it wrote an index.
+    NoIndex,
+}
+
+/// What stands in front of the problem that ended the scan.
+impl fmt::Display for ScanReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AskedFor => Ok(()),
+            Self::BagHeader => f.write_str("the bag header: "),
+            Self::Index(problem) => write!(f, "the index cannot be read ({problem}): "),
+            Self::NoIndex => f.write_str("the recorder did not finish the bag, it has no index: "),
+        }
+    }
+}
+
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "byte {}: {}", self.offset, self.what)?;
+        write!(f, "byte {}: {}", self.offset, self.reason)?;
+        match &self.problem {
+            Some(problem) => write!(f, "{problem}")?,
+            None => f.write_str("every record up to the end was read")?,
+        }
         match self.chunks_lost {
             Some(0) | None => {}
             Some(1) => write!(f, "; 1 chunk is lost")?,
@@ -133,17 +166,13 @@ impl Frames {
             let chunk = Chunk::read_to_break(bytes, at as u64)?;
             self.chunks.push(at as u64);
             if record.data.len() < record.data_len {
-                let problem = format!(
-                    "the last chunk should have {} bytes, {} are there",
-                    record.data_len,
-                    record.data.len()
-                );
+                let problem = ChunkProblem::Cut {
+                    stated: record.data_len,
+                    left: record.data.len(),
+                };
                 self.broken = Some(Fault::new(bytes.len(), problem));
             } else if chunk.size == usize::MAX {
-                self.broken = Some(Fault::new(
-                    bytes.len(),
-                    "the recorder did not finish the last chunk",
-                ));
+                self.broken = Some(Fault::new(bytes.len(), ChunkProblem::Unfinished));
             }
             return Ok(chunk.end);
         }
@@ -151,10 +180,8 @@ impl Frames {
         match record.op() {
             Some(op::CONNECTION) => self.connections.push(Connection::read(&record)?),
             Some(op::INDEX_DATA | op::CHUNK_INFO) => {}
-            Some(other) => {
-                return Err(record.fault(format!("op {other} cannot stand between chunks")));
-            }
-            None => return Err(record.fault("no record begins here (no field op)")),
+            Some(op) => return Err(record.fault(RecordProblem::Misplaced { op })),
+            None => return Err(record.fault(RecordProblem::NoRecord)),
         }
         Ok(record.end())
     }
@@ -187,7 +214,7 @@ impl Found {
                     // A byte of a compressed chunk's content is nowhere in the file: the chunk's own place stands.
                     Content::Unpacked(_) => Fault {
                         offset: position,
-                        problem: format!("in the chunk, byte {}: {}", fault.offset, fault.problem),
+                        problem: fault.within(),
                     },
                 });
                 (walk, opened.broken.or(inner))

@@ -3,8 +3,8 @@ use crate::buffer::Pool;
 use crate::chunk::Chunk;
 use crate::connection::Connection;
 use crate::entry;
-use crate::error::Fault;
 use crate::index::ChunkInfo;
+use crate::problem::Fault;
 use crate::{Error, Result, Time, content};
 
 /// A topic's content in a bag.
@@ -129,11 +129,11 @@ fn times(
         Chunk::read(file, info.position)
             .and_then(|chunk| entry::indexed(file, chunk.end, info, places, of_topic))
     };
-    let failed = |Fault { offset, problem }| Error::Chunk {
+    let failed = |fault: Fault| Error::Chunk {
         path: bag.path().to_owned(),
         offset: info.position,
         messages: info.messages(),
-        problem: format!("byte {offset}: {problem}"),
+        problem: fault.elsewhere(),
     };
     Ok(entries.map_err(failed)?.into_iter().map(|e| e.time))
 }

@@ -1,7 +1,7 @@
 use crate::compression::{Compression, compress};
 use crate::encode::{VERSION, bag_header, entry, field, record, record_header, time_bytes};
 use crate::msg::RosMessage;
-use crate::record::op;
+use crate::op;
 use crate::{Error, Result, Time};
 use deepfusion_fs::Partial;
 use std::collections::BTreeMap;
@@ -288,11 +288,11 @@ impl BagWriter {
             .map_err(|source| Error::file(&self.path, source))
     }
 
-    fn check(&self, what: &str, bytes: usize, limit: usize) -> Result<()> {
+    fn check(&self, what: &'static str, bytes: usize, limit: usize) -> Result<()> {
         if bytes > limit {
             Err(Error::TooLarge {
                 path: self.path.clone(),
-                what: what.to_owned(),
+                what,
                 bytes: bytes as u64,
                 limit: limit as u64,
             })

@@ -4,7 +4,8 @@ use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::{Header, Imu, PointCloud2, RosMessage};
 use deepfusion_rosbag::{
-    Bag, BagOptions, BagWriter, Compression, Error, Selection, Time, WriterOptions,
+    Bag, BagOptions, BagWriter, ChunkProblem, Compression, Error, ScanReason, Selection, Time,
+    WriterOptions,
 };
 use proptest::prelude::*;
 use std::path::Path;
@@ -168,7 +169,8 @@ fn a_bag_that_was_never_finished_is_read_and_says_so() {
         let bag = open(bytes.clone()).unwrap();
         assert_eq!(read(&bag), (whole.clone(), 0));
         let damage = bag.damage().unwrap();
-        assert!(damage.what.contains("no index"), "{damage}");
+        assert_eq!(damage.reason, ScanReason::NoIndex, "{damage}");
+        assert!(damage.to_string().contains("no index"), "{damage}");
         assert_eq!(
             (damage.chunks_lost, damage.offset),
             (None, bytes.len() as u64)
@@ -199,11 +201,11 @@ fn a_chunk_whose_length_was_never_filled_in_is_read_to_the_end() {
         bag.damage()
     );
     assert!(whole.starts_with(&found));
-    assert!(
-        bag.damage()
-            .unwrap()
-            .what
-            .contains("recorder did not finish")
+    let problem = bag.damage().unwrap().problem.as_ref().unwrap();
+    assert_eq!(problem, &ChunkProblem::Unfinished.into());
+    assert_eq!(
+        problem.to_string(),
+        "the recorder did not finish the last chunk"
     );
 }
 
@@ -284,7 +286,12 @@ fn lengths_that_lie_take_no_memory() {
         bytes[at..at + 4].fill(0xff);
     }
     let bag = open(bytes).unwrap();
-    assert!(bag.damage().unwrap().what.contains("index cannot be read"));
+    let damage = bag.damage().unwrap();
+    assert!(matches!(damage.reason, ScanReason::Index(_)), "{damage}");
+    assert!(
+        damage.to_string().contains("index cannot be read"),
+        "{damage}"
+    );
     assert_eq!(read(&bag).0.len(), 20);
 }
 

@@ -1,6 +1,21 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+/// Why an engine cannot run a network.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EngineProblem {
+    /// The fused engine refuses it.
+    #[error("{0}")]
+    Fused(#[from] deepfusion_infer::Error),
+    /// ONNX Runtime refuses it.
+    #[error("{0}")]
+    Onnx(#[from] deepfusion_onnx::Error),
+    /// What the caller's own runner says, whose error may be of any type.
+    #[error("{0}")]
+    Runner(String),
+}
+
 /// What can go wrong on the way from a network's name to metres.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -19,7 +34,8 @@ pub enum Error {
         /// Its name.
         engine: &'static str,
         /// What it says.
-        reason: String,
+        #[source]
+        reason: Box<EngineProblem>,
     },
     /// Int8 of a network whose convolutions' ranges nobody looked at.
     #[error("int8: the network was not calibrated, or not since it was last trained")]
@@ -54,10 +70,10 @@ pub enum Error {
 impl Error {
     /// What an engine said.
     #[must_use]
-    pub fn engine(engine: &'static str, reason: &dyn std::fmt::Display) -> Self {
+    pub fn engine(engine: &'static str, reason: impl Into<EngineProblem>) -> Self {
         Self::Engine {
             engine,
-            reason: reason.to_string(),
+            reason: Box::new(reason.into()),
         }
     }
 }

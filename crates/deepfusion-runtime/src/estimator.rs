@@ -1,6 +1,6 @@
 use std::fmt;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
@@ -11,8 +11,8 @@ use deepfusion_model::{InputSize, LOG_SCALE_BOUNDS, StoredNetwork, TrainConfig};
 use crate::augmentation::{blend_flipped, mirror};
 use crate::resample::Resample;
 use crate::{
-    Augmentation, DepthRunner, Error, FusedRunner, ModelSource, NetworkOutput, Prediction,
-    PreparedImage, Preparer, View,
+    Augmentation, DepthRunner, EngineProblem, Error, FusedRunner, ModelSource, NetworkOutput,
+    Prediction, PreparedImage, Preparer, RunnerPlan, View,
 };
 
 /// A trained depth network, ready for images. It belongs to one thread; [`Self::another`] makes one for another thread.
@@ -33,10 +33,19 @@ const SIZES_KEPT: usize = 6;
 
 /// Runners for other input sizes, made on demand.
 struct OtherSizes {
-    make: Arc<MakeRunner>,
+    plans: Arc<PlansBySize>,
     /// Most recently used last.
     made: Vec<(InputSize, Box<dyn DepthRunner>)>,
 }
+
+/// What an estimator and its like on other threads share: of each size what is packed. (Of ONNX Runtime's that is the model's bytes alone.)
+struct PlansBySize {
+    make: Box<MakeRunner>,
+    /// Most recently used last.
+    packed: Mutex<Packed>,
+}
+
+type Packed = Vec<(InputSize, Arc<dyn RunnerPlan>)>;
 
 type MakeRunner = dyn Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync;
 
@@ -49,16 +58,67 @@ impl fmt::Debug for OtherSizes {
 impl OtherSizes {
     fn runner(&mut self, size: InputSize) -> Result<&mut dyn DepthRunner, Error> {
         let found = match self.made.iter().position(|(of, _)| *of == size) {
-            Some(place) => self.made.remove(place),
-            None => (size, (self.make)(size)?),
+            Some(place) => {
+                self.plans.kept(size);
+                self.made.remove(place)
+            }
+            None => (size, self.plans.runner(size)?),
         };
-        if self.made.len() == SIZES_KEPT {
-            self.made.remove(0);
-        }
-        self.made.push(found);
+        keep_last(&mut self.made, found);
         let last = self.made.len() - 1;
         Ok(&mut *self.made[last].1)
     }
+}
+
+impl PlansBySize {
+    fn runner(&self, size: InputSize) -> Result<Box<dyn DepthRunner>, Error> {
+        if let Some(plan) = self.kept(size) {
+            return plan.runner();
+        }
+        // The lock is never held while something is packed: that is parallel work, and a thread that waits for its own may take up another
+        // estimator's task, which would wait for the lock. Two threads may so pack a size at once: the first one's is kept by both.
+        let runner = (self.make)(size)?;
+        let mut packed = self.lock();
+        let first = used(&mut packed, size);
+        if first.is_none() {
+            keep_last(&mut packed, (size, runner.plan()));
+        }
+        drop(packed);
+        match first {
+            Some(plan) => {
+                drop(runner);
+                plan.runner()
+            }
+            None => Ok(runner),
+        }
+    }
+
+    /// What is packed for a size already; it was then used last.
+    fn kept(&self, size: InputSize) -> Option<Arc<dyn RunnerPlan>> {
+        used(&mut self.lock(), size)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Packed> {
+        // Whoever panicked left a list that is whole.
+        self.packed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What is packed for a size, as what was used last.
+fn used(packed: &mut Packed, size: InputSize) -> Option<Arc<dyn RunnerPlan>> {
+    let place = packed.iter().position(|(of, _)| *of == size)?;
+    let found = packed.remove(place);
+    let plan = Arc::clone(&found.1);
+    packed.push(found);
+    Some(plan)
+}
+
+/// Adds what was used last; what was not used for longest goes, where there are [`SIZES_KEPT`].
+fn keep_last<T>(kept: &mut Vec<T>, last: T) {
+    if kept.len() == SIZES_KEPT {
+        kept.remove(0);
+    }
+    kept.push(last);
 }
 
 impl DepthEstimator {
@@ -119,10 +179,14 @@ impl DepthEstimator {
                     size,
                     ..of.as_ref().clone()
                 };
-                runner(&config, weights.clone()).map_err(|e| Error::engine("other size", &e))
+                runner(&config, weights.clone())
+                    .map_err(|e| Error::engine("other size", EngineProblem::Runner(e.to_string())))
             };
             OtherSizes {
-                make: Arc::new(make),
+                plans: Arc::new(PlansBySize {
+                    make: Box::new(make),
+                    packed: Mutex::default(),
+                }),
                 made: Vec::new(),
             }
         });
@@ -135,28 +199,29 @@ impl DepthEstimator {
         })
     }
 
-    /// An estimator for another thread: it shares the packed weights and has its own buffers.
+    /// An estimator for another thread: it shares the packed weights, those of input sizes yet to come as well, and has its own buffers.
     ///
     /// # Errors
     /// As [`DepthRunner::another`].
     pub fn another(&self) -> Result<Self, Error> {
-        let others = self.others.as_ref().map(|others| OtherSizes {
-            make: Arc::clone(&others.make),
-            made: Vec::new(),
-        });
-        let mut another = Self {
+        let others = match &self.others {
+            Some(OtherSizes { plans, made }) => {
+                let plans = Arc::clone(plans);
+                let made = made
+                    .iter()
+                    .map(|(size, runner)| Ok((*size, runner.another()?)));
+                let made = made.collect::<Result<_, Error>>()?;
+                Some(OtherSizes { plans, made })
+            }
+            None => None,
+        };
+        Ok(Self {
             config: Arc::clone(&self.config),
             camera: self.camera,
             runner: self.runner.another()?,
             others,
             step: self.step,
-        };
-        if let (Some(to), Some(from)) = (&mut another.others, &self.others) {
-            for (size, runner) in &from.made {
-                to.made.push((*size, runner.another()?));
-            }
-        }
-        Ok(another)
+        })
     }
 
     /// The runner at the size trained with.

@@ -1,12 +1,13 @@
+use std::sync::Arc;
 use std::time::Duration;
 
 use deepfusion_geometry::DepthRange;
-use deepfusion_infer::{Engine, Precision, SeenInputs};
+use deepfusion_infer::{Engine, EnginePlan, Precision, SeenInputs};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Int8Calibration, TrainConfig, depth_graph_with_uncertainty};
 
 use crate::runner::check_image;
-use crate::{DepthRunner, Error, NetworkOutput, metric_disparity};
+use crate::{DepthRunner, Error, NetworkOutput, RunnerPlan, metric_disparity};
 
 /// The network laid out and packed once for this processor.
 ///
@@ -49,11 +50,11 @@ impl FusedRunner {
             // Calibration would help nobody whose processor cannot.
             Self::check_int8()?;
             let set = graph.set_input_ranges(&int8.ok_or(Error::NotCalibrated)?.ranges);
-            set.map_err(|e| Error::engine("fused-int8", &e))?;
+            set.map_err(|e| Error::engine("fused-int8", e))?;
         }
         let engine = Engine::new(graph, config.size.width, config.size.height, precision);
         Ok(Self {
-            engine: engine.map_err(|e| Error::engine("fused", &e))?,
+            engine: engine.map_err(|e| Error::engine("fused", e))?,
             precision,
             range: config.depth_net.range,
             uncertainty: config.depth_net.uncertainty,
@@ -68,8 +69,7 @@ impl FusedRunner {
         if Engine::has_int8() {
             return Ok(());
         }
-        let refused = deepfusion_infer::Error::NoInt8;
-        Err(Error::engine("fused-int8", &refused))
+        Err(Error::engine("fused-int8", deepfusion_infer::Error::NoInt8))
     }
 
     /// The names of the network's convolutions that int8 computes.
@@ -123,16 +123,37 @@ impl DepthRunner for FusedRunner {
         Ok(())
     }
 
-    fn another(&self) -> Result<Box<dyn DepthRunner>, Error> {
-        let engine = self.engine.another();
-        Ok(Box::new(Self {
-            engine: engine.map_err(|e| Error::engine("fused", &e))?,
-            ..*self
-        }))
+    fn plan(&self) -> Arc<dyn RunnerPlan> {
+        Arc::new(FusedPlan {
+            engine: self.engine.plan(),
+            precision: self.precision,
+            range: self.range,
+            uncertainty: self.uncertainty,
+        })
     }
 
     fn profile(&mut self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
         check_image(image, self.values()).ok()?;
         Some(self.engine.profile(image))
+    }
+}
+
+#[derive(Debug)]
+struct FusedPlan {
+    engine: EnginePlan,
+    precision: Precision,
+    range: DepthRange,
+    uncertainty: bool,
+}
+
+impl RunnerPlan for FusedPlan {
+    fn runner(&self) -> Result<Box<dyn DepthRunner>, Error> {
+        let engine = self.engine.engine();
+        Ok(Box::new(FusedRunner {
+            engine: engine.map_err(|e| Error::engine("fused", e))?,
+            precision: self.precision,
+            range: self.range,
+            uncertainty: self.uncertainty,
+        }))
     }
 }

@@ -14,14 +14,13 @@
 //!
 //! [`ModelSource`] finds a network, [`DepthEstimator`] runs it on a [`DepthRunner`]: the fused engine ([`FusedRunner`]),
 //! ONNX Runtime ([`OrtRunner`]), or any other that yields disparities. Every thread has its own estimator
-//! ([`DepthEstimator::another`]); they share one copy of the packed weights, and nothing is locked. With time to spare, a network
+//! ([`DepthEstimator::another`]); they share one copy of the packed weights, and nothing is locked while a network runs. With time to spare, a network
 //! may look at an image more than once ([`Augmentation`]).
 
 mod augmentation;
 mod error;
 mod estimator;
 mod fused;
-mod layer_maps;
 mod ort;
 mod prediction;
 mod prepare;
@@ -31,12 +30,11 @@ mod source;
 
 pub use augmentation::Augmentation;
 pub use deepfusion_infer::{Precision, SeenInputs};
-pub use error::Error;
+pub use error::{EngineProblem, Error};
 pub use estimator::DepthEstimator;
 pub use fused::FusedRunner;
-pub use layer_maps::{FeatureMap, LayerMaps};
 pub use ort::OrtRunner;
 pub use prediction::Prediction;
 pub use prepare::{PreparedImage, Preparer, View, fitting};
-pub use runner::{DepthRunner, NetworkOutput, metric_disparity};
+pub use runner::{DepthRunner, FeatureMap, LayerMaps, NetworkOutput, RunnerPlan, metric_disparity};
 pub use source::{ModelSource, embedded, embedded_names, embedded_unless_run, unpacked};

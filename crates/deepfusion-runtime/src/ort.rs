@@ -7,7 +7,7 @@ use deepfusion_onnx::runtime::OrtEngine;
 use deepfusion_onnx::{DepthModel, write};
 
 use crate::runner::check_image;
-use crate::{DepthRunner, Error, NetworkOutput};
+use crate::{DepthRunner, Error, NetworkOutput, RunnerPlan};
 
 /// The network as an ONNX model in the user's ONNX Runtime.
 #[derive(Debug)]
@@ -73,11 +73,29 @@ impl DepthRunner for OrtRunner {
         output.log_scale = None;
         output.disparity.resize(self.pixels, 0.0);
         let done = self.engine.run(&self.rgb, &mut output.disparity);
-        done.map_err(|error| Error::engine("ort", &error))
+        done.map_err(|error| Error::engine("ort", error))
     }
 
-    fn another(&self) -> Result<Box<dyn DepthRunner>, Error> {
+    fn plan(&self) -> Arc<dyn RunnerPlan> {
+        Arc::new(OrtPlan {
+            library: self.library.clone(),
+            model: Arc::clone(&self.model),
+            pixels: self.pixels,
+        })
+    }
+}
+
+/// Each session of ONNX Runtime packs the model anew.
+#[derive(Debug)]
+struct OrtPlan {
+    library: Option<PathBuf>,
+    model: Arc<[u8]>,
+    pixels: usize,
+}
+
+impl RunnerPlan for OrtPlan {
+    fn runner(&self) -> Result<Box<dyn DepthRunner>, Error> {
         let (library, model) = (self.library.as_deref(), Arc::clone(&self.model));
-        Ok(Box::new(Self::open(library, model, self.pixels)?))
+        Ok(Box::new(OrtRunner::open(library, model, self.pixels)?))
     }
 }

@@ -1,6 +1,7 @@
 //! The interface to what runs a trained depth network: the fused engine, ONNX Runtime, Burn.
 
 use std::fmt::Debug;
+use std::sync::Arc;
 use std::time::Duration;
 
 use deepfusion_geometry::DepthRange;
@@ -21,11 +22,16 @@ pub trait DepthRunner: Debug + Send + Sync {
     /// [`Error::ImageSize`] for an image of another size; [`Error::Engine`] or [`Error::Onnx`] if the network fails to run.
     fn run(&mut self, image: &[f32], output: &mut NetworkOutput) -> Result<(), Error>;
 
+    /// What it shares with its like: the packed weights, without its buffers.
+    fn plan(&self) -> Arc<dyn RunnerPlan>;
+
     /// A second runner on the same weights, with its own buffers.
     ///
     /// # Errors
     /// If there is no memory for them.
-    fn another(&self) -> Result<Box<dyn DepthRunner>, Error>;
+    fn another(&self) -> Result<Box<dyn DepthRunner>, Error> {
+        self.plan().runner()
+    }
 
     /// Metric disparity alone, as [`Self::run`] gives it.
     ///
@@ -54,6 +60,15 @@ pub trait DepthRunner: Debug + Send + Sync {
     }
 }
 
+/// A network packed for one input size, from which any thread makes runners of its own.
+pub trait RunnerPlan: Debug + Send + Sync {
+    /// A runner with its own buffers.
+    ///
+    /// # Errors
+    /// If there is no memory for them.
+    fn runner(&self) -> Result<Box<dyn DepthRunner>, Error>;
+}
+
 /// A network's output for an image, row by row.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NetworkOutput {
@@ -61,6 +76,28 @@ pub struct NetworkOutput {
     pub disparity: Vec<f32>,
     /// ln b, H×W, b the Laplace scale of the error of ln depth; `None` if the network or its runner does not predict it.
     pub log_scale: Option<Vec<f32>>,
+}
+
+/// A map over the image, as coarse as the layer it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeatureMap {
+    /// Width, in pixels.
+    pub width: usize,
+    /// Height, in pixels.
+    pub height: usize,
+    /// H×W, row by row.
+    pub values: Vec<f32>,
+}
+
+/// Feature and attention maps of one layer of a network's encoder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerMaps {
+    /// Mean magnitude of the encoder's feature over its channels.
+    pub feature: FeatureMap,
+    /// The same for what the decoder reads, if context or attention change it.
+    pub refined: Option<FeatureMap>,
+    /// The spatial mask and the least and greatest value of the channel mask, where there is attention.
+    pub attention: Option<(FeatureMap, [f32; 2])>,
 }
 
 /// Sigmoid disparity to metric disparity, in place: d = 1/D_max + (1/D_min − 1/D_max)·σ.

@@ -138,7 +138,7 @@ impl ModelSource {
                 let read = TrainConfig::from_run_table(network.card.config.clone());
                 let (config, findings) = read.map_err(|e| deepfusion_model::Error::ConfigFile {
                     path: network.card.name.clone().into(),
-                    reason: e.to_string(),
+                    reason: e.into(),
                 })?;
                 Ok(match (config.assumed_camera, config.learned_camera()) {
                     (None, _) => None,

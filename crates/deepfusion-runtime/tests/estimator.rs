@@ -2,13 +2,15 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Barrier};
 
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_hint::Hint;
 use deepfusion_runtime::{
-    Augmentation, DepthEstimator, DepthRunner, Error as RuntimeError, ModelSource, Precision,
-    Prediction,
+    Augmentation, DepthEstimator, DepthRunner, Error as RuntimeError, FusedRunner, ModelSource,
+    Precision, Prediction,
 };
 use rayon::prelude::*;
 
@@ -42,6 +44,52 @@ fn another_estimator_gives_the_same_bits() -> Result {
         second.estimate(&picture(width, height, 9), Some(&k))?;
         assert_eq!(second.estimate(&image, Some(&k))?, expected);
     }
+    Ok(())
+}
+
+/// A size that only the second estimator has seen is there for the first, too: packing is what takes time and memory.
+#[test]
+fn estimators_share_what_is_packed_for_each_size() -> Result {
+    let packed = Arc::new(AtomicUsize::new(0));
+    let network = ModelSource::named("tiny".as_ref())?.load(None)?;
+    let count = Arc::clone(&packed);
+    let mut first = DepthEstimator::of(network, move |config, weights| {
+        count.fetch_add(1, Ordering::Relaxed);
+        FusedRunner::new(config, weights, Precision::F32)
+            .map(|runner| Box::new(runner) as Box<dyn DepthRunner>)
+    })?;
+    let mut second = first.another()?;
+    let (image, k) = (picture(320, 240, 1), camera(320, 240));
+    let expected = second.estimate(&image, Some(&k))?;
+    assert_eq!(first.estimate(&image, Some(&k))?, expected);
+    assert_eq!(first.another()?.estimate(&image, Some(&k))?, expected);
+    // Its own size, and that of the image.
+    assert_eq!(packed.load(Ordering::Relaxed), 2);
+    Ok(())
+}
+
+/// Both pack it, neither waits for the other, and both go on with what was there first.
+#[test]
+fn a_size_may_come_to_two_threads_at_once() -> Result {
+    let network = ModelSource::named("tiny".as_ref())?.load(None)?;
+    let (own, meet) = (network.config.size, Barrier::new(2));
+    let mut first = DepthEstimator::of(network, move |config, weights| {
+        if config.size != own {
+            meet.wait();
+        }
+        FusedRunner::new(config, weights, Precision::F32)
+            .map(|runner| Box::new(runner) as Box<dyn DepthRunner>)
+    })?;
+    let mut second = first.another()?;
+    let (image, k) = (picture(320, 240, 1), camera(320, 240));
+    let (one, other) = std::thread::scope(|scope| {
+        let other = scope.spawn(|| second.estimate(&image, Some(&k)));
+        (first.estimate(&image, Some(&k)), other.join())
+    });
+    let other = other.map_err(|_| "the other thread panicked")?;
+    assert_eq!(one?, other?);
+    // A third one packs nothing more: alone at the barrier it would wait for ever.
+    first.another()?.estimate(&image, Some(&k))?;
     Ok(())
 }
 

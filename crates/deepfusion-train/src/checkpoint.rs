@@ -1,7 +1,10 @@
 use std::path::PathBuf;
 
 use burn::tensor::Device;
-use deepfusion_model::{Checkpoint, CheckpointKind, Error as ModelError, RunFolder, TrainConfig};
+use deepfusion_model::{
+    ArchitectureProblem, Checkpoint, CheckpointKind, CheckpointLacks, Error as ModelError,
+    RunFolder, TrainConfig,
+};
 use deepfusion_nn::weights::{self, Weights};
 
 use crate::{Adam, Error, LearnedFocal, Model};
@@ -103,7 +106,7 @@ impl Checkpoints for RunFolder {
         if new_decoder {
             return Err(ModelError::NotResumable {
                 path,
-                reason: "it has no flow decoder, and this configuration trains one",
+                reason: CheckpointLacks::FlowDecoder,
             }
             .into());
         }
@@ -131,9 +134,7 @@ impl Checkpoints for RunFolder {
             let encoder = model.depth_net.encoder.take();
             let encoder = encoder.ok_or_else(|| deepfusion_nn::Error::UnknownArchitecture {
                 origin: path.display().to_string(),
-                reason: format!(
-                    "it holds ResNets, and this configuration's depth network is {kind}"
-                ),
+                reason: ArchitectureProblem::EncodersForOther { network: kind },
             })?;
             model.depth_net.encoder = Some(weights::apply(encoder, &depth)?);
             model.pose_net.encoder = weights::apply(model.pose_net.encoder, &pose)?;

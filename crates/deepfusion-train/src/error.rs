@@ -2,6 +2,13 @@ use crate::SharedFrames;
 use crate::stereo::NoStereo;
 use deepfusion_hint::Hint;
 
+mod samples;
+mod stopped;
+
+pub(crate) use self::samples::MOST_SIGMA_SHARE;
+pub use self::samples::{SampleProblem, Skipped};
+pub use self::stopped::{LoaderProblem, ThreadsProblem, WorkersProblem};
+
 /// What can go wrong while learning.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -12,7 +19,7 @@ pub enum Error {
         /// The data that was given.
         data: String,
         /// Why nothing is left.
-        reason: String,
+        reason: SampleProblem,
     },
     /// A configuration that reads how the car turned, and a drive that does not say.
     #[error(
@@ -96,13 +103,14 @@ pub enum Error {
     #[error("no threads to load images with: {reason}")]
     Threads {
         /// What the system says.
-        reason: String,
+        #[source]
+        reason: ThreadsProblem,
     },
     /// The loader's thread died.
     #[error("the loader of images stopped: {reason}")]
     Loader {
-        /// The batch, counted from 0, and what it died of.
-        reason: String,
+        /// What it died of.
+        reason: LoaderProblem,
     },
     /// Workers that learn together, and cannot.
     #[error("worker {rank} of {count}: {reason}")]
@@ -112,20 +120,27 @@ pub enum Error {
         /// How many there are.
         count: usize,
         /// What went wrong between them.
-        reason: String,
+        #[source]
+        reason: WorkersProblem,
     },
     /// Samples should be held out, and none are.
     #[error("no sample is held out to validate on")]
     NoValidation,
     /// The recording.
     #[error(transparent)]
-    Data(#[from] deepfusion_data::Error),
+    Data(Box<deepfusion_data::Error>),
     /// The simulator, of which views are learned from.
     #[error(transparent)]
     Simulator(#[from] deepfusion_sim::Error),
     /// The configuration, the run's folder, or the networks' weights.
     #[error(transparent)]
     Model(#[from] deepfusion_model::Error),
+}
+
+impl From<deepfusion_data::Error> for Error {
+    fn from(error: deepfusion_data::Error) -> Self {
+        Self::Data(Box::new(error))
+    }
 }
 
 impl Hint for Error {

@@ -3,7 +3,9 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
-use crate::{AssumedCamera, Error, SampleSet, SnippetBatch, TrainConfig, ViewMotion};
+use crate::{
+    AssumedCamera, Error, SampleProblem, SampleSet, SnippetBatch, TrainConfig, ViewMotion,
+};
 
 /// How far the focal length is from the one that was assumed, ln(f/f₀): of both axes, since turns to the side say nothing about fy. All
 /// recordings of a run share it.
@@ -99,7 +101,7 @@ pub(crate) fn check_camera(config: &TrainConfig, sets: [&SampleSet; 2]) -> Resul
     if first.is_none() {
         return Err(Error::NoSamples {
             data: "the data to learn a camera from".into(),
-            reason: "nothing is learned from video".into(),
+            reason: SampleProblem::NoVideo,
         });
     }
     Ok(())

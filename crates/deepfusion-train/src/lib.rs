@@ -58,7 +58,7 @@ pub use deepfusion_model::{
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};
 pub use depth_set::{DepthFrame, DepthSet, DepthView, SimulatedViews};
-pub use error::Error;
+pub use error::{Error, LoaderProblem, SampleProblem, Skipped, ThreadsProblem, WorkersProblem};
 pub use event::{Control, TrainEvent};
 pub use factors::BatchFactors;
 pub use inspector::Inspector;

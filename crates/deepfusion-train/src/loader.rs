@@ -1,6 +1,6 @@
 //! Batches prepared ahead of the trainer, on their own thread.
 
-use crate::Error;
+use crate::{Error, LoaderProblem, ThreadsProblem};
 use std::any::Any;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -64,7 +64,7 @@ impl<T: Send + 'static> Ahead<T> {
             }
             Ok(Err(error)) => Some(Err(error)),
             Err(_) => {
-                let reason = "its thread has ended before the last batch".into();
+                let reason = LoaderProblem::Ended;
                 Some(Err(Error::Loader { reason }))
             }
         }
@@ -77,15 +77,15 @@ fn start_thread(
     threads: usize,
     make: impl FnOnce(rayon::ThreadPool) + Send + 'static,
 ) -> Result<(), Error> {
-    let failed = |reason: String| Error::Threads { reason };
+    let failed = |reason| Error::Threads { reason };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|e| failed(e.to_string()))?;
+        .map_err(|e| failed(ThreadsProblem::Pool(e)))?;
     std::thread::Builder::new()
         .name("batches".into())
         .spawn(move || make(pool))
-        .map_err(|e| failed(e.to_string()))?;
+        .map_err(|e| failed(ThreadsProblem::Thread(e)))?;
     Ok(())
 }
 
@@ -93,8 +93,10 @@ fn start_thread(
 fn panicked(number: usize, panic: &(dyn Any + Send)) -> Error {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    let text = text.unwrap_or("it does not say why");
     Error::Loader {
-        reason: format!("batch {number}: {text}"),
+        reason: LoaderProblem::Panicked {
+            batch: number,
+            text: text.map(str::to_owned),
+        },
     }
 }

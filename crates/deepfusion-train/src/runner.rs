@@ -1,8 +1,12 @@
+use std::sync::Arc;
+
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_geometry::DepthRange;
 use deepfusion_nn::weights::Weights;
 use deepfusion_nn::{DepthNet, InputSize};
-use deepfusion_runtime::{DepthRunner, Error as RuntimeError, NetworkOutput, metric_disparity};
+use deepfusion_runtime::{
+    DepthRunner, Error as RuntimeError, NetworkOutput, RunnerPlan, metric_disparity,
+};
 
 use crate::{Error, TrainConfig};
 
@@ -55,8 +59,14 @@ impl DepthRunner for BurnRunner {
         peak_device_bytes(&self.device)
     }
 
+    fn plan(&self) -> Arc<dyn RunnerPlan> {
+        Arc::new(self.clone())
+    }
+}
+
+impl RunnerPlan for BurnRunner {
     /// The tensors are shared.
-    fn another(&self) -> Result<Box<dyn DepthRunner>, RuntimeError> {
+    fn runner(&self) -> Result<Box<dyn DepthRunner>, RuntimeError> {
         Ok(Box::new(self.clone()))
     }
 }

@@ -1,11 +1,9 @@
+use crate::error::MOST_SIGMA_SHARE;
 use crate::stereo::{NoStereo, OtherCameras, StereoSource};
-use crate::{DepthSet, Error, Learn, TrainConfig, shared_frames};
+use crate::{DepthSet, Error, Learn, SampleProblem, Skipped, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
 use std::sync::Arc;
-
-/// Standard deviation of a distance, as a share of it, above which its sample is left out: metres that unsure teach no scale.
-const MOST_SIGMA_SHARE: f64 = 0.2;
 
 /// Whether every distance of a sample is sure enough, as far as that is known.
 fn is_sure(snippet: &Snippet) -> bool {
@@ -13,6 +11,16 @@ fn is_sure(snippet: &Snippet) -> bool {
         let motion = &source.motion;
         let sigma_m = motion.distance_sigma_m.unwrap_or(0.0);
         sigma_m <= MOST_SIGMA_SHARE * motion.distance_m
+    })
+}
+
+/// Where this reason stands among the others. Both cameras of a drive, or a drive that is validated on as well, have one.
+fn noted(skipped: &mut Vec<Skipped>, reason: Skipped) -> usize {
+    let text = reason.to_string();
+    let place = skipped.iter().position(|s| s.to_string() == text);
+    place.unwrap_or_else(|| {
+        skipped.push(reason);
+        skipped.len() - 1
     })
 }
 
@@ -60,7 +68,7 @@ impl SampleSet {
         config: &TrainConfig,
         train: Vec<Dataset>,
         validation: Option<Vec<Dataset>>,
-    ) -> Result<(Self, Self, Vec<String>), Error> {
+    ) -> Result<(Self, Self, Vec<Skipped>), Error> {
         let one_set = |datasets: Vec<Dataset>| datasets.into_iter().map(|d| (0, d)).collect();
         Self::split_sets(config, one_set(train), validation.map(one_set))
     }
@@ -74,7 +82,7 @@ impl SampleSet {
         config: &TrainConfig,
         train: Vec<(usize, Dataset)>,
         validation: Option<Vec<(usize, Dataset)>>,
-    ) -> Result<(Self, Self, Vec<String>), Error> {
+    ) -> Result<(Self, Self, Vec<Skipped>), Error> {
         let mut skipped = Vec::new();
         let apart = validation.is_some();
         let share = if apart { 0.0 } else { config.validation_share };
@@ -136,7 +144,7 @@ impl SampleSet {
             if set.learn.from_motion() && !motion() {
                 return Err(Error::NoSamples {
                     data: format!("data set {}", set.name),
-                    reason: skipped.last().cloned().unwrap_or_default(),
+                    reason: SampleProblem::Skipped(skipped.pop().into_iter().collect()),
                 });
             }
         }
@@ -147,11 +155,11 @@ impl SampleSet {
         config: &TrainConfig,
         (datasets, set_of): (&[Dataset], &[usize]),
         share: f64,
-        skipped: &mut Vec<String>,
+        skipped: &mut Vec<Skipped>,
     ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
         let (mut train, mut held) = (Vec::new(), Vec::new());
-        // Why drives have no sample: an error, the last, or unsure distances.
-        let (mut last, mut unsure) = (None, Vec::<String>::new());
+        // Why drives have no sample: an error, the last, or unsure distances. Where they stand in `skipped`.
+        let (mut last, mut unsure) = (None, Vec::<usize>::new());
         let learns = |dataset: &usize| config.learn(set_of[*dataset]);
         let other_cameras = OtherCameras::of(datasets, set_of);
         for (dataset, recording) in datasets.iter().enumerate() {
@@ -169,17 +177,14 @@ impl SampleSet {
                     let all = snippets.len();
                     let snippets: Vec<_> = snippets.into_iter().filter(is_sure).collect();
                     if snippets.len() < all {
-                        let reason = format!(
-                            "{}: {} of {all} samples have a distance that is known to no better than {:.0} %",
-                            recording.name(),
-                            all - snippets.len(),
-                            100.0 * MOST_SIGMA_SHARE
-                        );
-                        if snippets.is_empty() && !unsure.contains(&reason) {
-                            unsure.push(reason.clone());
-                        }
-                        if !skipped.contains(&reason) {
-                            skipped.push(reason);
+                        let reason = Skipped::UnsureDistances {
+                            drive: recording.name().to_owned(),
+                            unsure: all - snippets.len(),
+                            of: all,
+                        };
+                        let place = noted(skipped, reason);
+                        if snippets.is_empty() && !unsure.contains(&place) {
+                            unsure.push(place);
                         }
                     }
                     let (a, b) = hold_out(snippets, share);
@@ -208,36 +213,34 @@ impl SampleSet {
                         });
                     }
                 }
-                Err(error) => {
-                    // Both cameras of a drive, or a drive that is validated on as well, have one reason.
-                    let reason = error.to_string();
-                    if !skipped.contains(&reason) {
-                        skipped.push(reason);
-                    }
-                    last = Some(error);
-                }
+                Err(error) => last = Some(noted(skipped, Skipped::Drive(error.into()))),
             }
         }
         let depth_alone =
             (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());
-        unsure.truncate(3);
-        let reasons: Vec<String> = unsure
-            .iter()
-            .cloned()
-            .chain(last.as_ref().map(ToString::to_string))
-            .collect();
-        match (train.is_empty() && !depth_alone, last) {
-            (false, _) => Ok((train, held)),
-            (true, Some(error)) if unsure.is_empty() => Err(error.into()),
-            (true, _) => Err(Error::NoSamples {
-                data: "the data given".into(),
-                reason: if reasons.is_empty() {
-                    "it has no drive".into()
-                } else {
-                    reasons.join("; ")
-                },
-            }),
+        if !train.is_empty() || depth_alone {
+            return Ok((train, held));
         }
+        unsure.truncate(3);
+        let mut all: Vec<_> = skipped.drain(..).map(Some).collect();
+        let places = unsure.into_iter().chain(last);
+        let mut reasons: Vec<Skipped> = places.filter_map(|i| all[i].take()).collect();
+        let one = match reasons.pop() {
+            Some(Skipped::Drive(error)) if reasons.is_empty() => match Arc::try_unwrap(error) {
+                // Nothing else is wrong than what an error says.
+                Ok(error) => return Err(error.into()),
+                Err(shared) => Some(Skipped::Drive(shared)),
+            },
+            one => one,
+        };
+        reasons.extend(one);
+        Err(Error::NoSamples {
+            data: "the data given".into(),
+            reason: match reasons.as_slice() {
+                [] => SampleProblem::NoDrive,
+                _ => SampleProblem::Skipped(reasons),
+            },
+        })
     }
 
     /// The mean length of the camera's translation over all pairs, in metres.

@@ -15,11 +15,11 @@ use crate::learned_focal::{self, check_camera};
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
-    Sampler, StepOutcome, TrainConfig, TrainEvent,
+    Sampler, StepOutcome, TrainConfig, TrainEvent, WorkersProblem,
 };
 use crate::{stereo, unmeasured_turns};
 use burn::tensor::Device;
-use deepfusion_model::Error as ModelError;
+use deepfusion_model::{CheckpointLacks, Error as ModelError};
 use pace::{Pace, Smoothed};
 use start::{check_precision, check_samples, findings};
 use std::path::Path;
@@ -163,7 +163,7 @@ impl Trainer {
         let model = freeze(model, &config, &train)?;
         let adam = adam.ok_or_else(|| ModelError::NotResumable {
             path: folder.checkpoint_path(CheckpointKind::Last),
-            reason: "it has no optimiser state to go on with",
+            reason: CheckpointLacks::OptimiserState,
         })?;
         Ok(Self {
             config,
@@ -281,7 +281,7 @@ impl Trainer {
                 return Err(Error::Workers {
                     rank: self.workers.rank(),
                     count: self.workers.count(),
-                    reason: "another worker has failed".into(),
+                    reason: WorkersProblem::AnotherFailed,
                 });
             }
             self.workers.average(&mut gradients, &mut losses)?;

@@ -8,7 +8,7 @@ use std::error::Error as StdError;
 
 use deepfusion_nn::weights::Weights;
 
-use crate::{Error, LossTerms, NamedGradients};
+use crate::{Error, LossTerms, NamedGradients, WorkersProblem};
 
 /// What connects one trainer with the others.
 pub trait Workers: Send {
@@ -69,10 +69,10 @@ impl WorkerGroup {
             return Ok(());
         }
         let (rank, count) = (self.rank(), self.count());
-        let failed = |reason: Box<dyn StdError + Send + Sync>| Error::Workers {
+        let failed = |error| Error::Workers {
             rank,
             count,
-            reason: reason.to_string(),
+            reason: WorkersProblem::Unreachable(error),
         };
         self.0.sum(values).map_err(failed)
     }
@@ -111,14 +111,14 @@ impl WorkerGroup {
             return Ok(());
         }
         let reason = match differs {
-            Some(0) => "they begin from other weights",
-            Some(1) => "they have other samples",
-            _ => "they have other settings",
+            Some(0) => WorkersProblem::OtherWeights,
+            Some(1) => WorkersProblem::OtherSamples,
+            _ => WorkersProblem::OtherSettings,
         };
         Err(Error::Workers {
             rank: self.rank(),
             count: self.count(),
-            reason: reason.into(),
+            reason,
         })
     }
 

@@ -61,7 +61,7 @@ fn samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet), Error> {
         }
     }
     let (train, validation, skipped) = SampleSet::split_sets(config, recordings, None)?;
-    assert_eq!(skipped, Vec::<String>::new());
+    assert!(skipped.is_empty(), "{skipped:?}");
     Ok((train, validation))
 }
 

@@ -1,6 +1,8 @@
-use deepfusion_hint::Hint;
+use crate::problem::{PacketProblem, ProgramProblem, quoted};
+use deepfusion_hint::{Hint, count_of};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What can go wrong with a video or a live source.
 #[derive(Debug, thiserror::Error)]
@@ -15,12 +17,12 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A picture cannot be read.
-    #[error("{}: {problem}", path.display())]
+    #[error("{}: cannot be decoded: {source}", path.display())]
     Picture {
         /// The picture.
         path: PathBuf,
         /// Why not.
-        problem: String,
+        source: image::ImageError,
     },
     /// ffmpeg or ffprobe failed, or is not there.
     #[error("{}: {program} {problem}", path.display())]
@@ -30,9 +32,7 @@ pub enum Error {
         /// The program.
         program: &'static str,
         /// What happened.
-        problem: String,
-        /// What to do.
-        remedy: &'static str,
+        problem: ProgramProblem,
     },
     /// A packet of a stream cannot be decoded.
     #[error("{}: {stream}, message {number}: {problem}", path.display())]
@@ -44,9 +44,7 @@ pub enum Error {
         /// Which of the stream's messages, counted from 0.
         number: u64,
         /// Why not.
-        problem: String,
-        /// What to do.
-        remedy: &'static str,
+        problem: PacketProblem,
     },
     /// A stream of a codec that is not read.
     #[error("{}: {stream}: a video of format `{format}` is not read", path.display())]
@@ -59,12 +57,16 @@ pub enum Error {
         format: String,
     },
     /// A live source gives no frame for longer than is waited for.
-    #[error("{address}: ffmpeg {problem}")]
+    #[error("{address}: ffmpeg gave no frame for {} s{}{}", waited.as_secs_f64(), after(*frames), quoted(said))]
     Silent {
         /// The source, without its password.
         address: String,
-        /// For how long, after how many frames, and what ffmpeg said.
-        problem: String,
+        /// For how long.
+        waited: Duration,
+        /// How many frames had come.
+        frames: u64,
+        /// What ffmpeg said last.
+        said: Vec<String>,
     },
 }
 
@@ -90,7 +92,8 @@ impl Hint for Error {
                 _ => return None,
             },
             Self::Picture { .. } => "PNG and JPEG are read",
-            Self::Program { remedy, .. } | Self::Packet { remedy, .. } => remedy,
+            Self::Program { problem, .. } => return problem.hint(),
+            Self::Packet { problem, .. } => return problem.hint(),
             Self::Codec { .. } => {
                 "h264, h265 (hevc), vp9 and av1 are read: encode the stream as one of them, or record images"
             }
@@ -105,5 +108,13 @@ fn said(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "no such file or folder".into(),
         _ => error.to_string(),
+    }
+}
+
+/// How many frames had come before, if any had.
+fn after(frames: u64) -> String {
+    match frames {
+        0 => String::new(),
+        n => format!(", after {}", count_of(n, "frame")),
     }
 }

@@ -7,8 +7,8 @@
 
 use crate::cache::{Origin, frame_path, keep};
 use crate::probe::{Probed, probe};
-use crate::program::{Printed, READ, in_either_words, outcome};
-use crate::{Error, Result};
+use crate::program::{Printed, in_either_words, outcome};
+use crate::{Error, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -94,7 +94,8 @@ impl VideoFrames {
 
 fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
     // One file a frame: none doubled or dropped to keep a rate.
-    in_either_words(|mode| ffmpeg(video, part, mode))?.succeeded("ffmpeg", (video, READ))?;
+    in_either_words(|mode| ffmpeg(video, part, mode))?
+        .succeeded("ffmpeg", (video, ProgramTask::Read))?;
     let written = std::fs::read_dir(part)
         .map_err(|e| Error::file(part, e))?
         .count();
@@ -102,8 +103,10 @@ fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
         return Err(Error::Program {
             path: video.to_owned(),
             program: "ffmpeg",
-            problem: format!("decoded {written} frames, ffprobe counts {frames}"),
-            remedy: "part of the video is damaged: write it anew, such as ffmpeg -i OLD -c:v libx264 -crf 12 NEW.mp4",
+            problem: ProgramProblem::Frames {
+                decoded: written,
+                counted: frames,
+            },
         });
     }
     Ok(())
@@ -128,5 +131,5 @@ fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Printed> {
         // Within the folder: a `%` in its own path would count as a number's place.
         "%010d.jpg".as_ref(),
     ];
-    outcome("ffmpeg", &arguments, (video, READ), part, None)
+    outcome("ffmpeg", &arguments, (video, ProgramTask::Read), part, None)
 }

@@ -9,6 +9,7 @@ mod frames;
 mod live;
 mod packets;
 mod probe;
+mod problem;
 mod program;
 mod write;
 
@@ -16,4 +17,8 @@ pub use error::{Error, Result};
 pub use frames::VideoFrames;
 pub use live::{Address, LiveFrame, LiveSource, NextFrame};
 pub use packets::{Codec, PacketFrames, PacketStream};
+pub use problem::{
+    AnswerProblem, FrameProblem, LiveProblem, PacketProblem, ProgramProblem, ProgramTask,
+    SourceKind,
+};
 pub use write::{VideoPicture, can_write_video, shown_for, write_video};

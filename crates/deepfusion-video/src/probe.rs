@@ -1,7 +1,7 @@
 //! What ffprobe says of a video, without decoding it.
 
-use crate::program::{READ, run};
-use crate::{Error, Result};
+use crate::program::run;
+use crate::{AnswerProblem, Error, ProgramTask, Result};
 use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
 use std::ops::RangeInclusive;
@@ -82,21 +82,25 @@ pub(crate) fn probe(file: &Path) -> Result<Probed> {
     let mut arguments: Vec<&std::ffi::OsStr> = arguments.iter().map(|a| a.as_ref()).collect();
     arguments.push(file.as_os_str());
     let folder = file.parent().unwrap_or(Path::new("."));
-    parse(&run("ffprobe", &arguments, (file, READ), folder)?).map_err(|problem| Error::Program {
+    parse(&run(
+        "ffprobe",
+        &arguments,
+        (file, ProgramTask::Read),
+        folder,
+    )?)
+    .map_err(|problem| Error::Program {
         path: file.to_owned(),
         program: "ffprobe",
-        problem,
-        remedy: "is it a video, and whole?",
+        problem: problem.into(),
     })
 }
 
-fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
-    let answer: Answer =
-        serde_json::from_slice(json).map_err(|e| format!("answered what cannot be read: {e}"))?;
+fn parse(json: &[u8]) -> std::result::Result<Probed, AnswerProblem> {
+    let answer: Answer = serde_json::from_slice(json)?;
     let stream = answer.streams.first();
-    let stream = stream.ok_or("finds no video stream in it")?;
+    let stream = stream.ok_or(AnswerProblem::NoStream)?;
     let (Some(width), Some(height)) = (stream.width, stream.height) else {
-        return Err("does not know the images' size".into());
+        return Err(AnswerProblem::NoSize);
     };
     let mut rotations = stream.side_data_list.iter().filter_map(|s| s.rotation);
     let upright = rotations
@@ -109,7 +113,7 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
         .filter(|p| !p.flags.contains('D'))
         .collect();
     if shown.is_empty() {
-        return Err("finds no frame in it".into());
+        return Err(AnswerProblem::NoFrame);
     }
     let times = shown.iter().map(|p| nanoseconds(p.pts_time.as_ref()?));
     let mut times_ns: Option<Vec<i64>> = times.collect();
@@ -178,7 +182,8 @@ mod tests {
             (r#"{"streams": [{"width": 1, "height": 1}]}"#, "no frame"),
             ("x", "cannot be read"),
         ] {
-            assert!(parse(json.as_bytes()).unwrap_err().contains(problem));
+            let text = parse(json.as_bytes()).unwrap_err().to_string();
+            assert!(text.contains(problem), "{text}");
         }
     }
 

@@ -1,15 +1,10 @@
 //! Running ffmpeg and ffprobe.
 
-use crate::{Error, Result};
+use crate::{Error, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
-
-/// What most want of it.
-pub(crate) const READ: &str = "read videos";
-/// And what some.
-pub(crate) const WRITE: &str = "write videos";
 
 /// Longest complaint that is passed on, in characters.
 const LONGEST: usize = 400;
@@ -24,18 +19,18 @@ pub(crate) struct Printed {
     pub(crate) succeeded: bool,
 }
 
-/// Runs a program on `file` in a folder, to do `what`, and gives what it printed on its standard output.
+/// Runs a program on `file` in a folder, for a task, and gives what it printed on its standard output.
 ///
 /// # Errors
 /// [`Error::Program`] where it is not installed, or fails.
 pub(crate) fn run<S: AsRef<OsStr>>(
     program: &'static str,
     arguments: &[S],
-    (file, what): (&Path, &str),
+    (file, task): (&Path, ProgramTask),
     folder: &Path,
 ) -> Result<Vec<u8>> {
-    let printed = outcome(program, arguments, (file, what), folder, None)?;
-    Ok(printed.succeeded(program, (file, what))?.text)
+    let printed = outcome(program, arguments, (file, task), folder, None)?;
+    Ok(printed.succeeded(program, (file, task))?.text)
 }
 
 impl Printed {
@@ -46,7 +41,7 @@ impl Printed {
     pub(crate) fn succeeded(
         self,
         program: &'static str,
-        (file, what): (&Path, &str),
+        (file, task): (&Path, ProgramTask),
     ) -> Result<Self> {
         if self.succeeded {
             return Ok(self);
@@ -54,10 +49,9 @@ impl Printed {
         Err(Error::Program {
             path: file.to_owned(),
             program,
-            problem: format!("failed: {}", self.complaint),
-            remedy: match what {
-                WRITE => "see whether the disk is full; a newer ffmpeg may have an encoder for MP4",
-                _ => "play the file to see whether it is whole; a newer ffmpeg may know its codec",
+            problem: ProgramProblem::Failed {
+                task,
+                said: self.complaint,
             },
         })
     }
@@ -75,22 +69,11 @@ impl Printed {
 pub(crate) fn outcome<S: AsRef<OsStr>>(
     program: &'static str,
     arguments: &[S],
-    (file, what): (&Path, &str),
+    (file, task): (&Path, ProgramTask),
     folder: &Path,
     input: Option<&[u8]>,
 ) -> Result<Printed> {
-    let failed = |e: std::io::Error| {
-        let remedy = match what {
-            WRITE => {
-                "install ffmpeg so that it is on the PATH, or save the pictures and make the video elsewhere"
-            }
-            _ => {
-                "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames elsewhere \
-                 and give their folder"
-            }
-        };
-        not_started(file, program, &e, what, remedy)
-    };
+    let failed = |e| not_started(file, program, e, task);
     let mut child = Command::new(program)
         .args(arguments)
         .current_dir(folder)
@@ -136,27 +119,19 @@ pub(crate) fn in_either_words(run: impl Fn(&str) -> Result<Printed>) -> Result<P
     }
 }
 
-/// The error of a program that could not be started; `what` it was to do, and `remedy` where it is not installed.
+/// The error of a program that could not be started.
 pub(crate) fn not_started(
     file: &Path,
     program: &'static str,
-    error: &std::io::Error,
-    what: &str,
-    remedy: &'static str,
+    error: std::io::Error,
+    task: ProgramTask,
 ) -> Error {
-    let (problem, remedy) = match error.kind() {
-        std::io::ErrorKind::NotFound => {
-            (format!("is needed to {what} and is not installed"), remedy)
-        }
-        _ => (
-            format!("cannot be run: {error}"),
-            "check that it can be run from a terminal",
-        ),
-    };
     Error::Program {
         path: file.to_owned(),
         program,
-        problem,
-        remedy,
+        problem: match error.kind() {
+            std::io::ErrorKind::NotFound => ProgramProblem::NotInstalled(task),
+            _ => ProgramProblem::NotRun(error),
+        },
     }
 }

@@ -1,7 +1,7 @@
 //! Pictures to a video file.
 
-use crate::program::{WRITE, in_either_words, outcome, run};
-use crate::{Error, Result};
+use crate::program::{in_either_words, outcome, run};
+use crate::{Error, ProgramProblem, ProgramTask, Result};
 use image::ImageReader;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -46,9 +46,9 @@ fn picture_size(path: &Path) -> Result<(u32, u32)> {
     let failed = |e| Error::file(path, e);
     let reader = ImageReader::open(path).map_err(failed)?;
     let reader = reader.with_guessed_format().map_err(failed)?;
-    reader.into_dimensions().map_err(|e| Error::Picture {
+    reader.into_dimensions().map_err(|source| Error::Picture {
         path: path.to_owned(),
-        problem: format!("cannot be decoded: {e}"),
+        source,
     })
 }
 
@@ -57,7 +57,13 @@ fn picture_size(path: &Path) -> Result<(u32, u32)> {
 /// # Errors
 /// [`Error::Program`] where it is not installed.
 pub fn can_write_video(path: &Path) -> Result<()> {
-    run("ffmpeg", &["-version"], (path, WRITE), Path::new(".")).map(|_| ())
+    run(
+        "ffmpeg",
+        &["-version"],
+        (path, ProgramTask::Write),
+        Path::new("."),
+    )
+    .map(|_| ())
 }
 
 const LIST: &str = "list";
@@ -133,9 +139,15 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
             "mp4".as_ref(),
             PART.as_ref(),
         ];
-        outcome("ffmpeg", &arguments, (video, WRITE), aside, None)
+        outcome(
+            "ffmpeg",
+            &arguments,
+            (video, ProgramTask::Write),
+            aside,
+            None,
+        )
     };
-    let done = in_either_words(with)?.succeeded("ffmpeg", (video, WRITE))?;
+    let done = in_either_words(with)?.succeeded("ffmpeg", (video, ProgramTask::Write))?;
     // It goes on after a picture that it cannot read, or ends there, and calls both a success.
     if done.complaint.is_empty() {
         Ok(())
@@ -143,8 +155,9 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
         Err(Error::Program {
             path: video.to_owned(),
             program: "ffmpeg",
-            problem: format!("made only a part of it: {}", done.complaint),
-            remedy: "see whether the disk is full and the pictures can be opened",
+            problem: ProgramProblem::Part {
+                said: done.complaint,
+            },
         })
     }
 }

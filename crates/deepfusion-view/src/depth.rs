@@ -5,7 +5,7 @@ use std::path::Path;
 
 use deepfusion_data::{image_size, read_depth_png};
 
-use crate::{Error, Result};
+use crate::{ArrayProblem, ContentProblem, Error, Result};
 
 /// More pixels than any camera's image; a file that says more is refused before anything is set aside for it.
 const MOST_PIXELS: u64 = 64 << 20;
@@ -74,10 +74,7 @@ impl DepthFile {
 }
 
 fn too_large(path: &Path, width: u64, height: u64) -> Error {
-    Error::content(
-        path,
-        format!("{width}x{height} pixels are more than any camera's image has"),
-    )
+    Error::content(path, ContentProblem::TooLarge { width, height })
 }
 
 /// An array of NumPy's format 1 to 3 (numpy.lib.format), as far as depth needs it.
@@ -98,8 +95,11 @@ fn read_npy(path: &Path) -> Result<DepthFile> {
     }
     let expected = header.begin as u64 + width * height * header.item_bytes;
     if length < expected {
-        let problem =
-            format!("ends early: {length} bytes of {expected} (a {width}x{height} array)");
+        let problem = ArrayProblem::Cut {
+            bytes: length,
+            expected,
+            size: (width, height),
+        };
         return Err(Error::content(path, problem));
     }
     let mut values = begin.split_off(header.begin.min(begin.len()));
@@ -132,13 +132,13 @@ struct NpyHeader {
 }
 
 impl NpyHeader {
-    fn parse(bytes: &[u8]) -> Result<Self, String> {
-        let early = || "ends early: the NPY header is cut off".to_owned();
+    fn parse(bytes: &[u8]) -> Result<Self, ArrayProblem> {
+        let early = || ArrayProblem::HeaderCut;
         if !bytes.starts_with(b"\x93NUMPY") {
             return Err(if bytes.len() < 6 {
                 early()
             } else {
-                "no NPY array".into()
+                ArrayProblem::NoArray
             });
         }
         let (text_at, text_bytes) = match bytes.get(6).ok_or_else(early)? {
@@ -154,15 +154,10 @@ impl NpyHeader {
         let item_bytes = match field(&text, "descr").map(|d| d.trim_matches(['\'', '"'])) {
             Some("<f4") => 4,
             Some("<f8") => 8,
-            other => {
-                return Err(format!(
-                    "depth is `<f4` or `<f8`, not {}",
-                    other.unwrap_or("without a type")
-                ));
-            }
+            other => return Err(ArrayProblem::Type(other.map(str::to_owned))),
         };
         if field(&text, "fortran_order").is_none_or(|f| f != "False") {
-            return Err("depth is stored row by row (fortran_order False)".into());
+            return Err(ArrayProblem::ColumnByColumn);
         }
         let after = text.split_once("'shape':").map(|(_, rest)| rest);
         let inside = after.and_then(|rest| rest.split_once('(')?.1.split_once(')'));
@@ -175,10 +170,7 @@ impl NpyHeader {
             })
             .unwrap_or_default();
         let &[height, width] = sides.as_slice() else {
-            return Err(format!(
-                "depth has two dimensions, this array {}",
-                sides.len()
-            ));
+            return Err(ArrayProblem::Dimensions(sides.len()));
         };
         Ok(Self {
             width,

@@ -1,6 +1,14 @@
+//! What can go wrong with showing results.
+
+mod content;
+
+pub use self::content::{ArrayProblem, ContentProblem};
+
 use deepfusion_hint::Hint;
 use std::net::SocketAddr;
 use std::path::PathBuf;
+#[cfg(feature = "rerun")]
+use {re_chunk::ChunkError, re_log_encoding::EncodeError};
 
 /// A result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -54,12 +62,13 @@ pub enum Error {
         total: usize,
     },
     /// A frame that another viewer's format cannot hold.
+    #[cfg(feature = "rerun")]
     #[error("{}: cannot be written: {problem}", path.display())]
     Encoding {
         /// The file that would have been written.
         path: PathBuf,
         /// Why.
-        problem: String,
+        problem: EncodingProblem,
     },
     /// A file or folder cannot be read or written.
     #[error("{}: {source}", path.display())]
@@ -75,7 +84,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        problem: String,
+        problem: ContentProblem,
     },
     /// A picture or a depth PNG cannot be read.
     #[error(transparent)]
@@ -96,6 +105,33 @@ pub enum Error {
     },
 }
 
+/// Why something cannot be logged: what the viewer's own libraries said.
+#[cfg(feature = "rerun")]
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EncodingProblem {
+    /// It cannot be written.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// It cannot be put together.
+    #[error(transparent)]
+    Chunk(#[from] ChunkError),
+}
+
+#[cfg(feature = "rerun")]
+impl EncodingProblem {
+    /// The failure of a file.
+    pub(crate) fn of(self, path: &std::path::Path) -> Error {
+        match self {
+            Self::Encode(EncodeError::Write(source)) => Error::file(path, source),
+            other => Error::Encoding {
+                path: path.to_owned(),
+                problem: other,
+            },
+        }
+    }
+}
+
 impl Error {
     /// An error of the system, named by file.
     pub(crate) fn file(path: &std::path::Path, source: std::io::Error) -> Self {
@@ -106,7 +142,7 @@ impl Error {
     }
 
     /// A file that is not what it should be.
-    pub(crate) fn content(path: &std::path::Path, problem: impl Into<String>) -> Self {
+    pub(crate) fn content(path: &std::path::Path, problem: impl Into<ContentProblem>) -> Self {
         Self::Content {
             path: path.to_owned(),
             problem: problem.into(),
@@ -131,10 +167,9 @@ impl Hint for Error {
                 Some("give two folders of predictions, or two of training runs".into())
             }
             Self::NoFrames { .. } => Some("give a folder of predictions or of targets".into()),
-            Self::File { .. }
-            | Self::Content { .. }
-            | Self::Stopped { .. }
-            | Self::Encoding { .. } => None,
+            Self::File { .. } | Self::Content { .. } | Self::Stopped { .. } => None,
+            #[cfg(feature = "rerun")]
+            Self::Encoding { .. } => None,
             Self::Picture(error) => error.hint(),
             Self::PortInUse { .. } => {
                 Some("give another port, or port 0 for any that is free".into())

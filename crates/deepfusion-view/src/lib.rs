@@ -20,7 +20,9 @@ mod server;
 mod training;
 
 pub use depth::{DepthCode, DepthFile};
-pub use error::{Error, Result};
+#[cfg(feature = "rerun")]
+pub use error::EncodingProblem;
+pub use error::{ArrayProblem, ContentProblem, Error, Result};
 pub use folder::Folder;
 #[cfg(feature = "rerun")]
 pub use rerun::{RerunReport, rerun_version, write_rerun};

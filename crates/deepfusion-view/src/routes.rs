@@ -134,7 +134,7 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
                     ),
                     _ => match picture_of(path, &entry) {
                         Ok(picture) => file(&picture.path, picture.content_type),
-                        Err(problem) => Response::problem(422, &problem, None),
+                        Err(none) => Response::problem(422, &none.to_string(), None),
                     },
                 },
             }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::{Error, Result};
+use crate::{ContentProblem, Error, Result};
 
 /// More rows than the page has columns for are thinned to this many.
 const MOST_ROWS: usize = 2000;
@@ -17,7 +17,7 @@ pub(crate) fn is_run(folder: &Path) -> bool {
 /// The log as columns, and the panels' names. A long log is thinned evenly for the steps; validations all stay.
 pub(crate) fn run_json(folder: &Path) -> Result<Value> {
     let path = folder.join("log.csv");
-    let failed = |e: csv::Error| Error::content(&path, e.to_string());
+    let failed = |e: csv::Error| Error::content(&path, e);
     // A last line that is being written has too few fields: it is left out.
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
@@ -33,10 +33,7 @@ pub(crate) fn run_json(folder: &Path) -> Result<Value> {
         header.iter().position(|h| h == "step"),
         header.iter().position(|h| h == "split"),
     ) else {
-        return Err(Error::content(
-            &path,
-            "no columns `step` and `split`: not a training log",
-        ));
+        return Err(Error::content(&path, ContentProblem::NoLog));
     };
     let (mut train, mut validation) = (Vec::new(), Vec::new());
     for row in reader.records() {

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+use crate::{CardProblem, Error};
 
 /// The version of the file pair; others are refused.
 pub const FORMAT_VERSION: u32 = 1;
@@ -98,7 +98,7 @@ impl Card {
     pub fn to_toml(&self) -> Result<String, Error> {
         let text = toml::to_string_pretty(self).map_err(|e| Error::Card {
             origin: self.name.clone(),
-            reason: e.to_string(),
+            reason: CardProblem::Unwritten(Box::new(e)),
         })?;
         let weights = format!("{}.safetensors", self.name);
         Ok(format!(
@@ -113,7 +113,7 @@ impl Card {
     pub fn parse(origin: &str, text: &str) -> Result<Self, Error> {
         let failed = |e: toml::de::Error| Error::Card {
             origin: origin.to_owned(),
-            reason: e.to_string(),
+            reason: CardProblem::NotOne(Box::new(e)),
         };
         // The version first: what else is in another version's card is not known.
         let table: toml::Table = text.parse().map_err(failed)?;

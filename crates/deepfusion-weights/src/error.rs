@@ -22,7 +22,8 @@ pub enum Error {
         /// The file, or the network's name.
         origin: String,
         /// Why.
-        reason: String,
+        #[source]
+        reason: CardProblem,
     },
     /// A card of another version.
     #[error(
@@ -62,10 +63,10 @@ pub enum Error {
         value: f32,
     },
     /// Tensors that do not make a file.
-    #[error("the tensors cannot be written: {reason}")]
+    #[error("the tensors cannot be written: {source}")]
     Tensors {
         /// What the format's library says.
-        reason: String,
+        source: safetensors::SafeTensorError,
     },
     /// A file that is in the way.
     #[error("{}: already exists", path.display())]
@@ -82,6 +83,24 @@ pub enum Error {
         action: &'static str,
         /// What the system says.
         source: std::io::Error,
+    },
+}
+
+/// Why a text is no card, or a card has no text.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CardProblem {
+    /// Its text cannot be read as one. What the parser says, without the line break that ends it.
+    #[error("{}", .0.to_string().trim_end())]
+    NotOne(Box<toml::de::Error>),
+    /// It has a value that TOML cannot hold.
+    #[error("{0}")]
+    Unwritten(#[source] Box<toml::ser::Error>),
+    /// It describes another network than the one it lies beside.
+    #[error("it is the card of `{name}`")]
+    OfAnother {
+        /// That network's name.
+        name: String,
     },
 }
 

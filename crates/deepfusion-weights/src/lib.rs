@@ -18,6 +18,6 @@ mod shipped;
 mod tensors;
 
 pub use card::{Card, FORMAT_VERSION, Figure};
-pub use error::Error;
+pub use error::{CardProblem, Error};
 pub use shipped::{DEFAULT, MAX_BYTES, Shipped, all, find, names};
 pub use tensors::{NUMBERS, Tensor, pack};

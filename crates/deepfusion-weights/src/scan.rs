@@ -15,6 +15,62 @@ pub(crate) struct Pair {
     pub weights: PathBuf,
 }
 
+/// What is wrong with a folder of networks.
+#[derive(Debug)]
+pub(crate) enum ScanError {
+    /// A folder or a file that cannot be read or written.
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    /// A file whose name is none of a network.
+    Name { path: PathBuf },
+    /// One of a network's files without the other.
+    Alone {
+        folder: PathBuf,
+        name: String,
+        lacks: Half,
+    },
+    /// A file that `include_bytes!` could not name.
+    Path { path: PathBuf },
+}
+
+/// One of a network's two files.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Half {
+    Card,
+    Weights,
+}
+
+impl std::fmt::Display for ScanError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
+            Self::Name { path } => write!(
+                f,
+                "{}: a network's name is letters a to z, digits and dashes, a letter first, and not `none`",
+                path.display()
+            ),
+            Self::Alone {
+                folder,
+                name,
+                lacks,
+            } => {
+                let [has, lacks] = match lacks {
+                    Half::Card => ["safetensors", "toml"],
+                    Half::Weights => ["toml", "safetensors"],
+                };
+                write!(
+                    f,
+                    "{}: {name}.{has} has no {name}.{lacks} beside it",
+                    folder.display()
+                )
+            }
+            Self::Path { path } => write!(f, "{}: not an absolute path in Unicode", path.display()),
+        }
+    }
+}
+
 /// Whether this is a valid network name: letters a to z, digits and dashes, a letter first. `none` is reserved for `--init none`.
 pub(crate) fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
@@ -24,12 +80,15 @@ pub(crate) fn is_name(name: &str) -> bool {
 /// The networks in a folder, by name; none where there is no such folder. Hidden files and those with other endings are ignored.
 ///
 /// # Errors
-/// A line that names a file without its counterpart or with an invalid name, or says why the folder cannot be read.
-pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
+/// A file without its counterpart or with an invalid name, or a folder that cannot be read.
+pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, ScanError> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
-    let failed = |e: std::io::Error| format!("{}: {e}", folder.display());
+    let failed = |source| ScanError::Io {
+        path: folder.to_owned(),
+        source,
+    };
     // By name: the card, the weights.
     let mut found: BTreeMap<String, [Option<PathBuf>; 2]> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -49,10 +108,7 @@ pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
             continue;
         }
         if !is_name(&name) {
-            return Err(format!(
-                "{}: a network's name is letters a to z, digits and dashes, a letter first, and not `none`",
-                path.display()
-            ));
+            return Err(ScanError::Name { path });
         }
         found.entry(name).or_default()[half] = Some(path);
     }
@@ -62,20 +118,14 @@ pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
             card,
             weights,
         }),
-        [card, _] => Err(format!(
-            "{}: {name}.{} has no {name}.{} beside it",
-            folder.display(),
-            if card.is_some() {
-                "toml"
-            } else {
-                "safetensors"
+        [card, _] => Err(ScanError::Alone {
+            folder: folder.to_owned(),
+            name,
+            lacks: match card {
+                Some(_) => Half::Weights,
+                None => Half::Card,
             },
-            if card.is_some() {
-                "safetensors"
-            } else {
-                "toml"
-            },
-        )),
+        }),
     };
     found.into_iter().map(pair).collect()
 }
@@ -84,13 +134,12 @@ pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
 ///
 /// # Errors
 /// If a path is not absolute, or not Unicode: `include_bytes!` could not name it.
-pub(crate) fn list(pairs: &[Pair]) -> Result<String, String> {
+pub(crate) fn list(pairs: &[Pair]) -> Result<String, ScanError> {
     let quoted = |path: &Path| match path.to_str() {
         Some(text) if path.is_absolute() => Ok(format!("{text:?}")),
-        _ => Err(format!(
-            "{}: not an absolute path in Unicode",
-            path.display()
-        )),
+        _ => Err(ScanError::Path {
+            path: path.to_owned(),
+        }),
     };
     let mut text = "&[\n".to_owned();
     for Pair {

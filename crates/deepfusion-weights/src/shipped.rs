@@ -5,7 +5,7 @@ use deepfusion_fs::{publish_all, write_aside};
 use sha2::{Digest, Sha256};
 
 use crate::scan::is_name;
-use crate::{Card, Error};
+use crate::{Card, CardProblem, Error};
 
 /// The default network.
 pub const DEFAULT: &str = "street";
@@ -69,7 +69,7 @@ impl Shipped {
         if card.name != origin {
             return Err(Error::Card {
                 origin: origin.to_owned(),
-                reason: format!("it is the card of `{}`", card.name),
+                reason: CardProblem::OfAnother { name: card.name },
             });
         }
         Ok(Self { card, bytes })
@@ -258,13 +258,14 @@ mod tests {
         for (gone, kept) in [(&weights, "street.toml"), (&card, "street.safetensors")] {
             let content = std::fs::read(gone).unwrap();
             std::fs::remove_file(gone).unwrap();
-            let error = scan(at).unwrap_err();
+            let error = scan(at).unwrap_err().to_string();
             assert!(error.contains(&format!("{kept} has no ")), "{error}");
             std::fs::write(gone, content).unwrap();
         }
         scan(at).unwrap();
         std::fs::write(at.join("Street 2.toml"), "").unwrap();
-        assert!(scan(at).unwrap_err().contains("Street 2.toml"));
+        let error = scan(at).unwrap_err().to_string();
+        assert!(error.contains("Street 2.toml"), "{error}");
     }
 
     /// The files in `weights/`, whatever they are: nothing is embedded that its card does not describe.

@@ -34,9 +34,7 @@ pub fn pack(tensors: &[Tensor]) -> Result<Vec<u8>, Error> {
         };
         packed.push((tensor, dtype, bytes));
     }
-    let failed = |e: safetensors::SafeTensorError| Error::Tensors {
-        reason: e.to_string(),
-    };
+    let failed = |source| Error::Tensors { source };
     let mut views = Vec::with_capacity(packed.len());
     for (tensor, dtype, bytes) in &packed {
         let view = TensorView::new(*dtype, tensor.shape.to_vec(), bytes).map_err(failed)?;

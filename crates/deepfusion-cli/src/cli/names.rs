@@ -4,6 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use deepfusion_data::GtKind;
 use deepfusion_eval::{Crop, PostProcess};
 use deepfusion_infer::Precision;
+use deepfusion_jobs::outputs::{DepthOutput, TargetOutput};
 use deepfusion_model::{CheckpointKind, Learn, Preset, ViewMotion};
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{Scene, Sensors};
@@ -245,6 +246,87 @@ pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
     )
 }
 
+/// What `predict` writes for an image, beside the JSON sidecar.
+pub(super) fn depth_output() -> impl TypedValueParser<Value = DepthOutput> {
+    one_of(
+        DepthOutput::name,
+        &[
+            (DepthOutput::DepthPng, "16-bit PNG, metres × 256"),
+            (DepthOutput::Npy, "H×W f32 metres, for NumPy"),
+            (
+                DepthOutput::Sigma,
+                "How sure the network is: H×W f32, the standard deviation of depth in metres, for NumPy; of networks that learned it",
+            ),
+            (
+                DepthOutput::Confidence,
+                "How far each pixel can be trusted: H×W f32 from 0 to 1, for NumPy; 0.9 where an error of 10 % is to be expected. Of networks that say how sure they are",
+            ),
+            (
+                DepthOutput::Color,
+                "Depth in colours with a legend in metres",
+            ),
+            (
+                DepthOutput::Image,
+                "The image itself as JPEG: `view` shows it where it is no file of its own",
+            ),
+            (
+                DepthOutput::SideBySide,
+                "The image and its depth in colours",
+            ),
+            (
+                DepthOutput::Ply,
+                "Coloured point cloud in the camera's axes, as PLY",
+            ),
+            (
+                DepthOutput::Pcd,
+                "The same as PCD, for the Point Cloud Library and ROS",
+            ),
+            (
+                DepthOutput::Features,
+                "What the network sees: its features and attention masks on the image",
+            ),
+            (
+                DepthOutput::Video,
+                "The pictures of `side-by-side`, which are kept, too, as an MP4 of each recording (through ffmpeg)",
+            ),
+        ],
+    )
+}
+
+/// What `perceive` writes for a frame, beside its targets.
+pub(super) fn target_output() -> impl TypedValueParser<Value = TargetOutput> {
+    one_of(
+        TargetOutput::name,
+        &[
+            (
+                TargetOutput::DepthPng,
+                "Depth as 16-bit PNG, metres × 256: what `view` shows",
+            ),
+            (
+                TargetOutput::Sigma,
+                "How sure the network is, as `predict --save sigma` writes it: `view` can then fade what is unsure",
+            ),
+            (TargetOutput::Overlay, "The image with boxes"),
+            (
+                TargetOutput::BirdsEye,
+                "The road from above: free space, boxes, velocities",
+            ),
+            (
+                TargetOutput::Segments,
+                "Disparity with each target in its colour",
+            ),
+            (
+                TargetOutput::Ply,
+                "Coloured point cloud in the camera's axes, without the points that hang between near and far, as PLY",
+            ),
+            (
+                TargetOutput::Pcd,
+                "The same as PCD, for the Point Cloud Library and ROS",
+            ),
+        ],
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -260,6 +342,10 @@ mod tests {
     fn whatever_the_library_lists_is_offered() {
         assert_eq!(names(&preset()), Preset::ALL.map(Preset::name));
         assert_eq!(names(&scene()), Scene::ALL.map(Scene::name));
+        let outputs = DepthOutput::ALL.map(DepthOutput::name);
+        assert_eq!(names(&depth_output()), outputs);
+        let outputs = TargetOutput::ALL.map(TargetOutput::name);
+        assert_eq!(names(&target_output()), outputs);
     }
 
     /// The names are those of the files, so that what is printed can be typed.

@@ -1,10 +1,11 @@
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use deepfusion_jobs::outputs::{CloudLimits, DepthOutputs, TargetOutput};
 
 use super::live::HEADING;
 use super::values::{not_negative, positive};
-use super::{InstanceArgs, Outputs, PredictionArgs, Save};
+use super::{InstanceArgs, PredictionArgs, names};
 
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
@@ -25,8 +26,8 @@ pub(crate) struct PerceiveArgs {
     #[command(flatten)]
     pub prediction: PredictionArgs,
     /// What to write for every frame, beside its targets.
-    #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "overlay"])]
-    pub save: Vec<PerceiveSave>,
+    #[arg(long, value_parser = names::target_output(), value_delimiter = ',', default_values = ["depth-png", "overlay"])]
+    pub save: Vec<TargetOutput>,
     /// Farthest depth that is looked at, in metres [default: 60, or what --config says].
     #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = positive)]
     pub max_depth: Option<f64>,
@@ -44,38 +45,14 @@ pub(crate) struct PerceiveArgs {
     pub json: bool,
 }
 
-/// What `perceive` writes for a frame, beside its targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PerceiveSave {
-    /// Depth as 16-bit PNG, metres × 256: what `view` shows.
-    DepthPng,
-    /// How sure the network is, as `predict --save sigma` writes it: `view` can then fade what is unsure.
-    Sigma,
-    /// The image with boxes.
-    Overlay,
-    /// The road from above: free space, boxes, velocities.
-    BirdsEye,
-    /// Disparity with each target in its colour.
-    Segments,
-    /// Coloured point cloud in the camera's axes, without the points that hang between near and far, as PLY.
-    Ply,
-    /// The same as PCD, for the Point Cloud Library and ROS.
-    Pcd,
-}
-
 impl PerceiveArgs {
     /// What is kept of the prediction that this stands on.
-    pub(crate) fn outputs(&self, max_depth_m: f64) -> Outputs {
-        let both = [
-            (PerceiveSave::DepthPng, Save::DepthPng),
-            (PerceiveSave::Sigma, Save::Sigma),
-        ];
-        let asked = both.iter().filter(|(asked, _)| self.save.contains(asked));
-        Outputs {
-            save: asked.map(|(_, save)| *save).collect(),
-            frames: true,
+    pub(crate) fn outputs(&self, max_depth_m: f64) -> DepthOutputs {
+        let limits = CloudLimits {
             max_depth_m,
             max_sigma: None,
-        }
+        };
+        let asked = self.save.iter().filter_map(|save| save.of_prediction());
+        DepthOutputs::of(asked, true, limits)
     }
 }

@@ -1,10 +1,11 @@
 use std::path::PathBuf;
 
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgGroup, Args};
+use deepfusion_jobs::outputs::{CloudLimits, DepthOutput, DepthOutputs};
 use deepfusion_model::Preset;
 
 use super::values::positive;
-use super::{EngineArgs, Outputs, PredictionArgs, Shard, Size, names};
+use super::{EngineArgs, PredictionArgs, Shard, Size, names};
 
 /// `deepfusion predict`.
 #[derive(Debug, Args)]
@@ -26,8 +27,8 @@ pub(crate) struct PredictArgs {
     #[command(flatten)]
     pub prediction: PredictionArgs,
     /// What to write for every image [default: depth-png,color; of films and bags image, too].
-    #[arg(long, value_enum, value_delimiter = ',')]
-    pub save: Option<Vec<Save>>,
+    #[arg(long, value_parser = names::depth_output(), value_delimiter = ',')]
+    pub save: Option<Vec<DepthOutput>>,
     /// Leave out points of the cloud beyond this depth, in metres.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
@@ -51,29 +52,17 @@ pub(crate) struct PredictArgs {
 
 impl PredictArgs {
     /// What is kept of every image.
-    pub(crate) fn outputs(&self) -> Outputs {
-        // A video is made of pictures, when they are all there.
-        let of_an_image = |save: &Save| match save {
-            Save::Video => Save::SideBySide,
-            other => *other,
-        };
-        let mut save: Vec<Save> = Vec::new();
-        for each in self.asked().iter().map(of_an_image) {
-            if !save.contains(&each) {
-                save.push(each);
-            }
-        }
-        Outputs {
-            save,
-            frames: self.save.is_none(),
+    pub(crate) fn outputs(&self) -> DepthOutputs {
+        let limits = CloudLimits {
             max_depth_m: self.max_depth,
             max_sigma: self.max_sigma,
-        }
+        };
+        DepthOutputs::of(self.asked().iter().copied(), self.save.is_none(), limits)
     }
 
     /// What `--save` says.
-    fn asked(&self) -> &[Save] {
-        let default = &[Save::DepthPng, Save::Color];
+    fn asked(&self) -> &[DepthOutput] {
+        let default = &[DepthOutput::DepthPng, DepthOutput::Color];
         self.save.as_deref().unwrap_or(default)
     }
 
@@ -84,42 +73,7 @@ impl PredictArgs {
 
     /// Whether videos are wanted.
     pub(crate) fn video(&self) -> bool {
-        self.asked().contains(&Save::Video)
-    }
-}
-
-/// What `predict` writes for an image, beside the JSON sidecar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Save {
-    /// 16-bit PNG, metres × 256.
-    DepthPng,
-    /// H×W f32 metres, for NumPy.
-    Npy,
-    /// How sure the network is: H×W f32, the standard deviation of depth in metres, for NumPy; of networks that learned it.
-    Sigma,
-    /// How far each pixel can be trusted: H×W f32 from 0 to 1, for NumPy; 0.9 where an error of 10 % is to be expected. Of networks that
-    /// say how sure they are.
-    Confidence,
-    /// Depth in colours with a legend in metres.
-    Color,
-    /// The image itself as JPEG: `view` shows it where it is no file of its own.
-    Image,
-    /// The image and its depth in colours.
-    SideBySide,
-    /// Coloured point cloud in the camera's axes, as PLY.
-    Ply,
-    /// The same as PCD, for the Point Cloud Library and ROS.
-    Pcd,
-    /// What the network sees: its features and attention masks on the image.
-    Features,
-    /// The pictures of `side-by-side`, which are kept, too, as an MP4 of each recording (through ffmpeg).
-    Video,
-}
-
-impl Save {
-    /// Whether it is a cloud, which needs the camera.
-    pub(crate) fn is_cloud(self) -> bool {
-        matches!(self, Self::Ply | Self::Pcd)
+        self.asked().contains(&DepthOutput::Video)
     }
 }
 

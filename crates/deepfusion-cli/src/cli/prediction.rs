@@ -6,7 +6,7 @@ use deepfusion_eval::PostProcess;
 use deepfusion_motion::ScaleMonitorConfig;
 
 use super::values::{hfov, positive};
-use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save, names};
+use super::{CameraIntrinsics, EngineArgs, LiveArgs, names};
 
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
 #[derive(Debug, Clone, Args)]
@@ -87,29 +87,5 @@ impl PredictionArgs {
             height_m: self.camera_height,
             ..ScaleMonitorConfig::default()
         }
-    }
-}
-
-/// What is kept of every image.
-#[derive(Debug, Clone)]
-pub(crate) struct Outputs {
-    /// Beside the sidecar.
-    pub save: Vec<Save>,
-    /// The images of films, bags and live sources, too, which are no files of their own.
-    pub frames: bool,
-    /// Points of a cloud beyond this depth are left out, metres.
-    pub max_depth_m: f64,
-    /// Points whose standard deviation is above this share of their depth are left out, too.
-    pub max_sigma: Option<f64>,
-}
-
-impl Outputs {
-    /// What is kept of one image. `is_file`: it is a file of its own, which whoever looks at its depth can open.
-    pub(crate) fn of_image(&self, is_file: bool) -> Vec<Save> {
-        let mut save = self.save.clone();
-        if self.frames && !is_file && !save.contains(&Save::Image) {
-            save.push(Save::Image);
-        }
-        save
     }
 }

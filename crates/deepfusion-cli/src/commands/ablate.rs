@@ -6,7 +6,7 @@ use std::time::Instant;
 use deepfusion_data::OpenOptions;
 use deepfusion_jobs::recordings::camera_word;
 use deepfusion_jobs::training::ablation::{OpenRun, Plan, Row, Run, RunResult, table, text};
-use deepfusion_model::{Preset, TrainConfig, ViewMotion};
+use deepfusion_model::{Preset, SettingProblem, TrainConfig, ViewMotion};
 use deepfusion_runtime::ModelSource;
 
 use super::recordings::{open_samples, print_warnings, warn_of_sample};
@@ -96,7 +96,8 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     config.batch = args.batch.unwrap_or(config.batch);
     for assignment in &args.set {
         if let Some(reason) = decided_by_the_table(assignment) {
-            let (assignment, reason) = (assignment.clone(), reason.into());
+            let (assignment, reason) =
+                (assignment.clone(), SettingProblem::DecidedElsewhere(reason));
             return Err(deepfusion_model::Error::Setting { assignment, reason }.into());
         }
         config.set(assignment)?;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use deepfusion_jobs::training::Pace;
 use deepfusion_jobs::training::adaptation::{
     AdaptSettings, Adaptation, Outcome, assumed_camera, require_new, undo,
 };
@@ -9,7 +10,6 @@ use deepfusion_model::SimulatedCamera;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
 use super::recordings::{print_warnings, warn_of_sample};
-use super::time_estimate::TimeEstimate;
 use super::{clocks, train};
 use crate::cli::{AdaptArgs, EngineArgs, SimulatedView};
 use crate::error::CliError;
@@ -50,8 +50,8 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
     }
     let mut trainer =
         adaptation.trainer(&mut print_warnings, &mut warn_of_sample, &mut train::began)?;
-    let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
-    let summary = train::train(&mut trainer, Some(time_estimate))?;
+    let pace = Pace::of(trainer.config().clone(), args.device.compute());
+    let summary = train::train(&mut trainer, Some(pace))?;
     drop(trainer);
     if summary.step < summary.steps {
         return Err(CliError::Stopped {

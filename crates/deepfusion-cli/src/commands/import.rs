@@ -1,11 +1,8 @@
-use std::io::ErrorKind;
 use std::path::Path;
 
 use deepfusion_data::OpenOptions;
 use deepfusion_hint::count_of;
-use deepfusion_logs::{
-    Camera, Clock, DriveFolder, DriveLog, Media, ReadOptions, read, time_on_clock,
-};
+use deepfusion_logs::{Camera, Clock, DriveFolder, Media, ReadOptions, read_all, time_on_clock};
 
 use super::clocks;
 use crate::cli::{CameraIntrinsics, ClockOffset, ImportArgs};
@@ -21,7 +18,14 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         let path = path.clone();
         return Err(deepfusion_data::Error::NoSuchPath { path }.into());
     }
-    let log = merged(args)?;
+    let options = ReadOptions {
+        time: args.time.clone(),
+        speed: args.speed.clone(),
+        unit: args.unit,
+        dbc: args.dbc.clone(),
+    };
+    // clap asks for one log at least.
+    let log = read_all(&args.logs, &options, args.zone.unwrap_or(0))?.ok_or(CliError::NoMedia)?;
     let start_ns = match &args.start {
         None => None,
         Some(word) => {
@@ -87,55 +91,15 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
     Ok(())
 }
 
-/// The speeds of the first log that has some, with the turns of the first that has some.
-fn merged(args: &ImportArgs) -> Result<DriveLog> {
-    let options = ReadOptions {
-        time: args.time.clone(),
-        speed: args.speed.clone(),
-        unit: args.unit,
-        dbc: args.dbc.clone(),
-    };
-    let mut merged: Option<DriveLog> = None;
-    for path in &args.logs {
-        let log = read(path, &options)?.in_zone(args.zone.unwrap_or(0));
-        match &mut merged {
-            None => merged = Some(log),
-            Some(first) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
-                if first.clock != log.clock {
-                    return Err(CliError::OtherClock { path: path.clone() }.into());
-                }
-                first.yaw_rates = log.yaw_rates;
-                first.notes.extend(log.notes);
-            }
-            Some(_) => {}
-        }
-    }
-    // clap asks for one log at least.
-    merged.ok_or_else(|| CliError::NoMedia.into())
-}
-
-/// Writes the folder, measures in it how far the camera's clock is ahead of the log's, and writes it again with that. Where that is not
-/// found, or Ctrl-C asks for it to stop, nothing is left that looks finished.
+/// Writes the folder with the offset of the clocks that its pictures show. Ctrl-C leaves nothing that looks finished.
 fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<String>> {
     folder.check(out)?;
-    let made = !out.exists();
     interrupt::catch("stopping once the clocks are compared; nothing is written");
-    folder.write(out)?;
-    let measured = clocks::seconds_of(Some(ClockOffset::Auto), out, &OpenOptions::default())
-        .and_then(|ahead_s| interrupt::check("comparing the clocks").map(|()| ahead_s));
-    // `dataset.toml`, which makes the folder a recording, first.
-    for file in DriveFolder::FILES.iter().rev().map(|name| out.join(name)) {
-        match std::fs::remove_file(&file) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
-            _ => {}
-        }
-    }
-    if measured.is_err() && made {
-        // Frames that were decoded stay for the next try.
-        let _ = std::fs::remove_dir(out);
-    }
-    folder.camera_ahead_s = measured?;
-    Ok(folder.write(out)?)
+    folder.write_measured(out, |out| {
+        let ahead_s = clocks::seconds_of(Some(ClockOffset::Auto), out, &OpenOptions::default())?;
+        interrupt::check("comparing the clocks")?;
+        Ok(ahead_s)
+    })
 }
 
 fn media(args: &ImportArgs, clock: Clock) -> Result<Media> {

@@ -35,8 +35,6 @@ mod resume;
 mod run_report;
 mod simulate;
 #[cfg(feature = "train")]
-mod time_estimate;
-#[cfg(feature = "train")]
 mod train;
 mod used_checkpoint;
 mod view;

@@ -4,10 +4,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use deepfusion_hint::count_of;
-use deepfusion_jobs::training::RunLog;
+use deepfusion_jobs::training::{Choice, Pace, RunLog, TimeEstimate};
 use deepfusion_train::{Control, LossTerms, TrainEvent};
 
-use super::time_estimate::TimeEstimate;
 use crate::failure::{Failure, Result};
 use crate::interrupt;
 use crate::progress::{Progress, clock, say};
@@ -20,23 +19,20 @@ pub(super) struct Recorder {
     log: RunLog,
     progress: Progress,
     last_line: Instant,
-    time_estimate: Option<TimeEstimate>,
+    /// Where it is to be said how long the run will take.
+    pace: Option<Pace>,
     /// The first failure to write a log: training goes on, the command ends with it.
     failure: Option<Failure>,
 }
 
 impl Recorder {
-    /// For the run in `folder`, going on after `step`; with a `time_estimate` it says how long the run will take.
-    pub(super) fn open(
-        folder: &Path,
-        step: usize,
-        time_estimate: Option<TimeEstimate>,
-    ) -> Result<Self> {
+    /// For the run in `folder`, going on after `step`; with a `pace` it says how long the run will take.
+    pub(super) fn open(folder: &Path, step: usize, pace: Option<Pace>) -> Result<Self> {
         Ok(Self {
             log: RunLog::open(folder, step)?,
             progress: Progress::new("training"),
             last_line: Instant::now(),
-            time_estimate,
+            pace,
             failure: None,
         })
     }
@@ -113,10 +109,10 @@ impl Recorder {
                     self.last_line = Instant::now();
                     say(&format!("step {step}/{steps}: {line}"));
                 }
-                if let Some(time_estimate) = &mut self.time_estimate
-                    && let Some(line) = time_estimate.after_step(step, steps)
+                if let Some(pace) = &mut self.pace
+                    && let Some(estimate) = pace.after_step(step, steps)
                 {
-                    say(&line);
+                    say(&how_long(&estimate));
                 }
             }
             TrainEvent::Validated {
@@ -183,4 +179,73 @@ fn held_out_terms(losses: &LossTerms) -> String {
         terms.push(format!("depth {:.4}", losses.depth));
     }
     terms.join(", ")
+}
+
+/// How long a run will take, and the options that choose otherwise.
+fn how_long(estimate: &TimeEstimate) -> String {
+    let pace = match estimate.step_s {
+        s if s < 10.0 => format!("{s:.2} s"),
+        s => format!("{s:.0} s"),
+    };
+    let mut line = format!(
+        "about {} from here: {} steps of {pace}",
+        clock(estimate.total_s()),
+        estimate.steps
+    );
+    let choices = estimate.choices.iter().map(|(choice, total_s)| {
+        let option = match choice {
+            Choice::Size(size) => format!("--size {}x{}", size.width, size.height),
+            Choice::Preset(preset) => format!("--preset {preset}"),
+        };
+        format!("{option} about {}", clock(*total_s))
+    });
+    let choices: Vec<String> = choices.collect();
+    if !choices.is_empty() {
+        line.push_str(&format!(
+            "; as many with {} (by their multiply-adds)",
+            choices.join(", ")
+        ));
+    }
+    if estimate.bf16 {
+        line.push_str("; on this processor --set precision=bf16 is nearly twice as fast");
+    }
+    line.push_str("; --steps N changes the length");
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_model::{InputSize, Preset};
+
+    #[test]
+    fn the_line_names_the_options_that_choose_otherwise() {
+        let mut estimate = TimeEstimate {
+            steps: 1200,
+            step_s: 1.0,
+            choices: vec![
+                (
+                    Choice::Size(InputSize {
+                        width: 640,
+                        height: 192,
+                    }),
+                    4800.0,
+                ),
+                (Choice::Preset(Preset::Tiny), 300.0),
+            ],
+            bf16: false,
+        };
+        assert_eq!(
+            how_long(&estimate),
+            "about 20:00 min from here: 1200 steps of 1.00 s; as many with --size 640x192 about 1 h 20 min, --preset tiny about \
+             5:00 min (by their multiply-adds); --steps N changes the length"
+        );
+        (estimate.bf16, estimate.step_s) = (true, 12.4);
+        estimate.choices.clear();
+        let line = how_long(&estimate);
+        assert!(
+            line.contains("steps of 12 s; on this processor --set precision=bf16"),
+            "{line}"
+        );
+    }
 }

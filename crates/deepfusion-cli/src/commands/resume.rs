@@ -1,19 +1,35 @@
-//! What the options of `train --resume` may change of a run, and what contradicts it.
+//! The options of `train --resume` as what they ask of the run ([`resume`]).
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use deepfusion_jobs::recordings::camera_word;
-use deepfusion_jobs::training::Start;
-use deepfusion_model::TrainConfig;
+use deepfusion_jobs::Error;
+use deepfusion_jobs::training::resume::{
+    self, Asked, ClockAhead, Contradiction, MovedRecordings, ResumeRequest, Setting,
+};
+use deepfusion_model::{InputSize, TrainConfig};
 
 use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
 
-/// A run's configuration with what was asked for: it may be made longer, and its recordings may have moved; all else must be as
-/// the run has it.
+/// A run's configuration with what was asked for.
 pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
+    resume::go_on_with(run, &request(args)?).map_err(|error| match error {
+        Error::Contradiction(Contradiction {
+            setting,
+            asked,
+            run,
+        }) => CliError::Contradicts {
+            option: option_of(&setting),
+            asked: typed(asked),
+            run,
+        }
+        .into(),
+        other => other.into(),
+    })
+}
+
+fn request(args: &TrainArgs) -> Result<ResumeRequest> {
     // Every option by name: one that is added says here what becomes of it.
     let TrainArgs {
         data,
@@ -21,7 +37,7 @@ pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainC
         config: file,
         out: _,
         resume: _,
-        device: _,
+        device,
         epochs,
         steps,
         size,
@@ -42,255 +58,83 @@ pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainC
         without,
         set,
     } = args;
-    let mut config = run.clone();
-    config.data.make_absolute();
-    if let Some(path) = file {
-        take_file(&mut config, path, args)?;
-    }
-    if let Some(preset) = preset {
-        same("--preset", preset.to_string(), run.preset.to_string())?;
-    }
-    if let Some(size) = size {
-        let asked = format!("{}x{}", size.width, size.height);
-        let found = format!("{}x{}", run.size.width, run.size.height);
-        same("--size", asked, found)?;
-    }
-    if let Some(batch) = batch {
-        same("--batch", batch.to_string(), run.batch.to_string())?;
-    }
-    if let Some(seed) = seed {
-        same("--seed", seed.to_string(), run.seed.to_string())?;
-    }
-    if let Some(learn) = learn {
-        let found = run.data.learn.name();
-        same("--learn", learn.name().into(), found.into())?;
-    }
-    if let Some(camera) = camera {
-        let found = camera_of(&config);
-        same("--camera", camera_word(*camera).into(), found)?;
-    }
-    if *stereo && !run.stereo {
-        return contradicts("--stereo", "on".into(), "has it off".into());
-    }
-    if intrinsics.is_some() {
-        let found = run.learned_camera().map_or("none", |_| "learn");
-        same("--intrinsics", "learn".into(), found.into())?;
-    }
-    if let Some(motion) = view_motion {
-        let found = run.view_motion.name();
-        same("--view-motion", motion.name().into(), found.into())?;
-    }
-    for term in with {
-        let mut other = run.clone();
-        other.with(term)?;
-        if other != *run {
-            return contradicts("--with", term.clone(), "is learned without it".into());
+    let file = match file {
+        Some(path) => {
+            let config = TrainConfig::read_over_preset(path, device.compute())?;
+            Some((path.clone(), Box::new(config)))
         }
-    }
-    for term in without {
-        let mut other = run.clone();
-        other.without(term)?;
-        if other != *run {
-            return contradicts("--without", term.clone(), "is learned with it".into());
-        }
-    }
-    for assignment in set {
-        let mut other = run.clone();
-        other.set(assignment)?;
-        if other != *run {
-            let found = "has another value in its config.toml";
-            return contradicts("--set", assignment.clone(), found.into());
-        }
-    }
-    if let Some(asked) = init {
-        // `none`, and the names of embedded networks, are no paths.
-        let asked = match (Start::is_none(asked), &run.init_sha256) {
-            (true, _) | (false, Some(_)) => asked.clone(),
-            (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.clone()),
-        };
-        let found = run.init.as_deref().map_or("none".into(), path_text);
-        same("--init", path_text(&asked), found)?;
-    }
-    let in_ms = |s: f64| format!("{} ms", 1000.0 * s);
-    let found = run.data.camera_ahead_s.map(in_ms);
-    match clock_offset {
-        // What was measured when the run began holds.
-        Some(ClockOffset::Auto) if found.is_some() => {}
-        Some(ClockOffset::Auto) => same("--clock-offset", "auto".into(), "none".into())?,
-        Some(ClockOffset::Seconds(ahead_s)) => {
-            let found = found.unwrap_or("none".into());
-            same("--clock-offset", in_ms(*ahead_s), found)?;
-        }
-        None => {}
-    }
-    for topic in topics {
-        let topic = topic.to_string();
-        if !run.data.topics.contains(&topic) {
-            let found = match run.data.topics.as_slice() {
-                [] => "names none".into(),
-                topics => format!("has {}", topics.join(", ")),
-            };
-            return contradicts("--topic", topic, found);
-        }
-    }
-    move_recordings(
-        &mut config,
-        data,
-        val_data,
-        [split.as_deref(), val_split.as_deref()],
-    )?;
-    config.steps = steps.or(config.steps);
-    if let Some(epochs) = epochs {
-        (config.epochs, config.steps, config.min_steps) = (*epochs, None, 0);
-    }
-    Ok(config)
+        None => None,
+    };
+    Ok(ResumeRequest {
+        file,
+        moved: MovedRecordings {
+            data: data.clone(),
+            validation: val_data.clone(),
+            split: split.clone(),
+            validation_split: val_split.clone(),
+        },
+        steps: *steps,
+        epochs: *epochs,
+        preset: *preset,
+        size: size.map(|size| InputSize {
+            width: size.width as usize,
+            height: size.height as usize,
+        }),
+        batch: *batch,
+        seed: *seed,
+        learn: *learn,
+        camera: *camera,
+        stereo: *stereo,
+        learned_camera: intrinsics.is_some(),
+        view_motion: *view_motion,
+        with: with.clone(),
+        without: without.clone(),
+        assignments: set.clone(),
+        init: init.clone(),
+        clock: clock_offset.as_ref().map(|offset| match offset {
+            ClockOffset::Auto => ClockAhead::Measured,
+            ClockOffset::Seconds(ahead_s) => ClockAhead::Seconds(*ahead_s),
+        }),
+        topics: topics.iter().map(ToString::to_string).collect(),
+    })
 }
 
-/// The places where the same recordings are now.
-fn move_recordings(
-    config: &mut TrainConfig,
-    data: &[PathBuf],
-    val_data: &[PathBuf],
-    splits: [Option<&Path>; 2],
-) -> Result<()> {
-    let of_sets = "has the data.sets of its config.toml, each with its own".to_owned();
-    let sets = !config.data.sets.is_empty();
-    if !data.is_empty() {
-        if sets {
-            return contradicts("--data", list(data), of_sets);
-        }
-        config.data.paths = data.to_vec();
-    }
-    if !val_data.is_empty() {
-        if sets {
-            return contradicts("--val-data", list(val_data), of_sets);
-        }
-        if config.data.validation.is_empty() {
-            let found = "is validated on the held-out end of each drive";
-            return contradicts("--val-data", list(val_data), found.into());
-        }
-        config.data.validation = val_data.to_vec();
-    }
-    let data = &mut config.data;
-    let kept = [
-        ("--split", &mut data.split),
-        ("--val-split", &mut data.validation_split),
-    ];
-    for ((option, kept), split) in kept.into_iter().zip(splits) {
-        let Some(split) = split else { continue };
-        if kept.is_none() {
-            let found = if sets {
-                of_sets.clone()
-            } else {
-                "has none".into()
-            };
-            return contradicts(option, path_text(split), found);
-        }
-        *kept = Some(split.to_owned());
-    }
-    config.data.make_absolute();
-    Ok(())
-}
-
-/// What a configuration file may change, and that it says nothing else than the run's.
-fn take_file(config: &mut TrainConfig, path: &Path, args: &TrainArgs) -> Result<()> {
-    let file = TrainConfig::read_over_preset(path, args.device.compute())?;
-    (config.steps, config.epochs) = (file.steps, file.epochs);
-    config.min_steps = file.min_steps;
-    config.checkpoint_minutes = file.checkpoint_minutes;
-    // What a run fills in from its data, or the options say, is not the file's to say.
-    let mut asked = file;
-    asked.data.make_absolute();
-    asked.init.clone_from(&config.init);
-    asked.init_sha256.clone_from(&config.init_sha256);
-    if asked.pose_net.metres_per_unit == 0.0 {
-        asked.pose_net.metres_per_unit = config.pose_net.metres_per_unit;
-    }
-    for (asked, has) in asked.data.sets.iter_mut().zip(&config.data.sets) {
-        if asked.metres_per_unit == 0.0 {
-            asked.metres_per_unit = has.metres_per_unit;
-        }
-    }
-    let (asked_data, has) = (&mut asked.data, &config.data);
-    if !args.data.is_empty() {
-        asked_data.paths.clone_from(&has.paths);
-    }
-    if !args.val_data.is_empty() {
-        asked_data.validation.clone_from(&has.validation);
-    }
-    if args.split.is_some() {
-        asked_data.split.clone_from(&has.split);
-    }
-    if args.val_split.is_some() {
-        asked_data
-            .validation_split
-            .clone_from(&has.validation_split);
-    }
-    let mut has = config.clone();
-    (asked.data.camera, has.data.camera) = (camera_of(&asked), camera_of(&has));
-    let (asked, has) = (settings(&asked)?, settings(&has)?);
-    let keys = asked.keys().chain(has.keys());
-    for key in keys {
-        if asked.get(key) != has.get(key) {
-            let of = |settings: &BTreeMap<String, String>| {
-                let value = settings.get(key).map_or("nothing", String::as_str);
-                format!("{key} = {value}")
-            };
-            let option = format!("--config {}", path.display());
-            return contradicts(&option, of(&asked), format!("has {}", of(&has)));
-        }
-    }
-    Ok(())
-}
-
-/// Every setting by its dotted key.
-fn settings(config: &TrainConfig) -> Result<BTreeMap<String, String>> {
-    fn add(all: &mut BTreeMap<String, String>, prefix: &str, table: &toml::Table) {
-        for (key, value) in table {
-            let key = format!("{prefix}{key}");
-            match value {
-                toml::Value::Table(inner) => add(all, &format!("{key}."), inner),
-                value => drop(all.insert(key, value.to_string())),
-            }
-        }
-    }
-    let mut all = BTreeMap::new();
-    add(&mut all, "", &toml::Table::try_from(config)?);
-    Ok(all)
-}
-
-/// Which cameras a run learns from; nothing said means 2.
-fn camera_of(config: &TrainConfig) -> String {
-    match config.data.camera.as_str() {
-        "" => "2".into(),
-        camera => camera.into(),
+/// What is typed to ask for it.
+fn typed(asked: Asked) -> String {
+    match asked {
+        Asked::Value(value) => value,
+        Asked::Learned => "learn".into(),
+        Asked::Measured => "auto".into(),
+        other => other.to_string(),
     }
 }
 
-fn same(option: &str, asked: String, found: String) -> Result<()> {
-    if asked == found {
-        Ok(())
-    } else {
-        contradicts(option, asked, format!("has {found}"))
+/// The option that asks for a setting.
+fn option_of(setting: &Setting) -> String {
+    match setting {
+        Setting::File(path) => return format!("--config {}", path.display()),
+        Setting::Preset => "--preset",
+        Setting::Size => "--size",
+        Setting::Batch => "--batch",
+        Setting::Seed => "--seed",
+        Setting::Learn => "--learn",
+        Setting::Camera => "--camera",
+        Setting::Stereo => "--stereo",
+        Setting::LearnedCamera => "--intrinsics",
+        Setting::ViewMotion => "--view-motion",
+        Setting::With => "--with",
+        Setting::Without => "--without",
+        Setting::Assignment => "--set",
+        Setting::Init => "--init",
+        Setting::Clock => "--clock-offset",
+        Setting::Topic => "--topic",
+        Setting::Data => "--data",
+        Setting::Validation => "--val-data",
+        Setting::Split => "--split",
+        Setting::ValidationSplit => "--val-split",
+        other => return other.to_string(),
     }
-}
-
-fn contradicts<T>(option: &str, asked: String, run: String) -> Result<T> {
-    Err(CliError::Contradicts {
-        option: option.to_owned(),
-        asked,
-        run,
-    }
-    .into())
-}
-
-fn list(paths: &[PathBuf]) -> String {
-    let paths: Vec<String> = paths.iter().map(|p| path_text(p)).collect();
-    paths.join(" ")
-}
-
-fn path_text(path: &Path) -> String {
-    path.display().to_string()
+    .to_owned()
 }
 
 /// Where an error is that one of the run's recordings is not there, one whose hint is the option that says where it is now.
@@ -298,25 +142,11 @@ pub(super) fn where_recordings_are(error: Failure, config: &TrainConfig, run: &P
     let Some(path) = error.missing().map(Path::to_owned) else {
         return error;
     };
-    // What is missing may lie within what was given.
-    let within = |given: &PathBuf| path.starts_with(given);
-    let data = &config.data;
-    let option = if data.paths.iter().any(within) {
-        Some("--data")
-    } else if data.validation.iter().any(within) {
-        Some("--val-data")
-    } else if data.split.iter().any(within) {
-        Some("--split")
-    } else if data.validation_split.iter().any(within) {
-        Some("--val-split")
-    } else if data.sets.iter().any(|set| {
-        let all = set.paths.iter().chain(&set.validation);
-        let mut all = all.chain(&set.split).chain(&set.validation_split);
-        all.any(within)
-    }) {
-        None
-    } else {
-        return error;
+    let option = match resume::setting_of(&path, config) {
+        // It stands in the run's configuration alone.
+        Some(Setting::DataSet) => None,
+        Some(setting) => Some(option_of(&setting)),
+        None => return error,
     };
     let run = run.to_owned();
     CliError::Moved { path, run, option }.into()
@@ -327,6 +157,7 @@ mod tests {
     use super::*;
     use clap::{CommandFactory, Parser};
     use deepfusion_model::Preset;
+    use std::path::PathBuf;
 
     #[derive(Parser)]
     struct Alone {
@@ -517,6 +348,16 @@ mod tests {
         );
         assert!(hint.contains("--data PATH"), "{hint}");
         assert!(explained("/data/val/x").1.contains("--val-data PATH"));
+        // A data set's own is named in the run's configuration alone.
+        let with_sets = TrainConfig {
+            data: toml::from_str("sets = [{ name = 'road', paths = ['/road'] }]").unwrap(),
+            ..a_run()
+        };
+        let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
+        let error = deepfusion_data::Error::file(Path::new("/road/a"), missing);
+        let error = where_recordings_are(error.into(), &with_sets, Path::new("runs/a"));
+        let hint = error.hint().unwrap_or_default();
+        assert!(hint.contains("config.toml"), "{hint}");
         // Another file is another matter.
         assert!(!explained("/etc/x").0.contains("runs/a"));
     }

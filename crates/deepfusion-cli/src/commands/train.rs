@@ -1,7 +1,7 @@
 use deepfusion_data::Cameras;
 use deepfusion_hint::count_of;
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
-use deepfusion_jobs::training::{Began, Start};
+use deepfusion_jobs::training::{Began, Pace, Start};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder,
     TrainConfig, ViewMotion,
@@ -10,7 +10,6 @@ use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 
 use super::recorder::Recorder;
 use super::recordings::open_samples;
-use super::time_estimate::TimeEstimate;
 use super::{clocks, resume};
 use crate::allocator;
 use crate::cli::{ClockOffset, TrainArgs};
@@ -64,8 +63,8 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     if let Some(advice) = unused_turns(&trainer, args) {
         say(&advice);
     }
-    let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
-    let summary = train(&mut trainer, Some(time_estimate))?;
+    let pace = Pace::of(trainer.config().clone(), args.device.compute());
+    let summary = train(&mut trainer, Some(pace))?;
     if let Some(bytes) = peak_device_bytes(&device) {
         let megabytes = devices::megabytes(bytes);
         say(&format!("memory of the device: {megabytes:.0} MB at most"));
@@ -148,15 +147,12 @@ fn plan(trainer: &Trainer) -> String {
     )
 }
 
-/// Runs a trainer with its logs, to its last step or until it is asked to stop; with a `time_estimate`, how long it will
+/// Runs a trainer with its logs, to its last step or until it is asked to stop; with a `pace`, how long it will
 /// take is said.
-pub(super) fn train(
-    trainer: &mut Trainer,
-    time_estimate: Option<TimeEstimate>,
-) -> Result<TrainSummary> {
+pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSummary> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
-    let mut recorder = Recorder::open(trainer.folder(), trainer.step(), time_estimate)?;
+    let mut recorder = Recorder::open(trainer.folder(), trainer.step(), pace)?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     recorder.finish()?;
     say(&format!(

@@ -9,20 +9,10 @@ pub(crate) trait Context<T> {
     /// # Errors
     /// The same, as a [`Failure`].
     fn context(self, what: impl Into<String>) -> Result<T>;
-
-    /// Puts what `what` returns before an error.
-    ///
-    /// # Errors
-    /// The same, as a [`Failure`].
-    fn with_context(self, what: impl FnOnce() -> String) -> Result<T>;
 }
 
 impl<T, E: Into<Failure>> Context<T> for std::result::Result<T, E> {
     fn context(self, what: impl Into<String>) -> Result<T> {
         self.map_err(|error| error.into().context(what))
-    }
-
-    fn with_context(self, what: impl FnOnce() -> String) -> Result<T> {
-        self.map_err(|error| error.into().context(what()))
     }
 }

@@ -478,10 +478,6 @@ macro_rules! foreign {
 
 foreign!(
     clap::Error,
-    image::ImageError,
-    ndarray::ShapeError,
-    ndarray_npy::ReadNpyError,
-    ndarray_npy::WriteNpyError,
     serde_json::Error,
     std::io::Error,
     toml::de::Error,

@@ -42,10 +42,9 @@ impl CameraCalibration {
         } else {
             numbers::parse(&text)
         };
-        let numbers = numbers.map_err(|refusal| Error::CameraFile {
+        let numbers = numbers.map_err(|problem| Error::CameraFile {
             by: path.into(),
-            problem: refusal.problem,
-            remedy: refusal.remedy,
+            problem: problem.into(),
         })?;
         Self::from_numbers(numbers, image_size, path.into())
     }
@@ -85,8 +84,7 @@ impl CameraCalibration {
         if let Some(problem) = intrinsics.implausible() {
             return Err(Error::CameraFile {
                 by: source,
-                problem,
-                remedy: "give the calibration of these images, in their own pixels".into(),
+                problem: problem.into(),
             });
         }
         Ok(Self {
@@ -117,9 +115,7 @@ impl CameraCalibration {
     pub fn lens(&self) -> Result<Lens> {
         Lens::new(self.intrinsics, &self.distortion).map_err(|problem| Error::CameraFile {
             by: self.source.clone(),
-            problem: problem.to_string(),
-            remedy: "take matrix and coefficients from one calibration, for images of this size"
-                .into(),
+            problem: problem.into(),
         })
     }
 }

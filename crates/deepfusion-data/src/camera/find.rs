@@ -5,7 +5,7 @@ use super::source::CalibrationSource;
 use crate::dataset::{assumed_warning, numbers_of_hfov};
 use crate::dataset_toml::FolderConfig;
 use crate::pictures::{ExifCamera, exif_camera};
-use crate::{DatasetKind, Error, OpenOptions, Result};
+use crate::{CameraProblem, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_logs::GoproLens;
 use std::path::{Path, PathBuf};
 
@@ -124,12 +124,13 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
     for (other, camera) in asked.filter_map(|path| Some((path, said(path)?))) {
         // A focal length in 35 mm film is of whole millimetres.
         if (camera.intrinsics.fx / first.intrinsics.fx - 1.0).abs() > 1e-6 {
-            let was = name(path);
-            let problem = format!("EXIF says {}, but {} in {was}", camera.by, first.by);
             return Err(Error::CameraFile {
                 by: other.as_path().into(),
-                problem,
-                remedy: "a recording has one camera: keep apart what was taken with another lens or zoom, or give a calibration".into(),
+                problem: CameraProblem::Zoomed {
+                    said: camera.by,
+                    other_said: first.by,
+                    other: name(path),
+                },
             });
         }
     }

@@ -1,8 +1,7 @@
 //! Taking a lens' distortion out of images.
 
-use crate::{Error, Result};
+use crate::{Error, NoLens, Result};
 use deepfusion_geometry::{DepthMap, Distortion, Intrinsics};
-use deepfusion_hint::Hint;
 use image::{Rgb, RgbImage};
 use std::sync::Arc;
 
@@ -19,24 +18,6 @@ pub struct Lens {
     /// For each pixel of the corrected image, where it lies in the original one; `None` without
     /// distortion.
     map: Option<Arc<Vec<[f32; 2]>>>,
-}
-
-/// Why a distortion does not fit a camera.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NoLens {
-    /// It shows one place twice.
-    #[error("the distortion folds over within the image: it does not fit this camera matrix")]
-    FoldsOver,
-    /// What is left after it is no camera's.
-    #[error("after correction {0}")]
-    Implausible(String),
-}
-
-impl Hint for NoLens {
-    fn hint(&self) -> Option<String> {
-        Some("take matrix and coefficients from one calibration, for images of this size".into())
-    }
 }
 
 impl Lens {

@@ -11,7 +11,7 @@ mod yaml;
 pub use calibration::CameraCalibration;
 pub use find::calibration_near;
 pub(crate) use find::{Pictures, find_camera};
-pub use lens::{Lens, NoLens};
+pub use lens::Lens;
 pub use source::CalibrationSource;
 pub use write::camera_info_yaml;
 pub(crate) use yaml::FISHEYE;

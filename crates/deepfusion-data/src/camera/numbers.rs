@@ -1,5 +1,6 @@
 //! Plain numbers: fx, fy, cx, cy, or a camera matrix row by row.
 
+use crate::CalibrationFileProblem;
 use deepfusion_geometry::Distortion;
 
 /// The numbers in a file, which may lack the image's size.
@@ -11,26 +12,8 @@ pub(super) struct Numbers {
     pub(super) size: Option<(u32, u32)>,
 }
 
-/// Why a file's text is no camera.
-#[derive(Debug, PartialEq)]
-pub(super) struct Refusal {
-    pub(super) problem: String,
-    pub(super) remedy: String,
-}
-
-impl Refusal {
-    pub(super) fn new(problem: impl Into<String>) -> Self {
-        Self {
-            problem: problem.into(),
-            remedy: "OpenCV's and ROS's calibration YAML, Kalibr's camchain and four numbers \
-                     fx, fy, cx, cy are read: docs/guides/train-on-your-own-video.md"
-                .into(),
-        }
-    }
-}
-
 /// Reads four or nine numbers, apart by commas, spaces or lines; `#` begins a comment.
-pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {
+pub(super) fn parse(text: &str) -> Result<Numbers, CalibrationFileProblem> {
     let lines = text.lines().map(|l| l.split('#').next().unwrap_or(""));
     let mut numbers = Vec::new();
     for word in lines
@@ -39,11 +22,11 @@ pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {
     {
         let value = word.parse::<f64>().ok().filter(|v| v.is_finite());
         let Some(value) = value else {
-            let word: String = word.chars().take(40).collect();
-            return Err(Refusal::new(format!("'{word}' is not a number")));
+            let text = word.chars().take(40).collect();
+            return Err(CalibrationFileProblem::NotANumber { text });
         };
         if numbers.len() == 9 {
-            return Err(Refusal::new("more than nine numbers"));
+            return Err(CalibrationFileProblem::TooManyNumbers);
         }
         numbers.push(value);
     }
@@ -52,17 +35,13 @@ pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {
         [fx, skew, cx, _, fy, cy, _, _, _] => {
             if skew.abs() > 1e-6 * fx.abs() || numbers[3] != 0.0 || numbers[6..] != [0.0, 0.0, 1.0]
             {
-                return Err(Refusal::new(
-                    "nine numbers, but no camera matrix fx 0 cx 0 fy cy 0 0 1",
-                ));
+                return Err(CalibrationFileProblem::NotAMatrix);
             }
             [*fx, *fy, *cx, *cy]
         }
         other => {
-            return Err(Refusal::new(format!(
-                "{} numbers, expected four (fx, fy, cx, cy) or a matrix of nine",
-                other.len()
-            )));
+            let found = other.len();
+            return Err(CalibrationFileProblem::Numbers { found });
         }
     };
     Ok(Numbers {
@@ -94,7 +73,7 @@ mod tests {
             ("1 2 nan 4", "'nan'"),
             ("1 2 3 4 5 6 7 8 9 10", "more than nine"),
         ] {
-            let problem = parse(bad).unwrap_err().problem;
+            let problem = parse(bad).unwrap_err().to_string();
             assert!(problem.contains(why), "{problem}");
         }
     }

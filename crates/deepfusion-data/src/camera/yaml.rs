@@ -1,6 +1,7 @@
 //! The YAML of OpenCV, ROS and Kalibr.
 
-use super::numbers::{Numbers, Refusal};
+use super::numbers::Numbers;
+use crate::CalibrationFileProblem;
 use deepfusion_geometry::Distortion;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -63,24 +64,17 @@ struct Kalibr {
 }
 
 /// Reads whichever of the three it is.
-pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {
+pub(super) fn parse(text: &str) -> Result<Numbers, CalibrationFileProblem> {
     if text.len() > LONGEST {
-        return Err(Refusal::new("too long for a calibration"));
+        return Err(CalibrationFileProblem::TooLong);
     }
     let text = plain(text);
-    let bad = |e: serde_saphyr::Error| {
-        let line = e.to_string();
-        let line = line.lines().next().unwrap_or_default().to_owned();
-        Refusal::new(format!("not the YAML of a calibration: {line}"))
-    };
+    let bad = |e: serde_saphyr::Error| CalibrationFileProblem::Yaml(Box::new(e));
     if text.lines().any(|l| l.trim_end() == "cam0:") {
         let chain: BTreeMap<String, Kalibr> = serde_saphyr::from_str(&text).map_err(bad)?;
         let first = chain.into_iter().next();
-        return kalibr(
-            first
-                .ok_or_else(|| Refusal::new("the camchain is empty"))?
-                .1,
-        );
+        let (_, camera) = first.ok_or(CalibrationFileProblem::NoCamera)?;
+        return kalibr(camera);
     }
     flat(serde_saphyr::from_str(&text).map_err(bad)?)
 }
@@ -94,7 +88,7 @@ fn plain(text: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-fn flat(file: Flat) -> Result<Numbers, Refusal> {
+fn flat(file: Flat) -> Result<Numbers, CalibrationFileProblem> {
     let model = file.distortion_model.as_deref().unwrap_or("plumb_bob");
     let fisheye = FISHEYE.contains(&model) || file.fisheye_model == Some(1);
     let known = [
@@ -111,17 +105,13 @@ fn flat(file: Flat) -> Result<Numbers, Refusal> {
     if let Some(other) = file.camera_model.as_deref().filter(|m| *m != "pinhole") {
         return Err(model_refused(other));
     }
-    let matrix = file
-        .camera_matrix
-        .ok_or_else(|| Refusal::new("it has no camera_matrix (nor K)"))?;
+    let matrix = file.camera_matrix.ok_or(CalibrationFileProblem::NoMatrix)?;
     let k = matrix.values("camera_matrix")?;
     let [fx, skew, cx, zero, fy, cy, 0.0, 0.0, 1.0] = k[..] else {
-        return Err(Refusal::new(
-            "camera_matrix: expected the nine numbers fx, 0, cx, 0, fy, cy, 0, 0, 1",
-        ));
+        return Err(CalibrationFileProblem::Matrix);
     };
     if skew != 0.0 || zero != 0.0 {
-        return Err(Refusal::new("camera_matrix: a skew is not supported"));
+        return Err(CalibrationFileProblem::Skew);
     }
     let coefficients = match file.distortion_coefficients {
         Some(matrix) => matrix.values("distortion_coefficients")?,
@@ -136,7 +126,7 @@ fn flat(file: Flat) -> Result<Numbers, Refusal> {
     ))
 }
 
-fn kalibr(camera: Kalibr) -> Result<Numbers, Refusal> {
+fn kalibr(camera: Kalibr) -> Result<Numbers, CalibrationFileProblem> {
     if camera.camera_model != "pinhole" {
         return Err(model_refused(&camera.camera_model));
     }
@@ -146,23 +136,20 @@ fn kalibr(camera: Kalibr) -> Result<Numbers, Refusal> {
         return Err(model_refused(model));
     }
     let [fx, fy, cx, cy] = camera.intrinsics[..] else {
-        return Err(Refusal::new(format!(
-            "intrinsics: {} numbers, expected fx, fy, cx, cy",
-            camera.intrinsics.len()
-        )));
+        let found = camera.intrinsics.len();
+        return Err(CalibrationFileProblem::Intrinsics { found });
     };
     let size = camera.resolution.map(|[w, h]| (w, h));
     let lens = lens(&camera.distortion_coeffs, fisheye)?;
     Ok(numbers([fx, fy, cx, cy], lens, size))
 }
 
-fn lens(coefficients: &[f64], fisheye: bool) -> Result<Distortion, Refusal> {
-    let lens = if fisheye {
-        Distortion::from_fisheye(coefficients)
+fn lens(coefficients: &[f64], fisheye: bool) -> Result<Distortion, CalibrationFileProblem> {
+    Ok(if fisheye {
+        Distortion::from_fisheye(coefficients)?
     } else {
-        Distortion::from_opencv(coefficients)
-    };
-    lens.map_err(|why| Refusal::new(format!("distortion coefficients: {why}")))
+        Distortion::from_opencv(coefficients)?
+    })
 }
 
 fn numbers(pinhole: [f64; 4], distortion: Distortion, size: Option<(u32, u32)>) -> Numbers {
@@ -173,29 +160,26 @@ fn numbers(pinhole: [f64; 4], distortion: Distortion, size: Option<(u32, u32)>) 
     }
 }
 
-fn model_refused(model: &str) -> Refusal {
-    let model: String = model.chars().take(40).collect();
-    Refusal {
-        problem: format!("the lens model '{model}' is not supported"),
-        remedy: "calibrate with Brown and Conrady's model (OpenCV's default, ROS plumb_bob or \
-                 rational_polynomial, Kalibr pinhole-radtan), of a fisheye lens with Kannala and Brandt's (cv::fisheye, \
-                 Kalibr pinhole-equi), or undistort the images first"
-            .into(),
-    }
+fn model_refused(model: &str) -> CalibrationFileProblem {
+    let name = model.chars().take(40).collect();
+    CalibrationFileProblem::Model { name }
 }
 
 impl Matrix {
-    fn values(self, name: &str) -> Result<Vec<f64>, Refusal> {
+    fn values(self, field: &'static str) -> Result<Vec<f64>, CalibrationFileProblem> {
         match self {
             Self::List(data) => Ok(data),
             Self::Nested(rows) => Ok(rows.concat()),
             Self::Sized { rows, cols, data } => {
                 let said = rows.zip(cols).map(|(r, c)| u64::from(r) * u64::from(c));
                 match said {
-                    Some(n) if n != data.len() as u64 => Err(Refusal::new(format!(
-                        "{name}: {} numbers, but its rows and cols make {n}",
-                        data.len()
-                    ))),
+                    Some(said) if said != data.len() as u64 => {
+                        Err(CalibrationFileProblem::MatrixSize {
+                            field,
+                            found: data.len(),
+                            said,
+                        })
+                    }
                     _ => Ok(data),
                 }
             }

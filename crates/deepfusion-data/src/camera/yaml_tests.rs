@@ -136,11 +136,7 @@ fn fisheye_lenses_are_read() {
     );
     // Five coefficients are another lens'.
     let refusal = parse(&ROS.replace("plumb_bob", "fisheye")).unwrap_err();
-    assert!(
-        refusal.problem.contains("5 coefficients"),
-        "{}",
-        refusal.problem
-    );
+    assert!(refusal.to_string().contains("5 coefficients"), "{refusal}");
 }
 
 #[test]
@@ -152,10 +148,10 @@ fn other_lenses_are_named() {
     ] {
         let refusal = parse(&text).unwrap_err();
         assert_eq!(
-            refusal.problem,
+            refusal.to_string(),
             format!("the lens model '{model}' is not supported")
         );
-        assert!(refusal.remedy.contains("radtan"));
+        assert!(refusal.remedy().contains("radtan"));
     }
 }
 
@@ -175,7 +171,7 @@ fn what_is_wrong_is_named() {
         (KALIBR.replacen("458.654, ", "", 1), "3 numbers"),
         ("[1, 2".to_owned(), "not the YAML"),
     ] {
-        let found = parse(&text).unwrap_err().problem;
+        let found = parse(&text).unwrap_err().to_string();
         assert!(found.contains(problem), "{found}");
     }
 }

@@ -1,5 +1,5 @@
 use super::parts::{Converted, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
-use crate::{Dataset, Error, GtKind, Result};
+use crate::{Dataset, Error, GtKind, ImageProblem, Result, TopicProblem};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
     CameraInfo, CompressedImage, Header, PointCloud2, RegionOfInterest, Twist, TwistStamped,
@@ -112,8 +112,7 @@ pub fn convert_to_bag(
                 let cloud = PointCloud2::from_columns(header("lidar"), &columns);
                 let cloud = cloud.map_err(|e| Error::Topic {
                     path: out.to_owned(),
-                    problem: e.to_string(),
-                    remedy: "report this with the recording".into(),
+                    problem: Box::new(TopicProblem::Cloud(e)),
                     choice: None,
                 })?;
                 bag.write(topic, stamp, &cloud)?;
@@ -153,8 +152,7 @@ fn png(dataset: &Dataset, frame: usize) -> Result<Vec<u8>> {
         .write_image(image.as_raw(), width, height, ExtendedColorType::Rgb8)
         .map_err(|e| Error::Image {
             path: dataset.frames()[frame].image.path().to_owned(),
-            problem: e.to_string(),
-            truncated: false,
+            problem: ImageProblem::Unencodable(e),
         })?;
     Ok(bytes)
 }

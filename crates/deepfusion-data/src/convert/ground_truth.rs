@@ -1,6 +1,6 @@
 //! Ground truth of many frames in one `.npz`.
 
-use crate::{Dataset, Error, GtKind, Result};
+use crate::{ArrayProblem, Dataset, Error, GtKind, Result};
 use ndarray::ArrayView2;
 use ndarray_npy::{NpzWriter, WriteNpyError, WriteNpzError};
 use std::collections::HashSet;
@@ -62,7 +62,7 @@ pub fn export_gt(
                         let mut add = |name: &str, values: &[f32]| -> Result<()> {
                             let size = (truth.depth.height, truth.depth.width);
                             let array = ArrayView2::from_shape(size, values)
-                                .map_err(|e| failed(out, e.to_string()))?;
+                                .map_err(|e| failed(out, ArrayProblem::Shape(e)))?;
                             npz.add_array(name, &array).map_err(|e| write_error(out, e))
                         };
                         add(name, &truth.depth.data)?;
@@ -94,11 +94,11 @@ pub fn export_gt(
 fn write_error(out: &Path, error: WriteNpzError) -> Error {
     match error {
         WriteNpzError::Npy(WriteNpyError::Io(source)) => Error::file(out, source),
-        other => failed(out, other.to_string()),
+        other => failed(out, ArrayProblem::Write(Box::new(other))),
     }
 }
 
-fn failed(out: &Path, problem: String) -> Error {
+fn failed(out: &Path, problem: ArrayProblem) -> Error {
     Error::Array {
         path: out.to_owned(),
         problem,

@@ -1,5 +1,6 @@
 //! Which of a car's cameras.
 
+use deepfusion_hint::Hint;
 use serde::{Deserialize, Serialize};
 
 /// One of the car's two colour cameras. The only camera of a recording counts as the left one.
@@ -50,15 +51,32 @@ impl Cameras {
     }
 }
 
-impl std::str::FromStr for Cameras {
-    type Err = String;
+/// A text that names no camera.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("'{text}' is no camera: 2, 3 or both")]
+pub struct NoSuchCamera {
+    /// The text.
+    pub text: String,
+}
 
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
+impl Hint for NoSuchCamera {
+    /// The message itself lists what can be chosen.
+    fn hint(&self) -> Option<String> {
+        None
+    }
+}
+
+impl std::str::FromStr for Cameras {
+    type Err = NoSuchCamera;
+
+    fn from_str(text: &str) -> Result<Self, NoSuchCamera> {
         match text {
             "2" => Ok(Self::Left),
             "3" => Ok(Self::Right),
             "both" => Ok(Self::Both),
-            _ => Err(format!("'{text}' is no camera: 2, 3 or both")),
+            _ => Err(NoSuchCamera {
+                text: text.to_owned(),
+            }),
         }
     }
 }

@@ -1,11 +1,10 @@
 use super::camera::Camera;
-use super::ego::Ego;
+use super::ego::{Ego, Receiver};
 use super::frame::Frame;
 use super::heading::{Heading, NO_MOUNT, NOT_GIVEN};
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use super::options::OpenOptions;
-use super::receiver::Receiver;
 use super::recording::{CameraPath, Recording};
 use super::seen_turn::{self, NO_YAW_RATE, SeenTurn};
 use super::selection::Selection;
@@ -350,7 +349,7 @@ impl Dataset {
     /// A frame's image at full size, freed of its lens' distortion.
     ///
     /// # Errors
-    /// As [`crate::load_rgb`], [`Error::FrameSize`], and [`Error::Program`] where a video cannot be
+    /// As [`crate::load_rgb`], [`Error::FrameSize`], and [`Error::Video`] where a video cannot be
     /// decoded.
     ///
     /// # Panics

@@ -23,6 +23,16 @@ pub struct EgoMotion {
     pub source_from_target: Option<Se3>,
 }
 
+/// What a satellite receiver's track says beside the speeds, on the frames' clock.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Receiver {
+    /// How the course over ground turned where the vehicle moved, in rad/s, positive to the left. It is spread over a second or
+    /// so: enough for the offset of two clocks, not for a camera's turn between two frames.
+    pub course_rate_radps: Option<Signal>,
+    /// Standard deviation of the speeds, in m/s; of other logs that say how sure they are, too.
+    pub speed_sigma_mps: Option<Signal>,
+}
+
 /// The car's track and the camera's place on the car: [`Dataset::ego`](crate::Dataset::ego).
 #[derive(Debug, Clone, Copy)]
 pub struct Ego<'a> {

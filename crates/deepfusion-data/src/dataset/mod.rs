@@ -13,7 +13,6 @@ mod inspection;
 mod inspection_text;
 mod kind;
 mod options;
-mod receiver;
 mod recording;
 pub(crate) mod seen_turn;
 pub(crate) mod selection;
@@ -22,10 +21,10 @@ mod speed_check;
 mod split;
 mod topic;
 
-pub use camera::{Camera, Cameras};
+pub use camera::{Camera, Cameras, NoSuchCamera};
 pub use coverage::SplitCoverage;
 pub use drive::{Dataset, DatasetParts};
-pub use ego::{Ego, EgoMotion, NoMotion};
+pub use ego::{Ego, EgoMotion, NoMotion, Receiver};
 pub use frame::{Frame, FrameImage};
 pub use heading::Heading;
 pub use inspection::{
@@ -34,7 +33,6 @@ pub use inspection::{
 pub use kind::DatasetKind;
 pub use options::OpenOptions;
 pub(crate) use options::{assumed_warning, numbers_of_hfov};
-pub use receiver::Receiver;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
 pub use seen_turn::SeenTurn;
 pub use snippet::{Snippet, Source, hold_out};
@@ -42,4 +40,4 @@ pub use speed_check::{
     PLAUSIBLE_HEIGHT_M, SpeedWarning, grey_image, road_camera_height, speed_unit_warning,
 };
 pub use split::{Split, SplitEntry};
-pub use topic::{NamedTopic, TopicRole};
+pub use topic::{NamedTopic, NoNamedTopic, TopicRole};

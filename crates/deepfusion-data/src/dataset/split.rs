@@ -1,7 +1,7 @@
 //! The field's split files: lists of frames, one a line; or of kinds of drives.
 
 use super::camera::Camera;
-use crate::{Error, Result};
+use crate::{Error, Result, SplitProblem};
 use std::path::{Path, PathBuf};
 
 /// A list of frames, in the file's order.
@@ -54,7 +54,7 @@ impl Split {
             return Err(Error::Split {
                 path: path.to_owned(),
                 line: 1,
-                problem: "the file names no frame".into(),
+                problem: SplitProblem::NoFrame,
             });
         }
         Ok(Self {
@@ -104,25 +104,26 @@ fn scenario(line: &str) -> Option<&str> {
     (key.trim() == "scenario" && !name.is_empty()).then_some(name)
 }
 
-fn parse(line: &str) -> std::result::Result<SplitEntry, String> {
+fn parse(line: &str) -> std::result::Result<SplitEntry, SplitProblem> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let (folder, index, side) = match words.as_slice() {
         [folder, index] => (folder, index, "l"),
         [folder, index, side] => (folder, index, *side),
         _ => {
-            return Err(format!(
-                "{} words, expected folder, index and side",
-                words.len()
-            ));
+            let found = words.len();
+            return Err(SplitProblem::Words { found });
         }
     };
-    let frame = index
-        .parse()
-        .map_err(|_| format!("index '{index}' is not a frame number"))?;
+    let frame = index.parse().map_err(|_| SplitProblem::Index {
+        text: (*index).to_owned(),
+    })?;
     let camera = match side {
         "l" => Camera::Left,
         "r" => Camera::Right,
-        _ => return Err(format!("side '{side}', expected l or r")),
+        _ => {
+            let text = side.to_owned();
+            return Err(SplitProblem::Side { text });
+        }
     };
     Ok(SplitEntry {
         folder: drive_name(folder.trim_end_matches('/')),

@@ -1,5 +1,6 @@
 //! Which topic of a bag is for what, where a caller says it.
 
+use deepfusion_hint::Hint;
 use std::fmt;
 use std::str::FromStr;
 
@@ -78,20 +79,50 @@ impl fmt::Display for NamedTopic {
     }
 }
 
-impl FromStr for NamedTopic {
-    type Err = String;
+/// Why a text names no topic.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoNamedTopic {
+    /// It is not written as one.
+    #[error("expected ROLE=NAME, such as image=/camera/front/image_raw")]
+    Shape,
+    /// Nothing is read for such a role.
+    #[error("`{text}` is no role: {} are", TopicRole::ALL.map(TopicRole::name).join(", "))]
+    Role {
+        /// What stands for the role.
+        text: String,
+    },
+    /// The name is empty.
+    #[error("no topic is named for {role}")]
+    NoName {
+        /// The role.
+        role: TopicRole,
+    },
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (role, topic) = text
-            .split_once('=')
-            .ok_or("expected ROLE=NAME, such as image=/camera/front/image_raw")?;
+impl Hint for NoNamedTopic {
+    fn hint(&self) -> Option<String> {
+        match self {
+            // These messages say what is expected.
+            Self::Shape | Self::Role { .. } => None,
+            Self::NoName { role } => Some(format!(
+                "write the topic's whole name after the equals sign, such as {role}=/a/b"
+            )),
+        }
+    }
+}
+
+impl FromStr for NamedTopic {
+    type Err = NoNamedTopic;
+
+    fn from_str(text: &str) -> Result<Self, NoNamedTopic> {
+        let (role, topic) = text.split_once('=').ok_or(NoNamedTopic::Shape)?;
         let known = TopicRole::ALL.into_iter().find(|r| r.name() == role.trim());
-        let Some(role) = known else {
-            let names = TopicRole::ALL.map(TopicRole::name).join(", ");
-            return Err(format!("`{role}` is no role: {names} are"));
-        };
+        let role = known.ok_or_else(|| NoNamedTopic::Role {
+            text: role.to_owned(),
+        })?;
         match topic.trim() {
-            "" => Err(format!("no topic is named for {role}")),
+            "" => Err(NoNamedTopic::NoName { role }),
             topic => Ok(Self {
                 role,
                 topic: topic.to_owned(),
@@ -116,7 +147,7 @@ mod tests {
             ("picture=/camera", "`picture` is no role: image,"),
             ("image= ", "no topic is named for image"),
         ] {
-            let error = text.parse::<NamedTopic>().unwrap_err();
+            let error = text.parse::<NamedTopic>().unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
     }

@@ -1,7 +1,7 @@
 //! What to do about each error.
 
 use super::Error;
-use crate::{DatasetKind, FoundInstead};
+use crate::{DatasetKind, FoundInstead, ImageProblem};
 use deepfusion_hint::Hint;
 
 impl Hint for Error {
@@ -66,12 +66,12 @@ impl Hint for Error {
                 ));
             }
             Self::OwnCalibration { .. } => "open it without intrinsics",
-            Self::CameraFile { remedy, .. }
-            | Self::Columns { remedy, .. }
-            | Self::NoTrack { remedy, .. }
-            | Self::Topic { remedy, .. }
-            | Self::Frames { remedy, .. }
-            | Self::NoFrames { remedy, .. } => remedy,
+            Self::CameraFile { problem, .. } => return Some(problem.remedy()),
+            Self::Columns { problem, .. } => return Some(problem.remedy()),
+            Self::Topic { problem, .. } => return Some(problem.remedy()),
+            Self::Frames { problem, .. } => return Some(problem.remedy()),
+            Self::NoTrack { reason, .. } => reason.remedy(),
+            Self::NoFrames { reason, .. } => reason.remedy(),
             Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
@@ -82,13 +82,13 @@ impl Hint for Error {
                 "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
             }
             Self::DepthKind { .. } => "camera z (kind z) is what every recording with depth has",
-            Self::Program { remedy, .. } => remedy,
             Self::Missing { remedy, .. } => remedy,
             Self::NoImages { .. } => {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
             }
             Self::Image {
-                truncated: true, ..
+                problem: ImageProblem::Truncated,
+                ..
             } => {
                 "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
             }

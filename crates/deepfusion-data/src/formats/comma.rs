@@ -12,7 +12,7 @@ use crate::logs::speed_log::SpeedLog;
 use crate::logs::vehicle_log::VehicleLog;
 use crate::{
     Camera, Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result,
-    SpeedRange, Stream,
+    SegmentProblem, SpeedRange, Stream,
 };
 use deepfusion_hint::count_of;
 use deepfusion_motion::{ImuMount, comma};
@@ -97,7 +97,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         world_from_cam: BTreeMap::new(),
         streams,
         warnings,
-        speed_remedy: "fetch processed_log/CAN/speed of the segment",
+        untimed_poses: false,
     }
     .into_dataset()
 }
@@ -185,16 +185,15 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
     let path = place.join("value");
     let values = column(&path)?;
     if values.len() != ns.len() {
-        return Err(array_error(
-            &path,
-            format!("{} values, but t has {}", values.len(), ns.len()),
-        ));
+        let problem = SegmentProblem::Length {
+            values: values.len(),
+            times: ns.len(),
+        };
+        return Err(array_error(&path, problem));
     }
     if let Some(row) = values.iter().position(|v| !v.is_finite()) {
-        return Err(array_error(
-            &path,
-            format!("row {row}: {} is no speed", values[row]),
-        ));
+        let value = values[row];
+        return Err(array_error(&path, SegmentProblem::NotASpeed { row, value }));
     }
     let origin = ns.first().copied().unwrap_or_default();
     let at: Vec<f64> = ns.iter().map(|t| seconds(*t, origin)).collect();
@@ -262,7 +261,11 @@ fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
     let mut last = f64::NEG_INFINITY;
     for (row, time) in times.iter().enumerate() {
         if !time.is_finite() || time.abs() > 9e9 || *time < last {
-            let problem = format!("row {row}: {time} s after {last} s is no time");
+            let problem = SegmentProblem::NotATime {
+                row,
+                time_s: *time,
+                last_s: last,
+            };
             return Err(array_error(path, problem));
         }
         last = *time;
@@ -274,7 +277,9 @@ fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
 fn column(path: &Path) -> Result<Vec<f64>> {
     comma::numbers(path).map_err(|error| match error {
         deepfusion_motion::Error::File { path, source } => Error::file(&path, source),
-        deepfusion_motion::Error::Array { path, problem } => array_error(&path, problem),
+        deepfusion_motion::Error::Array { path, problem } => {
+            array_error(&path, SegmentProblem::Array(problem))
+        }
         source => Error::Motion {
             path: path.to_owned(),
             source,
@@ -282,10 +287,9 @@ fn column(path: &Path) -> Result<Vec<f64>> {
     })
 }
 
-fn array_error(path: &Path, problem: String) -> Error {
+fn array_error(path: &Path, problem: SegmentProblem) -> Error {
     Error::Columns {
         path: PathBuf::from(path),
-        problem,
-        remedy: "fetch the segment again: it should be a NumPy array of numbers".into(),
+        problem: problem.into(),
     }
 }

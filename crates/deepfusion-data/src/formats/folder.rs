@@ -8,13 +8,15 @@ use crate::logs::frame_times::timed_images;
 use crate::logs::speed_log::SpeedLog;
 use crate::truth::depth_images::DepthImages;
 use crate::truth::measured::MeasuredDepth;
-use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
+use crate::{
+    Camera, ColumnsProblem, Dataset, DatasetKind, Error, NoFramesReason, OpenOptions, Result,
+    image_size,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Folders in which the images are looked for; then the recording's folder itself.
 const FOLDERS: [&str; 2] = ["images", "frames"];
-const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the images; evaluation and prediction do not";
 
 /// Whether a folder is one of images.
 pub(crate) fn has_images(folder: &Path) -> Result<bool> {
@@ -31,8 +33,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     let Some(first) = images.first() else {
         return Err(Error::NoFrames {
             path: place,
-            why: "no image (.png, .jpg, .jpeg)".into(),
-            remedy: "name the folder of the images in dataset.toml: images = \"…\"".into(),
+            reason: NoFramesReason::NoPicture,
         });
     };
     let size = image_size(first)?;
@@ -69,7 +70,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         world_from_cam: BTreeMap::new(),
         streams: Vec::new(),
         warnings,
-        speed_remedy: SPEED_REMEDY,
+        untimed_poses: false,
     }
     .into_dataset()
 }
@@ -102,9 +103,7 @@ fn depth_images(
     }
     let unit_m = config.depth_unit_m.ok_or_else(|| Error::Columns {
         path: place.clone(),
-        problem: "nothing says the unit of the depth images".into(),
-        remedy: "set depth_unit_m in dataset.toml: 0.001 for millimetres, 0.00390625 for KITTI's 1/256 m"
-            .into(),
+        problem: ColumnsProblem::NoDepthUnit,
     })?;
     Ok(Some(DepthImages {
         files,

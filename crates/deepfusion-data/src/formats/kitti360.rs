@@ -12,7 +12,8 @@ use super::poses::read_poses;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::measured::{MeasuredDepth, velodyne};
 use crate::{
-    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, image_size,
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, PoseField, PoseProblem,
+    Result, image_size,
 };
 use deepfusion_geometry::{Distortion, Se3};
 use nalgebra::{Matrix3x4, Vector3};
@@ -167,8 +168,7 @@ impl Drive {
                 .collect(),
             streams: Vec::new(),
             warnings: Vec::new(),
-            speed_remedy: "speeds come from data_poses/<drive>/poses.txt and timestamps.txt: train on drives that have them; \
-                 evaluation and prediction need none",
+            untimed_poses: false,
         }
         .into_dataset()
     }
@@ -287,8 +287,8 @@ impl Rig {
         let (_, velo_from_raw0) = velo_from_raw0.ok_or_else(|| Error::Pose {
             path,
             line: 1,
-            field: "pose".into(),
-            problem: "the file is empty".into(),
+            field: PoseField::Pose,
+            problem: PoseProblem::NoPose,
         })?;
         Ok(self.cam_from_raw0 * velo_from_raw0.inverse())
     }

@@ -14,7 +14,8 @@ use crate::logs::clock::TimeUnit;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::measured::{MeasuredDepth, velodyne};
 use crate::{
-    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, image_size,
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, TimeStampProblem,
+    image_size,
 };
 use deepfusion_geometry::{Distortion, Intrinsics, Se3};
 use nalgebra::Matrix3x4;
@@ -194,11 +195,7 @@ impl<'a> Sequence<'a> {
                 .map(|(number, pose)| (number, pose * cam0_from_cam))
                 .collect(),
             streams: Vec::new(),
-            speed_remedy: if times.is_none() && has_poses {
-                "speeds come from poses and times.txt: put the sequence's times there (data_odometry_calib.zip)"
-            } else { "speeds come from poses/<sequence>.txt, which KITTI publishes of sequences 00 to 10: train on those; \
-                 evaluation and prediction need none"
-            },
+            untimed_poses: times.is_none() && has_poses,
         }
         .into_dataset()
     }
@@ -249,16 +246,16 @@ fn read_times(path: &Path) -> Result<Vec<i64>> {
         .lines()
         .enumerate()
     {
-        let shown: String = line.trim().chars().take(60).collect();
-        let bad = |problem: String| Error::TimeStamp {
+        let text = || line.trim().chars().take(60).collect();
+        let bad = |problem: TimeStampProblem| Error::TimeStamp {
             path: path.to_owned(),
             line: i + 1,
             problem,
         };
         let ns = TimeUnit::Seconds.nanoseconds(line);
-        let ns = ns.ok_or_else(|| bad(format!("'{shown}' is not a time in seconds")))?;
+        let ns = ns.ok_or_else(|| bad(TimeStampProblem::NotSeconds { text: text() }))?;
         if times.last().is_some_and(|last| ns <= *last) {
-            return Err(bad(format!("'{shown}' is not after the line above")));
+            return Err(bad(TimeStampProblem::NotAfter { text: text() }));
         }
         times.push(ns);
     }

@@ -5,7 +5,7 @@ use super::found_instead::FoundInstead;
 use super::kitti::{self, Drive, drive_around, find_drives};
 use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use crate::{ConfigProblem, Dataset, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ impl Dataset {
     /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
     /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
     /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
-    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`], [`Error::Topic`],
+    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Video`], [`Error::Topic`],
     /// [`Error::Frames`], [`Error::NoTopics`], [`Error::Pose`], [`Error::Json`],
     /// [`Error::SeveralVersions`].
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
@@ -147,10 +147,7 @@ impl Layout {
         match (images, video) {
             (true, Some(video)) if !video.named => Err(Error::Config {
                 path: real.join(FolderConfig::NAME),
-                problem: format!(
-                    "there are images and a video ({}): name one, images = \"…\" or video = \"…\"",
-                    video.file.display()
-                ),
+                problem: ConfigProblem::ImagesAndVideo { video: video.file },
             }),
             (_, Some(_)) => Ok(Some(Self::Video(real))),
             (true, None) => Ok(Some(Self::Folder(real))),

@@ -8,8 +8,8 @@ use crate::logs::speed_log::SpeedLog;
 use crate::truth::measured::MeasuredDepth;
 use crate::{
     CalibrationPlace, CalibrationSource, Camera, CameraCalibration, CameraPath, Dataset,
-    DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind, Lens, OpenOptions, Receiver,
-    Recording, Result, Stream, load_rgb,
+    DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind, Lens, NoTrackReason, OpenOptions,
+    Receiver, Recording, Result, Stream, load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
 use deepfusion_hint::count_of;
@@ -59,7 +59,7 @@ pub(crate) struct PlainRecording {
     streams: Vec<Stream>,
     warnings: Vec<String>,
     /// Why there is no ego-motion, where there is none.
-    no_motion: (String, String),
+    no_motion: NoTrackReason,
 }
 
 /// What a layout found, before it is a [`Dataset`].
@@ -85,8 +85,8 @@ pub(crate) struct PlainParts {
     /// Beside those of the images, the speeds, the poses and the measured depth.
     pub(crate) streams: Vec<Stream>,
     pub(crate) warnings: Vec<String>,
-    /// What to do about missing speeds.
-    pub(crate) speed_remedy: &'static str,
+    /// Whether there are poses, but no times to make speeds of them.
+    pub(crate) untimed_poses: bool,
 }
 
 impl PlainParts {
@@ -114,11 +114,9 @@ impl PlainParts {
         let yaw_known = motion.as_ref().is_some_and(|(_, known)| *known);
         let track = motion.map(|(track, _)| track);
         let no_motion = match (&self.speeds, origin_ns) {
-            (None, _) => ("it has no speeds".to_owned(), self.speed_remedy.to_owned()),
-            _ => (
-                "nothing says when its frames were taken".to_owned(),
-                "add frames.csv, timestamps.txt or fps in dataset.toml".to_owned(),
-            ),
+            (None, _) if self.untimed_poses => NoTrackReason::UntimedPoses,
+            (None, _) => NoTrackReason::NoSpeeds { layout: self.kind },
+            _ => NoTrackReason::NoTimes,
         };
         self.check_size()?;
         let lens = self.calibration.lens()?;
@@ -298,11 +296,9 @@ impl Recording for PlainRecording {
     }
 
     fn no_motion(&self) -> Error {
-        let (why, remedy) = self.no_motion.clone();
         Error::NoTrack {
             drive: self.name.clone(),
-            why,
-            remedy,
+            reason: self.no_motion.clone(),
         }
     }
 

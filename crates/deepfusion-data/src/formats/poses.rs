@@ -1,6 +1,6 @@
 //! Files of poses: a line each, of a number of columns of numbers.
 
-use crate::{Error, Result};
+use crate::{Error, PoseField, PoseProblem, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -14,18 +14,13 @@ pub(crate) fn is_rotation(matrix: &Matrix3<f64>) -> bool {
         && matrix.determinant() > 0.0
 }
 
-/// A motion from the upper three rows of its matrix, row by row, in metres.
-///
-/// # Errors
-/// That it is none, in words.
-pub(crate) fn motion_of_rows(numbers: &[f64]) -> std::result::Result<Se3, String> {
+/// A motion from the upper three rows of its matrix, row by row, in metres; `None` where its rotation is none.
+pub(crate) fn motion_of_rows(numbers: &[f64]) -> Option<Se3> {
     let at = |row: usize, column: usize| numbers.get(4 * row + column).copied().unwrap_or(f64::NAN);
     let rotation = Matrix3::from_fn(at);
     let place = Vector3::new(at(0, 3), at(1, 3), at(2, 3));
-    if !is_rotation(&rotation) || !place.iter().all(|p| p.is_finite()) {
-        return Err("its rotation is none".into());
-    }
-    Ok(Se3::from_parts(&rotation, place))
+    let is_motion = is_rotation(&rotation) && place.iter().all(|p| p.is_finite());
+    is_motion.then(|| Se3::from_parts(&rotation, place))
 }
 
 /// The lines of a file of poses, each of `columns` finite numbers; with the line's number, counted from 1. Empty lines are skipped.
@@ -40,7 +35,7 @@ pub(crate) fn rows_of_numbers(path: &Path, columns: usize) -> Result<Vec<(usize,
         if line.trim().is_empty() {
             continue;
         }
-        let bad = |field: String, problem: String| Error::Pose {
+        let bad = |field: PoseField, problem: PoseProblem| Error::Pose {
             path: path.to_owned(),
             line: i + 1,
             field,
@@ -49,17 +44,21 @@ pub(crate) fn rows_of_numbers(path: &Path, columns: usize) -> Result<Vec<(usize,
         let mut numbers = Vec::with_capacity(columns);
         for (column, word) in line.split_whitespace().enumerate() {
             let number = word.parse::<f64>().ok().filter(|n| n.is_finite());
-            let shown: String = word.chars().take(40).collect();
             numbers.push(number.ok_or_else(|| {
-                bad(
-                    format!("value {} of {columns}", column + 1),
-                    format!("'{shown}' is not a finite number"),
-                )
+                let (number, text) = (column + 1, word.chars().take(40).collect());
+                let field = PoseField::Value {
+                    number,
+                    of: columns,
+                };
+                bad(field, PoseProblem::NotANumber { text })
             })?);
         }
         if numbers.len() != columns {
-            let problem = format!("{} numbers, expected {columns}", numbers.len());
-            return Err(bad("pose".into(), problem));
+            let problem = PoseProblem::Length {
+                found: numbers.len(),
+                expected: columns,
+            };
+            return Err(bad(PoseField::Pose, problem));
         }
         rows.push((i + 1, numbers));
     }
@@ -75,23 +74,25 @@ pub(crate) fn read_poses(path: &Path, numbered: bool, columns: usize) -> Result<
     let first = usize::from(numbered);
     let rows = rows_of_numbers(path, columns + first)?;
     let pose = |(row, (line, numbers)): (usize, (usize, Vec<f64>))| {
-        let bad = |field: &str, problem: String| Error::Pose {
+        let bad = |field: PoseField, problem: PoseProblem| Error::Pose {
             path: path.to_owned(),
             line,
-            field: field.to_owned(),
+            field,
             problem,
         };
         let number = match numbers.first() {
             Some(number) if numbered => {
                 let whole = number.fract() == 0.0 && (0.0..1e15).contains(number);
                 if !whole {
-                    return Err(bad("value 1", format!("{number} is not a frame's number")));
+                    let problem = PoseProblem::NotAFrame { value: *number };
+                    return Err(bad(PoseField::Frame, problem));
                 }
                 *number as u64
             }
             _ => row as u64,
         };
-        let pose = motion_of_rows(&numbers[first..]).map_err(|problem| bad("pose", problem))?;
+        let pose = motion_of_rows(&numbers[first..]);
+        let pose = pose.ok_or_else(|| bad(PoseField::Pose, PoseProblem::NoRotation))?;
         Ok((number, pose))
     };
     rows.into_iter().enumerate().map(pose).collect()

@@ -8,7 +8,10 @@ use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::depth_images::DepthImages;
 use crate::truth::measured::MeasuredDepth;
-use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
+use crate::{
+    Camera, Dataset, DatasetKind, Error, NoFramesReason, OpenOptions, PoseFileProblem, Result,
+    image_size,
+};
 use deepfusion_geometry::Se3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -48,8 +51,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     let Some((_, first)) = colour.first_key_value() else {
         return Err(Error::NoFrames {
             path: folder.to_owned(),
-            why: "no frame-<number>.color.png or .jpg".into(),
-            remedy: "fetch the sequence's images".into(),
+            reason: NoFramesReason::NoColour,
         });
     };
     let size = image_size(first)?;
@@ -103,7 +105,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         world_from_cam,
         streams: Vec::new(),
         warnings: Vec::new(),
-        speed_remedy: "an RGB-D camera is carried by hand: evaluate and predict on it, train on a vehicle's recording",
+        untimed_poses: false,
     }
     .into_dataset()
 }
@@ -126,22 +128,19 @@ fn colour_images(folder: &Path) -> Result<BTreeMap<u64, PathBuf>> {
 /// the camera, which 7-Scenes writes as numbers that are not finite.
 fn read_pose(path: &Path) -> Result<Option<Se3>> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-    let bad = |problem: &str| Error::Columns {
+    let bad = |problem: PoseFileProblem| Error::Columns {
         path: path.to_owned(),
-        problem: problem.to_owned(),
-        remedy:
-            "a pose is world_from_cam in four rows of four numbers: repair it, or delete the file"
-                .into(),
+        problem: problem.into(),
     };
     let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-    let numbers = numbers.ok_or_else(|| bad("a word is not a number"))?;
+    let numbers = numbers.ok_or_else(|| bad(PoseFileProblem::NotANumber))?;
     if numbers.len() != 16 {
-        return Err(bad(&format!("{} numbers, expected 16", numbers.len())));
+        let found = numbers.len();
+        return Err(bad(PoseFileProblem::Length { found }));
     }
     if numbers.iter().any(|n| !n.is_finite()) {
         return Ok(None);
     }
-    motion_of_rows(&numbers[..12])
-        .map(Some)
-        .map_err(|problem| bad(&problem))
+    let pose = motion_of_rows(&numbers[..12]);
+    Ok(Some(pose.ok_or_else(|| bad(PoseFileProblem::NoRotation))?))
 }

@@ -6,7 +6,9 @@ use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::{TimeUnit, seconds};
 use crate::logs::frame_times::{TimedImage, from_start, numbers_by_time};
 use crate::logs::speed_log::SpeedLog;
-use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result};
+use crate::{
+    Camera, CameraProblem, ConfigProblem, Dataset, DatasetKind, Error, OpenOptions, Result,
+};
 use deepfusion_geometry::Distortion;
 use deepfusion_logs::{GoproLens, may_hold_log};
 use deepfusion_video::VideoFrames;
@@ -15,7 +17,6 @@ use std::path::{Path, PathBuf};
 
 /// Endings of the files that are taken for videos.
 const ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
-const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) or a GPS track (.gpx, .nmea) beside the video; evaluation and prediction do not";
 
 /// Whether a file is named like a video.
 pub(crate) fn is_video(path: &Path) -> bool {
@@ -56,9 +57,7 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
     match videos.len() {
         0 => Ok(None),
         1 => Ok(videos.pop().map(|file| InFolder { file, named: false })),
-        n => Err(config.error(format!(
-            "{n} videos are there: name one, video = \"…\", or give its path"
-        ))),
+        count => Err(config.error(ConfigProblem::SeveralVideos { count })),
     }
 }
 
@@ -149,7 +148,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         world_from_cam: BTreeMap::new(),
         streams: Vec::new(),
         warnings,
-        speed_remedy: SPEED_REMEDY,
+        untimed_poses: false,
         video: Some(video),
         folder,
     }
@@ -162,13 +161,10 @@ fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<Str
     if lens.is_linear() || calibration.distortion != Distortion::default() {
         return None;
     }
-    Some(format!("{}: {OTHER_LENS}", bends(lens)))
+    Some(format!("{}: {}", bends(lens), CameraProblem::OTHER_LENS))
 }
 
-/// What to do about a lens that bends lines.
-const OTHER_LENS: &str = "film through the linear lens, or calibrate this one as a fisheye lens";
-
-fn bends(lens: &GoproLens) -> String {
+fn bends(lens: &GoproLens) -> CameraProblem {
     let digital = match lens.digital {
         'N' => "narrow".to_owned(),
         'W' => "wide".to_owned(),
@@ -177,27 +173,24 @@ fn bends(lens: &GoproLens) -> String {
         'M' => "max".to_owned(),
         other => other.to_string(),
     };
-    format!(
-        "the video says that its lens was \"{digital}\" on a {}, which bends lines as no pinhole does",
-        lens.model
-    )
+    CameraProblem::BendsLines {
+        lens: digital,
+        model: lens.model.clone(),
+    }
 }
 
 /// Why a GoPro's video does not say its camera.
 fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
-    let (problem, remedy) = if lens.is_linear() {
-        let problem = format!(
-            "filmed through the linear lens of a {}, but zoomed or cut to another shape: how wide it sees is not known",
-            lens.model
-        );
-        (problem, "calibrate the camera as it was zoomed")
+    let problem = if lens.is_linear() {
+        CameraProblem::LinearZoomed {
+            model: lens.model.clone(),
+        }
     } else {
-        (bends(lens), OTHER_LENS)
+        bends(lens)
     };
     Error::CameraFile {
         by: video.into(),
         problem,
-        remedy: format!("{remedy}; calibration.yaml beside the video then says it"),
     }
 }
 
@@ -226,7 +219,7 @@ fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64>
 /// The frames of a video, kept beside it or where `dataset.toml` says.
 ///
 /// # Errors
-/// [`Error::Program`].
+/// [`Error::Video`].
 pub(crate) fn frames_of(file: &Path, config: &FolderConfig) -> Result<VideoFrames> {
     let folder = file.parent().unwrap_or(Path::new("."));
     let cache = config.cache.as_ref();

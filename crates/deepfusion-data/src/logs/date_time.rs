@@ -1,10 +1,11 @@
 //! A date and a time of day in words, as KITTI writes them.
 
+use crate::TimeStampProblem;
+
 /// Nanoseconds since 1970 of `2011-09-26 13:04:32.345808896`; the fraction has 0 to 9 digits.
-pub(crate) fn parse(line: &str) -> std::result::Result<i64, String> {
-    let shape = || {
-        let shown: String = line.chars().take(60).collect();
-        format!("'{shown}' is not a time stamp like 2011-09-26 13:04:32.345808896")
+pub(crate) fn parse(line: &str) -> Result<i64, TimeStampProblem> {
+    let shape = || TimeStampProblem::NotADate {
+        text: line.chars().take(60).collect(),
     };
     let (date, time) = line.trim().split_once([' ', 'T']).ok_or_else(shape)?;
     let (clock, fraction) = time.trim().split_once('.').unwrap_or((time, ""));

@@ -2,10 +2,10 @@
 
 use super::clock::{TimeUnit, seconds};
 use super::date_time;
-use super::table::{Table, describe};
+use super::table::Table;
 use super::times::times;
 use crate::dataset_toml::FolderConfig;
-use crate::{Error, Result};
+use crate::{ColumnsProblem, Error, ExpectedCell, Result, TableProblem, TimeStampProblem};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -173,13 +173,9 @@ fn from_table(
     let mut listed = Vec::with_capacity(ns.len());
     for (row, word) in table.words(column).enumerate() {
         let name = word.rsplit(['/', '\\']).next().unwrap_or(word);
-        let image = by_name.get(name).ok_or_else(|| {
-            table.bad(
-                row,
-                column,
-                &describe(word, "the name of an image that is there"),
-            )
-        })?;
+        let image = by_name
+            .get(name)
+            .ok_or_else(|| table.bad(row, column, TableProblem::not(ExpectedCell::Image, word)))?;
         listed.push((*image).clone());
     }
     let unlisted = images.len().saturating_sub(listed.len());
@@ -197,7 +193,7 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
         .enumerate()
         .filter(|(_, l)| !l.trim_start().starts_with('#'));
     let lines: Vec<(usize, &str)> = lines.filter(|(_, l)| !l.trim().is_empty()).collect();
-    let bad = |line: usize, problem: String| Error::TimeStamp {
+    let bad = |line: usize, problem: TimeStampProblem| Error::TimeStamp {
         path: path.to_owned(),
         line: line + 1,
         problem,
@@ -205,11 +201,10 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
     if lines.len() != images {
         return Err(Error::Columns {
             path: path.to_owned(),
-            problem: format!("{} times, but there are {images} images", lines.len()),
-            remedy:
-                "it must have one line for each image, in order of their names; frames.csv names \
-                     each image"
-                    .into(),
+            problem: ColumnsProblem::TimesOfImages {
+                times: lines.len(),
+                images,
+            },
         });
     }
     let number = |text: &str| text.trim().parse::<f64>().ok();
@@ -224,8 +219,7 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
     if unit.is_none() && !dates && numbers.len() == lines.len() {
         return Err(Error::Columns {
             path: path.to_owned(),
-            problem: "nothing says the unit of its times".into(),
-            remedy: "set time_unit in dataset.toml: s, ms, us or ns".into(),
+            problem: ColumnsProblem::NoUnitOfTimes,
         });
     }
     let mut times = Vec::with_capacity(lines.len());
@@ -236,12 +230,14 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
             // A line that is not a number has kept the unit from being known: it is the one to be named.
             number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text))
         };
-        let ns = ns.ok_or_else(|| bad(*line, describe(text.trim(), "a time")))?;
+        let text = text.trim();
+        let ns = ns.ok_or_else(|| {
+            let text = text.chars().take(40).collect();
+            bad(*line, TimeStampProblem::NotATime { text })
+        })?;
         if times.last().is_some_and(|last| ns <= *last) {
-            return Err(bad(
-                *line,
-                format!("'{}' is not after the line above", text.trim()),
-            ));
+            let text = text.to_owned();
+            return Err(bad(*line, TimeStampProblem::NotAfter { text }));
         }
         times.push(ns);
     }

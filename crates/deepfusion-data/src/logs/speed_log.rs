@@ -8,7 +8,7 @@ use super::vehicle_log::{VehicleLog, imu_readings};
 use crate::Receiver;
 use crate::dataset::seen_turn::NO_YAW_RATE;
 use crate::dataset_toml::FolderConfig;
-use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
+use crate::{ConfigProblem, Error, MotionModel, Quantity, Result, Stream, VehicleTrack};
 use deepfusion_logs::{Clock, DriveLog, ReadOptions, YawRate, is_gps_track};
 use deepfusion_motion::{ImuMount, Signal};
 use std::path::{Path, PathBuf};
@@ -256,9 +256,7 @@ fn only_track(folder: &Path, config: &FolderConfig) -> Result<Option<PathBuf>> {
     }
     match tracks.len() {
         0 | 1 => Ok(tracks.pop()),
-        n => Err(config.error(format!(
-            "{n} tracks are there (.gpx, .nmea): name one, speed = \"…\""
-        ))),
+        count => Err(config.error(ConfigProblem::SeveralTracks { count })),
     }
 }
 
@@ -337,16 +335,7 @@ fn speed_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result
         Some("mps" | "m/s") => Ok(1.0),
         Some("kmh" | "km/h" | "kph") => Ok(1.0 / 3.6),
         Some("mph" | "mi/h") => Ok(0.447_04),
-        Some(other) => Err(table.lacks(
-            format!("the unit of speed '{other}' is not known"),
-            "units are mps (m/s), kmh (km/h) and mph".into(),
-        )),
-        None => Err(table.lacks(
-            format!("nothing says the unit of column {}", column.header),
-            "name the column speed_mps, speed_kmh or speed_mph, or set speed_unit in dataset.toml: \
-             a wrong unit would scale every depth"
-                .into(),
-        )),
+        other => Err(table.no_unit(Quantity::Speed, column, other)),
     }
 }
 
@@ -356,15 +345,7 @@ fn yaw_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f
     match unit {
         Some("radps" | "rad/s" | "rad s^-1") => Ok(1.0),
         Some("dps" | "degps" | "deg/s" | "°/s") => Ok(1_f64.to_radians()),
-        other => Err(table.lacks(
-            match other {
-                Some(other) => format!("the unit of yaw rate '{other}' is not known"),
-                None => format!("nothing says the unit of column {}", column.header),
-            },
-            "name the column yaw_rate_radps or yaw_rate_dps (positive to the left), or set yaw_rate_unit \
-             in dataset.toml"
-                .into(),
-        )),
+        other => Err(table.no_unit(Quantity::YawRate, column, other)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Comma-separated tables with a header, read so that every complaint names file, line and column.
 
-use crate::{Error, Result};
+use crate::{ColumnsProblem, Error, ExpectedCell, Quantity, Result, TableProblem};
 use std::path::{Path, PathBuf};
 
 /// A table's header and rows.
@@ -43,9 +43,12 @@ impl Table {
             problem: match error.kind() {
                 csv::ErrorKind::UnequalLengths {
                     expected_len, len, ..
-                } => format!("{len} values, the header has {expected_len}"),
-                csv::ErrorKind::Utf8 { .. } => "not UTF-8 text".into(),
-                _ => error.to_string(),
+                } => TableProblem::Length {
+                    found: *len,
+                    header: *expected_len,
+                },
+                csv::ErrorKind::Utf8 { .. } => TableProblem::NotText,
+                _ => TableProblem::Csv(error),
             },
         };
         let header = reader.headers().map_err(refused)?.clone();
@@ -75,23 +78,36 @@ impl Table {
     }
 
     /// As [`Self::column`], or an error that lists what there is.
-    pub(crate) fn require(&self, names: &[&str], example: &str) -> Result<&Column> {
+    pub(crate) fn require(&self, names: &[&str], example: &'static str) -> Result<&Column> {
         self.column(names).ok_or_else(|| {
-            let found: Vec<&str> = self.columns.iter().map(|c| c.header.as_str()).collect();
-            self.lacks(
-                format!("no column '{}', there is: {}", names[0], found.join(", ")),
-                format!("the first line names the columns, such as {example}"),
-            )
+            self.lacks(ColumnsProblem::NoColumn {
+                wanted: names[0].to_owned(),
+                found: self.columns.iter().map(|c| c.header.clone()).collect(),
+                example,
+            })
         })
     }
 
     /// An error about the table's columns.
-    pub(crate) fn lacks(&self, problem: String, remedy: String) -> Error {
+    pub(crate) fn lacks(&self, problem: ColumnsProblem) -> Error {
         Error::Columns {
             path: self.path.clone(),
             problem,
-            remedy,
         }
+    }
+
+    /// An error about a column whose unit is not known, or not said.
+    pub(crate) fn no_unit(&self, quantity: Quantity, column: &Column, unit: Option<&str>) -> Error {
+        self.lacks(match unit {
+            Some(unit) => ColumnsProblem::UnknownUnit {
+                quantity,
+                unit: unit.to_owned(),
+            },
+            None => ColumnsProblem::NoUnit {
+                quantity,
+                column: column.header.clone(),
+            },
+        })
     }
 
     /// How many rows there are.
@@ -113,34 +129,25 @@ impl Table {
         let words = self.words(column).enumerate();
         let number = |(row, word): (usize, &str)| {
             let value = word.parse::<f64>().ok().filter(|v| v.is_finite());
-            value.ok_or_else(|| self.bad(row, column, &describe(word, "a finite number")))
+            value
+                .ok_or_else(|| self.bad(row, column, TableProblem::not(ExpectedCell::Number, word)))
         };
         words.map(number).collect()
     }
 
     /// An error about a value, by row counted from 0.
-    pub(crate) fn bad(&self, row: usize, column: &Column, problem: &str) -> Error {
+    pub(crate) fn bad(&self, row: usize, column: &Column, problem: TableProblem) -> Error {
         Error::Table {
             path: self.path.clone(),
             line: self.line(row),
             column: column.header.clone(),
-            problem: problem.to_owned(),
+            problem,
         }
     }
 
     /// The line of a row, counted from 1.
     pub(crate) fn line(&self, row: usize) -> u64 {
         self.rows.get(row).map_or(0, |r| r.0)
-    }
-}
-
-/// `'x' is not a number`, short however long the word is.
-pub(crate) fn describe(word: &str, expected: &str) -> String {
-    let shown: String = word.chars().take(40).collect();
-    if shown.is_empty() {
-        format!("empty, expected {expected}")
-    } else {
-        format!("'{shown}' is not {expected}")
     }
 }
 

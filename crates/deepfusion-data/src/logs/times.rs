@@ -1,9 +1,9 @@
 //! The column of times of a table.
 
 use super::clock::{TimeUnit, seconds};
-use super::table::{Table, describe};
-use crate::Result;
+use super::table::Table;
 use crate::dataset_toml::FolderConfig;
+use crate::{ColumnsProblem, ExpectedCell, Result, TableProblem};
 
 pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
@@ -16,7 +16,7 @@ pub(crate) fn times(
 ) -> Result<Vec<i64>> {
     let column = table.require(&TIMES, "time_s,speed_mps")?;
     if table.len() == 0 {
-        return Err(table.lacks("no row below the header".into(), "record some".into()));
+        return Err(table.lacks(ColumnsProblem::NoRows));
     }
     let unit = match (&column.unit, &config.time_unit) {
         (Some(unit), _) | (None, Some(unit)) => TimeUnit::named(unit),
@@ -33,22 +33,23 @@ pub(crate) fn times(
         }
     };
     let Some(unit) = unit else {
-        return Err(table.lacks(
-            format!("nothing says the unit of time of column {}", column.header),
-            "name the column time_s, time_ms, time_us or time_ns, or set time_unit in dataset.toml"
-                .into(),
-        ));
+        return Err(table.lacks(ColumnsProblem::NoTimeUnit {
+            column: column.header.clone(),
+        }));
     };
     let mut all: Vec<i64> = Vec::with_capacity(table.len());
     let mut repeated = Vec::new();
     for (row, word) in table.words(column).enumerate() {
         let ns = unit.nanoseconds(word);
-        let ns = ns.ok_or_else(|| table.bad(row, column, &describe(word, "a time")))?;
+        let not_a_time = || TableProblem::not(ExpectedCell::Time, word);
+        let ns = ns.ok_or_else(|| table.bad(row, column, not_a_time()))?;
         match all.last() {
             Some(last) if ns < *last => {
-                let back = seconds(*last, ns);
-                let problem = format!("'{word}' is {back} s before the row above");
-                return Err(table.bad(row, column, &problem));
+                let problem = TableProblem::Earlier {
+                    text: word.to_owned(),
+                    seconds: seconds(*last, ns),
+                };
+                return Err(table.bad(row, column, problem));
             }
             Some(last) if ns == *last => repeated.push(table.line(row)),
             _ => {}

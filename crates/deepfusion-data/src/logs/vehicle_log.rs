@@ -3,7 +3,7 @@
 use super::clock::seconds;
 use super::samples::Samples;
 use super::table::{Column, Table};
-use crate::{MotionModel, Result};
+use crate::{MotionModel, Quantity, Result};
 use deepfusion_motion::{FusedTrack, ImuSample, MotionConfig, Signal, VehicleSensors};
 use nalgebra::Vector3;
 
@@ -121,12 +121,6 @@ fn acceleration_factor(table: &Table, column: &Column) -> Result<f64> {
     match column.unit.as_deref() {
         Some("mps2" | "m/s2" | "m/s^2" | "m/s²") => Ok(1.0),
         Some("g") => Ok(GRAVITY_MPS2),
-        other => Err(table.lacks(
-            match other {
-                Some(other) => format!("the unit of acceleration '{other}' is not known"),
-                None => format!("nothing says the unit of column {}", column.header),
-            },
-            "name the columns accel_x_mps2, accel_y_mps2, accel_z_mps2 (gravity included), or end them in _g".into(),
-        )),
+        other => Err(table.no_unit(Quantity::Acceleration, column, other)),
     }
 }

@@ -1,7 +1,7 @@
 //! KITTI's annotated depth: 16-bit grey PNG, depth = value / 256 metres, 0 = none.
 
 use super::files;
-use crate::{Error, Result};
+use crate::{Error, ImageProblem, Result};
 use deepfusion_geometry::DepthMap;
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::Path;
@@ -17,8 +17,7 @@ pub fn read_depth_png(path: &Path) -> Result<DepthMap> {
     let DynamicImage::ImageLuma16(image) = files::decode(path)? else {
         return Err(Error::Image {
             path: path.to_owned(),
-            problem: "not a 16-bit grey PNG, which depth in steps of 1/256 m needs".into(),
-            truncated: false,
+            problem: ImageProblem::NotAnnotatedDepth,
         });
     };
     Ok(DepthMap {

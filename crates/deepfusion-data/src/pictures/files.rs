@@ -1,7 +1,7 @@
 //! Images from files and to them.
 
 use super::jpeg;
-use crate::{Error, Result};
+use crate::{Error, ImageProblem, Result};
 use image::{DynamicImage, ImageError, ImageReader, RgbImage};
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
@@ -37,7 +37,7 @@ pub(crate) fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     }
     reader(Cursor::new(bytes), path)?
         .decode()
-        .map_err(|e| broken(path, &e))
+        .map_err(|e| broken(path, e))
 }
 
 /// Width and height of a PNG or JPEG, from its header alone.
@@ -51,14 +51,13 @@ pub fn image_size(path: &Path) -> Result<(u32, u32)> {
     if !jpeg::is_jpeg(begin) {
         return reader(input, path)?
             .into_dimensions()
-            .map_err(|e| broken(path, &e));
+            .map_err(|e| broken(path, e));
     }
     match jpeg::size(&mut input) {
         Ok(Some(size)) => Ok(size),
         Ok(None) => Err(Error::Image {
             path: path.to_owned(),
-            problem: "the JPEG has no frame header".into(),
-            truncated: false,
+            problem: ImageProblem::NoFrameHeader,
         }),
         Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Err(truncated(path)),
         Err(e) => Err(Error::file(path, e)),
@@ -72,23 +71,21 @@ fn reader<R: BufRead + Seek>(input: R, path: &Path) -> Result<ImageReader<R>> {
     if reader.format().is_none() {
         return Err(Error::Image {
             path: path.to_owned(),
-            problem: "neither a PNG nor a JPEG".into(),
-            truncated: false,
+            problem: ImageProblem::OtherFormat,
         });
     }
     Ok(reader)
 }
 
-fn broken(path: &Path, error: &ImageError) -> Error {
+fn broken(path: &Path, error: ImageError) -> Error {
     match error {
         // As the PNG decoder reports a cut file; a JPEG's end was looked for before.
         ImageError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof => {
             truncated(path)
         }
-        _ => Error::Image {
+        error => Error::Image {
             path: path.to_owned(),
-            problem: format!("cannot be decoded: {error}"),
-            truncated: false,
+            problem: ImageProblem::Undecodable(error),
         },
     }
 }
@@ -96,8 +93,7 @@ fn broken(path: &Path, error: &ImageError) -> Error {
 fn truncated(path: &Path) -> Error {
     Error::Image {
         path: path.to_owned(),
-        problem: "the image is truncated: the file ends within it".into(),
-        truncated: true,
+        problem: ImageProblem::Truncated,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Folders of depth images.
 
 use crate::pictures::decode;
-use crate::{Error, Result};
+use crate::{Error, ImageProblem, Result};
 use deepfusion_geometry::DepthMap;
 use image::DynamicImage;
 use std::collections::BTreeMap;
@@ -23,8 +23,7 @@ impl DepthImages {
         let DynamicImage::ImageLuma16(image) = decode(path)? else {
             return Err(Error::Image {
                 path: path.to_owned(),
-                problem: "not a 16-bit grey PNG, which depth images are".into(),
-                truncated: false,
+                problem: ImageProblem::NotDepth,
             });
         };
         let metres = |value: &u16| {

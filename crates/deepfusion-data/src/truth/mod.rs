@@ -6,4 +6,4 @@ mod moving;
 mod scan;
 
 pub use moving::{MovingLabels, MovingPixels, MovingSource};
-pub use scan::{DynamicAgreement, GtKind, LidarMotion, ScanTruth};
+pub use scan::{DynamicAgreement, GtKind, LidarMotion, NoSuchDepth, ScanTruth};

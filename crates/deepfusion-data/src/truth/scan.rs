@@ -1,6 +1,7 @@
 //! What a scan says of a frame: depth, velocities, dynamic pixels.
 
 use deepfusion_geometry::DepthMap;
+use deepfusion_hint::Hint;
 use nalgebra::Vector3;
 
 /// What a ground-truth depth means and at which pixel it lies.
@@ -29,17 +30,32 @@ impl GtKind {
     }
 }
 
-impl std::str::FromStr for GtKind {
-    type Err = String;
+/// A text that names no kind of ground-truth depth.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("'{text}' is no ground-truth depth: z, velodyne or annotated")]
+pub struct NoSuchDepth {
+    /// The text.
+    pub text: String,
+}
 
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
+impl Hint for NoSuchDepth {
+    /// The message itself lists the kinds.
+    fn hint(&self) -> Option<String> {
+        None
+    }
+}
+
+impl std::str::FromStr for GtKind {
+    type Err = NoSuchDepth;
+
+    fn from_str(text: &str) -> Result<Self, NoSuchDepth> {
         match text {
             "z" => Ok(Self::Z),
             "velodyne" => Ok(Self::Velodyne),
             "annotated" => Ok(Self::Annotated),
-            _ => Err(format!(
-                "'{text}' is no ground-truth depth: z, velodyne or annotated"
-            )),
+            _ => Err(NoSuchDepth {
+                text: text.to_owned(),
+            }),
         }
     }
 }

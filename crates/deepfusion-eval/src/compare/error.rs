@@ -21,12 +21,13 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file that is no evaluation.
-    #[error("{}: no evaluation: {what}", path.display())]
+    #[error("{}: no evaluation: {reason}", path.display())]
     NotAnEvaluation {
         /// The file.
         path: PathBuf,
         /// Why.
-        what: String,
+        #[source]
+        reason: EvaluationProblem,
     },
     /// A file of a newer program.
     #[error("{}: format version {found}, this program reads up to {}", path.display(), super::SAVED_VERSION)]
@@ -47,7 +48,34 @@ pub enum Error {
     Csv(#[from] csv::Error),
     /// The table of published figures, which is part of the program.
     #[error("published.toml: {0}")]
-    Published(String),
+    Published(#[source] PublishedProblem),
+}
+
+/// Why a file is no evaluation.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvaluationProblem {
+    /// No JSON, or that of something else.
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// Its version is not a number.
+    #[error("format_version is not a number")]
+    VersionNumber,
+}
+
+/// Why a text is no table of published figures.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PublishedProblem {
+    /// It cannot be read as one. What the parser says, without the line break that ends it.
+    #[error("{}", .0.to_string().trim_end())]
+    NotOne(Box<toml::de::Error>),
+    /// A row that names a source or group that does not exist.
+    #[error("`{method}` has no such source or group")]
+    Reference {
+        /// The row's method.
+        method: String,
+    },
 }
 
 /// A result of this module.

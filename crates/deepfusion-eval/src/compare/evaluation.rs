@@ -6,7 +6,7 @@ use deepfusion_hint::count_of;
 use serde_json::Value;
 
 use super::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
-use super::{Error, Result, SAVED_VERSION};
+use super::{Error, EvaluationProblem, Result, SAVED_VERSION};
 
 /// An evaluation to be compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,13 +70,13 @@ impl Evaluation {
         digests: &mut HashMap<PathBuf, Option<String>>,
     ) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-        let not = |what: String| Error::NotAnEvaluation {
+        let not = |reason: EvaluationProblem| Error::NotAnEvaluation {
             path: path.to_owned(),
-            what,
+            reason,
         };
-        let value: Value = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
+        let value: Value = serde_json::from_str(&text).map_err(|e| not(e.into()))?;
         let Some(version) = value.get("format_version") else {
-            let report = serde_json::from_value(value).map_err(|e| not(e.to_string()))?;
+            let report = serde_json::from_value(value).map_err(|e| not(e.into()))?;
             let stem = path.file_stem().unwrap_or(path.as_os_str());
             return Ok(Self {
                 name: stem.to_string_lossy().into_owned(),
@@ -92,10 +92,9 @@ impl Evaluation {
                 return Err(Error::Version { path, found });
             }
             Some(_) => {}
-            None => return Err(not("format_version is not a number".into())),
+            None => return Err(not(EvaluationProblem::VersionNumber)),
         }
-        let saved: SavedEvaluation =
-            serde_json::from_value(value).map_err(|e| not(e.to_string()))?;
+        let saved: SavedEvaluation = serde_json::from_value(value).map_err(|e| not(e.into()))?;
         // A saved file lies in RUN/eval.
         let run = run.or_else(|| path.parent().and_then(Path::parent));
         let now = run.and_then(|run| {

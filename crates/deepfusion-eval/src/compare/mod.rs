@@ -16,7 +16,7 @@ mod runs;
 mod saved;
 mod table;
 
-pub use error::{Error, Result};
+pub use error::{Error, EvaluationProblem, PublishedProblem, Result};
 pub use evaluation::{Evaluation, Origin};
 pub use metric_scale::{LEAST_IMAGES, LEAST_STEPS, MetricScale, TRUSTED_WITHIN, Verdict};
 pub use published::{Published, published_tables};

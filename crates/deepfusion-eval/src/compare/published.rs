@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::plausibility::{Flag, Seven, THREE_DECIMALS, check, identical};
 use super::table::{Column, Row, Table, Tables, Value};
-use super::{Error, Result};
+use super::{Error, PublishedProblem, Result};
 
 /// Farthest depth of KITTI's protocols, in metres.
 const CAP_M: f64 = 80.0;
@@ -82,13 +82,19 @@ impl Published {
     /// # Errors
     /// [`Error::Published`] naming the line, or the row whose source or group there is not.
     pub fn parse(text: &str) -> Result<Self> {
-        let published: Self = toml::from_str(text).map_err(|e| Error::Published(e.to_string()))?;
+        Self::read(text).map_err(Error::Published)
+    }
+
+    fn read(text: &str) -> std::result::Result<Self, PublishedProblem> {
+        let read = toml::from_str(text);
+        let published: Self = read.map_err(|e| PublishedProblem::NotOne(Box::new(e)))?;
         for row in &published.row {
             let known = published.source.iter().any(|s| s.id == row.source)
                 && published.group.iter().any(|g| g.id == row.group);
             if !known {
-                let what = format!("`{}` has no such source or group", row.method);
-                return Err(Error::Published(what));
+                return Err(PublishedProblem::Reference {
+                    method: row.method.clone(),
+                });
             }
         }
         Ok(published)
@@ -202,12 +208,11 @@ fn commonest<'a>(rows: &[&'a PublishedRow]) -> Option<(&'a str, &'a str)> {
 /// # Errors
 /// [`Error::Published`], which a test excludes.
 pub fn published_tables() -> Result<Tables> {
-    static PUBLISHED: LazyLock<std::result::Result<Published, String>> = LazyLock::new(|| {
-        Published::parse(include_str!("../../data/published.toml")).map_err(|e| e.to_string())
-    });
+    static PUBLISHED: LazyLock<std::result::Result<Published, PublishedProblem>> =
+        LazyLock::new(|| Published::read(include_str!("../../data/published.toml")));
     match &*PUBLISHED {
         Ok(published) => Ok(published.tables()),
-        Err(what) => Err(Error::Published(what.clone())),
+        Err(problem) => Err(Error::Published(problem.clone())),
     }
 }
 

@@ -1,6 +1,10 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+mod line;
+
+pub use self::line::PoseLineProblem;
+
 /// Two paths that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -76,7 +80,7 @@ pub enum PoseFileError {
         /// The line, counted from 1.
         line: usize,
         /// What is wrong with it.
-        problem: String,
+        problem: PoseLineProblem,
     },
     /// It holds no pose at all.
     #[error("{}: no pose in it", path.display())]

@@ -1,5 +1,5 @@
 use super::pose_text::{Line, parse_line};
-use super::{PoseFileError, TrackError, TrackPair};
+use super::{PoseFileError, PoseLineProblem, TrackError, TrackPair};
 use deepfusion_geometry::Se3;
 use std::path::{Path, PathBuf};
 
@@ -68,9 +68,10 @@ impl PoseFile {
             });
             if let Some(time_s) = time_s {
                 if let Some(last) = file.times_s.last().filter(|last| **last >= time_s) {
-                    return Err(bad(format!(
-                        "time {time_s} is not after {last}, the one before"
-                    )));
+                    return Err(bad(PoseLineProblem::Time {
+                        time_s,
+                        before_s: *last,
+                    }));
                 }
                 file.times_s.push(time_s);
             }

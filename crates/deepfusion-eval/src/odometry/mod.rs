@@ -12,7 +12,7 @@ mod report;
 mod segments;
 mod table;
 
-pub use error::{PoseFileError, TrackError};
+pub use error::{PoseFileError, PoseLineProblem, TrackError};
 pub use file::{PoseFile, PoseFormat};
 pub use local::{ATE_POSES, Local};
 pub use pose_text::{kitti_text, tum_text};

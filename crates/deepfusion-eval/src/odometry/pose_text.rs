@@ -1,6 +1,6 @@
 //! Lines of pose files.
 
-use super::PoseFormat;
+use super::{PoseFormat, PoseLineProblem};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write as _;
@@ -17,20 +17,22 @@ pub(super) struct Line {
 }
 
 /// Reads a line in the format of those before it, or, for the first, in the one its number of columns means.
-pub(super) fn parse_line(line: &str, before: Option<PoseFormat>) -> Result<Line, String> {
+pub(super) fn parse_line(line: &str, before: Option<PoseFormat>) -> Result<Line, PoseLineProblem> {
     let values = line
         .split([' ', '\t', ','])
         .filter(|word| !word.is_empty())
         .map(number)
-        .collect::<Result<Vec<f64>, String>>()?;
+        .collect::<Result<Vec<f64>, PoseLineProblem>>()?;
     let format = match (values.len(), before) {
         (12, None | Some(PoseFormat::Kitti)) => PoseFormat::Kitti,
         (8, None | Some(PoseFormat::Tum)) => PoseFormat::Tum,
-        (n, None) => return Err(format!("{n} columns, expected 12 (KITTI) or 8 (TUM)")),
-        (n, Some(PoseFormat::Kitti)) => {
-            return Err(format!("{n} columns, the lines before have 12"));
+        (found, None) => return Err(PoseLineProblem::Columns { found }),
+        (found, Some(PoseFormat::Kitti)) => {
+            return Err(PoseLineProblem::OtherColumns { found, before: 12 });
         }
-        (n, Some(PoseFormat::Tum)) => return Err(format!("{n} columns, the lines before have 8")),
+        (found, Some(PoseFormat::Tum)) => {
+            return Err(PoseLineProblem::OtherColumns { found, before: 8 });
+        }
     };
     match format {
         PoseFormat::Kitti => Ok(Line {
@@ -46,36 +48,31 @@ pub(super) fn parse_line(line: &str, before: Option<PoseFormat>) -> Result<Line,
     }
 }
 
-fn number(word: &str) -> Result<f64, String> {
-    let shown: String = word.chars().take(40).collect();
-    let value: f64 = word
-        .parse()
-        .map_err(|_| format!("'{shown}' is not a number"))?;
+fn number(word: &str) -> Result<f64, PoseLineProblem> {
+    let value: f64 = word.parse().map_err(|_| PoseLineProblem::NotANumber {
+        text: word.chars().take(40).collect(),
+    })?;
     if value.is_finite() {
         Ok(value)
     } else {
-        Err(format!("{value} is no finite number"))
+        Err(PoseLineProblem::NotFinite { value })
     }
 }
 
-fn from_rows(v: &[f64]) -> Result<Se3, String> {
+fn from_rows(v: &[f64]) -> Result<Se3, PoseLineProblem> {
     let rotation = Matrix3::new(v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10]);
     let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    if off > ROTATION_TOLERANCE || rotation.determinant() < 0.0 {
-        return Err(format!(
-            "its first three columns are no rotation (R·Rᵀ is {off:.2e} from the identity, its determinant {:.3})",
-            rotation.determinant()
-        ));
+    let determinant = rotation.determinant();
+    if off > ROTATION_TOLERANCE || determinant < 0.0 {
+        return Err(PoseLineProblem::Rotation { off, determinant });
     }
     Ok(Se3::from_parts(&rotation, Vector3::new(v[3], v[7], v[11])))
 }
 
-fn from_quaternion(v: &[f64]) -> Result<Se3, String> {
+fn from_quaternion(v: &[f64]) -> Result<Se3, PoseLineProblem> {
     let length = v[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
     if (length - 1.0).abs() > ROTATION_TOLERANCE {
-        return Err(format!(
-            "its quaternion has length {length:.4}, a rotation's has 1"
-        ));
+        return Err(PoseLineProblem::Quaternion { length });
     }
     Ok(Se3::from_quaternion(
         [v[6], v[3], v[4], v[5]],

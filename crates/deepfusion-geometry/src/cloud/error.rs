@@ -1,3 +1,9 @@
+//! What can go wrong with a cloud or its file.
+
+mod ply;
+
+pub use self::ply::PlyProblem;
+
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
@@ -31,7 +37,7 @@ pub enum Error {
     },
     /// A PLY header or body is not what this reader takes.
     #[error("PLY: {0}")]
-    Ply(String),
+    Ply(#[from] PlyProblem),
     /// A column, an image or a camera does not fit the points or the depth map.
     #[error("{what}: {found}, expected {expected}")]
     Size {

@@ -1,7 +1,7 @@
 //! PLY, binary little-endian: `x y z` as float, then `red green blue` as uchar, `intensity`, `radial_velocity`,
 //! `confidence` and `sigma` as float, each where the cloud has it.
 
-use super::{Error, PointCloud, Result};
+use super::{PlyProblem, PointCloud, Result};
 use std::io::{BufRead, Read, Write};
 
 /// Longest header line accepted, so that a binary file of another format is not read whole as one line.
@@ -13,7 +13,7 @@ impl PointCloud {
     /// Writes the cloud as a binary little-endian PLY.
     ///
     /// # Errors
-    /// [`Error::Stream`] if writing fails, [`Error::Size`] if a column does not fit.
+    /// [`Error::Stream`](super::Error::Stream) if writing fails, [`Error::Size`](super::Error::Size) if a column does not fit.
     pub fn write_ply(&self, mut out: impl Write) -> Result<()> {
         self.check()?;
         let mut header = format!(
@@ -63,7 +63,7 @@ impl PointCloud {
     /// among them `x`, `y`, `z`. Properties it does not know, and elements after it, are skipped.
     ///
     /// # Errors
-    /// [`Error::Ply`] for any other file and for one that ends early.
+    /// [`Error::Ply`](super::Error::Ply) for any other file and for one that ends early.
     pub fn read_ply(mut input: impl BufRead) -> Result<Self> {
         let header = Header::read(&mut input)?;
         let stride = header.properties.iter().map(|p| p.kind.bytes()).sum();
@@ -94,12 +94,9 @@ impl PointCloud {
         while left > 0 {
             let now = left.min(CHUNK_POINTS);
             buffer.resize(now * stride, 0);
-            input.read_exact(&mut buffer).map_err(|_| {
-                Error::Ply(format!(
-                    "ends before vertex {} of the {} its header announces",
-                    header.vertices - left + now,
-                    header.vertices
-                ))
+            input.read_exact(&mut buffer).map_err(|_| PlyProblem::Cut {
+                vertex: header.vertices - left + now,
+                vertices: header.vertices,
             })?;
             for vertex in buffer.chunks_exact(stride) {
                 cloud.xyz.push(position.map(|p| p.value(vertex) as f32));
@@ -209,9 +206,8 @@ struct NamedProperty {
 
 impl Header {
     fn read(input: &mut impl BufRead) -> Result<Self> {
-        let bad = |what: String| Error::Ply(what);
         if next_line(input)? != "ply" {
-            return Err(bad("does not begin with 'ply'".into()));
+            return Err(PlyProblem::NoPly.into());
         }
         let mut vertices: Option<usize> = None;
         let mut properties: Vec<NamedProperty> = Vec::new();
@@ -222,31 +218,29 @@ impl Header {
             match words.as_slice() {
                 ["format", "binary_little_endian", _] => format_seen = true,
                 ["format", other, ..] => {
-                    return Err(bad(format!(
-                        "format '{other}', expected binary_little_endian"
-                    )));
+                    return Err(PlyProblem::Format((*other).to_owned()).into());
                 }
                 ["element", "vertex", count] if vertices.is_none() => {
                     let count = count
                         .parse()
-                        .map_err(|_| bad(format!("'{count}' is not a number of vertices")))?;
+                        .map_err(|_| PlyProblem::Count((*count).to_owned()))?;
                     vertices = Some(count);
                     in_vertex = true;
                 }
                 ["element", name, _] => {
                     if vertices.is_none() {
-                        return Err(bad(format!(
-                            "element '{name}' comes before vertex, which should be the first"
-                        )));
+                        return Err(PlyProblem::Order((*name).to_owned()).into());
                     }
                     in_vertex = false;
                 }
                 ["property", "list", ..] if in_vertex => {
-                    return Err(bad("a vertex with a list property".into()));
+                    return Err(PlyProblem::List.into());
                 }
                 ["property", kind, name] if in_vertex => {
-                    let kind = Kind::of(kind)
-                        .ok_or_else(|| bad(format!("property {name}: unknown type '{kind}'")))?;
+                    let kind = Kind::of(kind).ok_or_else(|| PlyProblem::Type {
+                        name: (*name).to_owned(),
+                        kind: (*kind).to_owned(),
+                    })?;
                     let offset = properties.iter().map(|p| p.kind.bytes()).sum();
                     properties.push(NamedProperty {
                         name: (*name).to_owned(),
@@ -256,13 +250,13 @@ impl Header {
                 }
                 ["end_header"] => break,
                 ["comment" | "obj_info", ..] | ["property", ..] | [] => {}
-                _ => return Err(bad(format!("header line '{line}' is not understood"))),
+                _ => return Err(PlyProblem::Line(line).into()),
             }
         }
         if !format_seen {
-            return Err(bad("the header has no format line".into()));
+            return Err(PlyProblem::NoFormat.into());
         }
-        let vertices = vertices.ok_or_else(|| bad("the header has no vertex element".into()))?;
+        let vertices = vertices.ok_or(PlyProblem::NoVertices)?;
         Ok(Self {
             vertices,
             properties,
@@ -274,9 +268,8 @@ impl Header {
         Some(found.property)
     }
 
-    fn require(&self, name: &str) -> Result<Property> {
-        self.find(name)
-            .ok_or_else(|| Error::Ply(format!("a vertex without property '{name}'")))
+    fn require(&self, name: &'static str) -> std::result::Result<Property, PlyProblem> {
+        self.find(name).ok_or(PlyProblem::NoProperty(name))
     }
 }
 
@@ -288,9 +281,9 @@ fn next_line(input: &mut impl BufRead) -> Result<String> {
         .take(MAX_HEADER_LINE)
         .read_until(b'\n', &mut line)?;
     if line.pop() != Some(b'\n') {
-        return Err(Error::Ply("ends within its header".into()));
+        return Err(PlyProblem::HeaderCut.into());
     }
-    let line = String::from_utf8(line).map_err(|_| Error::Ply("the header is not text".into()))?;
+    let line = String::from_utf8(line).map_err(|_| PlyProblem::NoText)?;
     Ok(line.trim_end().to_owned())
 }
 

@@ -7,6 +7,7 @@ use deepfusion_data::{Camera, CameraCalibration, Lens, RgbImage, kitti::Calibrat
 use deepfusion_geometry::Intrinsics;
 use sha2::{Digest, Sha256};
 
+use crate::error::UnfitCamera;
 use crate::{Error, Result};
 
 /// Where the inputs' camera comes from.
@@ -66,18 +67,18 @@ impl CameraSource {
         ))
     }
 
-    /// One word for the sidecar.
+    /// What it is to an image that says nothing itself.
     #[must_use]
-    pub fn word(&self) -> &'static str {
+    pub fn from(&self) -> CameraFrom {
         match self {
-            Self::Given(_) | Self::Hfov(_) | Self::File(_) | Self::Lens(_) => "given",
-            Self::Trained(_) => "assumed",
-            Self::Learned(_) => "learned",
-            Self::Unknown => "unknown",
+            Self::Given(_) | Self::Hfov(_) | Self::File(_) | Self::Lens(_) => CameraFrom::Given,
+            Self::Trained(_) => CameraFrom::Assumed,
+            Self::Learned(_) => CameraFrom::Learned,
+            Self::Unknown => CameraFrom::Unknown,
         }
     }
 
-    /// The image as a pinhole camera would have taken it, that camera, and where it comes from, in a word. What `exif` says
+    /// The image as a pinhole camera would have taken it, that camera, and where it comes from. What EXIF says
     /// comes before what would only be assumed.
     ///
     /// # Errors
@@ -88,14 +89,14 @@ impl CameraSource {
             return Ok(PinholeImage {
                 image: lens.correct(image)?,
                 camera: Some(lens.intrinsics()),
-                from: self.word(),
+                from: self.from(),
             });
         }
         let (camera, from) = match (self, exif) {
             (Self::Trained(_) | Self::Learned(_) | Self::Unknown, Some(camera)) => {
-                (Some(camera), "exif")
+                (Some(camera), CameraFrom::Exif)
             }
-            _ => (self.of(image.width(), image.height())?, self.word()),
+            _ => (self.of(image.width(), image.height())?, self.from()),
         };
         Ok(PinholeImage {
             image,
@@ -110,17 +111,18 @@ impl CameraSource {
             Self::Given(k) => {
                 let k = Intrinsics::from_numbers(*k, (width, height));
                 match k.implausible() {
-                    Some(why) => Err(Error::Camera { why }),
+                    Some(why) => Err(Error::Camera(UnfitCamera::Implausible(why))),
                     None => Ok(Some(k)),
                 }
             }
             Self::Hfov(degrees) => Ok(Some(Intrinsics::from_hfov(*degrees, (width, height)))),
-            Self::File(k) if (k.width, k.height) != (width, height) => Err(Error::Camera {
-                why: format!(
-                    "the calibration is for {}x{}, the image has {width}x{height}",
-                    k.width, k.height
-                ),
-            }),
+            Self::File(k) if (k.width, k.height) != (width, height) => {
+                Err(Error::Camera(UnfitCamera::OtherSize {
+                    file: None,
+                    made_for: (k.width, k.height),
+                    image: (width, height),
+                }))
+            }
             Self::File(k) => Ok(Some(*k)),
             Self::Lens(_) => Ok(None),
             Self::Trained(k) | Self::Learned(k) => Ok(Some(with_the_view_of(k, width, height))),
@@ -136,8 +138,59 @@ pub struct PinholeImage {
     pub image: RgbImage,
     /// The camera, where it is known or assumed.
     pub camera: Option<Intrinsics>,
-    /// `given`, `recording`, `exif`, `learned`, `assumed` or `unknown`.
-    pub from: &'static str,
+    /// Where that comes from.
+    pub from: CameraFrom,
+}
+
+/// Where an image's camera comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CameraFrom {
+    /// Who started it said it.
+    Given,
+    /// The recording says it.
+    Recording,
+    /// The image's EXIF says it.
+    Exif,
+    /// The network's run learned it.
+    Learned,
+    /// The one that the network was trained with is taken for it.
+    Assumed,
+    /// Nothing says it.
+    Unknown,
+}
+
+impl CameraFrom {
+    /// One word for the sidecar.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::Recording => "recording",
+            Self::Exif => "exif",
+            Self::Learned => "learned",
+            Self::Assumed => "assumed",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// Whether it is the image's own camera, and not a guess.
+    #[must_use]
+    pub fn is_known(self) -> bool {
+        matches!(self, Self::Given | Self::Recording | Self::Exif)
+    }
+}
+
+/// How far a principal point may lie from the middle of the image, as a share of its side, in both axes and the same way: numbers of an
+/// image half as large again are 0.25 off, those of a cut image in one axis alone.
+const MOST_OFF: f64 = 0.2;
+
+/// Whether a camera's numbers look like those of images of another size.
+#[must_use]
+pub fn looks_like_another_sizes(k: &Intrinsics) -> bool {
+    let off = |c: f64, size: u32| c / f64::from(size) - 0.5;
+    let (x, y) = (off(k.cx, k.width), off(k.cy, k.height));
+    x * y > 0.0 && x.abs().min(y.abs()) > MOST_OFF
 }
 
 /// A calibration tool's file: OpenCV's, ROS's, Kalibr's, or four numbers.
@@ -165,12 +218,11 @@ impl LensFile {
         if *made_for == size {
             return Ok(lens);
         }
-        let ((width, height), (w, h)) = (*made_for, size);
-        let why = format!(
-            "{} is for images of {width}x{height}, this one has {w}x{h}",
-            self.path.display()
-        );
-        Err(Error::Camera { why })
+        Err(Error::Camera(UnfitCamera::OtherSize {
+            file: Some(self.path.clone()),
+            made_for: *made_for,
+            image: size,
+        }))
     }
 }
 

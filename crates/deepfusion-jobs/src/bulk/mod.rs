@@ -6,6 +6,7 @@
 
 mod camera;
 mod committer;
+mod loader;
 mod manifest;
 pub mod pipeline;
 mod progress;
@@ -15,11 +16,13 @@ mod shard;
 mod sidecars;
 mod video;
 
-pub use camera::{CameraSource, LensFile, PinholeImage};
+pub use crate::error::UnfitCamera;
+pub use camera::{CameraFrom, CameraSource, LensFile, PinholeImage, looks_like_another_sizes};
 pub use committer::{Written, commit, queue};
+pub use loader::{ImageLoader, LoadedImage};
 pub use manifest::{Entry, Lock, Manifest, State};
 pub use progress::{BulkProgress, Summary};
-pub use records::{RecordLines, record_line, write_record};
+pub use records::{RecordLines, record_line, record_path, write_record};
 pub use resume::{BulkJob, StartedJob};
 pub use shard::Shard;
 pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};

@@ -7,6 +7,12 @@ use deepfusion_records::FrameRecord;
 
 use crate::Result;
 
+/// Where a frame's record lies.
+#[must_use]
+pub fn record_path(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}_targets.json"))
+}
+
 /// A frame's record as one line.
 ///
 /// # Errors

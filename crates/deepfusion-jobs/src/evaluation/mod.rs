@@ -5,6 +5,7 @@ pub mod confidence;
 mod coverage;
 mod division;
 mod known_pixels;
+mod model_sheet;
 mod truth;
 
 use std::collections::HashMap;
@@ -23,6 +24,7 @@ pub use self::comparison::Comparison;
 pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
 pub use self::division::{Division, divide};
 pub use self::known_pixels::known_pixels;
+pub use self::model_sheet::ModelSheet;
 pub use self::truth::{
     Truth, array_places, baseline_from_arrays, baseline_from_datasets, baseline_from_training,
     depth_map,

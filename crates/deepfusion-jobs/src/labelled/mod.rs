@@ -15,7 +15,9 @@ use deepfusion_perception::{
 };
 
 pub use self::lidar::gathered;
-pub use self::object_frames::{ObjectFrame, is_folder_of, read as read_object_frames};
+pub use self::object_frames::{
+    ObjectFrame, ObjectFrameProblem, is_folder_of, read as read_object_frames,
+};
 pub use self::source::{DepthSource, PredictedDepth};
 pub use self::tracklets::{Labels, pixels_within};
 use crate::scene::MotionTracker;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Error, image_size};
+use deepfusion_data::{Error as DataError, image_size};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::Label;
@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 use super::tracklets::pixels_within;
 use super::{VisibilityDepth, counts};
-use crate::Result;
+use crate::{Error, Result};
 
 /// Points of the scan from which on a label counts.
 const LEAST_POINTS: usize = 15;
@@ -41,7 +41,7 @@ pub fn is_folder_of(path: &Path) -> bool {
 /// A file that is missing or is not what its name says.
 pub fn read(folder: &Path) -> Result<Vec<ObjectFrame>> {
     let labels = folder.join("label_2");
-    let entries = std::fs::read_dir(&labels).map_err(|e| Error::file(&labels, e))?;
+    let entries = std::fs::read_dir(&labels).map_err(|e| DataError::file(&labels, e))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
     paths.retain(|path| path.extension().is_some_and(|e| e == "txt"));
     paths.sort();
@@ -54,7 +54,7 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         .map(|ending| folder.join(format!("image_2/{name}.{ending}")))
         .into_iter()
         .find(|path| path.exists())
-        .ok_or_else(|| Error::Missing {
+        .ok_or_else(|| DataError::Missing {
             path: folder.join(format!("image_2/{name}.png")),
             what: "the image of a labelled frame",
             remedy: "fetch the images, or leave its label file out",
@@ -82,7 +82,7 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         depth: scan,
         dense: false,
     };
-    let text = std::fs::read_to_string(labels).map_err(|e| Error::file(labels, e))?;
+    let text = std::fs::read_to_string(labels).map_err(|e| DataError::file(labels, e))?;
     let mut found = Vec::new();
     for (number, line) in text
         .lines()
@@ -90,9 +90,9 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         .filter(|(_, l)| !l.trim().is_empty())
     {
         let (class, mut label) =
-            parse(line, number as u64, &offset).ok_or_else(|| Error::Config {
+            parse(line, number as u64, &offset).ok_or_else(|| Error::ObjectFrame {
                 path: labels.to_owned(),
-                problem: format!("line {}: not a label of 15 fields", number + 1),
+                problem: ObjectFrameProblem::Label { line: number + 1 },
             })?;
         if class == "DontCare" {
             continue;
@@ -130,6 +130,26 @@ fn parse<'a>(line: &'a str, object: u64, offset: &Vector3<f64>) -> Option<(&'a s
     ))
 }
 
+/// What is wrong with a file of KITTI's object frames.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ObjectFrameProblem {
+    /// A line that is no label.
+    #[error("line {line}: not a label of 15 fields")]
+    Label {
+        /// The line, counted from 1.
+        line: usize,
+    },
+    /// A calibration without the numbers of a field.
+    #[error("{field}: expected {count} numbers")]
+    Calibration {
+        /// The field, such as `P2`.
+        field: &'static str,
+        /// How many numbers it has.
+        count: usize,
+    },
+}
+
 /// A frame's calibration.
 struct Calib {
     p2: Matrix3x4<f64>,
@@ -139,8 +159,8 @@ struct Calib {
 
 impl Calib {
     fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-        let field = |name: &str, count: usize| -> Result<Vec<f64>, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| DataError::file(path, e))?;
+        let field = |name: &'static str, count: usize| -> Result<Vec<f64>> {
             let line = text.lines().find_map(|line| line.strip_prefix(name));
             let numbers = line.map(|line| {
                 line.trim_start_matches(':')
@@ -150,9 +170,9 @@ impl Calib {
             });
             numbers
                 .filter(|numbers| numbers.len() == count)
-                .ok_or_else(|| Error::Config {
+                .ok_or_else(|| Error::ObjectFrame {
                     path: path.to_owned(),
-                    problem: format!("{name}: expected {count} numbers"),
+                    problem: ObjectFrameProblem::Calibration { field: name, count },
                 })
         };
         Ok(Self {

@@ -1,6 +1,7 @@
 //! How the camera moved from frame to frame of a recording.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use deepfusion_data::Dataset;
 use deepfusion_geometry::Se3;
@@ -82,6 +83,72 @@ impl MotionTracker {
             down_in_cam: dataset
                 .cam_from_vehicle()
                 .map(|cam| -cam.rotate(&Vector3::z())),
+        }
+    }
+}
+
+/// The way of a camera that looks straight ahead from a vehicle that drives straight on. The scale is not watched: a speed
+/// that is given once for all says nothing of the metres.
+#[derive(Debug)]
+pub struct StraightWay {
+    speed_mps: Option<f64>,
+    first: Option<Instant>,
+}
+
+impl StraightWay {
+    /// At one speed in m/s: 0 is a camera that stands. Without it nothing is known of its way.
+    #[must_use]
+    pub fn new(speed_mps: Option<f64>) -> Self {
+        Self {
+            speed_mps,
+            first: None,
+        }
+    }
+
+    /// Its motion at a frame's arrival.
+    pub fn at(&mut self, arrived: Instant) -> Motion {
+        let Some(speed) = self.speed_mps else {
+            return Motion::default();
+        };
+        let goes_on = self.first.is_some();
+        let first = *self.first.get_or_insert(arrived);
+        let time_s = arrived.duration_since(first).as_secs_f64();
+        let place = Vector3::z() * speed * time_s;
+        Motion {
+            stamp: Some(Stamp {
+                time_s,
+                world_from_cam: Se3::from_axis_angle(Vector3::zeros(), place),
+            }),
+            speed_mps: Some(speed),
+            goes_on,
+            ..Motion::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn a_given_speed_is_a_way_straight_ahead() {
+        let mut way = StraightWay::new(Some(8.0));
+        let start = Instant::now();
+        assert!(!way.at(start).goes_on);
+        let motion = way.at(start + Duration::from_millis(250));
+        let stamp = motion.stamp.unwrap();
+        assert_eq!(stamp.time_s, 0.25);
+        assert_eq!(
+            stamp.world_from_cam.translation(),
+            Vector3::new(0.0, 0.0, 2.0)
+        );
+        assert_eq!(motion.speed_mps, Some(8.0));
+        assert!(motion.goes_on);
+        let mut nowhere = StraightWay::new(None);
+        for _ in 0..2 {
+            let unknown = nowhere.at(start);
+            assert!(unknown.stamp.is_none() && unknown.speed_mps.is_none() && !unknown.goes_on);
         }
     }
 }

@@ -2,8 +2,11 @@
 
 pub mod ablation;
 pub mod adaptation;
+pub mod resume;
 mod run_log;
 mod start;
+mod time_estimate;
 
 pub use run_log::RunLog;
 pub use start::{Began, Start};
+pub use time_estimate::{Choice, Pace, TimeEstimate};

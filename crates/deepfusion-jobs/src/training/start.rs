@@ -300,7 +300,7 @@ fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     let read = TrainConfig::from_run_table(network.card.config.clone());
     let (config, _) = read.map_err(|e| ModelError::ConfigFile {
         path: origin(),
-        reason: e.to_string(),
+        reason: e.into(),
     })?;
     Ok(config)
 }

@@ -20,7 +20,6 @@ mod input_gradient;
 mod lattice;
 mod product;
 mod shape;
-mod transpose;
 mod weight_gradient;
 
 pub use bf16::{Precision, has_bf16};

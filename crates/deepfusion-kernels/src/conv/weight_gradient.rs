@@ -5,7 +5,6 @@ use super::{
     few_outputs,
     lattice::{Lattice, Tile, gather_channels, tiles},
     product::{LANES, PixelProduct, padded},
-    transpose::transpose,
 };
 use crate::{scratch::with_scratch, send_ptr::SharedMut};
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
@@ -18,6 +17,9 @@ const TASKS: usize = 8;
 /// Weights up to which every task sums all of them over its own tiles; above, every task sums a group
 /// of channels over all tiles.
 const FEW_WEIGHTS: usize = 1 << 16;
+
+/// Side of the blocks of [`transpose`]: a block of rows and one of columns fit the first cache together.
+const BLOCK: usize = 16;
 
 /// `total` cut into at most `parts` ranges of nearly equal length.
 fn split(total: usize, parts: usize) -> Vec<Range<usize>> {
@@ -320,6 +322,43 @@ fn write(shape: &ConvShape, channels: Range<usize>, sum: &[f32], to: &SharedMut<
         for (tap, sums) in sum.chunks_exact(stride).enumerate() {
             for (row, value) in rows.iter_mut().zip(&sums[first..]) {
                 row[tap] = *value;
+            }
+        }
+    }
+}
+
+/// `to[q][r] = from[r][q]` for `rows` rows of `columns` values; the rest of each row of `to` is zeroed.
+///
+/// # Panics
+/// When a slice is too short for its strides.
+fn transpose<T: Copy + Default>(
+    from: &[T],
+    from_stride: usize,
+    rows: usize,
+    columns: usize,
+    to: &mut [T],
+    to_stride: usize,
+) {
+    assert!(rows <= to_stride && to.len() >= columns * to_stride);
+    for first_row in (0..to_stride).step_by(BLOCK) {
+        let height = BLOCK.min(rows.saturating_sub(first_row));
+        for first in (0..columns).step_by(BLOCK) {
+            let width = BLOCK.min(columns - first);
+            let mut block = [[T::default(); BLOCK]; BLOCK];
+            for r in 0..height {
+                let from = &from[(first_row + r) * from_stride + first..][..width];
+                if width == BLOCK {
+                    for q in 0..BLOCK {
+                        block[q][r] = from[q];
+                    }
+                } else {
+                    for q in 0..width {
+                        block[q][r] = from[q];
+                    }
+                }
+            }
+            for q in 0..width {
+                to[(first + q) * to_stride + first_row..][..BLOCK].copy_from_slice(&block[q]);
             }
         }
     }

@@ -1,6 +1,8 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+use crate::weights::FormatProblem;
+
 /// What can go wrong when a network is configured, or when weights are read, written or fitted
 /// into a network.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +47,8 @@ pub enum NetworkError {
         /// The file.
         path: PathBuf,
         /// What the reader found.
-        reason: String,
+        #[source]
+        reason: FormatProblem,
     },
 
     /// A tensor the network has and the weights lack.
@@ -110,7 +113,68 @@ pub enum NetworkError {
         /// Where the weights come from, usually a file.
         origin: String,
         /// What was looked for and what was found.
-        reason: String,
+        reason: ArchitectureProblem,
+    },
+}
+
+/// Why weights are not those of a network that is known, or that is wanted.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArchitectureProblem {
+    /// They lack a tensor that every network of a kind has.
+    #[error("not {network}: there is no `{lacks}`; its first tensor is `{first}`")]
+    NotOfKind {
+        /// The kind.
+        network: &'static str,
+        /// The tensor.
+        lacks: &'static str,
+        /// The first tensor that there is; empty without any.
+        first: String,
+    },
+    /// The same of a ResNet.
+    #[error("no ResNet: there is no `{lacks}`; its first tensor is `{first}`")]
+    NoResNet {
+        /// The tensor.
+        lacks: &'static str,
+        /// The first tensor that there is; empty without any.
+        first: String,
+    },
+    /// A ResNet of another depth than the known ones.
+    #[error("a ResNet of {blocks:?} blocks, bottleneck: {bottleneck}, is not known")]
+    ResNet {
+        /// Blocks of each layer.
+        blocks: [usize; 4],
+        /// Whether its blocks are bottlenecks.
+        bottleneck: bool,
+    },
+    /// A Lite-Mono of another size than the published ones.
+    #[error("a Lite-Mono of {widths:?} channels and {blocks:?} dilated blocks is not known")]
+    LiteMono {
+        /// Channels of each stage.
+        widths: [usize; 3],
+        /// Dilated blocks of each stage.
+        blocks: [usize; 3],
+    },
+    /// An R-MSFM of another encoder than the first half of a ResNet-18.
+    #[error(
+        "R-MSFM of a ResNet-18 reads 64 channels by `convX21.1.weight`, this one {}: R-MSFMX is not known",
+        channels.map_or_else(|| "none".to_owned(), |channels| channels.to_string())
+    )]
+    RMsfm {
+        /// The channels that this one reads.
+        channels: Option<usize>,
+    },
+    /// Weights of a ResNet for a network without one.
+    #[error("its weights are a ResNet's, and the network to start is {network}")]
+    ResNetForOther {
+        /// What the network is.
+        network: &'static str,
+    },
+    /// A checkpoint of encoders alone, which are ResNets, for a depth network without one.
+    #[error("it holds ResNets, and this configuration's depth network is {network}")]
+    EncodersForOther {
+        /// What the network is.
+        network: &'static str,
     },
 }
 

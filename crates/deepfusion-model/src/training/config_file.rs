@@ -1,6 +1,6 @@
 //! Configurations as people write them: a whole file, some keys over a preset, or one key on the command line.
 
-use crate::{Compute, Error, Preset, TrainConfig, TrainFindings};
+use crate::{Compute, Error, Preset, SettingProblem, TrainConfig, TrainFindings};
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -19,7 +19,7 @@ impl TrainConfig {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let wrong = |e: toml::de::Error| Error::ConfigFile {
             path: path.to_owned(),
-            reason: e.to_string().trim_end().to_owned(),
+            reason: e.into(),
         };
         let config = match Self::from_run_text(&text) {
             Ok((whole, _)) => whole,
@@ -47,12 +47,12 @@ impl TrainConfig {
     /// # Errors
     /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have; [`Error::PresetAsKey`].
     pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
-        let wrong = |reason: String| Error::Setting {
+        let wrong = |reason| Error::Setting {
             assignment: assignment.to_owned(),
             reason,
         };
         let Some((key, value)) = assignment.split_once('=') else {
-            return Err(wrong("expected KEY=VALUE".into()));
+            return Err(wrong(SettingProblem::NoValue));
         };
         let (key, value) = (key.trim(), value.trim());
         if key == "preset" {
@@ -70,7 +70,9 @@ impl TrainConfig {
                 .entry(part)
                 .or_insert_with(|| Value::Table(Table::new()));
             let Value::Table(next) = next else {
-                return Err(wrong(format!("`{part}` is a value and no table")));
+                return Err(wrong(SettingProblem::NoTable {
+                    key: part.to_owned(),
+                }));
             };
             inner = next;
         }
@@ -79,14 +81,16 @@ impl TrainConfig {
                 return if crate::config_keys().iter().any(|k| k.key == key) {
                     Ok(())
                 } else {
-                    Err(wrong(format!("there is no key `{key}`")))
+                    Err(wrong(SettingProblem::NoSuchKey {
+                        key: key.to_owned(),
+                    }))
                 };
             }
         } else {
             inner.insert(last.to_owned(), parsed(value));
         }
         let changed = Value::Table(table).try_into::<Self>();
-        *self = changed.map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
+        *self = changed.map_err(|e| wrong(SettingProblem::Value(e.into())))?;
         Ok(())
     }
 }

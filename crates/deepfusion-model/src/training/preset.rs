@@ -140,6 +140,7 @@ impl Preset {
             learning_rate: 1e-4,
             learning_rate_warmup_steps: 0,
             learning_rate_schedule: LearningRateSchedule::Drop,
+            learning_rate_steps: None,
             learning_rate_drop: 0.75,
             weight_decay: 0.0,
             clip_norm: 10.0,

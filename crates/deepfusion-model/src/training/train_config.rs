@@ -182,6 +182,9 @@ pub struct TrainConfig {
     /// How it falls.
     #[serde(default)]
     pub learning_rate_schedule: LearningRateSchedule,
+    /// Steps over which it falls, where they are not those of the run: a run that ends before has had a part of a longer one's schedule.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learning_rate_steps: Option<usize>,
     /// Share of the run after which the learning rate is divided by ten, where it falls by `drop`.
     pub learning_rate_drop: f64,
     /// Share of each weight, not of biases and norms, that a step at a learning rate of 1 takes away beside Adam's own (AdamW).
@@ -353,7 +356,7 @@ impl TrainConfig {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let (config, _) = Self::from_run_text(&text).map_err(|e| Error::ConfigFile {
             path: path.to_owned(),
-            reason: e.to_string(),
+            reason: e.into(),
         })?;
         config.validate()?;
         Ok(config)

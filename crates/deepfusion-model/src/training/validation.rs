@@ -76,6 +76,9 @@ impl TrainConfig {
         if let Some(camera) = &self.assumed_camera {
             camera.validate()?;
         }
+        if self.learning_rate_steps == Some(0) {
+            return fail("learning_rate_steps", "at least 1", "0".into());
+        }
         if !(0.0..=1.0).contains(&self.learning_rate_drop) {
             let found = self.learning_rate_drop.to_string();
             return fail("learning_rate_drop", "0 to 1", found);

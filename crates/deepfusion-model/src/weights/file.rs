@@ -9,7 +9,7 @@ use deepfusion_fs::Partial;
 use half::{bf16, f16};
 use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorView};
 
-use super::{WeightTensor, Weights};
+use super::{FormatProblem, WeightTensor, Weights};
 use crate::NetworkError;
 
 /// What kind of file holds weights.
@@ -44,10 +44,11 @@ impl FileKind {
         if start.starts_with(b"PK") || start[0] == 0x80 {
             return Ok(Self::PyTorch);
         }
-        let seen = if filled == 0 {
-            "the file is empty".to_owned()
-        } else {
-            format!("it starts with the bytes {:02x?}", &start[..filled])
+        let seen = match &start[..filled] {
+            [] => FormatProblem::Empty,
+            start => FormatProblem::Unknown {
+                start: start.to_owned(),
+            },
         };
         Err(format_error(path, seen))
     }
@@ -68,10 +69,7 @@ pub fn read_safetensors(path: &Path) -> Result<Weights, NetworkError> {
 /// As [`read_safetensors`].
 pub fn read_safetensors_under(path: &Path, prefix: &str) -> Result<Weights, NetworkError> {
     if FileKind::of(path)? == FileKind::PyTorch {
-        return Err(format_error(
-            path,
-            "a PyTorch file, where safetensors are expected",
-        ));
+        return Err(format_error(path, FormatProblem::PyTorch));
     }
     let file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
     let length = file
@@ -98,7 +96,7 @@ fn safetensors_of(
     prefix: &str,
 ) -> Result<Weights, NetworkError> {
     let failed = |source| io_error(path, "read", source);
-    let cut_off = || format_error(path, "the file ends within its header or its tensors");
+    let cut_off = || format_error(path, FormatProblem::CutOff);
     if length < 8 {
         return Err(cut_off());
     }
@@ -110,8 +108,8 @@ fn safetensors_of(
     }
     let mut header = vec![0; (data - 8) as usize];
     file.read_exact(&mut header).map_err(failed)?;
-    let header: Metadata =
-        serde_json::from_slice(&header).map_err(|e| format_error(path, e.to_string()))?;
+    let header: Metadata = serde_json::from_slice(&header)
+        .map_err(|e| format_error(path, FormatProblem::Header(e)))?;
     if header.data_len() as u64 != length - data {
         return Err(cut_off());
     }
@@ -166,8 +164,14 @@ pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkEr
         .collect();
     let mut views = Vec::with_capacity(bytes.len());
     for (name, tensor, bytes) in &bytes {
-        let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes)
-            .map_err(|e| format_error(path, format!("tensor `{name}`: {e}")))?;
+        let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes);
+        let view = view.map_err(|e| {
+            let problem = FormatProblem::Tensor {
+                name: (*name).clone(),
+                source: Box::new(e),
+            };
+            format_error(path, problem)
+        })?;
         views.push((name.as_str(), view));
     }
     let metadata: HashMap<String, String> = weights.metadata.clone().into_iter().collect();
@@ -175,7 +179,7 @@ pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkEr
     safetensors::serialize_to_file(views, Some(metadata), part.path())
         .map_err(|error| match error {
             SafeTensorError::IoError(source) => io_error(path, "write", source),
-            other => format_error(path, other.to_string()),
+            other => format_error(path, FormatProblem::Unwritten(Box::new(other))),
         })
         .and_then(|()| {
             part.publish()
@@ -191,9 +195,9 @@ fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> Networ
     }
 }
 
-fn format_error(path: &Path, reason: impl Into<String>) -> NetworkError {
+fn format_error(path: &Path, reason: FormatProblem) -> NetworkError {
     NetworkError::Format {
         path: path.to_owned(),
-        reason: reason.into(),
+        reason,
     }
 }

@@ -3,12 +3,14 @@
 //! A tensor's name is its path in the network, `encoder.layer1.0.conv1.weight`; the encoders' paths are torchvision's names.
 
 mod file;
+mod problem;
 
 use std::collections::BTreeMap;
 
 pub use file::{
     FileKind, floats, read_bytes, read_safetensors, read_safetensors_under, write_safetensors,
 };
+pub use problem::FormatProblem;
 
 /// One tensor's values, row-major.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +83,12 @@ impl Weights {
     pub fn merged(mut self, other: Self) -> Self {
         self.tensors.extend(other.tensors);
         self
+    }
+
+    /// The name of the first tensor, for messages; empty without any.
+    #[must_use]
+    pub fn first_name(&self) -> &str {
+        self.tensors.keys().next().map_or("", String::as_str)
     }
 
     /// How many values all tensors hold.

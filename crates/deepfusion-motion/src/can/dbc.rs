@@ -1,10 +1,7 @@
 use super::{BitLayout, ByteOrder, CanId, CanSignal, MultiplexCondition, Number};
-use crate::{Error, Result};
+use crate::error::{Error, Result, SignalProblem};
 use can_dbc::{MessageId, MultiplexIndicator, SignalExtendedValueType};
 use std::path::Path;
-
-/// Number of names that an error lists.
-const NAMES_SHOWN: usize = 12;
 
 /// A DBC file: the description of the signals in CAN frames.
 #[derive(Debug, Clone)]
@@ -19,12 +16,7 @@ impl Dbc {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let text = String::from_utf8(bytes)
             .unwrap_or_else(|e| e.as_bytes().iter().map(|b| char::from(*b)).collect());
-        Self::parse(&text).map_err(|error| match error {
-            Error::Dbc { problem } => Error::Dbc {
-                problem: format!("{}: {problem}", path.display()),
-            },
-            other => other,
-        })
+        Self::of_text(&text, Some(path))
     }
 
     /// Reads a file's text.
@@ -32,10 +24,15 @@ impl Dbc {
     /// # Errors
     /// [`Error::Dbc`] with the line that cannot be read.
     pub fn parse(text: &str) -> Result<Self> {
+        Self::of_text(text, None)
+    }
+
+    fn of_text(text: &str, path: Option<&Path>) -> Result<Self> {
         can_dbc::Dbc::try_from(text)
             .map(Self)
-            .map_err(|e| Error::Dbc {
-                problem: e.to_string(),
+            .map_err(|source| Error::Dbc {
+                path: path.map(Path::to_owned),
+                source: Box::new(source),
             })
     }
 
@@ -74,24 +71,26 @@ impl Dbc {
     }
 
     fn find(&self, name: &str) -> Result<(&can_dbc::Message, &can_dbc::Signal)> {
-        let missing = |problem: String| Error::NoSignal {
+        let missing = |problem| Error::NoSignal {
             name: name.to_owned(),
             problem,
         };
         let Some((message_name, signal_name)) = name.split_once('.') else {
-            return Err(missing("expected \"Message.Signal\"".into()));
+            return Err(missing(SignalProblem::Name));
         };
         let messages = &self.0.messages;
         let Some(message) = messages.iter().find(|m| m.name == message_name) else {
-            let names = some_names(messages.iter().map(|m| m.name.as_str()));
-            return Err(missing(format!(
-                "no message `{message_name}`; there are {names}"
-            )));
+            return Err(missing(SignalProblem::NoMessage {
+                message: message_name.to_owned(),
+                known: messages.iter().map(|m| m.name.clone()).collect(),
+            }));
         };
         let signals = &message.signals;
         let Some(signal) = signals.iter().find(|s| s.name == signal_name) else {
-            let names = some_names(signals.iter().map(|s| s.name.as_str()));
-            return Err(missing(format!("`{message_name}` has {names}")));
+            return Err(missing(SignalProblem::NoSignal {
+                message: message_name.to_owned(),
+                known: signals.iter().map(|s| s.name.clone()).collect(),
+            }));
         };
         Ok((message, signal))
     }
@@ -174,15 +173,5 @@ fn id(id: MessageId) -> CanId {
     match id {
         MessageId::Standard(id) => CanId::Standard(id),
         MessageId::Extended(id) => CanId::Extended { extended: id },
-    }
-}
-
-fn some_names<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
-    let count = names.len();
-    let shown: Vec<&str> = names.take(NAMES_SHOWN).collect();
-    match count.checked_sub(shown.len()) {
-        _ if count == 0 => "none".into(),
-        Some(0) | None => shown.join(", "),
-        Some(more) => format!("{} and {more} more", shown.join(", ")),
     }
 }

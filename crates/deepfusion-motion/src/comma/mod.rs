@@ -16,6 +16,7 @@
 mod npy;
 mod reference;
 
+pub use crate::error::{ArrayProblem, TimesArray};
 use crate::{Error, ImuSample, Result, Signal, VehicleSensors};
 use deepfusion_geometry::Trajectory;
 use nalgebra::Vector3;
@@ -114,11 +115,11 @@ impl Stream {
         if value.values.len() != time_s.len() * columns {
             return Err(Error::Array {
                 path,
-                problem: format!(
-                    "{} rows, but `t` beside it has {}",
-                    value.values.len() / columns,
-                    time_s.len()
-                ),
+                problem: ArrayProblem::Rows {
+                    rows: value.values.len() / columns,
+                    times: TimesArray::Beside,
+                    expected: time_s.len(),
+                },
             });
         }
         Ok(Self { time_s, value })

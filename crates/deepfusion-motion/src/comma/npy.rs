@@ -1,6 +1,6 @@
 //! Reads NumPy array files of one or two dimensions.
 
-use crate::{Error, Result};
+use crate::error::{ArrayProblem, Error, Result};
 use ndarray::ArrayD;
 use ndarray_npy::ReadNpyExt;
 use std::path::Path;
@@ -22,19 +22,19 @@ impl Table {
         })
     }
 
-    fn parse(bytes: &[u8], columns: usize) -> std::result::Result<Self, String> {
+    fn parse(bytes: &[u8], columns: usize) -> std::result::Result<Self, ArrayProblem> {
         check_header(bytes)?;
         let array = ArrayD::<f64>::read_npy(bytes)
             .or_else(|_| ArrayD::<f32>::read_npy(bytes).map(|a| a.mapv(f64::from)))
-            .map_err(|e| format!("no array of float64 or float32: {e}"))?;
+            .map_err(ArrayProblem::NoFloats)?;
         let fits = match array.shape() {
             [_] => columns == 1,
             [_, c] => *c == columns,
             _ => false,
         };
         if !fits {
-            let shape: Vec<String> = array.shape().iter().map(usize::to_string).collect();
-            return Err(format!("is {}, expected N×{columns}", shape.join("×")));
+            let shape = array.shape().to_vec();
+            return Err(ArrayProblem::Shape { shape, columns });
         }
         Ok(Self {
             // In logical order, whichever way the file stores it.
@@ -45,14 +45,14 @@ impl Table {
 }
 
 /// Checks the header's length against the file's before anything is allocated for it.
-fn check_header(bytes: &[u8]) -> std::result::Result<(), String> {
+fn check_header(bytes: &[u8]) -> std::result::Result<(), ArrayProblem> {
     let two = |at: usize| {
         bytes
             .get(at..at + 2)
             .map(|b| usize::from(b[0]) | usize::from(b[1]) << 8)
     };
     let (Some(b"\x93NUMPY"), Some(version)) = (bytes.get(..6), bytes.get(6)) else {
-        return Err("is no NumPy array".into());
+        return Err(ArrayProblem::NoArray);
     };
     let header = match version {
         1 => two(8).map(|length| 10 + length),
@@ -62,7 +62,7 @@ fn check_header(bytes: &[u8]) -> std::result::Result<(), String> {
     };
     match header {
         Some(length) if length <= bytes.len() => Ok(()),
-        _ => Err("ends within its header".into()),
+        _ => Err(ArrayProblem::HeaderCut),
     }
 }
 
@@ -96,14 +96,17 @@ mod tests {
         let flat: Array1<f32> = Array1::from(vec![0.5, 1.5]);
         flat.write_npy(&mut out).unwrap();
         assert_eq!(Table::parse(&out, 1).unwrap().values, [0.5, 1.5]);
-        assert!(Table::parse(&out, 3).unwrap_err().contains("expected N×3"));
+        let error = Table::parse(&out, 3).unwrap_err().to_string();
+        assert!(error.contains("is 2, expected N×3"), "{error}");
     }
 
     #[test]
     fn a_header_that_lies_about_lengths_allocates_nothing() {
         let mut file = b"\x93NUMPY\x02\x00".to_vec();
         file.extend([0xff, 0xff, 0xff, 0x7f]);
-        assert!(Table::parse(&file, 1).unwrap_err().contains("header"));
+        let error = Table::parse(&file, 1).unwrap_err();
+        assert!(matches!(error, ArrayProblem::HeaderCut), "{error}");
+        assert_eq!(error.to_string(), "ends within its header");
         // A shape of 2^40 rows with 16 bytes behind it.
         let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, ), }";
         let mut file = b"\x93NUMPY\x01\x00".to_vec();

@@ -1,7 +1,7 @@
 //! The satellite-fused poses of a segment, from earth-centred to local axes.
 
 use super::npy::Table;
-use crate::{Error, Result};
+use crate::error::{ArrayProblem, Error, Result, TimesArray};
 use deepfusion_geometry::{Se3, StampedPose, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -45,7 +45,11 @@ fn rows<const N: usize>(folder: &Path, name: &str, expected: usize) -> Result<Ve
     let (rows, _) = table.values.as_chunks::<N>();
     if rows.len() != expected {
         return Err(Error::Array {
-            problem: format!("{} rows, but frame_times has {expected}", rows.len()),
+            problem: ArrayProblem::Rows {
+                rows: rows.len(),
+                times: TimesArray::Frames,
+                expected,
+            },
             path,
         });
     }

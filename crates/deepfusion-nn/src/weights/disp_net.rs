@@ -8,7 +8,7 @@ use deepfusion_geometry::DepthRange;
 
 use super::monodepth2::rename;
 use super::{Imported, Weights, apply, read};
-use crate::{DepthNet, DepthNetConfig, Error};
+use crate::{ArchitectureProblem, DepthNet, DepthNetConfig, Error};
 use deepfusion_model::{DISP_NET_DISPARITY, DISP_NET_LEVELS};
 
 /// Whether tensors have the names of DispNet's file.
@@ -24,11 +24,12 @@ pub fn is_disp_net(weights: &Weights) -> bool {
 pub fn load_disp_net(file: &Path, device: &Device) -> Result<Imported, Error> {
     let weights = read(file)?;
     if !is_disp_net(&weights) {
-        let first = weights.tensors.keys().next().map_or("", String::as_str);
         return Err(Error::UnknownArchitecture {
-            reason: format!(
-                "not DispNet: there is no `predict_disp1.0.weight`; its first tensor is `{first}`"
-            ),
+            reason: ArchitectureProblem::NotOfKind {
+                network: "DispNet",
+                lacks: "predict_disp1.0.weight",
+                first: weights.first_name().to_owned(),
+            },
             origin: weights.origin,
         });
     }

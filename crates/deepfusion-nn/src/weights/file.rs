@@ -4,7 +4,7 @@ use std::path::Path;
 
 use burn::store::pytorch_reader::{DType as TorchDType, PytorchReader};
 use burn::tensor::{bf16, f16};
-use deepfusion_model::weights::{FileKind, floats, read_safetensors};
+use deepfusion_model::weights::{FileKind, FormatProblem, floats, read_safetensors};
 
 use super::{WeightTensor, Weights};
 use crate::Error;
@@ -25,16 +25,17 @@ pub fn read(path: &Path) -> Result<Weights, Error> {
         FileKind::PyTorch => read_pytorch(path)?,
     };
     if weights.tensors.is_empty() {
-        return Err(format_error(path, "it holds no float tensors"));
+        return Err(format_error(path, FormatProblem::NoTensors));
     }
     Ok(weights)
 }
 
 fn read_pytorch(path: &Path) -> Result<Weights, Error> {
-    let reader = PytorchReader::new(path).map_err(|e| format_error(path, e.to_string()))?;
+    let unreadable = |error| format_error(path, FormatProblem::Reader(error));
+    let reader = PytorchReader::new(path).map_err(|e| unreadable(e.into()))?;
     let mut weights = Weights::new(path.display().to_string());
     for (name, tensor) in reader.into_tensors() {
-        let read = || tensor.read().map_err(|e| format_error(path, e.to_string()));
+        let read = || tensor.read().map_err(|e| unreadable(e.into()));
         // The reader hands out the machine's own byte order.
         let values = match tensor.dtype() {
             TorchDType::F32 => floats(&read()?, f32::from_ne_bytes),
@@ -53,9 +54,9 @@ fn read_pytorch(path: &Path) -> Result<Weights, Error> {
     })
 }
 
-fn format_error(path: &Path, reason: impl Into<String>) -> Error {
+fn format_error(path: &Path, reason: FormatProblem) -> Error {
     Error::Format {
         path: path.to_owned(),
-        reason: reason.into(),
+        reason,
     }
 }

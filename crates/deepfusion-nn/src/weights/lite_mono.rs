@@ -7,7 +7,7 @@ use burn::tensor::Device;
 
 use super::monodepth2::{input_size, load_pose, rename};
 use super::{Imported, Monodepth2Files, Weights, apply, read};
-use crate::{DepthNet, DepthNetConfig, Error, LiteMonoConfig, LiteMonoSize};
+use crate::{ArchitectureProblem, DepthNet, DepthNetConfig, Error, LiteMonoConfig, LiteMonoSize};
 
 /// Whether tensors have the names of Lite-Mono's `encoder.pth`.
 pub(super) fn is_lite_mono(encoder: &Weights) -> bool {
@@ -78,15 +78,16 @@ fn tensors_alone(weights: Weights) -> Weights {
 
 /// Which of the published networks these are the weights of.
 fn detect(encoder: &Weights) -> Result<LiteMonoSize, Error> {
-    let unknown = |reason: String| Error::UnknownArchitecture {
+    let unknown = |reason| Error::UnknownArchitecture {
         origin: encoder.origin.clone(),
         reason,
     };
     if !is_lite_mono(encoder) {
-        let first = encoder.tensors.keys().next().map_or("", String::as_str);
-        return Err(unknown(format!(
-            "not Lite-Mono: there is no `stem2.0.conv.weight`; its first tensor is `{first}`"
-        )));
+        return Err(unknown(ArchitectureProblem::NotOfKind {
+            network: "Lite-Mono",
+            lacks: "stem2.0.conv.weight",
+            first: encoder.first_name().to_owned(),
+        }));
     }
     let halving = [
         "stem2.0.conv.weight",
@@ -108,11 +109,10 @@ fn detect(encoder: &Weights) -> Result<LiteMonoSize, Error> {
         let config = LiteMonoConfig::new(*size);
         config.widths == widths && config.dilations.map(|rates| rates.len()) == blocks
     };
-    LiteMonoSize::ALL.into_iter().find(fits).ok_or_else(|| {
-        unknown(format!(
-            "a Lite-Mono of {widths:?} channels and {blocks:?} dilated blocks is not known"
-        ))
-    })
+    LiteMonoSize::ALL
+        .into_iter()
+        .find(fits)
+        .ok_or_else(|| unknown(ArchitectureProblem::LiteMono { widths, blocks }))
 }
 
 /// Linear layers as the 1×1 convolutions that they are here, a factor a head as a vector.

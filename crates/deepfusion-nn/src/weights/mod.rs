@@ -14,7 +14,7 @@ mod r_msfm;
 mod torchvision;
 
 pub use deepfusion_model::weights::{
-    WeightTensor, Weights, read_bytes, read_safetensors_under, write_safetensors,
+    FormatProblem, WeightTensor, Weights, read_bytes, read_safetensors_under, write_safetensors,
 };
 pub use disp_net::{is_disp_net, load_disp_net};
 pub use file::read;

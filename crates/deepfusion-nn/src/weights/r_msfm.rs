@@ -6,7 +6,7 @@ use burn::tensor::Device;
 use super::monodepth2::{input_size, load_pose, rename};
 use super::torchvision::apply_half;
 use super::{Imported, Monodepth2Files, Weights, apply, read};
-use crate::{DepthNet, DepthNetConfig, Error};
+use crate::{ArchitectureProblem, DepthNet, DepthNetConfig, Error};
 
 /// Whether tensors have the names of R-MSFM's `depth.pth`.
 pub(super) fn is_r_msfm(depth: &Weights) -> bool {
@@ -48,25 +48,21 @@ pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<Imported,
 
 /// How often the network of these weights refines.
 fn detect(decoder: &Weights) -> Result<usize, Error> {
-    let unknown = |reason: String| Error::UnknownArchitecture {
+    let unknown = |reason| Error::UnknownArchitecture {
         origin: decoder.origin.clone(),
         reason,
     };
     if !is_r_msfm(decoder) {
-        let first = decoder.tensors.keys().next().map_or("", String::as_str);
-        return Err(unknown(format!(
-            "not R-MSFM: there is no `convX11.1.weight`; its first tensor is `{first}`"
-        )));
+        return Err(unknown(ArchitectureProblem::NotOfKind {
+            network: "R-MSFM",
+            lacks: "convX11.1.weight",
+            first: decoder.first_name().to_owned(),
+        }));
     }
     let middle = decoder.tensors.get("convX21.1.weight");
-    match middle.and_then(|tensor| tensor.shape.get(1)) {
+    match middle.and_then(|tensor| tensor.shape.get(1).copied()) {
         Some(64) => {}
-        other => {
-            return Err(unknown(format!(
-                "R-MSFM of a ResNet-18 reads 64 channels by `convX21.1.weight`, this one {}: R-MSFMX is not known",
-                other.map_or_else(|| "none".to_owned(), usize::to_string)
-            )));
-        }
+        channels => return Err(unknown(ArchitectureProblem::RMsfm { channels })),
     }
     Ok(if decoder.tensors.contains_key("convX12.0.weight") {
         6

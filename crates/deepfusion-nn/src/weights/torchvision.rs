@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Weights, apply, read};
 use crate::r_msfm::HalfResNet;
-use crate::{Error, ResNet, ResNetDepth};
+use crate::{ArchitectureProblem, Error, ResNet, ResNetDepth};
 
 /// Reads ImageNet weights, as torchvision publishes them (`resnet18-f37072fd.pth` and its like, or
 /// the same tensors as `.safetensors`), into an encoder. The classifier (`fc`) is left out; for an
@@ -83,12 +83,12 @@ pub fn detect_resnet(weights: &Weights) -> Result<ResNetDepth, Error> {
         .ok_or_else(|| Error::UnknownArchitecture {
             origin: weights.origin.clone(),
             reason: if blocks == [0; 4] {
-                let first = weights.tensors.keys().next().map_or("", String::as_str);
-                format!(
-                    "no ResNet: there is no `layer1.0.conv1.weight`; its first tensor is `{first}`"
-                )
+                ArchitectureProblem::NoResNet {
+                    lacks: "layer1.0.conv1.weight",
+                    first: weights.first_name().to_owned(),
+                }
             } else {
-                format!("a ResNet of {blocks:?} blocks, bottleneck: {bottleneck}, is not known")
+                ArchitectureProblem::ResNet { blocks, bottleneck }
             },
         })
 }

@@ -6,7 +6,7 @@ use ort::session::Session;
 use ort::value::{TensorElementType, TensorRef};
 
 use super::{Library, refused, session};
-use crate::Error;
+use crate::{Error, ModelProblem};
 
 /// A model's description of an input or an output.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,7 +83,7 @@ impl ForeignModel {
         let &[name] = &names[..] else {
             return Err(Error::Model {
                 part: "inputs",
-                reason: format!("{} of them, expected one picture", names.len()),
+                reason: ModelProblem::Inputs { found: names.len() },
             });
         };
         let name = name.to_owned();

@@ -7,7 +7,7 @@ use libloading::Symbol;
 use ort::sys::OrtApiBase;
 
 use super::places;
-use crate::Error;
+use crate::{Error, LibraryProblem};
 
 /// A usable ONNX Runtime library.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,26 +49,26 @@ pub fn find(asked: Option<&Path>) -> Result<Library, Error> {
 
 /// Opens a library and asks for its version.
 fn open(path: &Path) -> Result<Library, Error> {
-    let fail = |reason: String| Error::Library {
+    let fail = |reason| Error::Library {
         path: path.to_owned(),
         reason,
     };
     // A name without a folder would be searched for by the system; a path never is.
-    let file = std::path::absolute(path).map_err(|e| fail(e.to_string()))?;
+    let file = std::path::absolute(path).map_err(|e| fail(LibraryProblem::Refused(e.into())))?;
     if !file.is_file() {
-        return Err(fail("there is no such file".into()));
+        return Err(fail(LibraryProblem::Missing));
     }
     // SAFETY: opening a library runs its initialisers; the file is one that the user named or that bears
     // ONNX Runtime's name in a folder of installed programs.
     let library = unsafe { libloading::Library::new(&file) };
-    let library = library.map_err(|e| fail(e.to_string()))?;
+    let library = library.map_err(|e| fail(LibraryProblem::Refused(e.into())))?;
     // SAFETY: the symbol is ONNX Runtime's one entry point, whose type has never changed.
     let entry: Result<Symbol<unsafe extern "C" fn() -> *const OrtApiBase>, _> =
         unsafe { library.get(b"OrtGetApiBase") };
-    let entry = entry.map_err(|_| fail("it has no entry point `OrtGetApiBase`".into()))?;
+    let entry = entry.map_err(|_| fail(LibraryProblem::NoEntryPoint))?;
     // SAFETY: it takes nothing and gives a pointer to a constant, or null.
     let base = unsafe { entry().as_ref() };
-    let base = base.ok_or_else(|| fail("its entry point gives nothing".into()))?;
+    let base = base.ok_or_else(|| fail(LibraryProblem::EmptyEntryPoint))?;
     // SAFETY: as ONNX Runtime documents it, a text that lives as long as the library.
     let version = unsafe { CStr::from_ptr((base.GetVersionString)()) };
     let version = version.to_string_lossy().into_owned();
@@ -76,9 +76,10 @@ fn open(path: &Path) -> Result<Library, Error> {
     let known = !unsafe { (base.GetApi)(ort::MINOR_VERSION) }.is_null();
     if !known || !is_new_enough(&version) {
         let oldest = ort::MINOR_VERSION;
-        return Err(fail(format!(
-            "it is version {version}, expected 1.{oldest} or later"
-        )));
+        return Err(fail(LibraryProblem::Version {
+            found: version,
+            oldest,
+        }));
     }
     // It stays open: it is wanted now, and threads of a library must not outlive its code.
     std::mem::forget(library);

@@ -15,7 +15,7 @@ use ort::value::TensorRef;
 pub use foreign::{ForeignModel, Tensor, TensorInfo};
 pub use library::{Library, find};
 
-use crate::{DepthMaps, Error};
+use crate::{DepthMaps, Error, LibraryProblem, ModelProblem};
 
 /// A model in ONNX Runtime.
 #[derive(Debug)]
@@ -117,7 +117,7 @@ impl OrtEngine {
         for (name, buffer) in wanted {
             let missing = || Error::Model {
                 part: "outputs",
-                reason: format!("no `{name}`"),
+                reason: ModelProblem::NoOutput { name },
             };
             let values = outputs.get(name).ok_or_else(missing)?;
             let values = values.try_extract_tensor::<f32>();
@@ -130,10 +130,10 @@ impl OrtEngine {
     }
 }
 
-fn refused<R>(action: &'static str, error: ort::Error<R>) -> Error {
+fn refused(action: &'static str, error: impl Into<ort::Error>) -> Error {
     Error::Runtime {
         action,
-        reason: error.to_string(),
+        source: Box::new(error.into()),
     }
 }
 
@@ -161,7 +161,7 @@ fn size_of(session: &Session) -> Result<(usize, usize), Error> {
     };
     size.ok_or_else(|| Error::Model {
         part: "input",
-        reason: "no 1×H×W×3 picture of bytes named `image`".into(),
+        reason: ModelProblem::NoPicture,
     })
 }
 
@@ -192,25 +192,24 @@ fn environment(asked: Option<&Path>) -> Result<(Library, Environment), Error> {
         return match asked {
             Some(path) if !same(path) => Err(Error::Library {
                 path: path.to_owned(),
-                reason: format!(
-                    "this process already uses {}, and can use one only",
-                    library.path.display()
-                ),
+                reason: LibraryProblem::AnotherInUse {
+                    path: library.path.clone(),
+                },
             }),
             _ => Ok((library.clone(), environment.clone())),
         };
     }
     let library = find(asked)?;
-    let unusable = |reason: String| Error::Library {
+    let unusable = |error| Error::Library {
         path: library.path.clone(),
-        reason,
+        reason: LibraryProblem::Refused(error),
     };
-    let environment = ort::init_from(&library.path).map_err(|e| unusable(e.to_string()))?;
+    let environment = ort::init_from(&library.path).map_err(|e| unusable(e.into()))?;
     let environment = environment
         .with_name("deepfusion")
         .with_telemetry(false)
         .build();
-    let environment = environment.map_err(|e| unusable(e.to_string()))?;
+    let environment = environment.map_err(|e| unusable(e.into()))?;
     *open = Some((library.clone(), environment.clone()));
     Ok((library, environment))
 }

@@ -1,11 +1,68 @@
 //! A decompressed chunk, and the positions of its messages.
 
-use super::record::{ChunkHead, Fields, MESSAGE_HEAD, MessageHead, op, record};
+use super::record::{ChunkHead, Fields, MESSAGE_HEAD, MessageHead, RecordProblem, op, record};
 use crate::storage::MOST_BYTES;
 use deepfusion_rosbag::Time;
-use std::io::Read;
+use std::io::{self, Read};
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Why a chunk of an MCAP file cannot be read, or not all of it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChunkProblem {
+    /// It ends within its own head.
+    #[error("its head is cut off")]
+    HeadCut,
+    /// Its end is missing.
+    #[error("{missing} of its {stored} bytes are missing")]
+    Cut {
+        /// How many bytes are missing.
+        missing: u64,
+        /// How many there should be.
+        stored: u64,
+    },
+    /// It is larger than a chunk may be.
+    #[error("{size} bytes unpacked, at most {MOST_BYTES} are read")]
+    TooLarge {
+        /// How many bytes it has unpacked.
+        size: u64,
+    },
+    /// It is compressed in a way that is not read.
+    #[error("compression `{name}`: none, lz4 and zstd are read")]
+    Compression {
+        /// The compression's name.
+        name: String,
+    },
+    /// No decoder can be set up.
+    #[error("{0}")]
+    Decoder(#[source] io::Error),
+    /// It cannot be unpacked.
+    #[error("cannot be unpacked: {0}")]
+    Unpack(#[source] io::Error),
+    /// It has another length than its head says.
+    #[error("{bytes} bytes unpacked, its head says {stated}")]
+    Length {
+        /// How many bytes came out.
+        bytes: u64,
+        /// The length in its head.
+        stated: u64,
+    },
+    /// Its checksum is another than its head's.
+    #[error("its checksum differs")]
+    Checksum,
+    /// A record in it is not whole.
+    #[error("unpacked, {0}")]
+    Record(#[source] RecordProblem),
+    /// It has a message before its first one.
+    #[error("a message at {time}, the index says the first is at {first}")]
+    Early {
+        /// The message's time.
+        time: Time,
+        /// The first message's time by the index.
+        first: Time,
+    },
+}
 
 /// A chunk's records: in the file itself, or unpacked.
 #[derive(Debug, Clone)]
@@ -33,10 +90,9 @@ pub(super) struct Entry {
 }
 
 /// Decompresses the chunk whose record's content is `content`; on an error it returns what was read up to there, and the reason.
-pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<String>) {
+pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<ChunkProblem>) {
     let Some(head) = ChunkHead::read(content) else {
-        let problem = "its head is cut off".to_owned();
-        return (Content::Stored(&[]), Some(problem));
+        return (Content::Stored(&[]), Some(ChunkProblem::HeadCut));
     };
     let stored = &content[head.length..];
     let whole = usize::try_from(head.stored)
@@ -44,24 +100,24 @@ pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<String>) {
         .and_then(|n| stored.get(..n));
     let cut = whole.is_none().then(|| {
         let missing = head.stored - stored.len() as u64;
-        format!("{missing} of its {} bytes are missing", head.stored)
+        let stored = head.stored;
+        ChunkProblem::Cut { missing, stored }
     });
     let stored = whole.unwrap_or(stored);
     if head.size > MOST_BYTES {
         let size = head.size;
-        let problem = format!("{size} bytes unpacked, at most {MOST_BYTES} are read");
-        return (Content::Stored(&[]), Some(problem));
+        return (Content::Stored(&[]), Some(ChunkProblem::TooLarge { size }));
     }
     let unpacked = match head.compression.as_str() {
         "" | "none" => Ok(Content::Stored(stored)),
         "lz4" => unpack(lz4_flex::frame::FrameDecoder::new(stored), head.size),
         "zstd" => match zstd::stream::read::Decoder::with_buffer(stored) {
             Ok(decoder) => unpack(decoder, head.size),
-            Err(e) => Err((Vec::new(), e.to_string())),
+            Err(e) => Err((Vec::new(), ChunkProblem::Decoder(e))),
         },
         other => {
-            let problem = format!("compression `{other}`: none, lz4 and zstd are read");
-            Err((Vec::new(), problem))
+            let name = other.to_owned();
+            Err((Vec::new(), ChunkProblem::Compression { name }))
         }
     };
     let (content, problem) = match unpacked {
@@ -72,26 +128,23 @@ pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<String>) {
     (content, problem)
 }
 
-fn unpack<'a>(decoder: impl Read, size: u64) -> Result<Content<'a>, (Vec<u8>, String)> {
+fn unpack<'a>(decoder: impl Read, size: u64) -> Result<Content<'a>, (Vec<u8>, ChunkProblem)> {
     let mut bytes = Vec::new();
     // One byte more than there should be, so that too many are seen; memory grows with what comes.
     match decoder.take(size + 1).read_to_end(&mut bytes) {
         Ok(_) => Ok(Content::Unpacked(Arc::new(bytes))),
-        Err(e) => Err((bytes, format!("cannot be unpacked: {e}"))),
+        Err(e) => Err((bytes, ChunkProblem::Unpack(e))),
     }
 }
 
 /// Size and checksum from the header; a checksum of 0 means none.
-fn wrong(head: &ChunkHead, bytes: &[u8]) -> Option<String> {
-    if bytes.len() as u64 != head.size {
-        return Some(format!(
-            "{} bytes unpacked, its head says {}",
-            bytes.len(),
-            head.size
-        ));
+fn wrong(head: &ChunkHead, content: &[u8]) -> Option<ChunkProblem> {
+    let (bytes, stated) = (content.len() as u64, head.size);
+    if bytes != stated {
+        return Some(ChunkProblem::Length { bytes, stated });
     }
-    let differs = head.crc != 0 && crc32fast::hash(bytes) != head.crc;
-    differs.then(|| "its checksum differs".to_owned())
+    let differs = head.crc != 0 && crc32fast::hash(content) != head.crc;
+    differs.then_some(ChunkProblem::Checksum)
 }
 
 /// The result of walking through a chunk's records.
@@ -100,7 +153,7 @@ pub(super) struct Walk<'a> {
     pub messages: Vec<Entry>,
     /// Schemas and channels: operation and content.
     pub definitions: Vec<(u8, &'a [u8])>,
-    pub broken: Option<String>,
+    pub broken: Option<ChunkProblem>,
 }
 
 /// Goes through a chunk's records, up to the first that is not whole.
@@ -112,7 +165,7 @@ pub(super) fn walk(bytes: &[u8]) -> Walk<'_> {
             Ok(Some(found)) => found,
             Ok(None) => return walk,
             Err(cut) => {
-                walk.broken = Some(format!("unpacked, {}", cut.problem()));
+                walk.broken = Some(ChunkProblem::Record(cut.problem()));
                 return walk;
             }
         };
@@ -124,7 +177,8 @@ pub(super) fn walk(bytes: &[u8]) -> Walk<'_> {
                     range: found.start + MESSAGE_HEAD..found.end(),
                 }),
                 None => {
-                    walk.broken = Some(format!("unpacked, the message at byte {at} is too short"));
+                    let short = RecordProblem::ShortMessage { at };
+                    walk.broken = Some(ChunkProblem::Record(short));
                     return walk;
                 }
             },

@@ -3,7 +3,7 @@
 use super::chunk::{self, indexed_times, walk};
 use super::definitions::Definitions;
 use super::record::{Fields, MAGIC, TAIL, op, record};
-use super::{ChunkInfo, Index};
+use super::{ChunkInfo, Damage, Index};
 use crate::storage::hull;
 use deepfusion_rosbag::Time;
 
@@ -19,32 +19,31 @@ struct Statistics {
 /// Positions of a chunk's message indexes, by channel.
 struct Indexes(Vec<(u16, u64)>);
 
-/// The index from the summary; else the reason why the file has to be scanned.
-pub(super) fn read(bytes: &[u8]) -> Result<Index, String> {
+/// The index from the summary; else the file has to be scanned, for what is wrong with the summary, if anything is.
+pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<Damage>> {
     let tail = bytes.len().checked_sub(TAIL);
     let (Some(tail), true) = (tail, bytes.ends_with(MAGIC)) else {
-        return Err("the recorder did not finish the file, it has no summary".into());
+        return Err(Some(Damage::NoSummary));
     };
     let footer = match record(bytes, tail) {
         Ok(Some(footer)) if footer.op == op::FOOTER => footer,
-        _ => return Err("the file's end is damaged".into()),
+        _ => return Err(Some(Damage::End)),
     };
     let start = Fields(footer.content).u64().unwrap_or_default();
     if start == 0 {
-        return Err(String::new());
+        return Err(None);
     }
-    let damaged = |what: &str| format!("the summary is damaged: {what}");
     let mut definitions = Definitions::default();
     let (mut chunks, mut indexes, mut statistics) = (Vec::new(), Vec::new(), None);
     let mut at = usize::try_from(start).unwrap_or(usize::MAX);
     if at >= tail {
-        return Err(damaged("it begins behind its end"));
+        return Err(Some(Damage::SummaryPlace));
     }
     while at < tail {
         let found = match record(&bytes[..tail], at) {
             Ok(Some(found)) => found,
             Ok(None) => break,
-            Err(cut) => return Err(damaged(&cut.problem())),
+            Err(cut) => return Err(Some(Damage::SummaryCut(cut.problem()))),
         };
         let sound = match found.op {
             op::SCHEMA | op::CHANNEL => definitions.add(found.op, found.content).is_some(),
@@ -63,19 +62,19 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, String> {
             _ => true,
         };
         if !sound {
-            return Err(damaged(&format!("the record at byte {at}")));
+            return Err(Some(Damage::SummaryRecord { at }));
         }
         at = found.end();
     }
     // Recorders may leave parts of the summary out; then nothing but the file itself tells.
     let Some(statistics) = statistics else {
-        return Err(String::new());
+        return Err(None);
     };
     let complete = statistics.chunks == chunks.len() as u64
         && statistics.channels == definitions.channels.len() as u64
         && (statistics.messages == 0 || !chunks.is_empty());
     if !complete {
-        return Err(String::new());
+        return Err(None);
     }
     for (id, count) in &statistics.counts {
         if let Some(place) = definitions.places.get(id) {

@@ -1,8 +1,8 @@
 //! A file's messages in time order, chunk by chunk.
 
-use super::chunk::{self, Content, Entry};
+use super::chunk::{self, ChunkProblem, Content, Entry};
 use super::{ChunkInfo, McapFile};
-use crate::storage::{COPY_AGAIN, error};
+use crate::problem::StorageProblem;
 use deepfusion_rosbag::{Error, Message, Result, Selection, Time};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
@@ -76,14 +76,13 @@ impl<'a> Messages<'a> {
         let walk = chunk::walk(content.bytes());
         // What is wrong with a scanned chunk is known since the scan.
         if let Some(problem) = problem.or(walk.broken).filter(|_| !info.scanned) {
-            return self.fail(info, &problem);
+            return self.fail(info, problem);
         }
         let mut entries = walk.messages;
         if let Some(early) = entries.iter().find(|e| e.time < info.first) {
             // It has come too late to keep the order.
             let (time, first) = (early.time, info.first);
-            let problem = format!("a message at {time}, the index says the first is at {first}");
-            return self.fail(info, &problem);
+            return self.fail(info, ChunkProblem::Early { time, first });
         }
         let places = &self.file.index.places;
         let wanted = |channel: &u16| places.get(channel).is_some_and(|p| self.wanted[*p]);
@@ -102,10 +101,10 @@ impl<'a> Messages<'a> {
         }
     }
 
-    fn fail(&mut self, info: &ChunkInfo, problem: &str) {
-        let problem = format!("the chunk at byte {}: {problem}", info.from);
-        self.errors
-            .push_back(error(&self.file.path, problem, COPY_AGAIN));
+    fn fail(&mut self, info: &ChunkInfo, problem: ChunkProblem) {
+        let at = info.from;
+        let problem = StorageProblem::Chunk { at, problem };
+        self.errors.push_back(problem.of(&self.file.path));
     }
 }
 

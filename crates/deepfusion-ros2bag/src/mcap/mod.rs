@@ -9,11 +9,14 @@ mod messages;
 mod record;
 mod scan;
 
-use crate::storage::{Channel, Storage, error, hull};
+use crate::problem::StorageProblem;
+use crate::storage::{Channel, Storage, hull};
+pub use chunk::ChunkProblem;
 use chunk::Entry;
 use deepfusion_rosbag::{Error, MessageIter, Result, Selection, Time};
 use memmap2::Mmap;
 use record::MAGIC;
+pub use record::RecordProblem;
 use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -39,7 +42,28 @@ struct Index {
     chunks: Vec<ChunkInfo>,
     /// Messages outside of chunks, in time order, by place in the file.
     loose: Vec<Entry>,
-    damage: Option<String>,
+    damage: Vec<Damage>,
+}
+
+/// What is wrong with a file that was scanned.
+#[derive(Debug, thiserror::Error)]
+enum Damage {
+    #[error("the recorder did not finish the file, it has no summary")]
+    NoSummary,
+    #[error("the file's end is damaged")]
+    End,
+    #[error("the summary is damaged: it begins behind its end")]
+    SummaryPlace,
+    #[error("the summary is damaged: {0}")]
+    SummaryCut(RecordProblem),
+    #[error("the summary is damaged: the record at byte {at}")]
+    SummaryRecord { at: usize },
+    #[error("the definition at byte {at} is cut off")]
+    Definition { at: usize },
+    #[error(transparent)]
+    Record(RecordProblem),
+    #[error("the chunk at byte {at}: {problem}")]
+    Chunk { at: usize, problem: ChunkProblem },
 }
 
 /// A chunk.
@@ -76,15 +100,11 @@ impl McapFile {
             index: Index::default(),
         };
         if !opened.bytes().starts_with(MAGIC) {
-            return Err(error(
-                path,
-                "not an MCAP file: it does not begin as one",
-                "give the recording's own .mcap file",
-            ));
+            return Err(StorageProblem::NotMcap.of(path));
         }
         opened.index = match index::read(opened.bytes()) {
             Ok(index) => index,
-            Err(why) => scan::read(opened.bytes(), why),
+            Err(damage) => scan::read(opened.bytes(), damage),
         };
         Ok(opened)
     }
@@ -108,7 +128,8 @@ impl Storage for McapFile {
     }
 
     fn damage(&self) -> Option<String> {
-        self.index.damage.clone()
+        let damage: Vec<String> = self.index.damage.iter().map(Damage::to_string).collect();
+        (!damage.is_empty()).then(|| damage.join("; "))
     }
 
     fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a> {

@@ -49,14 +49,40 @@ pub(super) struct TruncatedRecord<'a> {
     pub missing: u64,
 }
 
+/// What is wrong with a record of an MCAP file. Its place is counted in the file, or in the chunk that holds it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordProblem {
+    /// Its end is missing.
+    #[error("the record at byte {at} (type {op:#04x}) lacks {missing} bytes")]
+    Cut {
+        /// Where it begins.
+        at: usize,
+        /// Its kind.
+        op: u8,
+        /// How many bytes are missing.
+        missing: u64,
+    },
+    /// It ends within its kind and length.
+    #[error("the record at byte {at} is cut off within its head")]
+    HeadCut {
+        /// Where it begins.
+        at: usize,
+    },
+    /// A message is shorter than its own head.
+    #[error("the message at byte {at} is too short")]
+    ShortMessage {
+        /// Where it begins.
+        at: usize,
+    },
+}
+
 impl TruncatedRecord<'_> {
-    pub(super) fn problem(&self) -> String {
+    pub(super) fn problem(&self) -> RecordProblem {
+        let (at, missing) = (self.at, self.missing);
         match self.op {
-            Some(op) => format!(
-                "the record at byte {} (type {op:#04x}) lacks {} bytes",
-                self.at, self.missing
-            ),
-            None => format!("the record at byte {} is cut off within its head", self.at),
+            Some(op) => RecordProblem::Cut { at, op, missing },
+            None => RecordProblem::HeadCut { at },
         }
     }
 }

@@ -2,18 +2,19 @@
 
 use super::chunk::{self, Entry, walk};
 use super::definitions::Definitions;
-use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, op, record};
-use super::{ChunkInfo, Index};
+use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, RecordProblem, op, record};
+use super::{ChunkInfo, Damage, Index};
 use deepfusion_rosbag::Time;
 
-/// The index by going through the file; `why` is the problem with its summary, `None` if it never had one.
-pub(super) fn read(bytes: &[u8], why: String) -> Index {
+/// The index by going through the file; `summary` is what is wrong with its summary, `None` if nothing is, but that it does not say
+/// everything.
+pub(super) fn read(bytes: &[u8], summary: Option<Damage>) -> Index {
     let mut scan = Scan {
         bytes,
         definitions: Definitions::default(),
         chunks: Vec::new(),
         loose: Vec::new(),
-        broken: Vec::new(),
+        damage: summary.into_iter().collect(),
     };
     scan.go();
     let mut index = Index {
@@ -21,14 +22,9 @@ pub(super) fn read(bytes: &[u8], why: String) -> Index {
         places: scan.definitions.places,
         chunks: scan.chunks,
         loose: scan.loose,
-        damage: None,
+        damage: scan.damage,
     };
     index.loose.sort_by_key(|m| (m.time, m.range.start));
-    let mut problems = scan.broken;
-    if !why.is_empty() {
-        problems.insert(0, why);
-    }
-    index.damage = (!problems.is_empty()).then(|| problems.join("; "));
     index
 }
 
@@ -37,7 +33,7 @@ struct Scan<'a> {
     definitions: Definitions,
     chunks: Vec<ChunkInfo>,
     loose: Vec<Entry>,
-    broken: Vec<String>,
+    damage: Vec<Damage>,
 }
 
 impl Scan<'_> {
@@ -62,7 +58,7 @@ impl Scan<'_> {
                     if cut.op == Some(op::CHUNK) {
                         self.chunk(cut.start, cut.start + cut.content.len(), at);
                     }
-                    self.broken.push(cut.problem());
+                    self.damage.push(Damage::Record(cut.problem()));
                     return;
                 }
             }
@@ -71,8 +67,7 @@ impl Scan<'_> {
 
     fn define(&mut self, op: u8, content: &[u8], at: usize) {
         if self.definitions.add(op, content).is_none() {
-            self.broken
-                .push(format!("the definition at byte {at} is cut off"));
+            self.damage.push(Damage::Definition { at });
         }
     }
 
@@ -84,9 +79,10 @@ impl Scan<'_> {
                 let entry = self.count(head.channel, time, range);
                 self.loose.extend(entry);
             }
-            None => self
-                .broken
-                .push(format!("the message at byte {at} is too short")),
+            None => {
+                let short = RecordProblem::ShortMessage { at };
+                self.damage.push(Damage::Record(short));
+            }
         }
     }
 
@@ -105,9 +101,8 @@ impl Scan<'_> {
         let bytes = self.bytes;
         let (content, problem) = chunk::open(&bytes[from..to]);
         let walk = walk(content.bytes());
-        for problem in problem.iter().chain(&walk.broken) {
-            self.broken
-                .push(format!("the chunk at byte {at}: {problem}"));
+        for problem in problem.into_iter().chain(walk.broken) {
+            self.damage.push(Damage::Chunk { at, problem });
         }
         for (op, content) in &walk.definitions {
             self.define(*op, content, at);

@@ -1,7 +1,8 @@
 //! Messages from rows: first their positions, some thousand at a time, then each one's bytes.
 
 use super::{SqliteFile, failed};
-use crate::storage::{MOST_BYTES, error};
+use crate::problem::{PackedProblem, StorageProblem};
+use crate::storage::MOST_BYTES;
 use deepfusion_rosbag::{Message, Result, Selection, Time};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
@@ -117,7 +118,7 @@ impl<'a> Rows<'a> {
                         Ok(()) => continue,
                         Err(e) => {
                             self.done = true;
-                            return Some(Err(failed(&self.file.path, &e)));
+                            return Some(Err(failed(&self.file.path, e)));
                         }
                     },
                 },
@@ -165,15 +166,16 @@ impl<'a> Rows<'a> {
     fn message(&self, key: &Key) -> Result<Message<'a>> {
         let file = self.file;
         let channel = &file.channels[key.topic as usize];
-        let bytes = bytes(&file.database(), key.id).map_err(|e| failed(&file.path, &e))?;
+        let bytes = bytes(&file.database(), key.id).map_err(|e| failed(&file.path, e))?;
         let bytes = if bytes.starts_with(&ZSTD) {
             unpack(&bytes).map_err(|problem| {
-                let topic = &channel.connection.topic;
-                error(
-                    &file.path,
-                    format!("{topic}, row {}: {problem}", key.id),
-                    "the message is damaged",
-                )
+                let (topic, row) = (channel.connection.topic.clone(), key.id);
+                let problem = StorageProblem::Message {
+                    topic,
+                    row,
+                    problem,
+                };
+                problem.of(&file.path)
             })?
         } else {
             bytes
@@ -203,14 +205,15 @@ fn bytes(database: &Connection, id: i64) -> rusqlite::Result<Vec<u8>> {
 }
 
 /// A message that was compressed by itself.
-fn unpack(bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
+fn unpack(bytes: &[u8]) -> std::result::Result<Vec<u8>, PackedProblem> {
     let mut message = Vec::new();
-    let decoder = zstd::stream::read::Decoder::with_buffer(bytes).map_err(|e| e.to_string())?;
+    let decoder =
+        zstd::stream::read::Decoder::with_buffer(bytes).map_err(PackedProblem::Decoder)?;
     let read = decoder.take(MOST_BYTES).read_to_end(&mut message);
     match read {
         Ok(_) if (message.len() as u64) < MOST_BYTES => Ok(message),
-        Ok(_) => Err(format!("{MOST_BYTES} bytes or more unpacked")),
-        Err(e) => Err(format!("cannot be unpacked: {e}")),
+        Ok(_) => Err(PackedProblem::TooLarge),
+        Err(e) => Err(PackedProblem::Unpack(e)),
     }
 }
 

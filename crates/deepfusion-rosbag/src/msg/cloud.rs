@@ -1,6 +1,6 @@
 //! Access to a point cloud's values by field name, for any layout.
 
-use super::{Header, MessageError, PointCloud2, PointField};
+use super::{Header, LayoutProblem, MessageError, MessagePart, PointCloud2, PointField};
 use std::borrow::Cow;
 
 /// The number type of a field.
@@ -146,22 +146,26 @@ impl PointCloud2<'_> {
         }
         let row = width * u64::from(self.point_step);
         let wrong = |problem| MessageError::Layout {
-            what: "cloud".to_owned(),
+            of: MessagePart::Cloud,
             problem,
         };
         if height > 1 && u64::from(self.row_step) < row {
-            let (w, p, r) = (width, self.point_step, self.row_step);
-            return Err(wrong(format!(
-                "{w} points of {p} bytes do not fit into a row of {r}"
-            )));
+            return Err(wrong(LayoutProblem::PointRow {
+                points: width,
+                point_step: self.point_step,
+                row_step: self.row_step,
+            }));
         }
         // The last row needs no padding behind it. Below 2⁶⁴: 2³² rows of 2³² bytes, less the first.
         let needed = u128::from(height - 1) * u128::from(self.row_step) + u128::from(row);
         if self.point_step == 0 || needed > self.data.len() as u128 {
-            let (p, n) = (self.point_step, self.data.len());
-            return Err(wrong(format!(
-                "{width}x{height} points of {p} bytes need {needed} bytes, there are {n}"
-            )));
+            return Err(wrong(LayoutProblem::Points {
+                width,
+                height,
+                point_step: self.point_step,
+                needed,
+                left: self.data.len(),
+            }));
         }
         // Every point takes a byte at least, so that their number is below the data's length.
         Ok((width * height) as usize)
@@ -188,23 +192,22 @@ impl PointCloud2<'_> {
                 datatype: field.datatype,
             })?;
         let wrong = |problem| MessageError::Layout {
-            what: format!("field {name}"),
+            of: MessagePart::Field(name.to_owned()),
             problem,
         };
-        if element >= field.count.max(1) {
-            return Err(wrong(format!(
-                "{} numbers, number {element} was asked for",
-                field.count.max(1)
-            )));
+        let count = field.count.max(1);
+        if element >= count {
+            return Err(wrong(LayoutProblem::Element { count, element }));
         }
         let offset = u64::from(field.offset) + u64::from(element) * datatype.size() as u64;
         let end = offset + datatype.size() as u64;
         let points = self.points()?;
         if points > 0 && end > u64::from(self.point_step) {
-            return Err(wrong(format!(
-                "bytes {offset} to {end} of a point of {} bytes",
-                self.point_step
-            )));
+            return Err(wrong(LayoutProblem::Outside {
+                offset,
+                end,
+                point_step: self.point_step,
+            }));
         }
         Ok(Column {
             data: self.data.get(offset as usize..).unwrap_or_default(),
@@ -235,22 +238,22 @@ impl PointCloud2<'static> {
     pub fn from_columns(header: Header, columns: &[(&str, &[f32])]) -> Result<Self, MessageError> {
         let points = columns.first().map_or(0, |(_, numbers)| numbers.len());
         let wrong = |name: &str, problem| MessageError::Layout {
-            what: format!("field {name}"),
+            of: MessagePart::Field(name.to_owned()),
             problem,
         };
         if let Some((name, numbers)) = columns.iter().find(|(_, numbers)| numbers.len() != points) {
             return Err(wrong(
                 name,
-                format!("{} numbers, {} has {points}", numbers.len(), columns[0].0),
+                LayoutProblem::Columns {
+                    numbers: numbers.len(),
+                    first: columns[0].0.to_owned(),
+                    points,
+                },
             ));
         }
         let point_step = 4 * columns.len();
-        let bytes = u32::try_from(points * point_step).map_err(|_| {
-            wrong(
-                columns[0].0,
-                format!("{points} points of {point_step} bytes exceed 4 GiB"),
-            )
-        })?;
+        let bytes = u32::try_from(points * point_step)
+            .map_err(|_| wrong(columns[0].0, LayoutProblem::TooMany { points, point_step }))?;
         let mut data = Vec::with_capacity(points * point_step);
         for point in 0..points {
             for (_, numbers) in columns {

@@ -1,5 +1,6 @@
 use deepfusion_hint::Hint;
 use std::borrow::Cow;
+use std::fmt;
 
 /// What can be wrong within a message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -50,12 +51,12 @@ pub enum MessageError {
         datatype: u8,
     },
     /// Sizes within a message contradict each other.
-    #[error("{what}: {problem}")]
+    #[error("{of}: {problem}")]
     Layout {
-        /// What has the size.
-        what: String,
+        /// What has the sizes.
+        of: MessagePart,
         /// The contradiction.
-        problem: String,
+        problem: LayoutProblem,
     },
     /// An image's encoding is unknown, or another than asked for.
     #[error("encoding `{encoding}`: expected {expected}")]
@@ -64,6 +65,127 @@ pub enum MessageError {
         encoding: String,
         /// Those that would do.
         expected: Cow<'static, str>,
+    },
+}
+
+/// A part of a message that states how its bytes are laid out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MessagePart {
+    /// An image.
+    Image {
+        /// Its width in pixels.
+        width: u32,
+        /// Its height in pixels.
+        height: u32,
+        /// Its encoding's name.
+        encoding: String,
+    },
+    /// A cloud of points.
+    Cloud,
+    /// A field of a cloud's points, by name.
+    Field(String),
+}
+
+impl fmt::Display for MessagePart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Image {
+                width,
+                height,
+                encoding,
+            } => write!(f, "image of {width}x{height} {encoding}"),
+            Self::Cloud => f.write_str("cloud"),
+            Self::Field(name) => write!(f, "field {name}"),
+        }
+    }
+}
+
+/// How sizes within a message contradict each other.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LayoutProblem {
+    /// A row of pixels is longer than the distance between rows.
+    #[error("a row of {row} bytes does not fit into a step of {step}")]
+    Row {
+        /// The row's length.
+        row: usize,
+        /// From row to row.
+        step: usize,
+    },
+    /// There are fewer bytes than the pixels take.
+    #[error("{needed} bytes needed, there are {left}")]
+    Pixels {
+        /// How many bytes they take.
+        needed: usize,
+        /// How many there are.
+        left: usize,
+    },
+    /// A Bayer pattern does not fit into the image.
+    #[error("a Bayer pattern has two rows and columns or more")]
+    Bayer,
+    /// Pairs of pixels share a colour, and the width is odd.
+    #[error("two pixels share a colour, so the width must be even")]
+    OddWidth,
+    /// A row of points is longer than the distance between rows.
+    #[error("{points} points of {point_step} bytes do not fit into a row of {row_step}")]
+    PointRow {
+        /// How many points a row has.
+        points: u64,
+        /// From point to point.
+        point_step: u32,
+        /// From row to row.
+        row_step: u32,
+    },
+    /// There are fewer bytes than the points take.
+    #[error("{width}x{height} points of {point_step} bytes need {needed} bytes, there are {left}")]
+    Points {
+        /// How many points a row has.
+        width: u64,
+        /// How many rows there are.
+        height: u64,
+        /// From point to point.
+        point_step: u32,
+        /// How many bytes they take.
+        needed: u128,
+        /// How many there are.
+        left: usize,
+    },
+    /// A field has fewer numbers than were asked for.
+    #[error("{count} numbers, number {element} was asked for")]
+    Element {
+        /// How many it has.
+        count: u32,
+        /// The one asked for, counted from 0.
+        element: u32,
+    },
+    /// A field lies outside of its point.
+    #[error("bytes {offset} to {end} of a point of {point_step} bytes")]
+    Outside {
+        /// Where it begins.
+        offset: u64,
+        /// Where it ends.
+        end: u64,
+        /// From point to point.
+        point_step: u32,
+    },
+    /// Columns have different lengths.
+    #[error("{numbers} numbers, {first} has {points}")]
+    Columns {
+        /// How many numbers the column has.
+        numbers: usize,
+        /// The first column's name.
+        first: String,
+        /// How many numbers that has.
+        points: usize,
+    },
+    /// The points take more bytes than the format can count.
+    #[error("{points} points of {point_step} bytes exceed 4 GiB")]
+    TooMany {
+        /// How many points there are.
+        points: usize,
+        /// From point to point.
+        point_step: usize,
     },
 }
 

@@ -1,6 +1,6 @@
 //! Access to an image's pixels by its encoding and step.
 
-use super::{Image, MessageError, bayer, yuv};
+use super::{Image, LayoutProblem, MessageError, MessagePart, bayer, yuv};
 use std::borrow::Cow;
 
 /// What [`Image::to_rgb8`] reads.
@@ -118,9 +118,7 @@ impl Image<'_> {
             self.step as usize,
         );
         if height > 0 && row > step {
-            return Err(self.wrong_layout(format!(
-                "a row of {row} bytes does not fit into a step of {step}"
-            )));
+            return Err(self.wrong_layout(LayoutProblem::Row { row, step }));
         }
         // The last row needs no padding behind it.
         let needed = height
@@ -128,10 +126,8 @@ impl Image<'_> {
             .saturating_mul(step)
             .saturating_add(row);
         if height > 0 && needed > self.data.len() {
-            return Err(self.wrong_layout(format!(
-                "{needed} bytes needed, there are {}",
-                self.data.len()
-            )));
+            let left = self.data.len();
+            return Err(self.wrong_layout(LayoutProblem::Pixels { needed, left }));
         }
         let data = &self.data[..];
         // Nothing is shown of an image without columns, however many rows it claims.
@@ -204,12 +200,10 @@ impl Image<'_> {
                     return Ok(Vec::new());
                 }
                 let rgb = bayer::to_rgb8(&rows, pattern);
-                rgb.ok_or_else(|| {
-                    self.wrong_layout("a Bayer pattern has two rows and columns or more")
-                })
+                rgb.ok_or_else(|| self.wrong_layout(LayoutProblem::Bayer))
             }
             Encoding::Uyvy | Encoding::Yuyv if self.width % 2 == 1 => {
-                Err(self.wrong_layout("two pixels share a colour, so the width must be even"))
+                Err(self.wrong_layout(LayoutProblem::OddWidth))
             }
             Encoding::Uyvy => self.each_pixel(|&[u, y0, v, y1]| yuv::pair([y0, y1], u, v)),
             Encoding::Yuyv => self.each_pixel(|&[y0, u, y1, v]| yuv::pair([y0, y1], u, v)),
@@ -238,11 +232,13 @@ impl Image<'_> {
         }
     }
 
-    fn wrong_layout(&self, problem: impl Into<String>) -> MessageError {
-        MessageError::Layout {
-            what: format!("image of {}x{} {}", self.width, self.height, self.encoding),
-            problem: problem.into(),
-        }
+    fn wrong_layout(&self, problem: LayoutProblem) -> MessageError {
+        let of = MessagePart::Image {
+            width: self.width,
+            height: self.height,
+            encoding: self.encoding.clone(),
+        };
+        MessageError::Layout { of, problem }
     }
 }
 

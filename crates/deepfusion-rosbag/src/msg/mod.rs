@@ -24,7 +24,7 @@ mod yuv;
 pub use ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 pub use can_msgs::Frame;
 pub use cloud::{Column, Datatype};
-pub use error::MessageError;
+pub use error::{LayoutProblem, MessageError, MessagePart};
 pub use ffmpeg_image_transport_msgs::{FfmpegPacket, OldFfmpegPacket};
 pub use foxglove_msgs::CompressedVideo;
 pub use geometry_msgs::{

@@ -52,7 +52,7 @@ impl MountedCamera {
             })
         };
         if let Some(why) = self.intrinsics.implausible() {
-            return bad("cameras.intrinsics", why, "a lens");
+            return bad("cameras.intrinsics", why.to_string(), "a lens");
         }
         if let Some(height) = self.height_m
             && !(HEIGHTS.0..=HEIGHTS.1).contains(&height)

@@ -5,8 +5,8 @@ use crate::model::displacement_ratio;
 use crate::update::FOCAL;
 use crate::workers::WorkerGroup;
 use crate::{
-    BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LossTerms,
-    NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
+    BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LoaderProblem,
+    LossTerms, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
 };
 use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops::autocast;
@@ -157,7 +157,7 @@ impl PanelInput {
 fn next<T>(batch: impl FnOnce() -> Option<Result<T, Error>>) -> Result<T, Error> {
     batch().unwrap_or_else(|| {
         Err(Error::Loader {
-            reason: "it has no further batch".into(),
+            reason: LoaderProblem::NoBatch,
         })
     })
 }

@@ -1,7 +1,10 @@
 //! The mean loss over the samples that are held out.
 
 use crate::model::displacement_ratio;
-use crate::{BatchLoader, DepthLoader, Error, LossTerms, Model, SampleSet, Schedule, TrainConfig};
+use crate::{
+    BatchLoader, DepthLoader, Error, LossTerms, Model, SampleProblem, SampleSet, Schedule,
+    TrainConfig,
+};
 use burn::tensor::Device;
 
 /// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which exists
@@ -72,6 +75,6 @@ impl Mean {
 pub(super) fn no_samples(data: &str) -> Error {
     Error::NoSamples {
         data: data.into(),
-        reason: "it is empty".into(),
+        reason: SampleProblem::Empty,
     }
 }

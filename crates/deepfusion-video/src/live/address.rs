@@ -1,6 +1,6 @@
 //! What names a live source, and how it is passed to ffmpeg.
 
-use crate::{Error, Result};
+use crate::{Error, LiveProblem, Result, SourceKind};
 use std::fmt;
 use std::path::PathBuf;
 
@@ -8,14 +8,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
     text: String,
-    kind: Kind,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Camera,
-    Stream,
-    Stdin,
+    kind: SourceKind,
 }
 
 /// What stands before a camera's number or name.
@@ -26,11 +19,11 @@ impl Address {
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let kind = if text == "-" {
-            Kind::Stdin
+            SourceKind::Stdin
         } else if text.starts_with(CAMERA) || text.starts_with("/dev/video") {
-            Kind::Camera
+            SourceKind::Camera
         } else if scheme(text).is_some() {
-            Kind::Stream
+            SourceKind::Stream
         } else {
             return None;
         };
@@ -41,18 +34,22 @@ impl Address {
     /// Whether it is standard input.
     #[must_use]
     pub fn is_stdin(&self) -> bool {
-        self.kind == Kind::Stdin
+        self.kind == SourceKind::Stdin
     }
 
     /// Whether it is a camera of this machine.
     #[must_use]
     pub fn is_camera(&self) -> bool {
-        self.kind == Kind::Camera
+        self.kind == SourceKind::Camera
+    }
+
+    pub(super) fn kind(&self) -> SourceKind {
+        self.kind
     }
 
     /// Whether its end can be meant: a camera has none, be it here or at the end of a wire.
     pub(super) fn may_end(&self) -> bool {
-        self.kind != Kind::Camera && !self.is_rtsp()
+        self.kind != SourceKind::Camera && !self.is_rtsp()
     }
 
     fn is_rtsp(&self) -> bool {
@@ -82,11 +79,13 @@ impl Address {
     pub(super) fn input(&self, system: &str) -> Result<Vec<String>> {
         let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
         Ok(match self.kind {
-            Kind::Stdin => words(&["-i", "pipe:0"]),
+            SourceKind::Stdin => words(&["-i", "pipe:0"]),
             // Over UDP a camera's pictures tear where the network loses a packet.
-            Kind::Stream if self.is_rtsp() => words(&["-rtsp_transport", "tcp", "-i", &self.text]),
-            Kind::Stream => words(&["-i", &self.text]),
-            Kind::Camera => {
+            SourceKind::Stream if self.is_rtsp() => {
+                words(&["-rtsp_transport", "tcp", "-i", &self.text])
+            }
+            SourceKind::Stream => words(&["-i", &self.text]),
+            SourceKind::Camera => {
                 let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
                 let number = name.parse::<u32>().is_ok();
                 match system {
@@ -103,28 +102,22 @@ impl Address {
                     ]),
                     "windows" if !number => words(&["-f", "dshow", "-i", &format!("video={name}")]),
                     "windows" => {
-                        return Err(self.unknown(
-                            "knows cameras by name here, not by number",
-                            "`ffmpeg -list_devices true -f dshow -i dummy` lists them: camera:NAME",
-                        ));
+                        return Err(self.error(LiveProblem::CameraNumber));
                     }
                     _ => {
-                        return Err(self.unknown(
-                            "reads no cameras on this system",
-                            "give a stream's address, or pipe a stream in and give -",
-                        ));
+                        return Err(self.error(LiveProblem::NoCameras));
                     }
                 }
             }
         })
     }
 
-    fn unknown(&self, problem: &str, remedy: &'static str) -> Error {
+    /// The error of reading from it.
+    pub(super) fn error(&self, problem: LiveProblem) -> Error {
         Error::Program {
             path: PathBuf::from(self.to_string()),
             program: "ffmpeg",
             problem: problem.into(),
-            remedy,
         }
     }
 }
@@ -132,7 +125,7 @@ impl Address {
 impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.kind {
-            Kind::Stdin => f.write_str("standard input"),
+            SourceKind::Stdin => f.write_str("standard input"),
             _ => f.write_str(&self.without_password(&self.text)),
         }
     }

@@ -3,8 +3,8 @@
 use super::address::Address;
 use super::ppm;
 use super::slot::Slot;
-use crate::Result;
 use crate::program::not_started;
+use crate::{ProgramTask, Result};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -31,8 +31,8 @@ pub(super) struct Ffmpeg {
 /// How an ffmpeg ended.
 #[derive(Debug)]
 pub(super) struct FfmpegExit {
-    code: Option<i32>,
-    said: Vec<String>,
+    pub(super) code: Option<i32>,
+    pub(super) said: Vec<String>,
 }
 
 impl Ffmpeg {
@@ -67,8 +67,7 @@ impl Ffmpeg {
         out_of_reach_of_ctrl_c(&mut command);
         let mut child = command.spawn().map_err(|e| {
             let name = address.to_string();
-            let remedy = "install ffmpeg so that it is on the PATH; it opens cameras and streams";
-            not_started(Path::new(&name), "ffmpeg", &e, "read live sources", remedy)
+            not_started(Path::new(&name), "ffmpeg", e, ProgramTask::ReadLive)
         })?;
         let slot = Arc::new(Slot::new());
         let said = Arc::new(Mutex::new(VecDeque::new()));
@@ -146,7 +145,7 @@ fn read_frames(pipe: impl Read, slot: &Slot) {
         match ppm::read(&mut pipe, spare) {
             Ok(Some(image)) => spare = slot.put(image),
             Ok(None) => break None,
-            Err(error) => break Some(format!("cannot be read: {error}")),
+            Err(problem) => break Some(problem),
         }
     };
     slot.close(problem);
@@ -197,24 +196,6 @@ impl FfmpegExit {
     pub(super) fn said_one_of(&self, texts: &[&str]) -> bool {
         let mut said = self.said.iter();
         said.any(|line| texts.iter().any(|text| line.contains(text)))
-    }
-
-    /// Its exit code and last words.
-    pub(super) fn text(&self) -> String {
-        let code = match self.code {
-            Some(code) => format!("ended with code {code}"),
-            None => "was ended".into(),
-        };
-        code + &quoted(&self.said)
-    }
-}
-
-/// What it said, to be put behind what happened.
-pub(super) fn quoted(said: &[String]) -> String {
-    if said.is_empty() {
-        String::new()
-    } else {
-        format!(", saying\n  {}", said.join("\n  "))
     }
 }
 

@@ -12,11 +12,10 @@ mod slot;
 pub use address::Address;
 pub use slot::LiveFrame;
 
-use self::ffmpeg::{Ffmpeg, FfmpegExit, quoted};
+use self::ffmpeg::Ffmpeg;
 use self::slot::SlotState;
-use crate::{Error, Result};
-use deepfusion_hint::count_of;
-use std::path::PathBuf;
+use crate::{Error, FrameProblem, LiveProblem, Result};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// What [`LiveSource::take`] found.
@@ -77,11 +76,7 @@ impl LiveSource {
                 if first == size {
                     return Ok(NextFrame::Frame(frame));
                 }
-                let ((w, h), (width, height)) = (first, size);
-                Err(self.error(
-                    format!("gave frames of {w}x{h}, and now of {width}x{height}"),
-                    "start again: a camera of another size has other intrinsics",
-                ))
+                Err(self.address.error(LiveProblem::Size { first, now: size }))
             }
             SlotState::Nothing { silence } if silence >= self.timeout => Err(self.silent()),
             SlotState::Nothing { .. } => Ok(NextFrame::NotYet),
@@ -90,7 +85,7 @@ impl LiveSource {
     }
 
     /// The pipe was closed: by the stream's end, or by what went wrong.
-    fn ended(&mut self, problem: Option<String>) -> Result<NextFrame> {
+    fn ended(&mut self, problem: Option<Arc<FrameProblem>>) -> Result<NextFrame> {
         let end = self.ffmpeg.end();
         let came = self.ffmpeg.slot().arrived();
         if came == 0 && !self.old_names && end.knows_no_option() {
@@ -100,58 +95,33 @@ impl LiveSource {
             return Ok(NextFrame::NotYet);
         }
         if let Some(problem) = problem {
-            return Err(self.error(problem, "a newer ffmpeg may know the stream better"));
+            return Err(self.address.error(LiveProblem::Frame(problem)));
         }
         if came > 0 && end.is_clean() && self.address.may_end() {
             return Ok(NextFrame::Ended);
         }
-        let happened = match came {
-            0 => "gave no frame".to_owned(),
-            n => format!("lost the connection after {}", count_of(n, "frame")),
-        };
-        Err(self.error(
-            format!("{happened}: {}", self.address.without_password(&end.text())),
-            remedy(&self.address, came, &end),
-        ))
+        Err(self.address.error(LiveProblem::Lost {
+            kind: self.address.kind(),
+            frames: came,
+            code: end.code,
+            said: self.without_password(&end.said),
+        }))
     }
 
     /// Nothing came for too long.
     fn silent(&self) -> Error {
-        let before = match self.ffmpeg.slot().arrived() {
-            0 => String::new(),
-            n => format!(", after {}", count_of(n, "frame")),
-        };
-        let said = self.address.without_password(&quoted(&self.ffmpeg.said()));
-        let seconds = self.timeout.as_secs_f64();
         Error::Silent {
             address: self.address.to_string(),
-            problem: format!("gave no frame for {seconds} s{before}{said}"),
+            waited: self.timeout,
+            frames: self.ffmpeg.slot().arrived(),
+            said: self.without_password(&self.ffmpeg.said()),
         }
     }
 
-    fn error(&self, problem: String, remedy: &'static str) -> Error {
-        Error::Program {
-            path: PathBuf::from(self.address.to_string()),
-            program: "ffmpeg",
-            problem,
-            remedy,
-        }
+    fn without_password(&self, said: &[String]) -> Vec<String> {
+        let lines = said.iter();
+        lines
+            .map(|line| self.address.without_password(line))
+            .collect()
     }
-}
-
-fn remedy(address: &Address, came: u64, end: &FfmpegExit) -> &'static str {
-    if came > 0 {
-        return "what was written is whole; start again when the source is back";
-    }
-    if address.is_stdin() {
-        return "pipe a stream that ffmpeg knows: Motion-JPEG, MPEG-TS, YUV4MPEG, Matroska";
-    }
-    if end.said_one_of(&["nauthorized", "orbidden"]) {
-        return "give name and password: rtsp://NAME:PASSWORD@HOST/…";
-    }
-    if address.is_camera() {
-        return "is it plugged in, free, and yours to read? `v4l2-ctl --list-devices` lists the cameras of Linux, \
-                `ffmpeg -sources` those ffmpeg knows";
-    }
-    "is the source running, and the address right? `ffplay ADDRESS` shows what it sends"
 }

@@ -1,7 +1,8 @@
 //! Pictures as ffmpeg pipes them: each begins with its size, so that nothing has to be asked beforehand.
 
+use crate::FrameProblem;
 use image::RgbImage;
-use std::io::{BufRead, Error, ErrorKind};
+use std::io::{BufRead, ErrorKind};
 
 /// Largest side of a frame: more is no camera's, but a stream that is no picture.
 const LARGEST: u32 = 1 << 15;
@@ -11,15 +12,15 @@ const LARGEST: u32 = 1 << 15;
 ///
 /// # Errors
 /// Where something else comes than a picture, or reading fails.
-pub(super) fn read(input: &mut impl BufRead, spare: Vec<u8>) -> std::io::Result<Option<RgbImage>> {
+pub(super) fn read(
+    input: &mut impl BufRead,
+    spare: Vec<u8>,
+) -> Result<Option<RgbImage>, FrameProblem> {
     let Some(magic) = word(input)? else {
         return Ok(None);
     };
     if magic != "P6" {
-        return Err(Error::new(
-            ErrorKind::InvalidData,
-            "a frame that does not begin with P6",
-        ));
+        return Err(FrameProblem::Magic);
     }
     let mut numbers = [0_u32; 3];
     for number in &mut numbers {
@@ -30,12 +31,7 @@ pub(super) fn read(input: &mut impl BufRead, spare: Vec<u8>) -> std::io::Result<
             .parse()
             .ok()
             .filter(|n| (1..=LARGEST).contains(n))
-            .ok_or_else(|| {
-                Error::new(
-                    ErrorKind::InvalidData,
-                    format!("a frame's size of {word:?}"),
-                )
-            })?;
+            .ok_or(FrameProblem::Size(word))?;
     }
     let [width, height, _] = numbers;
     let mut pixels = spare;
@@ -43,12 +39,12 @@ pub(super) fn read(input: &mut impl BufRead, spare: Vec<u8>) -> std::io::Result<
     match input.read_exact(&mut pixels) {
         Ok(()) => Ok(RgbImage::from_raw(width, height, pixels)),
         Err(e) if e.kind() == ErrorKind::UnexpectedEof => Ok(None),
-        Err(e) => Err(e),
+        Err(e) => Err(e.into()),
     }
 }
 
 /// The next word and the one blank that ends it; `None` at the end.
-fn word(input: &mut impl BufRead) -> std::io::Result<Option<String>> {
+fn word(input: &mut impl BufRead) -> Result<Option<String>, FrameProblem> {
     /// Longer words are no header's.
     const LONGEST: usize = 8;
     let mut word = String::new();
@@ -63,10 +59,7 @@ fn word(input: &mut impl BufRead) -> std::io::Result<Option<String>> {
         }
         word.push(char::from(byte[0]));
         if word.len() > LONGEST {
-            return Err(Error::new(
-                ErrorKind::InvalidData,
-                "a frame without a header",
-            ));
+            return Err(FrameProblem::Header);
         }
     }
 }

@@ -3,9 +3,9 @@
 //! IVF is a header of 32 bytes (codec, size, rate, count) and, before each packet, its length and a time. ffmpeg names a picture by
 //! that time, so that one that it does not give is missed by its name.
 
-use super::{Codec, REORDERED};
-use crate::program::{Printed, READ, in_either_words, outcome};
-use crate::{Error, Result};
+use super::Codec;
+use crate::program::{Printed, in_either_words, outcome};
+use crate::{Error, PacketProblem, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
@@ -79,7 +79,10 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// [`Error::Program`] where ffmpeg is not installed; [`Error::File`].
-    pub(super) fn decode(mut self, of: &Path) -> Result<std::result::Result<(), (u64, String)>> {
+    pub(super) fn decode(
+        mut self,
+        of: &Path,
+    ) -> Result<std::result::Result<(), (u64, PacketProblem)>> {
         let path = self.folder.join(NAME);
         self.file.flush().map_err(|e| Error::file(&path, e))?;
         let whole = self.run(of, NAME, self.folder, self.len())?;
@@ -92,7 +95,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The first packet that is wrong, by decoding fewer of them; `problem` is what all of them gave.
-    fn first_wrong(&self, of: &Path, problem: String) -> Result<(u64, String)> {
+    fn first_wrong(&self, of: &Path, problem: PacketProblem) -> Result<(u64, PacketProblem)> {
         let aside = self.folder.join("tried");
         let path = self.folder.join(TRIED);
         let (mut whole, mut wrong) = (0, (self.len(), problem));
@@ -120,7 +123,13 @@ impl<'a> Batch<'a> {
     }
 
     /// Decodes a file of the first `packets` into a folder: what was wrong, if something was.
-    fn run(&self, of: &Path, file: &str, folder: &Path, packets: usize) -> Result<Option<String>> {
+    fn run(
+        &self,
+        of: &Path,
+        file: &str,
+        folder: &Path,
+        packets: usize,
+    ) -> Result<Option<PacketProblem>> {
         let printed = ffmpeg(self.codec, &Source::File(file), (of, folder))?;
         let there = |i: &u64| crate::cache::frame_path(folder, *i).is_file();
         let numbers = self.first..self.first + packets as u64;
@@ -135,20 +144,22 @@ impl<'a> Batch<'a> {
             return Err(Error::Program {
                 path: of.to_owned(),
                 program: "ffmpeg",
-                problem: own.trim().to_owned(),
-                remedy: "an ffmpeg that decodes the stream, and space on the disk where its pictures are kept, are needed",
+                problem: ProgramProblem::Unable {
+                    said: own.trim().to_owned(),
+                },
             });
         }
         if said.contains("monoton") || said.contains("Invalid pts") {
-            return Ok(Some(REORDERED.to_owned()));
+            return Ok(Some(PacketProblem::Reordered));
         }
         // The first line, without which part of ffmpeg it was and where that lay in memory.
         let line = said.lines().next().unwrap_or_default();
         let line = line.rsplit_once("] ").map_or(line, |(_, line)| line);
         Ok(Some(if line.is_empty() {
-            "it gives no picture".to_owned()
+            PacketProblem::NoPicture
         } else {
-            format!("it is damaged, or one before it is missing: {line}")
+            let said = line.to_owned();
+            PacketProblem::Damaged { said }
         }))
     }
 }
@@ -161,11 +172,12 @@ pub(super) fn picture(
     codec: Codec,
     packet: &[u8],
     of: &Path,
-) -> Result<std::result::Result<Vec<u8>, String>> {
+) -> Result<std::result::Result<Vec<u8>, PacketProblem>> {
     let file = [&head(codec)[..], &packet_head(packet, 0), packet].concat();
     let printed = ffmpeg(codec, &Source::Bytes(&file), (of, Path::new(".")))?;
     Ok(if printed.text.is_empty() {
-        Err(format!("it gives no picture: {}", printed.complaint))
+        let said = printed.complaint;
+        Err(PacketProblem::NoFirstPicture { said })
     } else {
         Ok(printed.text)
     })
@@ -223,7 +235,7 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
             ],
         });
         let arguments: Vec<&OsStr> = arguments.iter().map(OsStr::new).collect();
-        outcome("ffmpeg", &arguments, (of, READ), folder, bytes)
+        outcome("ffmpeg", &arguments, (of, ProgramTask::Read), folder, bytes)
     })
 }
 

@@ -2,6 +2,7 @@
 //! (ITU-T H.264, 7.3.2.1 and 7.3.3). ffmpeg conceals the one and allows the other.
 
 use super::nal::units;
+use crate::PacketProblem;
 
 /// Looks at a stream's packets in their order.
 #[derive(Debug, Default)]
@@ -24,7 +25,7 @@ struct Set {
 
 impl Watch {
     /// Looks at the next packet: what is wrong with it, if something is.
-    pub(super) fn next(&mut self, packet: &[u8]) -> Result<(), &'static str> {
+    pub(super) fn next(&mut self, packet: &[u8]) -> Result<(), PacketProblem> {
         for unit in units(packet) {
             let (kind, referred) = (unit[0] & 31, unit[0] & 0b0110_0000 != 0);
             match kind {
@@ -32,11 +33,11 @@ impl Watch {
                 1 | 5 => {
                     let Some(set) = self.set else { return Ok(()) };
                     let Some((slice, count)) = slice(unit, set) else {
-                        return Err("it is cut off within a slice's header");
+                        return Err(PacketProblem::Cut);
                     };
                     // B, in which a picture refers to later ones.
                     if slice % 5 == 1 {
-                        return Err(super::REORDERED);
+                        return Err(PacketProblem::Reordered);
                     }
                     let follows = self
                         .last
@@ -48,13 +49,13 @@ impl Watch {
                     return if in_order {
                         Ok(())
                     } else {
-                        Err("a message before it is missing, which its picture refers to")
+                        Err(PacketProblem::Gap)
                     };
                 }
                 _ => {}
             }
         }
-        Err("it holds no picture")
+        Err(PacketProblem::Empty)
     }
 }
 
@@ -196,7 +197,9 @@ mod tests {
             &[0, 0, 1, 0x67],
             &[0, 0, 1, 0x67, 100, 0, 0, 0],
         ] {
-            assert_eq!(watch.next(packet), Err("it holds no picture"), "{packet:?}");
+            let error = watch.next(packet).unwrap_err();
+            assert_eq!(error, PacketProblem::Empty, "{packet:?}");
+            assert_eq!(error.to_string(), "it holds no picture");
         }
         assert!(watch.set.is_none());
         // A slice without parameters says nothing.
@@ -252,10 +255,12 @@ mod tests {
         assert_eq!(watch.next(&picture(0, 0x01, 4)), Ok(()));
         assert_eq!(watch.next(&picture(0, 0x41, 4)), Ok(()));
         let error = watch.next(&picture(0, 0x41, 6)).unwrap_err();
-        assert!(error.contains("missing"), "{error}");
+        assert_eq!(error, PacketProblem::Gap);
+        assert!(error.to_string().contains("missing"), "{error}");
         // Where the encoder leaves some out on purpose, it is none.
         assert_eq!(first(1).next(&picture(0, 0x41, 6)), Ok(()));
         let error = first(0).next(&picture(1, 0x01, 1)).unwrap_err();
-        assert!(error.contains("B-frame"), "{error}");
+        assert_eq!(error, PacketProblem::Reordered);
+        assert!(error.to_string().contains("B-frame"), "{error}");
     }
 }

@@ -13,15 +13,13 @@ mod nal;
 pub use codec::Codec;
 
 use crate::cache::{Origin, frame_path, keep};
-use crate::{Error, Result};
+use crate::{Error, PacketProblem, Result};
 use batch::Batch;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// Packets that are decoded together, at least: from there on a key frame begins the next.
 const TOGETHER: usize = 250;
-/// What is wrong with pictures that come in another order than their packets.
-const REORDERED: &str = "its picture is shown before that of an earlier message (a B-frame)";
 
 /// Which stream it is.
 #[derive(Debug, Clone)]
@@ -109,7 +107,7 @@ impl PacketFrames {
         for packet in packets {
             let packet = packet?;
             if let Some(Err(problem)) = watch.as_mut().map(|watch| watch.next(&packet)) {
-                return Err(self.wrong(number, problem.to_owned()).into());
+                return Err(self.wrong(number, problem).into());
             }
             if batch.len() >= TOGETHER && codec.begins(&packet) {
                 self.decode_batch(batch)?;
@@ -120,10 +118,8 @@ impl PacketFrames {
         }
         self.decode_batch(batch)?;
         if number != self.stream.count as u64 {
-            let count = self.stream.count;
-            let problem =
-                format!("the stream ends here, {count} packets were counted when it was opened");
-            return Err(self.wrong(number, problem).into());
+            let counted = self.stream.count;
+            return Err(self.wrong(number, PacketProblem::Ended { counted }).into());
         }
         Ok(())
     }
@@ -136,16 +132,11 @@ impl PacketFrames {
         decoded.map_err(|(number, problem)| self.wrong(number, problem))
     }
 
-    fn wrong(&self, packet: u64, problem: String) -> Error {
+    fn wrong(&self, packet: u64, problem: PacketProblem) -> Error {
         Error::Packet {
             path: self.stream.file.clone(),
             stream: self.stream.name.clone(),
             number: self.stream.before + packet,
-            remedy: if problem == REORDERED {
-                "encode without B-frames (libx264: -bf 0, or -tune zerolatency)"
-            } else {
-                "cut the recording before that message, or after it at a key frame (`rosbag filter`; messages are counted from 0), and use the parts"
-            },
             problem,
         }
     }

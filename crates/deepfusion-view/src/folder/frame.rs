@@ -82,7 +82,7 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
                 problems.push("the picture has changed since its depth was made".into());
             }
         }
-        Err(problem) => problems.push(problem),
+        Err(none) => problems.push(none.to_string()),
     }
     match entry.depth.as_ref().map(|d| folder.join(&d.file)) {
         // An array's header is read with its numbers; the page compares the sizes once more.
@@ -126,8 +126,25 @@ pub(crate) struct Picture {
     pub changed: bool,
 }
 
+/// Why a frame has no picture.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum NoPicture {
+    /// It cannot be read.
+    #[error(transparent)]
+    Unreadable(Error),
+    /// A video or a bag, which holds it, is named.
+    #[error("{}: one picture among others, and none is kept beside the results", .0.display())]
+    AmongOthers(PathBuf),
+    /// It was there when depth was made from it.
+    #[error("{}: the picture is not there any more", .0.display())]
+    Gone(PathBuf),
+    /// Nothing says which it was.
+    #[error("no picture is known")]
+    Unknown,
+}
+
 /// The picture of a frame: the one its sidecar names, or `NAME_image.*` beside it.
-pub(crate) fn picture_of(folder: &Path, entry: &Entry) -> Result<Picture, String> {
+pub(crate) fn picture_of(folder: &Path, entry: &Entry) -> Result<Picture, NoPicture> {
     let sidecar = SmallFiles::read(folder, entry).sidecar;
     picture(folder, entry, sidecar.as_ref().map(|s| &s.record))
 }
@@ -136,7 +153,7 @@ fn picture(
     folder: &Path,
     entry: &Entry,
     sidecar: Option<&PredictionRecord>,
-) -> Result<Picture, String> {
+) -> Result<Picture, NoPicture> {
     let named = sidecar.and_then(|s| s.image.clone());
     // As it was given to `predict`, whose folder this may still be; or beside the results, which were moved together.
     let mut places: Vec<PathBuf> = named
@@ -167,19 +184,16 @@ fn picture(
             }
             // A video or a bag is no picture: the one beside the results was taken out of it.
             Ok(None) => {}
-            Err(e) => problem = Some(problem.unwrap_or(e.to_string())),
+            Err(e) => problem = Some(problem.unwrap_or(e)),
         }
     }
     Err(match (problem, named) {
-        (Some(problem), _) => problem,
+        (Some(problem), _) => NoPicture::Unreadable(problem),
         (None, Some(named)) if places.iter().any(|path| path.is_file()) => {
-            format!(
-                "{}: one picture among others, and none is kept beside the results",
-                named.display()
-            )
+            NoPicture::AmongOthers(named)
         }
-        (None, Some(named)) => format!("{}: the picture is not there any more", named.display()),
-        (None, None) => "no picture is known".into(),
+        (None, Some(named)) => NoPicture::Gone(named),
+        (None, None) => NoPicture::Unknown,
     })
 }
 

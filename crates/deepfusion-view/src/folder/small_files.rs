@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::entry::{Entry, FrameFile};
-use crate::{Error, Result};
+use crate::{ContentProblem, Error, Result};
 
 /// No sidecar or list of targets is as large; what is, is another program's file.
 const MOST_JSON_BYTES: u64 = 16 << 20;
@@ -93,23 +93,11 @@ impl SmallFiles {
 fn read_json(path: &Path) -> Result<Value> {
     let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
     if meta.len() > MOST_JSON_BYTES {
-        return Err(Error::content(
-            path,
-            format!(
-                "{} bytes are too many for a frame's description",
-                meta.len()
-            ),
-        ));
+        let bytes = meta.len();
+        return Err(Error::content(path, ContentProblem::TooLong { bytes }));
     }
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-    serde_json::from_slice(&bytes).map_err(|e| {
-        let what = if e.is_eof() {
-            "half-written, or cut off"
-        } else {
-            "no JSON"
-        };
-        Error::content(path, format!("{what}: {e}"))
-    })
+    serde_json::from_slice(&bytes).map_err(|e| Error::content(path, e))
 }
 
 #[cfg(test)]

@@ -11,11 +11,11 @@ use re_sdk_types::archetypes::{DepthImage, EncodedImage, Pinhole, Scalars, TextL
 use re_sdk_types::components::{PinholeProjection, TextLogLevel};
 use re_sdk_types::datatypes::ChannelDatatype;
 
-use super::recording::{Problem, Recording};
+use super::recording::Recording;
 use super::targets::{SeenTarget, boxes, ground, velocities};
 use super::tracks::Tracks;
 use crate::folder::{Entry, SmallFiles, Summary, frame_json, picture_of};
-use crate::{DepthCode, DepthFile};
+use crate::{DepthCode, DepthFile, EncodingProblem};
 
 /// Logs frames in their order.
 #[derive(Default)]
@@ -31,7 +31,7 @@ impl FrameLogger {
         folder: &Path,
         entry: &Entry,
         place: usize,
-    ) -> Result<Vec<String>, Problem> {
+    ) -> Result<Vec<String>, EncodingProblem> {
         let frame = frame_json(folder, entry);
         let summary = Summary::read(folder, entry);
         let time = time_of(place, summary.time_s);
@@ -76,7 +76,7 @@ impl FrameLogger {
         recording: &mut Recording<W>,
         time: &TimePoint,
         frame: &FrameRecord,
-    ) -> Result<(), Problem> {
+    ) -> Result<(), EncodingProblem> {
         let targets: Vec<SeenTarget> = frame.targets.iter().map(SeenTarget::of).collect();
         recording.log_or_clear("world/camera/targets", time, any(&boxes(&targets)))?;
         recording.log_or_clear("world/camera/velocities", time, any(&velocities(&targets)))?;
@@ -187,7 +187,7 @@ fn log_name<W: Write>(
     time: &TimePoint,
     name: &str,
     problems: &[String],
-) -> Result<(), Problem> {
+) -> Result<(), EncodingProblem> {
     if problems.is_empty() {
         let line = TextLog::new(name).with_level(TextLogLevel::INFO);
         return recording.log("frames", time, &line);

@@ -2,16 +2,15 @@
 
 use std::collections::HashSet;
 use std::io::Write;
-use std::path::Path;
 
 use re_build_info::CrateVersion;
-use re_chunk::{Chunk, ChunkError, EntityPath, RowId};
-use re_log_encoding::{EncodeError, Encoder, EncodingOptions};
+use re_chunk::{Chunk, EntityPath, RowId};
+use re_log_encoding::{Encoder, EncodingOptions};
 use re_log_types::{LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreKind, StoreSource, TimePoint};
 use re_sdk_types::AsComponents;
 use re_sdk_types::archetypes::{Clear, RecordingInfo, ViewCoordinates};
 
-use crate::Error;
+use crate::EncodingProblem;
 
 /// What recordings are called by the program that made them: the viewer keeps one layout of its windows for each.
 const APPLICATION: &str = "deepfusion";
@@ -26,7 +25,7 @@ pub(super) struct Recording<W: Write> {
 
 impl<W: Write> Recording<W> {
     /// Begins with the static content. `name` is shown to users.
-    pub(super) fn begin(out: W, name: &str) -> Result<Self, Problem> {
+    pub(super) fn begin(out: W, name: &str) -> Result<Self, EncodingProblem> {
         // Another id each time: two files of one folder stay two recordings.
         let store = StoreId::random(StoreKind::Recording, APPLICATION);
         let made_by = format!("deepfusion {}", env!("CARGO_PKG_VERSION"));
@@ -59,7 +58,7 @@ impl<W: Write> Recording<W> {
         entity: &'static str,
         time: &TimePoint,
         what: &dyn AsComponents,
-    ) -> Result<(), Problem> {
+    ) -> Result<(), EncodingProblem> {
         self.shown.insert(entity);
         self.append(entity.into(), time, what)
     }
@@ -70,7 +69,7 @@ impl<W: Write> Recording<W> {
         entity: &'static str,
         time: &TimePoint,
         what: Option<&dyn AsComponents>,
-    ) -> Result<(), Problem> {
+    ) -> Result<(), EncodingProblem> {
         match what {
             Some(what) => self.log(entity, time, what),
             None if self.shown.remove(entity) => self.append(entity.into(), time, &Clear::flat()),
@@ -79,7 +78,7 @@ impl<W: Write> Recording<W> {
     }
 
     /// Writes the end.
-    pub(super) fn finish(mut self) -> Result<(), Problem> {
+    pub(super) fn finish(mut self) -> Result<(), EncodingProblem> {
         Ok(self.encoder.finish()?)
     }
 
@@ -88,34 +87,12 @@ impl<W: Write> Recording<W> {
         entity: EntityPath,
         time: &TimePoint,
         what: &dyn AsComponents,
-    ) -> Result<(), Problem> {
+    ) -> Result<(), EncodingProblem> {
         let chunk = Chunk::builder(entity)
             .with_archetype(RowId::new(), time.clone(), what)
             .build()?;
         let message = LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?);
         self.encoder.append(&message)?;
         Ok(())
-    }
-}
-
-/// Why something could not be logged.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum Problem {
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
-    #[error(transparent)]
-    Chunk(#[from] ChunkError),
-}
-
-impl Problem {
-    /// The failure of a file.
-    pub(super) fn of(self, path: &Path) -> Error {
-        match self {
-            Self::Encode(EncodeError::Write(source)) => Error::file(path, source),
-            other => Error::Encoding {
-                path: path.to_owned(),
-                problem: other.to_string(),
-            },
-        }
     }
 }

@@ -2,22 +2,11 @@
 
 mod modules;
 
-use std::path::Path;
-use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
-
-use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
-use deepfusion_geometry::cloud::PointCloud;
-use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_hint::count_of;
-use deepfusion_jobs::bulk::pipeline::{self, Threads};
+use deepfusion_jobs::bench::{IMAGES_PER_REPEAT, PICTURE_SIZE, Stages, StreetBench};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Preset, TrainConfig};
-use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
-use deepfusion_render::{DepthScale, depth_picture};
 use deepfusion_runtime::{DepthRunner, ModelSource, Precision};
-use deepfusion_sim::{SimConfig, Simulation};
-use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
 
 use self::modules::{Module, Modules};
@@ -25,12 +14,6 @@ use crate::cli::BenchArgs;
 use crate::failure::Result;
 use crate::model;
 use crate::{devices, engine, output};
-
-/// The picture that is decoded and resized, a simulated street: a KITTI frame's size.
-const PICTURE: (u32, u32) = (1242, 375);
-
-/// Frames a second are measured over this many images for every repeat of a stage.
-const IMAGES_PER_REPEAT: usize = 3;
 
 #[derive(Debug, Serialize)]
 struct Report {
@@ -57,27 +40,20 @@ struct Report {
     profile_ms: Vec<(String, f64)>,
 }
 
-#[derive(Debug, Default, Serialize)]
-struct Stages {
-    decode: f64,
-    resize: f64,
-    network: f64,
-    depth: f64,
-    cloud: f64,
-    targets: f64,
-    colour: f64,
-}
-
 /// `deepfusion bench`.
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let (name, config, mut runner) = network(args)?;
     let modules = Modules::new(&config);
     let table = modules.table();
     let repeats = args.repeats.max(1);
-    let bench = Bench::new(&config)?;
+    let bench = StreetBench::new(&config)?;
     let stages = bench.stages(&mut *runner, repeats)?;
     let profile_ms = if args.profile {
-        bench.profile(&mut *runner, repeats)?
+        let profile = bench.profile(&mut *runner, repeats)?;
+        if profile.is_empty() {
+            tracing::warn!("only the fused engine can time its steps");
+        }
+        profile
     } else {
         Vec::new()
     };
@@ -127,8 +103,8 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         report.device,
         count_of(repeats, "run"),
         s.decode,
-        PICTURE.0,
-        PICTURE.1,
+        PICTURE_SIZE.0,
+        PICTURE_SIZE.1,
         s.resize,
         s.network,
         s.depth,
@@ -173,9 +149,11 @@ fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Box<dyn DepthRunner
     }
     config.validate()?;
     let weights = first_weights(&config)?;
-    let int8 = (args.engine.precision == Precision::Int8)
-        .then(|| deepfusion_jobs::int8::on_a_street(&config, &weights))
-        .transpose()?;
+    let int8 = if args.engine.precision == Precision::Int8 {
+        Some(deepfusion_jobs::int8::on_a_street(&config, &weights)?)
+    } else {
+        None
+    };
     let runner = engine::runner(&args.engine, &config, weights, int8.as_ref())?;
     Ok((preset.to_string(), config, runner))
 }
@@ -192,180 +170,6 @@ fn first_weights(config: &TrainConfig) -> Result<Weights> {
 fn first_weights(_: &TrainConfig) -> Result<Weights> {
     let what = "--preset";
     Err(crate::error::CliError::BuiltWithoutTraining { what }.into())
-}
-
-impl Stages {
-    fn sum(&self) -> f64 {
-        self.decode
-            + self.resize
-            + self.network
-            + self.depth
-            + self.cloud
-            + self.targets
-            + self.colour
-    }
-}
-
-/// What the stages work on.
-struct Bench {
-    jpeg: Vec<u8>,
-    k: Intrinsics,
-    /// The picture's true depth at the network's size: a network with random weights sees no targets.
-    truth: DepthMap,
-}
-
-impl Bench {
-    fn new(config: &TrainConfig) -> Result<Self> {
-        let street = Simulation::new(&SimConfig {
-            frames: 1,
-            width: PICTURE.0,
-            height: PICTURE.1,
-            ..SimConfig::default()
-        })?;
-        let frame = street.frame(0);
-        let mut jpeg = Vec::new();
-        JpegEncoder::new_with_quality(&mut jpeg, 92).encode_image(&frame.rgb)?;
-        let (width, height) = (config.size.width as u32, config.size.height as u32);
-        Ok(Self {
-            jpeg,
-            k: street.intrinsics().resized(width, height),
-            truth: frame.depth.nearest(width as usize, height as usize),
-        })
-    }
-
-    fn decode(&self) -> Result<RgbImage> {
-        Ok(decode_rgb(&self.jpeg, Path::new("the bench's picture"))?)
-    }
-
-    fn resize(&self, picture: &RgbImage) -> Vec<f32> {
-        let whole = [0, 0, picture.width(), picture.height()];
-        to_network_input(picture, whole, self.k.width, self.k.height)
-    }
-
-    fn depth(&self, disparity: &[f32]) -> DepthMap {
-        DepthMap {
-            width: self.k.width as usize,
-            height: self.k.height as usize,
-            data: disparity.iter().map(|d| d.recip()).collect(),
-        }
-    }
-
-    fn cloud(&self, depth: &DepthMap, small: &RgbImage) -> Result<PointCloud> {
-        Ok(PointCloud::from_depth(depth, &self.k, Some(small), 80.0)?)
-    }
-
-    /// Each stage alone.
-    fn stages(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<Stages> {
-        let picture = self.decode()?;
-        let small = resize_rgb(&picture, self.k.width, self.k.height);
-        let input = self.resize(&picture);
-        let disparity = runner.disparity(&input)?;
-        let depth = self.depth(&disparity);
-        Ok(Stages {
-            decode: median(repeats, || self.decode())?,
-            resize: median(repeats, || Ok(self.resize(&picture)))?,
-            network: median(repeats, || Ok(runner.disparity(&input)?))?,
-            depth: median(repeats, || Ok(self.depth(&disparity)))?,
-            cloud: median(repeats, || self.cloud(&depth, &small))?,
-            targets: self.targets(repeats)?,
-            colour: median(repeats, || {
-                Ok(depth_picture(&depth, &DepthScale::default()))
-            })?,
-        })
-    }
-
-    /// Ground, boxes and tracks of a picture that is seen again and again.
-    fn targets(&self, repeats: usize) -> Result<f64> {
-        let mut perception = Perception::new(PerceptionConfig {
-            parking_rows: true,
-            ..PerceptionConfig::default()
-        });
-        let mut time_s = 0.0;
-        median(repeats, || {
-            time_s += 0.1;
-            let stamp = Stamp {
-                time_s,
-                world_from_cam: Se3::identity(),
-            };
-            Ok(perception.detect(&self.truth, &self.k, Some(stamp))?)
-        })
-    }
-
-    /// The least each step of the network took.
-    fn profile(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<Vec<(String, f64)>> {
-        let input = self.resize(&self.decode()?);
-        let mut least: Vec<(String, f64)> = Vec::new();
-        for _ in 0..repeats {
-            let Some(steps) = runner.profile(&input) else {
-                tracing::warn!("only the fused engine can time its steps");
-                break;
-            };
-            let steps = steps
-                .into_iter()
-                .map(|(name, t)| (name, t.as_secs_f64() * 1e3));
-            if least.is_empty() {
-                least = steps.collect();
-                continue;
-            }
-            for ((_, least), (_, ms)) in least.iter_mut().zip(steps) {
-                *least = least.min(ms);
-            }
-        }
-        Ok(least)
-    }
-
-    /// Images a second through all stages at once, from the JPEG to cloud and coloured depth in memory.
-    fn overlapped_fps(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<f64> {
-        let small = resize_rgb(&self.decode()?, self.k.width, self.k.height);
-        let failure = Mutex::new(None);
-        let keep = |error| {
-            failure
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .get_or_insert(error);
-        };
-        let before = |_| match self.decode() {
-            Ok(picture) => Some(self.resize(&picture)),
-            Err(error) => {
-                keep(error);
-                None
-            }
-        };
-        let after = |_, disparity: Result<Vec<f32>>| {
-            let depth = match disparity {
-                Ok(disparity) => self.depth(&disparity),
-                Err(error) => return keep(error),
-            };
-            match self.cloud(&depth, &small) {
-                Ok(cloud) => drop(std::hint::black_box(cloud)),
-                Err(error) => keep(error),
-            }
-            std::hint::black_box(depth_picture(&depth, &DepthScale::default()));
-        };
-        let images = repeats * IMAGES_PER_REPEAT;
-        let threads = Threads::for_this_machine();
-        let start = Instant::now();
-        let network = |input: Vec<f32>| Ok(runner.disparity(&input)?);
-        pipeline::run(images, threads, &|| false, &before, network, &after);
-        let seconds = start.elapsed().as_secs_f64();
-        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            Some(error) => Err(error),
-            None => Ok(images as f64 / seconds),
-        }
-    }
-}
-
-/// Median time of `work` in milliseconds, after one run that is not counted.
-fn median<T>(repeats: usize, mut work: impl FnMut() -> Result<T>) -> Result<f64> {
-    work()?;
-    let mut times = Vec::with_capacity(repeats);
-    for _ in 0..repeats {
-        let start = Instant::now();
-        std::hint::black_box(work()?);
-        times.push(start.elapsed().as_secs_f64() * 1e3);
-    }
-    times.sort_by(f64::total_cmp);
-    Ok(times[times.len() / 2])
 }
 
 /// The most memory this process ever had, where the system reports it (Linux).

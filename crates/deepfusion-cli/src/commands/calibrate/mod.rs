@@ -3,10 +3,10 @@
 mod page;
 mod summary;
 
-use deepfusion_calibrate::{Board, Calibration, Error, LEAST_VIEWS, calibrate};
+use deepfusion_calibrate::{Board, Calibration, Error, calibrate};
 use deepfusion_data::{Lens, camera_info_yaml};
 use deepfusion_hint::count_of;
-use deepfusion_jobs::board::{BoardViews, LeftOut, SearchProgress, find_views};
+use deepfusion_jobs::board::{LeftOut, SearchProgress, find_views};
 use serde::Serialize;
 
 use crate::cli::CalibrateArgs;
@@ -66,11 +66,11 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         },
     )?;
     drop(progress);
-    enough(&seen, &board)?;
+    seen.require_enough(&board)?;
     let mut found = calibrate(&seen.views, &board, seen.size, args.model())?;
     found.warnings.extend(seen.turned());
     let lens = found.distortion().map_err(|problem| Error::Undetermined {
-        problem: problem.to_string(),
+        problem: problem.into(),
     })?;
     if let Err(problem) = Lens::new(found.intrinsics, &lens) {
         found.warnings.push(format!(
@@ -105,31 +105,6 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         args.out.display()
     ));
     Ok(())
-}
-
-/// Whether there are views enough; which grid was seen instead, where not.
-fn enough(seen: &BoardViews, board: &Board) -> Result<()> {
-    let (found, pictures, board) = (seen.views.len(), seen.looked_at, *board);
-    if found >= LEAST_VIEWS {
-        return Ok(());
-    }
-    let instead = seen.other_grid();
-    Err(if found == 0 {
-        Error::NoBoard {
-            board,
-            pictures,
-            seen: instead,
-        }
-    } else {
-        Error::TooFewViews {
-            board,
-            found,
-            pictures,
-            needed: LEAST_VIEWS,
-            seen: instead,
-        }
-    }
-    .into())
 }
 
 /// What the file says of itself.

@@ -1,5 +1,6 @@
 //! With the embedded network: what it sees at first sight on a street it has never seen, and what learning there adds.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -7,6 +8,7 @@ use clap::Parser;
 use deepfusion_data::{Dataset, OpenOptions, Split};
 use deepfusion_jobs::ModelFacts;
 use deepfusion_jobs::evaluation::Evaluated;
+use deepfusion_jobs::recordings::write_split;
 use deepfusion_jobs::training::Start;
 use deepfusion_model::{TrainConfig, ViewMotion};
 use deepfusion_nn::ops::{Precision, supports};
@@ -20,8 +22,8 @@ use super::{DEMO, Demo, TEST_SEED, measure};
 use crate::cli::PerceiveArgs;
 use crate::commands::{perceive, run_report, train};
 use crate::failure::Result;
+use crate::interrupt;
 use crate::progress::{clock, say};
-use crate::{interrupt, output};
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
 const FRAMES: usize = 200;
@@ -162,18 +164,13 @@ impl Parts {
             )?)
         };
         let all = open(None)?.swap_remove(0);
-        let frames = all.frames();
-        let list = |name: &str, part: &[deepfusion_data::Frame]| -> Result<PathBuf> {
+        let list = |name: &str, part: Range<usize>| -> Result<PathBuf> {
             let path = demo.out.join(name);
-            let line = |frame: &deepfusion_data::Frame| {
-                format!("{} {:010} l\n", all.split_name(), frame.number)
-            };
-            let text: String = part.iter().map(line).collect();
-            output::write(&path, text)?;
+            write_split(&all, part, &path)?;
             Ok(path)
         };
-        let learn = list("learned.txt", &frames[..LEARNED])?;
-        let measure = list("measured.txt", &frames[LEARNED + GAP..])?;
+        let learn = list("learned.txt", 0..LEARNED)?;
+        let measure = list("measured.txt", LEARNED + GAP..all.frames().len())?;
         Ok(Self {
             learned: open(Some(&learn))?,
             measured: open(Some(&measure))?,

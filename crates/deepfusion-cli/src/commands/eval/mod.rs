@@ -4,21 +4,20 @@ use deepfusion_hint::count_of;
 use std::fmt;
 use std::path::Path;
 
-use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_data::{Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_eval::verdict::{ScaleCertificate, Verdict};
 use deepfusion_eval::{ArraySet, Crop, Grid, Prediction, Protocol, Report, points_csv};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
-pub(super) use deepfusion_jobs::evaluation::predict;
 use deepfusion_jobs::evaluation::{
     Evaluated, ImageRef, Truth, array_places, baseline_from_arrays, baseline_from_training,
     check_used, default_crop, depth_map, evaluate_arrays, evaluate_datasets, expected_frames,
     predict_by,
 };
-use deepfusion_jobs::held_out::{held_out, unseen};
+use deepfusion_jobs::held_out::learned_from_none;
 use deepfusion_jobs::intervals;
-use deepfusion_jobs::recordings::read_split;
+use deepfusion_jobs::recordings::{camera_word, read_split};
 use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, ShownFrame};
 use deepfusion_runtime::DepthEstimator;
@@ -263,7 +262,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
 /// That a network's intervals can be calibrated at all, before anything is measured.
 fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<()> {
     if !estimator.knows_uncertainty() {
-        return Err(CliError::NoUncertainty.into());
+        return Err(deepfusion_jobs::Error::NoUncertainty.into());
     }
     match model.folder() {
         Some(_) => Ok(()),
@@ -450,27 +449,12 @@ fn saved(
             data: args.data.iter().map(absolute).collect(),
             split: args.split.as_ref().map(absolute),
             gt: args.gt.as_ref().map(absolute),
-            camera: match args.camera {
-                Cameras::Left => "2",
-                Cameras::Right => "3",
-                Cameras::Both => "both",
-            }
-            .into(),
+            camera: camera_word(args.camera).into(),
             engine: format!("{} {precision}", estimator.engine()),
             set: args.engine.set.clone(),
             focal_correction: !args.no_focal_correction,
             post_process: args.post_process,
-            held_out: match model {
-                ModelSource::Run { folder, .. } => held_out(
-                    estimator.config(),
-                    &folder.read_findings()?.averaged,
-                    datasets,
-                    &evaluated.places,
-                ),
-                ModelSource::Packed { network, .. } => {
-                    unseen(&network.card, datasets).then_some(true)
-                }
-            },
+            held_out: learned_from_none(model, estimator.config(), datasets, &evaluated.places)?,
             program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
             command: run_report::command(),
             time: output::now(),

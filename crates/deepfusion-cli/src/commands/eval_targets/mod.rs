@@ -10,12 +10,12 @@ use deepfusion_jobs::evaluation::augmentation;
 use deepfusion_jobs::labelled::{
     DepthSource, EvaluatedFrame, PredictedDepth, TargetEvaluation, is_folder_of,
 };
+use deepfusion_jobs::perception_settings;
 use deepfusion_perception::{ScoringRules, TargetScore};
 use deepfusion_render::box_overlay;
 use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
-use super::perceive::read_config;
 use super::warnings;
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::failure::Result;
@@ -40,7 +40,7 @@ struct Report {
 /// `deepfusion eval-targets`.
 pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
     let source = source(args)?;
-    let config = read_config(args.config.as_deref(), source.settings())?;
+    let config = perception_settings(args.config.as_deref(), source.settings())?;
     let out = match &args.out {
         Some(out) => Some(output::run_folder(Some(out), "eval-targets")?),
         None => None,

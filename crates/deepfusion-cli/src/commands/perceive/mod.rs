@@ -1,27 +1,26 @@
 //! `deepfusion perceive`: images to 3D targets, followed over time.
 
-mod frame_processor;
-mod instances;
 mod live;
-mod pictures;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use deepfusion_hint::count_of;
-use deepfusion_jobs::Input;
+use deepfusion_instances::InstanceModel;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
-use deepfusion_jobs::bulk::{RecordLines, record_line, write_record};
+use deepfusion_jobs::bulk::{RecordLines, record_line, record_path, write_record};
 use deepfusion_jobs::scene::MotionTracker;
+use deepfusion_jobs::{
+    Input, PerceivedFrame, StartedFrame, TargetFinder, TargetSettings, perception_settings,
+};
 use deepfusion_perception::PerceptionConfig;
 
-use self::frame_processor::{FrameProcessor, PerceivedFrame, StartedFrame};
 use super::live as sources;
-use super::predict::{Job, check_watched, find_inputs};
+use super::predict::{Job, check_watched, find_inputs, warn_of_drift};
 use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::CliError;
-use crate::failure::{Context, Failure, Result};
+use crate::failure::{Failure, Result};
 use crate::model;
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
@@ -38,7 +37,7 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         (None, None) => find_inputs(prediction, &model)?,
     };
     check_watched(prediction, source.as_ref(), &all)?;
-    let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
+    let mut config = perception_settings(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;
     }
@@ -49,10 +48,19 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         &model,
         &estimator,
     )?;
-    let processor = FrameProcessor::open(args, &model, &mut estimator, config)?;
+    let library = prediction.engine.ort_lib.as_deref();
+    let load = |path: &PathBuf| InstanceModel::load(path, library, 0, args.masks.limits());
+    let settings = TargetSettings {
+        perception: config,
+        instances: args.masks.instances.as_ref().map(load).transpose()?,
+        scale: prediction.scale_config(),
+        correct_scale: prediction.correct_scale,
+        draw: args.save.clone(),
+    };
+    let finder = TargetFinder::open(&model, &mut estimator, settings)?;
     output::make_folder(out)?;
     if source.is_some() {
-        sources::make_room(out, prediction.overwrite)?;
+        deepfusion_jobs::live::make_room(out, prediction.overwrite)?;
     }
     refuse_what_is_there(args, &job, &all)?;
     interrupt::catch("stopping after the frames at work");
@@ -65,30 +73,9 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
-        Some(address) => work.go_live(&address, processor),
-        None => work.go(processor),
+        Some(address) => work.go_live(&address, finder),
+        None => work.go(finder),
     }
-}
-
-/// Settings from a file over `base`, with rows of parked cars unless the file says otherwise.
-pub(super) fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
-    let base = PerceptionConfig {
-        parking_rows: true,
-        ..base
-    };
-    let Some(path) = path else { return Ok(base) };
-    // What the file says over what it does not.
-    let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
-    let named = || path.display().to_string();
-    let mut table = toml::Table::try_from(&base).with_context(named)?;
-    let wrong = |error: toml::de::Error| CliError::PerceptionFile {
-        path: path.to_owned(),
-        problem: error.to_string().trim_end().to_owned(),
-    };
-    table.extend(text.parse::<toml::Table>().map_err(wrong)?);
-    let config: PerceptionConfig = table.try_into().map_err(wrong)?;
-    config.validate().with_context(named)?;
-    Ok(config)
 }
 
 /// Nothing is overwritten unless asked, whoever wrote it.
@@ -96,11 +83,8 @@ fn refuse_what_is_there(args: &PerceiveArgs, job: &Job, all: &[Input]) -> Result
     let PredictionArgs { out, overwrite, .. } = &args.prediction;
     let of = |input: &Input| {
         let name = &input.name;
-        let pictures = args
-            .save
-            .iter()
-            .map(|save| pictures::path(out, name, *save));
-        let mut paths = job.paths(input);
+        let pictures = args.save.iter().map(|save| save.path(out, name));
+        let mut paths = job.writer.paths(input);
         paths.extend(pictures);
         paths.push(record_path(out, name));
         paths
@@ -116,8 +100,13 @@ fn refuse_what_is_there(args: &PerceiveArgs, job: &Job, all: &[Input]) -> Result
     }
 }
 
-fn record_path(out: &Path, name: &str) -> PathBuf {
-    out.join(format!("{name}_targets.json"))
+/// What was found in a frame; it is said where metres have drifted.
+fn found(frame: Result<PerceivedFrame, deepfusion_jobs::Error>) -> Result<PerceivedFrame> {
+    let frame = frame?;
+    if let Some(ratio) = frame.drift {
+        warn_of_drift(&frame.input.name, ratio);
+    }
+    Ok(frame)
 }
 
 /// What became of the frames.
@@ -141,7 +130,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn go(self, mut processor: FrameProcessor) -> Result<()> {
+    fn go(self, mut finder: TargetFinder) -> Result<()> {
         let mut motions = MotionTracker::default();
         let load = |index: usize| {
             let start = Instant::now();
@@ -161,7 +150,7 @@ impl Work<'_> {
         };
         let look = |started: StartedFrame| {
             let motion = motions.next(&started.input);
-            processor.process(started, motion)
+            found(finder.next(started, motion))
         };
         let write = |_: usize, found: Result<PerceivedFrame>| {
             if let Err(error) = found.and_then(|found| self.write(&found)) {
@@ -186,9 +175,9 @@ impl Work<'_> {
     fn write(&self, found: &PerceivedFrame) -> Result<()> {
         let (out, input) = (&self.args.prediction.out, &found.input);
         for (save, picture) in &found.pictures {
-            picture.save(&pictures::path(out, &input.name, *save))?;
+            picture.save(&save.path(out, &input.name))?;
         }
-        self.job.write(input, &found.loaded, &found.seen)?;
+        self.job.writer.write(input, &found.loaded, &found.seen)?;
         write_record(&found.record, &record_path(out, &input.name))?;
         let line = record_line(&found.record)?;
         self.lines

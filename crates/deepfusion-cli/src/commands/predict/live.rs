@@ -3,14 +3,16 @@
 use std::sync::{Mutex, PoisonError};
 
 use deepfusion_hint::count_of;
-use deepfusion_jobs::bulk::{CameraSource, Lock, write_one_video};
+use deepfusion_jobs::bulk::{CameraSource, LoadedImage, Lock, write_one_video};
+use deepfusion_jobs::outputs::{DepthOutput, SeenDepth};
+use deepfusion_jobs::{Error, Input, live};
 use deepfusion_records::LiveMark;
 use deepfusion_runtime::ModelSource;
 use deepfusion_video::{Address, LiveFrame, shown_for};
 
-use super::{Job, check_watched, outputs, print_videos};
-use crate::cli::{Outputs, PredictArgs, Save, Shard};
-use crate::commands::live::{self, Feed};
+use super::{Job, check_watched, print_videos};
+use crate::cli::{PredictArgs, Shard};
+use crate::commands::live::open;
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::say;
@@ -25,25 +27,23 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     check_watched(prediction, Some(address), &[])?;
     let mut estimator = engine::load(model, &prediction.engine)?;
     // They are nowhere else, and depth is little without them.
-    let outputs = Outputs {
-        frames: true,
-        ..args.outputs()
-    };
+    let mut outputs = args.outputs();
+    outputs.frames = true;
     let job = Job::new(prediction, outputs, model, &estimator)?;
-    if args.cloud() && matches!(job.camera, CameraSource::Unknown) {
-        return Err(CliError::NoCamera.into());
+    if args.cloud() && matches!(job.loader.camera, CameraSource::Unknown) {
+        return Err(Error::NoCamera.into());
     }
     live::make_room(out, prediction.overwrite)?;
     let _lock = Lock::take(out, args.shard)?;
     interrupt::catch("stopping after the frames at work");
-    let mut feed = Feed::open(address, &prediction.live)?;
+    let mut feed = open(address, &prediction.live)?;
     let look = |frame: LiveFrame| {
         let input = live::input(address, &frame);
         let (arrived, mark) = (
             frame.arrived,
             LiveMark::of_arrival(frame.arrived_at, frame.dropped),
         );
-        let (mut loaded, prepared) = job.load_live(frame)?;
+        let (mut loaded, prepared) = job.loader.load_live(frame)?;
         let seen = job.see(&mut estimator, &prepared)?;
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
         loaded.live = Some(LiveMark { latency_ms, ..mark });
@@ -51,8 +51,8 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     };
     // Name and time of each frame that was written.
     let done = Mutex::new(Vec::new());
-    let ending = live::run(&mut feed, look, |(input, loaded, seen)| {
-        let sidecar = job.write(&input, &loaded, &seen)?;
+    let write = |(input, loaded, seen): (Input, LoadedImage, SeenDepth)| -> Result<()> {
+        let sidecar = job.writer.write(&input, &loaded, &seen)?;
         let mark = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
         let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
         done.push((input.name, mark));
@@ -62,7 +62,8 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
         } else {
             Ok(())
         }
-    });
+    };
+    let ending = live::run(&mut feed, look, write, say);
     let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(figures) = feed.summary() {
         let ended = ending
@@ -78,7 +79,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     if args.video() {
         let times: Vec<Option<f64>> = done.iter().map(|(_, time)| *time).collect();
         let shown = done.iter().map(|(name, _)| name.as_str());
-        let pictures = outputs::ending(Save::SideBySide);
+        let pictures = DepthOutput::SideBySide.ending();
         filmed = write_one_video(out, shown.zip(shown_for(&times)), pictures, live::VIDEO)
             .map(|video| print_videos(video.as_slice()))
             .map_err(Into::into);

@@ -1,18 +1,18 @@
 //! What the outputs of a command depend on, beside the image.
 
 use crate::failure::Result;
-use clap::ValueEnum;
 use deepfusion_jobs::bulk::CameraSource;
+use deepfusion_jobs::outputs::DepthOutputs;
 use deepfusion_records::MadeWith;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
-use crate::cli::{Outputs, PredictionArgs, Save};
+use crate::cli::PredictionArgs;
 use crate::model::ModelFacts;
 
 /// For these arguments and this network.
 pub(super) fn made_with(
     args: &PredictionArgs,
-    outputs: &Outputs,
+    outputs: &DepthOutputs,
     model: &ModelSource,
     estimator: &DepthEstimator,
     camera: &CameraSource,
@@ -21,9 +21,9 @@ pub(super) fn made_with(
         version: env!("CARGO_PKG_VERSION").into(),
         weights: model.content_sha256(args.engine.precision)?,
         engine: format!("{} on {}", estimator.engine(), args.engine.device),
-        save: outputs.save.iter().map(|s| word(*s)).collect(),
-        max_depth_m: outputs.max_depth_m,
-        max_sigma: outputs.max_sigma,
+        save: outputs.save().iter().map(|s| s.name().to_owned()).collect(),
+        max_depth_m: outputs.limits.max_depth_m,
+        max_sigma: outputs.limits.max_sigma,
         intrinsics: match camera {
             CameraSource::Given(k) => Some(*k),
             CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
@@ -47,9 +47,4 @@ pub(super) fn made_with(
         post_process: args.post_process,
         set: args.engine.set.clone(),
     })
-}
-
-fn word(save: Save) -> String {
-    save.to_possible_value()
-        .map_or_else(String::new, |v| v.get_name().to_owned())
 }

@@ -6,7 +6,8 @@ use super::source;
 use super::topics::{Role, Topics};
 use crate::camera::FISHEYE;
 use crate::{
-    CalibrationPlace, CalibrationSource, CameraCalibration, Error, Lens, OpenOptions, Result,
+    CalibrationPlace, CalibrationSource, CameraCalibration, CameraInfoProblem, CameraProblem,
+    ConfigProblem, Error, Lens, OpenOptions, Result,
 };
 use deepfusion_geometry::{Distortion, Intrinsics};
 use deepfusion_rosbag::MessageSource;
@@ -35,7 +36,7 @@ pub(super) fn find(
         field,
     };
     let pinhole = |intrinsics: Intrinsics| {
-        Lens::new(intrinsics, &Distortion::default()).map_err(|e| e.to_string())
+        Lens::new(intrinsics, &Distortion::default()).map_err(CameraInfoProblem::from)
     };
     let mut assumed = false;
     let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
@@ -66,8 +67,7 @@ pub(super) fn find(
     };
     let lens = lens.map_err(|problem| Error::CameraFile {
         by: place.source.clone(),
-        problem,
-        remedy: "calibrate the camera at the size of these images".into(),
+        problem: problem.into(),
     })?;
     let found = lens.intrinsics();
     if (found.width, found.height) != (width, height) {
@@ -93,48 +93,50 @@ fn calibrated(
 ) -> Result<(Lens, CalibrationPlace)> {
     let path = config.folder().join(file);
     if !path.is_file() {
-        return Err(config.wrong(format!("calibration: there is no {}", path.display())));
+        return Err(config.wrong(ConfigProblem::NoFile {
+            key: "calibration",
+            path,
+        }));
     }
     let calibration = CameraCalibration::read(&path, size)?;
     // Such a file is of the raw images: rectified ones have another matrix, and no distortion left to take out.
     if rectified && !calibration.distortion.is_none() {
         return Err(Error::CameraFile {
             by: path.into(),
-            problem: "it has a distortion, and the images are of a topic with `rect` in its name, rectified already".into(),
-            remedy: format!(
-                "name the raw images' topic (topics.image), or give the rectified camera as [camera], both in {}",
-                config.path.display()
-            ),
+            problem: CameraProblem::Rectified {
+                config: config.path.clone(),
+            },
         });
     }
     Ok((calibration.lens()?, calibration.place()))
 }
 
 /// Of rectified images P without distortion, of raw ones K with it.
-fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Lens, String> {
+fn of_camera_info(
+    info: &CameraInfo,
+    rectified: bool,
+) -> std::result::Result<Lens, CameraInfoProblem> {
     let size = (info.width, info.height);
     let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
     if rectified && info.p[0] > 0.0 {
         let p = &info.p;
         let camera = of(p[0], p[5], p[2], p[6]);
-        return Lens::new(camera, &Distortion::default()).map_err(|e| e.to_string());
+        return Ok(Lens::new(camera, &Distortion::default())?);
     }
     let known = ["plumb_bob", "rational_polynomial", ""];
     let model = info.distortion_model.as_str();
     let fisheye = FISHEYE.contains(&model);
     if !(fisheye || known.contains(&model)) && info.d.iter().any(|d| *d != 0.0) {
-        return Err(format!(
-            "distortion_model {model} is not known: plumb_bob, rational_polynomial and equidistant are"
-        ));
+        let name = model.to_owned();
+        return Err(CameraInfoProblem::Model { name });
     }
     let distortion = match info.d.as_slice() {
-        d if fisheye => Distortion::from_fisheye(d),
-        [] => Ok(Distortion::default()),
-        d => Distortion::from_opencv(d),
+        d if fisheye => Distortion::from_fisheye(d)?,
+        [] => Distortion::default(),
+        d => Distortion::from_opencv(d)?,
     };
-    let distortion = distortion.map_err(|e| e.to_string())?;
     let k = &info.k;
-    Lens::new(of(k[0], k[4], k[2], k[5]), &distortion).map_err(|e| e.to_string())
+    Ok(Lens::new(of(k[0], k[4], k[2], k[5]), &distortion)?)
 }
 
 #[cfg(test)]
@@ -176,7 +178,7 @@ mod tests {
             ("equidistant", &[f64::NAN; 4], "NaN"),
             ("division", &d, "division is not known"),
         ] {
-            let error = read(model, d).unwrap_err();
+            let error = read(model, d).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
     }

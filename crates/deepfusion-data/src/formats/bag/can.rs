@@ -2,13 +2,10 @@
 
 use super::can_config::SignalConfig;
 use super::config::BagConfig;
-use crate::Result;
+use crate::error::{HIGHEST_EXTENDED, HIGHEST_STANDARD};
+use crate::{CanProblem, ConfigProblem, ExpectedValue, Result};
 use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
 use deepfusion_rosbag::msg::Frame;
-
-/// The highest identifiers of 11 and of 29 bits.
-const HIGHEST_STANDARD: u16 = 0x7ff;
-const HIGHEST_EXTENDED: u32 = 0x1fff_ffff;
 
 /// The signals that are read, each with its factor to m/s or rad.
 #[derive(Debug, Default)]
@@ -33,23 +30,20 @@ impl Can {
         let Some(can) = &config.can else {
             return Ok(Self::default());
         };
-        let wrong = |e: deepfusion_motion::Error| config.wrong(format!("can: {e}"));
+        let wrong = |e| config.wrong(CanProblem::Dbc(Box::new(e)));
         let dbc = can.dbc.as_ref();
         let dbc = dbc.map(|dbc| Dbc::open(&config.folder().join(dbc)));
         let dbc = dbc.transpose().map_err(wrong)?;
-        let signal = |key: &str, signal: &SignalConfig| {
-            match (signal, &dbc) {
+        let signal = |key: &'static str, signal: &SignalConfig| match (signal, &dbc) {
             (SignalConfig::Named(name), Some(dbc)) => dbc.signal(name).map_err(wrong),
-            (SignalConfig::Named(name), None) => Err(config.wrong(format!(
-                "can.{key} names {name} of a DBC file, and can.dbc names none; without one, write the signal out: \
-                 {key} = {{ id = …, layout = {{ start_bit = …, length = …, byte_order = … }} }}"
-            ))),
+            (SignalConfig::Named(name), None) => Err(config.wrong(CanProblem::NoDbc {
+                key,
+                signal: name.clone(),
+            })),
             (SignalConfig::Inline(signal), _) => {
-                let key = format!("can.{key}");
-                check(signal, &key).map_err(|problem| config.wrong(problem))?;
+                check(signal, key).map_err(|problem| config.wrong(problem))?;
                 Ok(signal.clone())
             }
-        }
         };
         let speed = match &can.speed {
             None => None,
@@ -57,14 +51,12 @@ impl Can {
                 let found = signal("speed", source)?;
                 let unit = can.speed_unit.or_else(|| source.unit(dbc.as_ref()?));
                 let unit = unit.ok_or_else(|| {
-                    config.wrong(format!(
-                        "can.speed_unit is missing, and {}: \"m/s\", \"km/h\" or \"mph\"",
-                        match source {
-                            SignalConfig::Named(name) =>
-                                format!("the DBC file gives {name} none that is known"),
-                            SignalConfig::Inline(_) => "can.speed has no unit of its own".into(),
-                        }
-                    ))
+                    config.wrong(match source {
+                        SignalConfig::Named(name) => CanProblem::UnknownSpeedUnit {
+                            signal: name.clone(),
+                        },
+                        SignalConfig::Inline(_) => CanProblem::NoSpeedUnit,
+                    })
                 })?;
                 Some((found, unit.metres_per_second()))
             }
@@ -72,13 +64,15 @@ impl Can {
         let steering = match &can.steering {
             None => None,
             Some(source) => {
-                let factor = can.steering_rad.ok_or_else(|| {
-                    config.wrong(
-                        "can.steering_rad is missing: radians for one unit of the signal, 0.0174533 for degrees, 1.0 for radians".into(),
-                    )
-                })?;
+                let factor = can
+                    .steering_rad
+                    .ok_or_else(|| config.wrong(CanProblem::NoSteeringUnit))?;
                 if !factor.is_finite() || factor == 0.0 {
-                    return Err(config.wrong(format!("can.steering_rad is {factor}")));
+                    return Err(config.wrong(ConfigProblem::Value {
+                        key: "can.steering_rad",
+                        value: factor,
+                        expected: ExpectedValue::AsNamed,
+                    }));
                 }
                 Some((signal("steering", source)?, factor))
             }
@@ -133,26 +127,23 @@ impl Can {
 }
 
 /// What no frame can hold, by field.
-fn check(signal: &CanSignal, key: &str) -> std::result::Result<(), String> {
+fn check(signal: &CanSignal, key: &'static str) -> std::result::Result<(), CanProblem> {
     match signal.id {
         CanId::Standard(id) if id > HIGHEST_STANDARD => {
-            return Err(format!(
-                "{key}: id is 0x{id:x}, expected at most 0x{HIGHEST_STANDARD:x}; one of 29 bits is written id = {{ extended = 0x{id:x} }}"
-            ));
+            return Err(CanProblem::StandardId { key, id });
         }
         CanId::Extended { extended } if extended > HIGHEST_EXTENDED => {
-            return Err(format!(
-                "{key}: id.extended is 0x{extended:x}, expected at most 0x{HIGHEST_EXTENDED:x}"
-            ));
+            return Err(CanProblem::ExtendedId { key, id: extended });
         }
         CanId::Standard(_) | CanId::Extended { .. } => {}
     }
     if signal.layout.scale == 0.0 {
-        return Err(format!("{key}: scale is 0, every value would be the same"));
+        return Err(CanProblem::NoScale { key });
     }
     let switches = signal.multiplexed.iter().map(|m| &m.switch);
     for layout in std::iter::once(&signal.layout).chain(switches) {
-        layout.validate(key).map_err(|e| e.to_string())?;
+        let checked = layout.validate(&format!("can.{key}"));
+        checked.map_err(|e| CanProblem::Layout(Box::new(e)))?;
     }
     Ok(())
 }

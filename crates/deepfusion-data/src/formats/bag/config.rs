@@ -3,7 +3,7 @@
 use super::can_config::{CanConfig, SpeedUnit};
 use super::profile;
 use crate::dataset_toml::MOST_GAP_S;
-use crate::{Error, NamedTopic, OpenOptions, Result, TopicRole};
+use crate::{ConfigProblem, Error, ExpectedValue, NamedTopic, OpenOptions, Result, TopicRole};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_motion::{FusionConfig, SPEED_SCALES};
 use nalgebra::Vector3;
@@ -234,7 +234,7 @@ impl BagConfig {
             if let Some(filled) = Self::over_profile(own, name) {
                 config = filled.map_err(|e| Error::Config {
                     path: path.clone(),
-                    problem: e.to_string().trim_end().to_owned(),
+                    problem: e.into(),
                 })?;
             }
         }
@@ -285,13 +285,19 @@ impl BagConfig {
         if let Some(gap) = self.vehicle.max_gap_s
             && !(gap > 0.0 && gap <= MOST_GAP_S)
         {
-            return Err(self.wrong(format!(
-                "vehicle.max_gap_s is {gap}, expected a time above 0 s, at most {MOST_GAP_S} s"
-            )));
+            return Err(self.wrong(ConfigProblem::Value {
+                key: "vehicle.max_gap_s",
+                value: gap,
+                expected: ExpectedValue::TimeUpTo(MOST_GAP_S),
+            }));
         }
         for (key, value, positive) in numbers {
             if !value.is_finite() || (positive && value <= 0.0) {
-                return Err(self.wrong(format!("{key} is {value}")));
+                return Err(self.wrong(ConfigProblem::Value {
+                    key,
+                    value,
+                    expected: ExpectedValue::AsNamed,
+                }));
             }
         }
         for (key, transform) in [
@@ -302,20 +308,17 @@ impl BagConfig {
             let Some(t) = transform else { continue };
             let all = t.translation.iter().chain(&t.rotation);
             if !all.clone().all(|x| x.is_finite()) {
-                return Err(self.wrong(format!("{key} holds a number that is not finite")));
+                return Err(self.wrong(ConfigProblem::NotFinite { key }));
             }
         }
         if self.camera.is_some() && self.calibration.is_some() {
-            return Err(self.wrong(
-                "[camera] and calibration both say what the camera is: keep one of them".into(),
-            ));
+            return Err(self.wrong(ConfigProblem::CameraAndCalibration));
         }
         let mut known = profile::names();
         match &self.profile {
             Some(asked) if !known.any(|name| name == asked) => {
-                let names: Vec<String> = profile::names().map(|n| format!("\"{n}\"")).collect();
-                let names = names.join(", ");
-                Err(self.wrong(format!("profile: the only one there is is {names}")))
+                let known = profile::names().collect();
+                Err(self.wrong(ConfigProblem::NoProfile { known }))
             }
             _ => Ok(()),
         }
@@ -326,10 +329,10 @@ impl BagConfig {
         self.path.parent().unwrap_or(&self.path)
     }
 
-    pub(super) fn wrong(&self, problem: String) -> Error {
+    pub(super) fn wrong(&self, problem: impl Into<ConfigProblem>) -> Error {
         Error::Config {
             path: self.path.clone(),
-            problem,
+            problem: problem.into(),
         }
     }
 }

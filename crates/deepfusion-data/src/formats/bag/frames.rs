@@ -32,9 +32,9 @@ struct Link {
 
 /// How far two transforms are apart.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Change {
-    pub(super) metres: f64,
-    pub(super) radians: f64,
+pub(crate) struct Change {
+    pub(crate) metres: f64,
+    pub(crate) radians: f64,
 }
 
 impl Change {
@@ -70,7 +70,7 @@ impl std::fmt::Display for Change {
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
     /// From the source's frame to the target's.
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     pub(super) target_from_source: Se3,
 }
 

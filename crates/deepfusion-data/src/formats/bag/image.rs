@@ -1,7 +1,7 @@
 //! An image message as pixels.
 
 use super::index::MessageRef;
-use crate::{Error, Result, decode_rgb};
+use crate::{Error, ImageProblem, Result, decode_rgb};
 use deepfusion_rosbag::msg::{CompressedImage, Image, RosMessage};
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use image::RgbImage;
@@ -28,8 +28,10 @@ pub(super) fn message<'bag>(
     }
     last.ok_or_else(|| Error::Image {
         path: bag.path().to_owned(),
-        problem: format!("{topic}: no message at {}", place.recorded),
-        truncated: false,
+        problem: ImageProblem::NoMessage {
+            topic: topic.to_owned(),
+            time: place.recorded,
+        },
     })
 }
 
@@ -43,11 +45,6 @@ pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<R
         return decode_rgb(&image.data, bag.path());
     }
     let image: Image<'_> = message.decode()?;
-    let bad = |problem: String| Error::Image {
-        path: bag.path().to_owned(),
-        problem: format!("{} at {}: {problem}", message.topic(), message.time()),
-        truncated: false,
-    };
     // As a message of the bag's, whose hint says what is read: an image file's would say PNG and JPEG.
     let pixels = image
         .to_rgb8()
@@ -58,8 +55,13 @@ pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<R
             type_name: Image::TYPE,
             source: Box::new(source),
         })?;
-    RgbImage::from_raw(image.width, image.height, pixels)
-        .ok_or_else(|| bad("its pixels do not fill its size".into()))
+    RgbImage::from_raw(image.width, image.height, pixels).ok_or_else(|| Error::Image {
+        path: bag.path().to_owned(),
+        problem: ImageProblem::TooFewPixels {
+            topic: message.topic().to_owned(),
+            time: message.time(),
+        },
+    })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::fixes::Fixes;
 use super::frames::Frames;
 use super::packet::{VideoTopic, packet};
 use super::topics::{Role, Topics};
-use crate::{Error, Result};
+use crate::{ConfigProblem, Error, ImageProblem, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
@@ -118,11 +118,9 @@ impl Index {
             if video.count != index.images.len() {
                 return Err(Error::Image {
                     path: bag.path().to_owned(),
-                    problem: format!(
-                        "{}: some of its messages are pictures, others packets of a video",
-                        video.name
-                    ),
-                    truncated: false,
+                    problem: ImageProblem::Mixed {
+                        topic: video.name.clone(),
+                    },
                 });
             }
             video.order = (0..index.images.len() as u64).collect();
@@ -286,10 +284,9 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     }
     let value = number(message)?;
     let unit = config.vehicle.speed_unit.ok_or_else(|| {
-        config.wrong(format!(
-            "vehicle.speed_unit is missing: {} is a bare number, \"m/s\", \"km/h\" or \"mph\"",
-            message.topic()
-        ))
+        config.wrong(ConfigProblem::NoSpeedUnit {
+            topic: message.topic().to_owned(),
+        })
     })?;
     Ok(Reading {
         speed_mps: value * unit.metres_per_second(),

@@ -30,6 +30,7 @@ mod video;
 mod write_config;
 
 pub use doppler::{DopplerEgo, ego_velocity, ground_radial};
+pub(crate) use frames::Change;
 pub(crate) use inspect::without_images;
 pub(crate) use open::{open, open_bag};
 pub(crate) use source::{bags_in, is_bag};

@@ -4,10 +4,10 @@
 use super::config::BagConfig;
 use super::frames::{Chain, Change, Way};
 use super::index::Index;
-use crate::{Error, Mount, Result};
+use crate::{ConfigProblem, Error, FramesProblem, Mount, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Names of the vehicle's frame, the likelier to be at the rear axle first; the last part of a name counts. REP 105 lets
 /// `base_link` lie anywhere on the base; vehicles' stacks put it below the middle of the rear axle.
@@ -179,9 +179,48 @@ enum Said {
     /// It, and by which way.
     Here(Se3, String),
     /// Why nothing, where something could be expected.
-    No(String),
+    No(Unsaid),
     /// Nothing, and nothing was to be expected.
     Nothing,
+}
+
+/// Why the frames do not say a mount that they could be expected to.
+#[derive(Debug, thiserror::Error)]
+enum Unsaid {
+    #[error(
+        "none of the frames {} is known as the vehicle's ({}); frames.vehicle in {} names it",
+        frames.join(", "), VEHICLES.concat().join(", "), config.display()
+    )]
+    NoVehicle {
+        frames: Vec<String>,
+        config: PathBuf,
+    },
+    #[error(
+        "the frame of {whose}, {frame}, is in no transform of the bag; frames.{key} in {} names another",
+        config.display()
+    )]
+    Absent {
+        whose: &'static str,
+        frame: String,
+        key: &'static str,
+        config: PathBuf,
+    },
+    #[error(
+        "the frames {source_frame} and {target} are not fixed to each other: {} moves in {} by up to {change}, so it is not \
+         taken from them",
+        moving[0], moving[1]
+    )]
+    Moves {
+        source_frame: String,
+        target: String,
+        moving: [String; 2],
+        change: Change,
+    },
+    #[error("no transforms lead from the frame {source_frame} to {target}")]
+    NoWay {
+        source_frame: String,
+        target: String,
+    },
 }
 
 /// The frames with the sensors' names in them.
@@ -209,13 +248,11 @@ impl<'a> ByFrames<'a> {
             if let Some(name) = name
                 && !frames.has(name)
             {
-                let there = match frames.names().as_slice() {
-                    [] => "the bag has no transforms of frames".to_owned(),
-                    names => format!("there are {}", names.join(", ")),
-                };
-                return Err(
-                    config.wrong(format!("frames.{key}: {name} is in no transform; {there}"))
-                );
+                return Err(config.wrong(ConfigProblem::NoFrame {
+                    key,
+                    name: name.clone(),
+                    there: frames.names().into_iter().map(str::to_owned).collect(),
+                }));
             }
         }
         let among = |named: &Option<String>, of_messages: &[&Option<String>]| {
@@ -245,16 +282,11 @@ impl<'a> ByFrames<'a> {
             return Ok(self.absent(of_images, "the images", "camera"));
         };
         let Some(vehicle) = self.vehicle(camera)? else {
-            let vehicles: Vec<&str> = VEHICLES
-                .iter()
-                .flat_map(|tier| tier.iter().copied())
-                .collect();
-            return Ok(Said::No(format!(
-                "none of the frames {} is known as the vehicle's ({}); frames.vehicle in {} names it",
-                self.index.frames.names().join(", "),
-                vehicles.join(", "),
-                self.config.path.display()
-            )));
+            let frames = self.index.frames.names().into_iter();
+            return Ok(Said::No(Unsaid::NoVehicle {
+                frames: frames.map(str::to_owned).collect(),
+                config: self.config.path.clone(),
+            }));
         };
         Ok(self.upright(self.said("cam_from_vehicle", camera, &vehicle)?))
     }
@@ -284,7 +316,7 @@ impl<'a> ByFrames<'a> {
     }
 
     /// A sensor's frame that no transform has.
-    fn absent(&self, frame: &Option<String>, whose: &str, key: &str) -> Said {
+    fn absent(&self, frame: &Option<String>, whose: &'static str, key: &'static str) -> Said {
         if self.index.frames.is_empty() {
             return Said::Nothing;
         }
@@ -292,10 +324,12 @@ impl<'a> ByFrames<'a> {
         let Some(frame) = frame else {
             return Said::Nothing;
         };
-        Said::No(format!(
-            "the frame of {whose}, {frame}, is in no transform of the bag; frames.{key} in {} names another",
-            self.config.path.display()
-        ))
+        Said::No(Unsaid::Absent {
+            whose,
+            frame: frame.clone(),
+            key,
+            config: self.config.path.clone(),
+        })
     }
 
     /// The vehicle's frame: the one that the file names, else the likeliest that a sensor's frame is fixed to.
@@ -327,10 +361,11 @@ impl<'a> ByFrames<'a> {
                 match frames.way(anchor, name) {
                     Way::Fixed(chain) => match &found {
                         Some((first, other)) if !same(other, &chain) => {
-                            return Err(self.error(
-                                format!("{first} and {name} could both be the vehicle's frame"),
-                                format!("frames.vehicle = \"{first}\""),
-                            ));
+                            return Err(self.error(FramesProblem::TwoVehicles {
+                                first: (*first).to_owned(),
+                                other: name.to_owned(),
+                                config: self.config.path.clone(),
+                            }));
                         }
                         Some(_) => {}
                         None => found = Some((name, chain)),
@@ -349,7 +384,7 @@ impl<'a> ByFrames<'a> {
     }
 
     /// Where the source's frame is in the target's.
-    fn said(&self, mount: &str, target: &str, source: &str) -> Result<Said> {
+    fn said(&self, mount: &'static str, target: &str, source: &str) -> Result<Said> {
         Ok(match self.index.frames.way(target, source) {
             Way::Fixed(chain) => {
                 let source = format!("{BY_FRAMES}{chain}");
@@ -358,18 +393,24 @@ impl<'a> ByFrames<'a> {
             Way::Several(both) => {
                 let [a, b] = *both;
                 let apart = Change::between(&a.target_from_source, &b.target_from_source);
-                return Err(self.error(
-                    format!("{mount} is ambiguous: the frames {a} and {b} are {apart} apart"),
-                    format!("say it: [{mount}] translation = […], rotation = […]"),
-                ));
+                return Err(self.error(FramesProblem::TwoWays {
+                    mount,
+                    ways: Box::new([a.names, b.names]),
+                    metres: apart.metres,
+                    radians: apart.radians,
+                    config: self.config.path.clone(),
+                }));
             }
-            Way::Moves([a, b], change) => Said::No(format!(
-                "the frames {source} and {target} are not fixed to each other: {a} moves in {b} by up to {change}, so it is not \
-                 taken from them"
-            )),
-            Way::Unknown => Said::No(format!(
-                "no transforms lead from the frame {source} to {target}"
-            )),
+            Way::Moves(moving, change) => Said::No(Unsaid::Moves {
+                source_frame: source.to_owned(),
+                target: target.to_owned(),
+                moving,
+                change,
+            }),
+            Way::Unknown => Said::No(Unsaid::NoWay {
+                source_frame: source.to_owned(),
+                target: target.to_owned(),
+            }),
         })
     }
 
@@ -398,11 +439,10 @@ impl<'a> ByFrames<'a> {
         }
     }
 
-    fn error(&self, problem: String, remedy: String) -> Error {
+    fn error(&self, problem: FramesProblem) -> Error {
         Error::Frames {
             path: self.bag.to_owned(),
             problem,
-            remedy: format!("{remedy} (in {})", self.config.path.display()),
         }
     }
 }

@@ -14,10 +14,10 @@ use super::{camera, image, sensors, source};
 use crate::dataset::assumed_warning;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::{
-    Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, OpenOptions, Result,
+    Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, NoFramesReason,
+    OpenOptions, Result,
 };
 use deepfusion_geometry::{StampedPose, Trajectory};
-use deepfusion_hint::count_of;
 use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -85,7 +85,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         let k = lens.intrinsics();
         warnings.push(assumed_warning([k.fx, k.fy, k.cx, k.cy]));
     }
-    warnings.extend(lens.intrinsics().implausible());
+    warnings.extend(lens.intrinsics().implausible().map(|why| why.to_string()));
     let mounts = Mounts::find(path, &config, &index, &mut warnings)?;
     let cam_from_vehicle = mounts.cam_from_vehicle;
     let imu = mounts.vehicle_from_imu.as_ref();
@@ -168,18 +168,16 @@ fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<MessageRef> {
     {
         return Err(Error::NoFrames {
             path: bag.path().to_owned(),
-            why: format!(
-                "{topic} has {} and no key frame among them, with the parameters that decoding begins with",
-                count_of(*before, "message")
-            ),
-            remedy: "record for longer than from one key frame of the encoder to the next, or have it write them more often".into(),
+            reason: NoFramesReason::NoKeyFrame {
+                topic: topic.clone(),
+                messages: *before,
+            },
         });
     }
-    let list: Vec<String> = bag.topics()?.into_iter().map(|t| t.name).collect();
+    let topics = bag.topics()?.into_iter().map(|t| t.name).collect();
     Err(Error::NoFrames {
         path: bag.path().to_owned(),
-        why: format!("none of its topics holds images: {}", list.join(", ")),
-        remedy: "topics.image in the file beside the bag names the camera's topic".into(),
+        reason: NoFramesReason::NoImageTopic { topics },
     })
 }
 

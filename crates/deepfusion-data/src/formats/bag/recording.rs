@@ -7,7 +7,8 @@ use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use crate::{
     CalibrationPlace, CameraPath, Dataset, DatasetKind, DynamicAgreement, Error, Frame, GtKind,
-    Lens, LidarMotion, Mount, MovingLabels, MovingSource, Recording, Result, ScanTruth, Stream,
+    ImageProblem, Lens, LidarMotion, Mount, MovingLabels, MovingSource, NoTrackReason, Recording,
+    Result, ScanTruth, Stream,
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Se3, Trajectory};
@@ -49,8 +50,7 @@ impl Recording for BagRecording {
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
         let missing = || Error::Image {
             path: self.bag.path().to_owned(),
-            problem: format!("there is no image {}", frame.number),
-            truncated: false,
+            problem: ImageProblem::NoImage(frame.number),
         };
         if let Some(video) = &self.video {
             let image = video.load(self.bag.as_ref(), frame.number)?;
@@ -79,10 +79,7 @@ impl Recording for BagRecording {
     fn no_motion(&self) -> Error {
         Error::NoTrack {
             drive: self.bag.path().display().to_string(),
-            why: "the bag has no speed of the vehicle (TwistStamped, TwistWithCovarianceStamped, Odometry, AckermannDriveStamped, NavSatFix, a \
-                  CAN signal)"
-                .into(),
-            remedy: "topics.speed in the file beside the bag names its topic; [can] reads it from CAN frames".into(),
+            reason: NoTrackReason::NoSpeedTopic,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::config::{LidarConfig, Sign};
 use super::doppler::{ego_velocity, ground_radial};
-use crate::{Error, Result};
+use crate::{Error, Result, TopicProblem};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_rosbag::msg::PointCloud2;
 use deepfusion_rosbag::{Message, MessageSource};
@@ -70,10 +70,10 @@ fn column(
 ) -> Result<Vec<f32>> {
     let column = cloud.column(name).map_err(|e| Error::Topic {
         path: bag.path().to_owned(),
-        problem: format!("{}: {e}", message.topic()),
-        remedy:
-            "lidar.velocity_field names the field of the radial velocity; x, y and z must be there"
-                .into(),
+        problem: Box::new(TopicProblem::Column {
+            topic: message.topic().to_owned(),
+            source: e,
+        }),
         choice: None,
     })?;
     Ok(column.f32s().collect())

@@ -1,7 +1,7 @@
 //! Which topic is which: by message type, unless the file beside the bag names it.
 
 use super::config::BagConfig;
-use crate::{Error, NamedTopic, Result, TopicRole};
+use crate::{Error, Result, TopicProblem, TopicRole};
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, CompressedImage, Float32, Float64, Frame, Image, Imu,
     NavSatFix, Odometry, OldTFMessage, PointCloud2, TFMessage, TwistStamped,
@@ -174,15 +174,20 @@ impl Search<'_> {
     ) -> Result<Option<String>> {
         if let Some(name) = named {
             let Some(topic) = self.all.iter().find(|t| t.name == *name) else {
-                let there: Vec<&str> = self.all.iter().map(|t| t.name.as_str()).collect();
-                return Err(self.error(format!("has no topic {name}"), None, || {
-                    format!("topics.{role} must be one of: {}", there.join(", "))
+                return Err(self.error(TopicProblem::NoTopic {
+                    role,
+                    name: name.clone(),
+                    there: self.all.iter().map(|t| t.name.clone()).collect(),
+                    config: self.config.to_owned(),
                 }));
             };
             if !types.contains(&topic.type_name.as_str()) {
-                let problem = format!("{name} holds {}", topic.type_name);
-                return Err(self.error(problem, None, || {
-                    format!("topics.{role} must be a topic of {}", types.join(" or "))
+                return Err(self.error(TopicProblem::OtherType {
+                    role,
+                    name: name.clone(),
+                    found: topic.type_name.clone(),
+                    expected: types.iter().map(|&name| name.to_owned()).collect(),
+                    config: self.config.to_owned(),
                 }));
             }
             return Ok(Some(name.clone()));
@@ -196,21 +201,11 @@ impl Search<'_> {
         match candidates.as_slice() {
             [] => Ok(None),
             [only] => Ok(Some(only.name.clone())),
-            several => {
-                let list: Vec<&str> = several.iter().map(|t| t.name.as_str()).collect();
-                let problem = format!(
-                    "{} topics could be the {role}: {}",
-                    list.len(),
-                    list.join(", ")
-                );
-                let choice = NamedTopic {
-                    role,
-                    topic: list[0].to_owned(),
-                };
-                Err(self.error(problem, Some(choice), || {
-                    format!("name it: [topics] {role} = \"{}\"", list[0])
-                }))
-            }
+            several => Err(self.error(TopicProblem::Several {
+                role,
+                topics: several.iter().map(|t| t.name.clone()).collect(),
+                config: self.config.to_owned(),
+            })),
         }
     }
 
@@ -220,10 +215,10 @@ impl Search<'_> {
         match named {
             Some(name) if signal => Err(Error::Topic {
                 path: self.config.to_owned(),
-                problem: format!(
-                    "topics.{role} (\"{name}\") and can.{role} both say where the {role} is"
-                ),
-                remedy: format!("keep one of them: delete topics.{role} or can.{role}"),
+                problem: Box::new(TopicProblem::AndSignal {
+                    role,
+                    name: name.clone(),
+                }),
                 choice: None,
             }),
             _ => Ok(signal),
@@ -234,8 +229,9 @@ impl Search<'_> {
     fn can(&self, named: &Option<String>) -> Result<String> {
         self.one(TopicRole::Can, named, &[Frame::TYPE], |_| true)?
             .ok_or_else(|| {
-                let problem = format!("has no topic of {}, which [can] reads", Frame::TYPE);
-                self.error(problem, None, || "delete [can], or record the bus".into())
+                self.error(TopicProblem::NoCan {
+                    config: self.config.to_owned(),
+                })
             })
     }
 
@@ -318,17 +314,11 @@ impl Search<'_> {
         one(&|_| true)
     }
 
-    fn error(
-        &self,
-        problem: String,
-        choice: Option<NamedTopic>,
-        remedy: impl Fn() -> String,
-    ) -> Error {
+    fn error(&self, problem: TopicProblem) -> Error {
         Error::Topic {
             path: self.bag.to_owned(),
-            problem,
-            remedy: format!("{} (in {})", remedy(), self.config.display()),
-            choice,
+            choice: problem.choice(),
+            problem: Box::new(problem),
         }
     }
 }

@@ -43,7 +43,7 @@ impl BagVideo {
     /// The first frame, without decoding the others.
     ///
     /// # Errors
-    /// [`crate::Error::Program`] without ffmpeg, [`crate::Error::Video`], [`crate::Error::Bag`].
+    /// [`crate::Error::Video`], without ffmpeg too, and [`crate::Error::Bag`].
     pub(super) fn first(&self, bag: &dyn MessageSource) -> Result<RgbImage> {
         let mut packets = self.packets(bag)?;
         let first = packets.next().unwrap_or_else(|| Ok(Vec::new()))?;

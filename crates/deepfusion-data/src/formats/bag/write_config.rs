@@ -7,7 +7,7 @@ use super::open::open_bag;
 use super::source;
 use super::topics::{Role, Topics};
 use crate::formats::layout::Layout;
-use crate::{Error, Mount, OpenOptions, Result};
+use crate::{ConfigProblem, Error, Mount, OpenOptions, Result};
 use deepfusion_hint::count_of;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -131,7 +131,8 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
         let mut alone = Table::new();
         alone.insert(key.clone(), value.clone());
         text.push('\n');
-        text += &toml::to_string(&alone).map_err(|e| config.wrong(e.to_string()))?;
+        text += &toml::to_string(&alone)
+            .map_err(|e| config.wrong(ConfigProblem::Unwritable(Box::new(e))))?;
     }
     if !own.contains_key("vehicle") {
         text += VEHICLE;

@@ -1,7 +1,7 @@
 //! The `name: values` lines of KITTI's calibration files.
 
 use crate::formats::poses::{is_rotation, motion_of_rows};
-use crate::{Error, Result};
+use crate::{CalibrationProblem, Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use std::collections::HashMap;
@@ -39,7 +39,7 @@ impl Fields {
         }))
     }
 
-    pub(crate) fn error(&self, field: &str, problem: String) -> Error {
+    pub(crate) fn error(&self, field: &str, problem: CalibrationProblem) -> Error {
         Error::Calibration {
             path: self.path.clone(),
             field: field.to_owned(),
@@ -52,15 +52,16 @@ impl Fields {
         let text = self
             .values
             .get(field)
-            .ok_or_else(|| self.error(field, "the file has no such line".into()))?;
+            .ok_or_else(|| self.error(field, CalibrationProblem::NoLine))?;
         let mut numbers = [0.0; N];
         let mut count = 0;
         for word in text.split_whitespace() {
+            let text = || word.to_owned();
             let number: f64 = word
                 .parse()
-                .map_err(|_| self.error(field, format!("'{word}' is not a number")))?;
+                .map_err(|_| self.error(field, CalibrationProblem::NotANumber { text: text() }))?;
             if !number.is_finite() {
-                return Err(self.error(field, format!("'{word}' is not finite")));
+                return Err(self.error(field, CalibrationProblem::NotFinite { text: text() }));
             }
             if let Some(slot) = numbers.get_mut(count) {
                 *slot = number;
@@ -68,14 +69,19 @@ impl Fields {
             count += 1;
         }
         if count != N {
-            return Err(self.error(field, format!("{count} numbers, expected {N}")));
+            let problem = CalibrationProblem::Length {
+                found: count,
+                expected: N,
+            };
+            return Err(self.error(field, problem));
         }
         Ok(numbers)
     }
 
     /// Twelve numbers that are the upper three rows of a motion, row by row.
     pub(crate) fn motion(&self, field: &str) -> Result<Se3> {
-        motion_of_rows(&self.numbers::<12>(field)?).map_err(|problem| self.error(field, problem))
+        let motion = motion_of_rows(&self.numbers::<12>(field)?);
+        motion.ok_or_else(|| self.error(field, CalibrationProblem::NotAMotion))
     }
 
     /// The camera of images of a size that a projection (P = K [I | t]) has.
@@ -94,7 +100,7 @@ impl Fields {
             height,
         };
         match intrinsics.implausible() {
-            Some(problem) => Err(self.error(field, problem)),
+            Some(problem) => Err(self.error(field, problem.into())),
             None => Ok(intrinsics),
         }
     }
@@ -105,7 +111,7 @@ impl Fields {
         if is_rotation(&rotation) {
             Ok(rotation)
         } else {
-            Err(self.error(field, "is not a rotation".into()))
+            Err(self.error(field, CalibrationProblem::NotARotation))
         }
     }
 
@@ -119,7 +125,7 @@ impl Fields {
         if value.fract() == 0.0 && (1.0..=65_535.0).contains(&value) {
             Ok(value as u32)
         } else {
-            Err(self.error(field, format!("{value} is not a size in pixels")))
+            Err(self.error(field, CalibrationProblem::NotASize { value }))
         }
     }
 }

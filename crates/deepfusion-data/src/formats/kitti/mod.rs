@@ -13,6 +13,9 @@ mod timestamps;
 mod tracklets;
 mod velodyne;
 
+pub use crate::error::{
+    CalibrationProblem, OxtsField, OxtsProblem, TrackletPart, TrackletPlace, TrackletsProblem,
+};
 pub use crate::truth::GtKind;
 pub use calibration::Calibration;
 pub(crate) use fields::{Fields, cam_from_cam0};

@@ -1,7 +1,7 @@
 //! OXTS: one file a packet of the car's GPS / IMU, thirty numbers.
 
 use super::timestamps::TimeStamps;
-use crate::{Error, Result, VehicleTrack};
+use crate::{Error, OxtsField, OxtsProblem, Result, VehicleTrack};
 use std::path::Path;
 
 /// The fields' names, in their order (KITTI's `oxts/dataformat.txt`).
@@ -43,22 +43,26 @@ impl OxtsPacket {
         })
     }
 
-    fn parse(text: &str) -> std::result::Result<Self, (String, String)> {
+    fn parse(text: &str) -> std::result::Result<Self, (OxtsField, OxtsProblem)> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let mut values = [0.0; 30];
         for (i, word) in words.iter().take(30).enumerate() {
-            let field = || format!("{} (value {} of 30)", NAMES[i], i + 1);
-            let value: f64 = word
-                .parse()
-                .map_err(|_| (field(), format!("'{word}' is not a number")))?;
+            let field = OxtsField::Value {
+                name: NAMES[i],
+                number: i + 1,
+            };
+            let value: f64 = word.parse().map_err(|_| {
+                let text = (*word).to_owned();
+                (field, OxtsProblem::NotANumber { text })
+            })?;
             if !value.is_finite() {
-                return Err((field(), format!("is {value}, expected a finite number")));
+                return Err((field, OxtsProblem::NotFinite { value }));
             }
             values[i] = value;
         }
         if words.len() != 30 {
-            let problem = format!("{} values, expected 30", words.len());
-            return Err(("packet".into(), problem));
+            let found = words.len();
+            return Err((OxtsField::Packet, OxtsProblem::Length { found }));
         }
         let three = |i: usize| [values[i], values[i + 1], values[i + 2]];
         Ok(Self {

@@ -1,6 +1,6 @@
 //! `tracklet_labels.xml`: boxes around traffic, followed over a drive's frames.
 
-use crate::Error;
+use crate::{Error, TrackletPart, TrackletPlace, TrackletsProblem};
 use nalgebra::Vector3;
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -61,13 +61,13 @@ impl Tracklet {
         })
     }
 
-    fn parse(text: impl BufRead) -> Result<Vec<Self>, (String, String)> {
+    fn parse(text: impl BufRead) -> Result<Vec<Self>, (TrackletPlace, TrackletsProblem)> {
         let mut reader = Reader::from_reader(text);
         let (mut buffer, mut document) = (Vec::new(), Document::default());
         loop {
             let event = reader.read_event_into(&mut buffer);
-            let at_byte = || format!("byte {}", reader.buffer_position());
-            match event.map_err(|e| (at_byte(), e.to_string()))? {
+            let at_byte = || TrackletPlace::Byte(reader.buffer_position());
+            match event.map_err(|e| (at_byte(), TrackletsProblem::Xml(Box::new(e))))? {
                 Event::Start(tag) => document.open(&String::from_utf8_lossy(tag.name().as_ref())),
                 Event::Text(text) => document.text += &String::from_utf8_lossy(&text),
                 Event::End(_) => document.close()?,
@@ -119,7 +119,7 @@ impl Document {
         self.text.clear();
     }
 
-    fn close(&mut self) -> Result<(), (String, String)> {
+    fn close(&mut self) -> Result<(), (TrackletPlace, TrackletsProblem)> {
         let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
         let outcome = match path.as_slice() {
             ["boost_serialization", "tracklets", inner @ ..] => match inner {
@@ -143,36 +143,34 @@ impl Document {
         outcome
     }
 
-    /// Where the document stands, in the words of a message.
-    fn place(&self, path: &[&str]) -> String {
-        let mut place = match path.get(2) {
-            Some(&"item") => format!("tracklet {}", self.tracklets.len()),
-            _ => "the list of tracklets".to_owned(),
-        };
-        if path.get(4) == Some(&"item") {
-            place += &format!(", pose {}", self.tracklet.poses.len());
-        }
-        match path.last() {
-            Some(&name) if name != "item" => place + ", " + name,
-            _ => place,
+    /// Where the document stands.
+    fn place(&self, path: &[&str]) -> TrackletPlace {
+        let name = path.last().filter(|name| **name != "item");
+        let field = name.map(|&name| name.to_owned());
+        match path.get(2) {
+            Some(&"item") => TrackletPlace::Tracklet {
+                number: self.tracklets.len(),
+                pose: (path.get(4) == Some(&"item")).then_some(self.tracklet.poses.len()),
+                field,
+            },
+            _ => TrackletPlace::List { field },
         }
     }
 
-    fn finish(self) -> Result<Vec<Tracklet>, String> {
-        match (self.path.first(), self.announced) {
-            (Some(_), _) => Err(format!("ends within <{}>", self.path.join("><"))),
-            (None, None) => {
-                Err("has no <boost_serialization><tracklets><count>: it holds no tracklets".into())
-            }
-            (None, Some(count)) => {
-                enough(count, self.tracklets.len(), "tracklets").map(|()| self.tracklets)
+    fn finish(self) -> Result<Vec<Tracklet>, TrackletsProblem> {
+        match (self.path.is_empty(), self.announced) {
+            (false, _) => Err(TrackletsProblem::Ends { within: self.path }),
+            (true, None) => Err(TrackletsProblem::NoTracklets),
+            (true, Some(count)) => {
+                let found = self.tracklets.len();
+                enough(count, found, TrackletPart::Tracklets).map(|()| self.tracklets)
             }
         }
     }
 }
 
 impl OpenTracklet {
-    fn set(&mut self, field: &str, text: &str) -> Result<(), String> {
+    fn set(&mut self, field: &str, text: &str) -> Result<(), TrackletsProblem> {
         match field {
             "objectType" => self.object = Some(text.trim().to_owned()),
             "l" => self.length = Some(length(text)?),
@@ -184,25 +182,25 @@ impl OpenTracklet {
         Ok(())
     }
 
-    fn take(&mut self) -> Result<Tracklet, String> {
+    fn take(&mut self) -> Result<Tracklet, TrackletsProblem> {
         let open = std::mem::take(self);
-        let count = open.announced.ok_or("has no <poses>")?;
-        enough(count, open.poses.len(), "poses")?;
+        let count = there(open.announced, "poses")?;
+        enough(count, open.poses.len(), TrackletPart::Poses)?;
         Ok(Tracklet {
-            object: open.object.ok_or("has no <objectType>")?,
+            object: there(open.object, "objectType")?,
             size_m: [
-                open.length.ok_or("has no <l>")?,
-                open.width.ok_or("has no <w>")?,
-                open.height.ok_or("has no <h>")?,
+                there(open.length, "l")?,
+                there(open.width, "w")?,
+                there(open.height, "h")?,
             ],
-            first_frame: open.first_frame.ok_or("has no <first_frame>")?,
+            first_frame: there(open.first_frame, "first_frame")?,
             poses: open.poses,
         })
     }
 }
 
 impl OpenPose {
-    fn set(&mut self, field: &str, text: &str) -> Result<(), String> {
+    fn set(&mut self, field: &str, text: &str) -> Result<(), TrackletsProblem> {
         let place = match field {
             "tx" => &mut self.tx,
             "ty" => &mut self.ty,
@@ -214,33 +212,37 @@ impl OpenPose {
         Ok(())
     }
 
-    fn take(&mut self) -> Result<TrackletPose, String> {
+    fn take(&mut self) -> Result<TrackletPose, TrackletsProblem> {
         let open = std::mem::take(self);
         Ok(TrackletPose {
             bottom_m: Vector3::new(
-                open.tx.ok_or("has no <tx>")?,
-                open.ty.ok_or("has no <ty>")?,
-                open.tz.ok_or("has no <tz>")?,
+                there(open.tx, "tx")?,
+                there(open.ty, "ty")?,
+                there(open.tz, "tz")?,
             ),
-            yaw_rad: open.rz.ok_or("has no <rz>")?,
+            yaw_rad: there(open.rz, "rz")?,
         })
     }
 }
 
-fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {
-    let problem = || format!("'{}' is not a whole number", shown(text));
-    text.trim().parse().map_err(|_| problem())
+fn there<T>(part: Option<T>, element: &'static str) -> Result<T, TrackletsProblem> {
+    part.ok_or(TrackletsProblem::Lacks { element })
 }
 
-fn finite(text: &str) -> Result<f64, String> {
+fn number<T: std::str::FromStr>(text: &str) -> Result<T, TrackletsProblem> {
+    let problem = |_| TrackletsProblem::NotACount { text: shown(text) };
+    text.trim().parse().map_err(problem)
+}
+
+fn finite(text: &str) -> Result<f64, TrackletsProblem> {
     let value: Option<f64> = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
-    value.ok_or_else(|| format!("'{}' is not a finite number", shown(text)))
+    value.ok_or_else(|| TrackletsProblem::NotANumber { text: shown(text) })
 }
 
-fn length(text: &str) -> Result<f64, String> {
+fn length(text: &str) -> Result<f64, TrackletsProblem> {
     match finite(text)? {
         value if value > 0.0 => Ok(value),
-        value => Err(format!("{value} is not a length")),
+        value => Err(TrackletsProblem::NotALength { value }),
     }
 }
 
@@ -249,11 +251,15 @@ fn shown(text: &str) -> String {
     text.trim().chars().take(40).collect()
 }
 
-fn enough(announced: usize, found: usize, what: &str) -> Result<(), String> {
+fn enough(announced: usize, found: usize, of: TrackletPart) -> Result<(), TrackletsProblem> {
     if announced == found {
         Ok(())
     } else {
-        Err(format!("{found} {what}, its count says {announced}"))
+        Err(TrackletsProblem::Count {
+            of,
+            found,
+            announced,
+        })
     }
 }
 
@@ -291,7 +297,7 @@ mod tests {
     const POSE: &str = "<item><tx>13.7</tx><ty>4.5</ty><tz>-1.74</tz><rx>0</rx><ry>0</ry>\
                         <rz>0.54</rz><state>2</state><occlusion>0</occlusion></item>";
 
-    fn parse(text: &str) -> Result<Vec<Tracklet>, (String, String)> {
+    fn parse(text: &str) -> Result<Vec<Tracklet>, (TrackletPlace, TrackletsProblem)> {
         Tracklet::parse(text.as_bytes())
     }
 
@@ -345,8 +351,8 @@ mod tests {
         ];
         for (text, place, problem) in cases {
             let error = parse(&text).unwrap_err();
-            assert!(error.0.starts_with(place), "{error:?}");
-            assert!(error.1.contains(problem), "{error:?}");
+            assert!(error.0.to_string().starts_with(place), "{error:?}");
+            assert!(error.1.to_string().contains(problem), "{error:?}");
         }
     }
 

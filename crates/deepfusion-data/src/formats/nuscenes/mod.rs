@@ -15,7 +15,8 @@ use super::pose_track::speed_log;
 use crate::logs::frame_times::{TimedImage, numbers_by_time};
 use crate::truth::measured::{MeasuredDepth, PlacedScan, Scans};
 use crate::{
-    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, image_size,
+    Camera, CameraCalibration, CameraProblem, Dataset, DatasetKind, Error, NoFramesReason,
+    OpenOptions, Result, image_size,
 };
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -93,10 +94,11 @@ pub(crate) fn open(
         let named = first.unwrap_or_else(|| format!("samples/{CAMERA}"));
         return Err(Error::NoFrames {
             path: place.root.join(named),
-            why: format!(
-                "not there, and no other image of {CAMERA} that {SAMPLE_DATA} names in {all} scenes"
-            ),
-            remedy: "unpack samples and sweeps beside the folder of the tables".into(),
+            reason: NoFramesReason::NotUnpacked {
+                camera: CAMERA,
+                table: SAMPLE_DATA,
+                scenes: all,
+            },
         });
     }
     open_each(path, here, options, |(scene, there)| {
@@ -131,8 +133,10 @@ impl TableFolder {
         let (true, Some((_, first))) = (one_camera, here.first()) else {
             return Err(Error::CameraFile {
                 by: calibrations.into(),
-                problem: format!("{name}: its images have several calibrations of {CAMERA}"),
-                remedy: "a scene has one camera: leave it out".into(),
+                problem: CameraProblem::Several {
+                    scene: name,
+                    camera: CAMERA,
+                },
             });
         };
         let size = image_size(&self.root.join(&first.file))?;
@@ -169,7 +173,7 @@ impl TableFolder {
                 .collect(),
             streams: Vec::new(),
             warnings,
-            speed_remedy: "",
+            untimed_poses: false,
         }
         .into_dataset()
     }

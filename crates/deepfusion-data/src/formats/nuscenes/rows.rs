@@ -1,6 +1,6 @@
 //! Tables of JSON: an array of objects, read one at a time, since a table may be larger than the memory.
 
-use crate::{Error, Result};
+use crate::{Error, JsonProblem, Result};
 use memchr::memchr_iter;
 use serde::Deserialize;
 use std::fs::File;
@@ -29,19 +29,17 @@ impl<'a> Row<'a> {
             let before = lines.take(error.line().saturating_sub(1));
             let start: usize = before.map(|line| line.len() + 1).sum();
             let end = (start + error.column()).min(self.text.len());
-            let text = error.to_string();
-            let problem = text.split(" at line ").next().unwrap_or(&text);
             Error::Json {
                 path: self.table.to_owned(),
                 line: self.line + error.line().saturating_sub(1),
                 field: last_key(&self.text[..end]),
-                problem: problem.to_owned(),
+                problem: JsonProblem::Unread(error),
             }
         })
     }
 
     /// An error about one of its fields.
-    pub(super) fn bad(&self, field: &str, problem: String) -> Error {
+    pub(super) fn bad(&self, field: &str, problem: JsonProblem) -> Error {
         Error::Json {
             path: self.table.to_owned(),
             line: self.line_of(field),
@@ -99,13 +97,9 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
                     text.clear();
                 }
                 Step::Wrong => {
-                    let shown = char::from(*byte).escape_debug();
                     let line = line + newlines(&chunk[counted..i]);
-                    return Err(damaged(
-                        path,
-                        line,
-                        format!("'{shown}' is not expected here"),
-                    ));
+                    let found = char::from(*byte);
+                    return Err(damaged(path, line, JsonProblem::Unexpected { found }));
                 }
             }
         }
@@ -119,11 +113,11 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
         Ok(())
     } else {
         let line = if scanner.in_row() { row_line } else { line };
-        Err(damaged(path, line, "the file ends within the table".into()))
+        Err(damaged(path, line, JsonProblem::Ends))
     }
 }
 
-fn damaged(path: &Path, line: usize, problem: String) -> Error {
+fn damaged(path: &Path, line: usize, problem: JsonProblem) -> Error {
     Error::Json {
         path: path.to_owned(),
         line,
@@ -297,6 +291,7 @@ mod tests {
                     problem,
                     ..
                 } => {
+                    let problem = problem.to_string();
                     assert_eq!(line, at, "{field}: {problem}");
                     assert!(
                         field.starts_with(of) && problem.contains(why),

@@ -1,7 +1,7 @@
 //! The tables of nuScenes, as far as one camera and the LiDAR need them.
 
 use super::rows::{Row, each_row};
-use crate::{Error, Result};
+use crate::{Error, JsonProblem, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 use serde::de::Visitor;
@@ -203,7 +203,10 @@ pub(super) fn read_scenes(folder: &Path) -> Result<Vec<Scene>> {
             path: folder.join(SAMPLE_DATA),
             line: one.line,
             field: "ego_pose_token".into(),
-            problem: format!("ego_pose.json has no row {}", one.pose),
+            problem: JsonProblem::NoRow {
+                table: "ego_pose.json",
+                token: one.pose.to_string(),
+            },
         })?;
         let scene = &mut scenes[one.scene];
         let list = match one.kind {
@@ -231,10 +234,13 @@ fn named<T: Copy>(
     field: &str,
     token: Token,
     rows: &HashMap<Token, T>,
-    table: &str,
+    table: &'static str,
 ) -> Result<T> {
     let found = rows.get(&token).copied();
-    found.ok_or_else(|| row.bad(field, format!("{table} has no row {token}")))
+    found.ok_or_else(|| {
+        let token = token.to_string();
+        row.bad(field, JsonProblem::NoRow { table, token })
+    })
 }
 
 /// The sensors on their vehicles; `None` where it is neither the camera nor the LiDAR.
@@ -259,7 +265,7 @@ fn calibrated_sensors(folder: &Path) -> Result<HashMap<Token, Option<(SensorKind
             path,
             line: 1,
             field: "channel".into(),
-            problem: format!("no sensor is {CAMERA}"),
+            problem: JsonProblem::NoSensor { name: CAMERA },
         });
     }
     let mut sensors = HashMap::new();
@@ -304,18 +310,15 @@ fn ego_poses(folder: &Path, wanted: HashSet<Token>) -> Result<HashMap<Token, Se3
 fn motion(row: &Row<'_>, rotation: [f64; 4], translation: [f64; 3]) -> Result<Se3> {
     let norm = rotation.iter().map(|q| q * q).sum::<f64>().sqrt();
     if (norm - 1.0).abs() > 1e-2 {
-        return Err(row.bad(
-            "rotation",
-            format!("a quaternion of length {norm:.3}, expected 1"),
-        ));
+        return Err(row.bad("rotation", JsonProblem::NotARotation { length: norm }));
     }
     Ok(Se3::from_quaternion(rotation, Vector3::from(translation)))
 }
 
 fn pinhole(row: &Row<'_>, k: &[[f64; 3]]) -> Result<[f64; 4]> {
     let [[fx, _, cx], [_, fy, cy], _] = k else {
-        let problem = format!("{} rows, expected the 3 of a camera matrix", k.len());
-        return Err(row.bad("camera_intrinsic", problem));
+        let rows = k.len();
+        return Err(row.bad("camera_intrinsic", JsonProblem::NotAMatrix { rows }));
     };
     Ok([*fx, *fy, *cx, *cy])
 }

@@ -56,7 +56,7 @@ impl Plan {
         let text = std::fs::read_to_string(&path).map_err(|e| DataError::file(&path, e))?;
         Ok(toml::from_str(&text).map_err(|e| ModelError::ConfigFile {
             path,
-            reason: e.to_string(),
+            reason: e.into(),
         })?)
     }
 

@@ -110,7 +110,8 @@ impl Folders {
     pub(super) fn keep(&self) -> Result<PathBuf> {
         // An empty folder of this name may be there.
         let _ = fs::remove_dir(&self.out);
-        rename(&self.work, &self.out)?;
+        deepfusion_fs::publish_folder(&self.work, &self.out)
+            .map_err(|e| DataError::file(&self.out, e))?;
         Ok(self.out.clone())
     }
 

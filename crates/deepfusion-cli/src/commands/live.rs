@@ -1,0 +1,38 @@
+//! What `predict` and `perceive` do alike with a camera or a stream.
+
+use std::io::IsTerminal;
+
+use deepfusion_jobs::live::{Feed, Until};
+use deepfusion_video::Address;
+
+use crate::cli::LiveArgs;
+use crate::error::CliError;
+use crate::failure::Result;
+use crate::interrupt;
+
+/// The live source among the arguments, if they name one; it is then alone, and options of live sources are for it.
+pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, CliError> {
+    let mut found = inputs.iter().filter_map(|input| Address::parse(input));
+    match (found.next(), args.given()) {
+        (Some(address), _) if inputs.len() > 1 => Err(CliError::LiveAlone {
+            address: address.to_string(),
+        }),
+        (Some(address), _) if address.is_stdin() && std::io::stdin().is_terminal() => {
+            Err(CliError::Terminal)
+        }
+        (Some(address), _) => Ok(Some(address)),
+        (None, Some(option)) => Err(CliError::OnlyLive { option }),
+        (None, None) => Ok(None),
+    }
+}
+
+/// Begins to read a source, until Ctrl-C or what the options say.
+pub(super) fn open(address: &Address, args: &LiveArgs) -> Result<Feed> {
+    let until = Until {
+        frames: args.frames,
+        duration_s: args.duration,
+        timeout_s: args.timeout_s(),
+        stop: interrupt::asked,
+    };
+    Ok(Feed::open(address, &until)?)
+}

@@ -1,0 +1,96 @@
+//! What is wrong with KITTI's calibration and OXTS files.
+
+use deepfusion_geometry::ImplausibleCamera;
+use std::fmt;
+
+/// What is wrong with a field of one of KITTI's calibration files.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationProblem {
+    /// It is not there.
+    #[error("the file has no such line")]
+    NoLine,
+    /// A word of it is no number.
+    #[error("'{text}' is not a number")]
+    NotANumber {
+        /// The word.
+        text: String,
+    },
+    /// A number of it is NaN or infinite.
+    #[error("'{text}' is not finite")]
+    NotFinite {
+        /// The number, as it is written.
+        text: String,
+    },
+    /// It has too many numbers, or too few.
+    #[error("{found} numbers, expected {expected}")]
+    Length {
+        /// How many it has.
+        found: usize,
+        /// How many it should have.
+        expected: usize,
+    },
+    /// A matrix that turns nothing, or mirrors it.
+    #[error("is not a rotation")]
+    NotARotation,
+    /// Rows of a motion whose rotation is none.
+    #[error("its rotation is none")]
+    NotAMotion,
+    /// A projection that is no camera's.
+    #[error(transparent)]
+    Implausible(#[from] ImplausibleCamera),
+    /// A width or height that no image has.
+    #[error("{value} is not a size in pixels")]
+    NotASize {
+        /// What it says.
+        value: f64,
+    },
+}
+
+/// Where in an OXTS packet something is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OxtsField {
+    /// One of its values.
+    Value {
+        /// Its name, such as `vf`.
+        name: &'static str,
+        /// Which it is, counted from 1.
+        number: usize,
+    },
+    /// All of it.
+    Packet,
+}
+
+impl fmt::Display for OxtsField {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Value { name, number } => write!(f, "{name} (value {number} of 30)"),
+            Self::Packet => f.write_str("packet"),
+        }
+    }
+}
+
+/// Why an OXTS packet cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OxtsProblem {
+    /// A value is no number.
+    #[error("'{text}' is not a number")]
+    NotANumber {
+        /// What it is.
+        text: String,
+    },
+    /// A value is NaN or infinite.
+    #[error("is {value}, expected a finite number")]
+    NotFinite {
+        /// The value.
+        value: f64,
+    },
+    /// It has too many values, or too few.
+    #[error("{found} values, expected 30")]
+    Length {
+        /// How many it has.
+        found: usize,
+    },
+}

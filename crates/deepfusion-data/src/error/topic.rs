@@ -1,0 +1,134 @@
+//! Why a bag's topics are not what is needed.
+
+use crate::{NamedTopic, TopicRole};
+use deepfusion_rosbag::msg::Frame;
+use deepfusion_rosbag::{MessageError, RosMessage};
+use std::path::PathBuf;
+
+/// Why a bag's topics are not what is needed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TopicProblem {
+    /// A topic was named that is not there.
+    #[error("has no topic {name}")]
+    NoTopic {
+        /// What it was named for.
+        role: TopicRole,
+        /// Its name.
+        name: String,
+        /// The topics that there are.
+        there: Vec<String>,
+        /// The file beside the bag.
+        config: PathBuf,
+    },
+    /// A topic was named whose messages are of another type.
+    #[error("{name} holds {found}")]
+    OtherType {
+        /// What it was named for.
+        role: TopicRole,
+        /// Its name.
+        name: String,
+        /// Its type.
+        found: String,
+        /// The types that can be read for it.
+        expected: Vec<String>,
+        /// The file beside the bag.
+        config: PathBuf,
+    },
+    /// Several topics could be meant.
+    #[error("{} topics could be the {role}: {}", topics.len(), topics.join(", "))]
+    Several {
+        /// What for.
+        role: TopicRole,
+        /// The topics.
+        topics: Vec<String>,
+        /// The file beside the bag.
+        config: PathBuf,
+    },
+    /// A topic and a signal of CAN frames were named for one quantity.
+    #[error("topics.{role} (\"{name}\") and can.{role} both say where the {role} is")]
+    AndSignal {
+        /// The quantity.
+        role: TopicRole,
+        /// The topic.
+        name: String,
+    },
+    /// Signals of CAN frames were named, and there are no frames.
+    #[error("has no topic of {}, which [can] reads", Frame::TYPE)]
+    NoCan {
+        /// The file beside the bag.
+        config: PathBuf,
+    },
+    /// A cloud lacks a field.
+    #[error("{topic}: {source}")]
+    Column {
+        /// Its topic.
+        topic: String,
+        /// Which.
+        source: MessageError,
+    },
+    /// Points make no cloud.
+    #[error("{0}")]
+    Cloud(#[source] MessageError),
+}
+
+impl TopicProblem {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> String {
+        match self {
+            Self::NoTopic {
+                role,
+                there,
+                config,
+                ..
+            } => format!(
+                "topics.{role} must be one of: {} (in {})",
+                there.join(", "),
+                config.display()
+            ),
+            Self::OtherType {
+                role,
+                expected,
+                config,
+                ..
+            } => format!(
+                "topics.{role} must be a topic of {} (in {})",
+                expected.join(" or "),
+                config.display()
+            ),
+            Self::Several {
+                role,
+                topics,
+                config,
+            } => format!(
+                "name it: [topics] {role} = \"{}\" (in {})",
+                topics.first().map_or("", String::as_str),
+                config.display()
+            ),
+            Self::AndSignal { role, .. } => {
+                format!("keep one of them: delete topics.{role} or can.{role}")
+            }
+            Self::NoCan { config } => {
+                format!(
+                    "delete [can], or record the bus (in {})",
+                    config.display()
+                )
+            }
+            Self::Column { .. } => {
+                "lidar.velocity_field names the field of the radial velocity; x, y and z must be there".into()
+            }
+            Self::Cloud(_) => "report this with the recording".into(),
+        }
+    }
+
+    /// Of several topics the first, which could be named.
+    pub(crate) fn choice(&self) -> Option<NamedTopic> {
+        match self {
+            Self::Several { role, topics, .. } => topics.first().map(|topic| NamedTopic {
+                role: *role,
+                topic: topic.clone(),
+            }),
+            _ => None,
+        }
+    }
+}

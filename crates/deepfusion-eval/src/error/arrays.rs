@@ -1,0 +1,93 @@
+//! Why a file does not hold the arrays that it should.
+
+use ndarray_npy::{ReadNpyError, ReadNpzError};
+
+/// Why a file does not hold the arrays that it should.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArrayProblem {
+    /// It is another kind of file.
+    #[error("is neither an .npz nor an .npy file")]
+    NotArrays,
+    /// There is nothing in it.
+    #[error("has no arrays")]
+    Empty,
+    /// It has fewer arrays than that.
+    #[error("has {count} arrays, number {index} was asked for")]
+    NoSuchArray {
+        /// How many it has.
+        count: usize,
+        /// The one asked for, from 0.
+        index: usize,
+    },
+    /// An array of other dimensions.
+    #[error("{array} has shape {found:?}, expected {expected}")]
+    Shape {
+        /// Which one.
+        array: ArrayName,
+        /// Its dimensions.
+        found: Vec<usize>,
+        /// What they should be.
+        expected: &'static str,
+    },
+    /// An array of other numbers, or of objects.
+    #[error("{array} holds values of type {found}, expected float32 or float64")]
+    Numbers {
+        /// Which one.
+        array: ArrayName,
+        /// NumPy's name for what it holds.
+        found: String,
+    },
+    /// An array that cannot be read.
+    #[error("{array} cannot be read: {source}")]
+    Unreadable {
+        /// Which one.
+        array: ArrayName,
+        /// What the reader says.
+        source: Box<ReadNpyError>,
+    },
+    /// An archive that cannot be read.
+    #[error("cannot be read: {0}")]
+    Archive(#[source] Box<ReadNpzError>),
+}
+
+impl ArrayProblem {
+    /// What to do about it, if there is something.
+    pub(super) fn remedy(&self) -> Option<&'static str> {
+        match self {
+            Self::NotArrays => Some(
+                "write it with numpy.savez (arrays with names) or numpy.save (N×H×W in split order)",
+            ),
+            Self::Empty | Self::NoSuchArray { .. } => None,
+            Self::Shape { .. } => Some("one H×W array an image; different sizes need an .npz"),
+            Self::Numbers { .. } => Some(
+                "convert with .astype(numpy.float32); pickled object arrays: numpy.savez(file, **{name: array, …})",
+            ),
+            Self::Unreadable { .. } | Self::Archive(_) => {
+                Some("the file may be cut off: write it again")
+            }
+        }
+    }
+}
+
+/// Which array of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ArrayName {
+    /// The only one, or all of them in one.
+    Only,
+    /// By its place, from 0.
+    Number(usize),
+    /// By its name.
+    Named(String),
+}
+
+impl std::fmt::Display for ArrayName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Only => f.write_str("the array"),
+            Self::Number(index) => write!(f, "array {index}"),
+            Self::Named(name) => write!(f, "array `{name}`"),
+        }
+    }
+}

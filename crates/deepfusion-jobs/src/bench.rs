@@ -1,0 +1,236 @@
+//! How fast a network is, and every stage around it: from a JPEG to depth, cloud, targets and colours.
+
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
+use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_model::TrainConfig;
+use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
+use deepfusion_render::{DepthScale, depth_picture};
+use deepfusion_runtime::DepthRunner;
+use deepfusion_sim::{SimConfig, Simulation};
+use image::codecs::jpeg::JpegEncoder;
+use serde::Serialize;
+
+use crate::Result;
+use crate::bulk::pipeline::{self, Threads};
+
+/// The picture that is decoded and resized, a simulated street: a KITTI frame's size.
+pub const PICTURE_SIZE: (u32, u32) = (1242, 375);
+
+/// Frames a second are measured over this many images for every repeat of a stage.
+pub const IMAGES_PER_REPEAT: usize = 3;
+
+/// Milliseconds of each stage.
+#[derive(Debug, Default, Clone, Copy, Serialize)]
+pub struct Stages {
+    /// The JPEG to pixels.
+    pub decode: f64,
+    /// To the network's size and numbers.
+    pub resize: f64,
+    /// The network.
+    pub network: f64,
+    /// Disparity to metres.
+    pub depth: f64,
+    /// Coloured points.
+    pub cloud: f64,
+    /// Boxes and tracks, from the picture's true depth.
+    pub targets: f64,
+    /// Depth as a picture.
+    pub colour: f64,
+}
+
+impl Stages {
+    /// What an image waits, one stage after another.
+    #[must_use]
+    pub fn sum(&self) -> f64 {
+        self.decode
+            + self.resize
+            + self.network
+            + self.depth
+            + self.cloud
+            + self.targets
+            + self.colour
+    }
+}
+
+/// What the stages work on: a simulated street's picture.
+pub struct StreetBench {
+    jpeg: Vec<u8>,
+    k: Intrinsics,
+    /// The picture's true depth at the network's size: a network with random weights sees no targets.
+    truth: DepthMap,
+}
+
+impl StreetBench {
+    /// For a network of this configuration.
+    ///
+    /// # Errors
+    /// A street that cannot be simulated or encoded.
+    pub fn new(config: &TrainConfig) -> Result<Self> {
+        let street = Simulation::new(&SimConfig {
+            frames: 1,
+            width: PICTURE_SIZE.0,
+            height: PICTURE_SIZE.1,
+            ..SimConfig::default()
+        })?;
+        let frame = street.frame(0);
+        let mut jpeg = Vec::new();
+        JpegEncoder::new_with_quality(&mut jpeg, 92).encode_image(&frame.rgb)?;
+        let (width, height) = (config.size.width as u32, config.size.height as u32);
+        Ok(Self {
+            jpeg,
+            k: street.intrinsics().resized(width, height),
+            truth: frame.depth.nearest(width as usize, height as usize),
+        })
+    }
+
+    fn decode(&self) -> Result<RgbImage> {
+        Ok(decode_rgb(&self.jpeg, Path::new("the bench's picture"))?)
+    }
+
+    fn resize(&self, picture: &RgbImage) -> Vec<f32> {
+        let whole = [0, 0, picture.width(), picture.height()];
+        to_network_input(picture, whole, self.k.width, self.k.height)
+    }
+
+    fn depth(&self, disparity: &[f32]) -> DepthMap {
+        DepthMap {
+            width: self.k.width as usize,
+            height: self.k.height as usize,
+            data: disparity.iter().map(|d| d.recip()).collect(),
+        }
+    }
+
+    fn cloud(&self, depth: &DepthMap, small: &RgbImage) -> Result<PointCloud> {
+        Ok(PointCloud::from_depth(depth, &self.k, Some(small), 80.0)?)
+    }
+
+    /// Each stage alone, the median of so many runs.
+    ///
+    /// # Errors
+    /// What the network's engine says.
+    pub fn stages(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<Stages> {
+        let picture = self.decode()?;
+        let small = resize_rgb(&picture, self.k.width, self.k.height);
+        let input = self.resize(&picture);
+        let disparity = runner.disparity(&input)?;
+        let depth = self.depth(&disparity);
+        Ok(Stages {
+            decode: median(repeats, || self.decode())?,
+            resize: median(repeats, || Ok(self.resize(&picture)))?,
+            network: median(repeats, || Ok(runner.disparity(&input)?))?,
+            depth: median(repeats, || Ok(self.depth(&disparity)))?,
+            cloud: median(repeats, || self.cloud(&depth, &small))?,
+            targets: self.targets(repeats)?,
+            colour: median(repeats, || {
+                Ok(depth_picture(&depth, &DepthScale::default()))
+            })?,
+        })
+    }
+
+    /// Ground, boxes and tracks of a picture that is seen again and again.
+    fn targets(&self, repeats: usize) -> Result<f64> {
+        let mut perception = Perception::new(PerceptionConfig {
+            parking_rows: true,
+            ..PerceptionConfig::default()
+        });
+        let mut time_s = 0.0;
+        median(repeats, || {
+            time_s += 0.1;
+            let stamp = Stamp {
+                time_s,
+                world_from_cam: Se3::identity(),
+            };
+            Ok(perception.detect(&self.truth, &self.k, Some(stamp))?)
+        })
+    }
+
+    /// The least milliseconds that each step of the network took; empty where its engine cannot time them.
+    ///
+    /// # Errors
+    /// A picture that cannot be decoded.
+    pub fn profile(
+        &self,
+        runner: &mut dyn DepthRunner,
+        repeats: usize,
+    ) -> Result<Vec<(String, f64)>> {
+        let input = self.resize(&self.decode()?);
+        let mut least: Vec<(String, f64)> = Vec::new();
+        for _ in 0..repeats {
+            let Some(steps) = runner.profile(&input) else {
+                break;
+            };
+            let steps = steps
+                .into_iter()
+                .map(|(name, t)| (name, t.as_secs_f64() * 1e3));
+            if least.is_empty() {
+                least = steps.collect();
+                continue;
+            }
+            for ((_, least), (_, ms)) in least.iter_mut().zip(steps) {
+                *least = least.min(ms);
+            }
+        }
+        Ok(least)
+    }
+
+    /// Images a second through all stages at once, from the JPEG to cloud and coloured depth in memory.
+    ///
+    /// # Errors
+    /// The first of any stage.
+    pub fn overlapped_fps(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<f64> {
+        let small = resize_rgb(&self.decode()?, self.k.width, self.k.height);
+        let failure = Mutex::new(None);
+        let keep = |error| {
+            failure
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .get_or_insert(error);
+        };
+        let before = |_| match self.decode() {
+            Ok(picture) => Some(self.resize(&picture)),
+            Err(error) => {
+                keep(error);
+                None
+            }
+        };
+        let after = |_, disparity: Result<Vec<f32>>| {
+            let depth = match disparity {
+                Ok(disparity) => self.depth(&disparity),
+                Err(error) => return keep(error),
+            };
+            match self.cloud(&depth, &small) {
+                Ok(cloud) => drop(std::hint::black_box(cloud)),
+                Err(error) => keep(error),
+            }
+            std::hint::black_box(depth_picture(&depth, &DepthScale::default()));
+        };
+        let images = repeats * IMAGES_PER_REPEAT;
+        let threads = Threads::for_this_machine();
+        let start = Instant::now();
+        let network = |input: Vec<f32>| Ok(runner.disparity(&input)?);
+        pipeline::run(images, threads, &|| false, &before, network, &after);
+        let seconds = start.elapsed().as_secs_f64();
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(images as f64 / seconds),
+        }
+    }
+}
+
+/// Median time of `work` in milliseconds, after one run that is not counted.
+fn median<T>(repeats: usize, mut work: impl FnMut() -> Result<T>) -> Result<f64> {
+    work()?;
+    let mut times = Vec::with_capacity(repeats);
+    for _ in 0..repeats {
+        let start = Instant::now();
+        std::hint::black_box(work()?);
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}

@@ -1,0 +1,22 @@
+//! A camera or a stream: always the newest frame, how late it is, and room for what comes of it.
+
+mod feed;
+mod figures;
+mod folder;
+
+pub use feed::{Ending, Feed, Until, run};
+pub use folder::{VIDEO, make_room};
+
+use deepfusion_video::{Address, LiveFrame};
+
+use crate::Input;
+
+/// A frame as an input among others: named by its place in the stream.
+#[must_use]
+pub fn input(address: &Address, frame: &LiveFrame) -> Input {
+    Input {
+        path: address.to_string().into(),
+        name: folder::frame_name(frame.number),
+        frame: None,
+    }
+}

@@ -1,0 +1,147 @@
+use std::path::{Path, PathBuf};
+
+use deepfusion_eval::IntervalFactors;
+use deepfusion_eval::compare::MetricScale;
+use deepfusion_records::{MadeWith, PredictionRecord, ScaleRecord, Sidecar};
+use deepfusion_runtime::{LayerMaps, ModelSource, Prediction};
+
+use super::depth::{Maps, write};
+use super::{DepthOutput, DepthOutputs};
+use crate::bulk::{LoadedImage, add_output, sidecar_path, write_unsynced};
+use crate::{Input, Result, intervals};
+
+/// What a network says about an image.
+pub struct SeenDepth {
+    /// Its depth.
+    pub prediction: Prediction,
+    /// What its layers do; empty where nobody asked for [`DepthOutput::Features`].
+    pub layers: Vec<LayerMaps>,
+    /// Whether the metres hold, where that is watched.
+    pub scale: Option<ScaleRecord>,
+}
+
+/// Writes what is kept of every image of a run.
+pub struct DepthWriter<'a> {
+    /// Where to.
+    pub folder: &'a Path,
+    /// What is kept.
+    pub outputs: DepthOutputs,
+    /// How the intervals are stretched that the network says.
+    pub intervals: IntervalFactors,
+    /// The network.
+    pub model: &'a ModelSource,
+    /// Steps that it was trained for.
+    pub step: usize,
+    /// What was measured of its metres.
+    pub scale: MetricScale,
+    /// What the outputs depend on, beside the image.
+    pub made_with: MadeWith,
+}
+
+impl DepthWriter<'_> {
+    /// Everything that is written of an image of a file or a recording.
+    #[must_use]
+    pub fn paths(&self, input: &Input) -> Vec<PathBuf> {
+        let saves = self.outputs.of_image(has_file(input)).into_iter();
+        let files = saves.map(|save| self.folder.join(file_of(input, save)));
+        files
+            .chain([sidecar_path(self.folder, &input.name)])
+            .collect()
+    }
+
+    /// Writes an image's outputs, then its sidecar, without waiting for the disk.
+    ///
+    /// # Errors
+    /// As [`Self::write_outputs`].
+    pub fn write(&self, input: &Input, loaded: &LoadedImage, seen: &SeenDepth) -> Result<Sidecar> {
+        let sidecar = self.write_outputs(input, loaded, seen)?;
+        write_unsynced(&sidecar, self.folder, &input.name)?;
+        Ok(sidecar)
+    }
+
+    /// Writes an image's outputs without waiting for the disk, and gives the sidecar that is to be written once they are on it.
+    ///
+    /// # Errors
+    /// A file that cannot be written; [`crate::Error::NoCamera`] and [`crate::Error::NoUncertainty`] where an output needs what is not known.
+    pub fn write_outputs(
+        &self,
+        input: &Input,
+        loaded: &LoadedImage,
+        seen: &SeenDepth,
+    ) -> Result<Sidecar> {
+        let (image, prediction) = (&loaded.image, &seen.prediction);
+        let depth = prediction.depth();
+        let sigma = if self.outputs.have_sigma() {
+            intervals::sigma(prediction, &depth, &self.intervals)
+        } else {
+            None
+        };
+        let maps = Maps {
+            prediction,
+            depth: &depth,
+            layers: &seen.layers,
+            sigma: sigma.as_ref(),
+        };
+        let is_file = loaded.live.is_none() && has_file(input);
+        let mut files = Vec::new();
+        for save in self.outputs.of_image(is_file) {
+            let file = file_of(input, save);
+            let (path, camera) = (self.folder.join(&file), loaded.camera.as_ref());
+            write(save, self.outputs.limits, image, camera, &maps, &path)?;
+            files.push(file);
+        }
+        let mut sidecar = Sidecar {
+            prediction: self.record(input, loaded, seen, &depth.data),
+            files: Vec::new(),
+            file_bytes: Vec::new(),
+            file_crc32: Vec::new(),
+            live: loaded.live,
+            made_with: self.made_with.clone(),
+        };
+        for file in files {
+            add_output(&mut sidecar, self.folder, file)?;
+        }
+        Ok(sidecar)
+    }
+
+    /// What the sidecar says of the prediction; `depth_m`: its metres.
+    fn record(
+        &self,
+        input: &Input,
+        loaded: &LoadedImage,
+        seen: &SeenDepth,
+        depth_m: &[f32],
+    ) -> PredictionRecord {
+        let known = depth_m.iter().copied().filter(|d| *d > 0.0);
+        let ends = |[low, high]: [f32; 2], d: f32| [low.min(d), high.max(d)];
+        PredictionRecord {
+            image: Some(input.path.clone()),
+            image_file: Some(loaded.mark),
+            size: Some([loaded.image.width(), loaded.image.height()]),
+            unit: "metres along the camera's axis (z)".into(),
+            model: self.model.given().to_owned(),
+            model_sha256: self.model.packed_sha256().map(str::to_owned),
+            checkpoint_step: self.step,
+            intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
+            intrinsics_from: loaded.camera_from.word().into(),
+            camera_known: loaded.camera_from.is_known(),
+            scale: self.scale,
+            focal_factor: seen.prediction.focal_factor,
+            window: seen.prediction.window,
+            depth_m: known
+                .map(|d| [d, d])
+                .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
+            scale_monitor: seen.scale,
+        }
+    }
+}
+
+fn file_of(input: &Input, save: DepthOutput) -> String {
+    format!("{}{}", input.name, save.ending())
+}
+
+/// Whether an image is a file of its own, which whoever looks at its depth can open.
+fn has_file(input: &Input) -> bool {
+    let frame = input.frame.as_ref();
+    frame.is_none_or(|(dataset, index)| dataset.frames()[*index].image.file().is_some())
+}

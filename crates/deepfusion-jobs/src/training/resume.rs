@@ -1,0 +1,536 @@
+//! What may be asked of a run that goes on, and what contradicts it.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use deepfusion_data::Cameras;
+use deepfusion_model::{InputSize, Learn, Preset, TrainConfig, ViewMotion};
+
+use super::Start;
+use crate::recordings::camera_word;
+use crate::{Error, Result};
+
+/// What is asked of a run that goes on. It may be made longer, and its recordings may have moved; all else must be as the run has it, so
+/// that nothing is asked for in vain.
+#[derive(Debug, Clone, Default)]
+pub struct ResumeRequest {
+    /// A configuration file, read over its preset.
+    pub file: Option<(PathBuf, Box<TrainConfig>)>,
+    /// Where the recordings, those of the validation, and the splits of both are now.
+    pub moved: MovedRecordings,
+    /// Steps of the whole run.
+    pub steps: Option<usize>,
+    /// Epochs of the whole run, instead of steps.
+    pub epochs: Option<usize>,
+    /// A preset.
+    pub preset: Option<Preset>,
+    /// The size of the network's input.
+    pub size: Option<InputSize>,
+    /// Samples of a batch.
+    pub batch: Option<usize>,
+    /// The seed.
+    pub seed: Option<u64>,
+    /// What is learned from.
+    pub learn: Option<Learn>,
+    /// Cameras.
+    pub camera: Option<Cameras>,
+    /// Whether the other camera's view is asked for.
+    pub stereo: bool,
+    /// Whether the camera is to be learned.
+    pub learned_camera: bool,
+    /// The pose used for warping.
+    pub view_motion: Option<ViewMotion>,
+    /// Loss terms and parts of the network that are asked for.
+    pub with: Vec<String>,
+    /// Those that are not wanted.
+    pub without: Vec<String>,
+    /// Keys with values, as `batch=4`.
+    pub assignments: Vec<String>,
+    /// What it starts from.
+    pub init: Option<PathBuf>,
+    /// How far the camera's clock is ahead.
+    pub clock: Option<ClockAhead>,
+    /// Topics of bags, as `imu=/imu`.
+    pub topics: Vec<String>,
+}
+
+/// Where recordings are now.
+#[derive(Debug, Clone, Default)]
+pub struct MovedRecordings {
+    /// Those that are learned from.
+    pub data: Vec<PathBuf>,
+    /// Those of the validation.
+    pub validation: Vec<PathBuf>,
+    /// The split of the first.
+    pub split: Option<PathBuf>,
+    /// The split of the validation.
+    pub validation_split: Option<PathBuf>,
+}
+
+/// How far a camera's clock is said to be ahead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ClockAhead {
+    /// As it is measured. What was measured when a run began holds.
+    Measured,
+    /// Seconds.
+    Seconds(f64),
+}
+
+/// A setting that something asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Setting {
+    /// A configuration file.
+    File(PathBuf),
+    /// [`ResumeRequest::preset`].
+    Preset,
+    /// [`ResumeRequest::size`].
+    Size,
+    /// [`ResumeRequest::batch`].
+    Batch,
+    /// [`ResumeRequest::seed`].
+    Seed,
+    /// [`ResumeRequest::learn`].
+    Learn,
+    /// [`ResumeRequest::camera`].
+    Camera,
+    /// [`ResumeRequest::stereo`].
+    Stereo,
+    /// [`ResumeRequest::learned_camera`].
+    LearnedCamera,
+    /// [`ResumeRequest::view_motion`].
+    ViewMotion,
+    /// [`ResumeRequest::with`].
+    With,
+    /// [`ResumeRequest::without`].
+    Without,
+    /// [`ResumeRequest::assignments`].
+    Assignment,
+    /// [`ResumeRequest::init`].
+    Init,
+    /// [`ResumeRequest::clock`].
+    Clock,
+    /// [`ResumeRequest::topics`].
+    Topic,
+    /// [`MovedRecordings::data`].
+    Data,
+    /// [`MovedRecordings::validation`].
+    Validation,
+    /// [`MovedRecordings::split`].
+    Split,
+    /// [`MovedRecordings::validation_split`].
+    ValidationSplit,
+    /// A data set's own recordings and splits.
+    DataSet,
+}
+
+impl fmt::Display for Setting {
+    /// The key of a configuration, or the file.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::File(path) => return write!(f, "{}", path.display()),
+            Self::Preset => "preset",
+            Self::Size => "size",
+            Self::Batch => "batch",
+            Self::Seed => "seed",
+            Self::Learn => "data.learn",
+            Self::Camera => "data.camera",
+            Self::Stereo => "stereo",
+            Self::LearnedCamera => "assumed_camera.learn",
+            Self::ViewMotion => "view_motion",
+            Self::With | Self::Without => "loss",
+            Self::Assignment => "config.toml",
+            Self::Init => "init",
+            Self::Clock => "data.camera_ahead_s",
+            Self::Topic => "data.topics",
+            Self::Data => "data.paths",
+            Self::Validation => "data.validation",
+            Self::Split => "data.split",
+            Self::ValidationSplit => "data.validation_split",
+            Self::DataSet => "data.sets",
+        })
+    }
+}
+
+/// Something that is asked of a run and is not what it has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{setting}: {asked} contradicts the run, which {run}")]
+pub struct Contradiction {
+    /// What was to be set.
+    pub setting: Setting,
+    /// To what.
+    pub asked: Asked,
+    /// What the run has.
+    pub run: RunHas,
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Asked {
+    /// This.
+    #[error("{0}")]
+    Value(String),
+    /// The other camera's view.
+    #[error("on")]
+    OtherCamera,
+    /// That the camera is learned.
+    #[error("to be learned")]
+    Learned,
+    /// That the clocks are compared.
+    #[error("to be measured")]
+    Measured,
+}
+
+impl From<String> for Asked {
+    fn from(value: String) -> Self {
+        Self::Value(value)
+    }
+}
+
+/// What a run has instead of what is asked for, in words that follow on "which".
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunHas {
+    /// This.
+    #[error("has {0}")]
+    Value(String),
+    /// Nothing of the kind.
+    #[error("has none")]
+    Nothing,
+    /// It is switched off.
+    #[error("has it off")]
+    Off,
+    /// The term is not among its own.
+    #[error("is learned without it")]
+    WithoutIt,
+    /// The term is among its own.
+    #[error("is learned with it")]
+    WithIt,
+    /// The key has another value.
+    #[error("has another value in its config.toml")]
+    AnotherValue,
+    /// It names no topic.
+    #[error("names none")]
+    NoTopics,
+    /// It is validated on frames of its own drives.
+    #[error("is validated on the held-out end of each drive")]
+    HeldOutEnd,
+    /// Each of its data sets has its own.
+    #[error("has the data.sets of its config.toml, each with its own")]
+    OwnOfEachSet,
+}
+
+/// A run's configuration with what is asked of it.
+///
+/// # Errors
+/// [`Error::Contradiction`]; a term or a key that there is not.
+pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainConfig> {
+    // Every field by name: one that is added says here what becomes of it.
+    let ResumeRequest {
+        file,
+        moved,
+        steps,
+        epochs,
+        preset,
+        size,
+        batch,
+        seed,
+        learn,
+        camera,
+        stereo,
+        learned_camera,
+        view_motion,
+        with,
+        without,
+        assignments,
+        init,
+        clock,
+        topics,
+    } = request;
+    let mut config = run.clone();
+    config.data.make_absolute();
+    if let Some((path, file)) = file {
+        take_file(&mut config, path, file, moved)?;
+    }
+    if let Some(preset) = preset {
+        same(Setting::Preset, preset.to_string(), run.preset.to_string())?;
+    }
+    if let Some(size) = size {
+        let text = |size: &InputSize| format!("{}x{}", size.width, size.height);
+        same(Setting::Size, text(size), text(&run.size))?;
+    }
+    if let Some(batch) = batch {
+        same(Setting::Batch, batch.to_string(), run.batch.to_string())?;
+    }
+    if let Some(seed) = seed {
+        same(Setting::Seed, seed.to_string(), run.seed.to_string())?;
+    }
+    if let Some(learn) = learn {
+        let found = run.data.learn.name();
+        same(Setting::Learn, learn.name().into(), found.into())?;
+    }
+    if let Some(camera) = camera {
+        let found = camera_of(&config);
+        same(Setting::Camera, camera_word(*camera).into(), found)?;
+    }
+    if *stereo && !run.stereo {
+        return contradicts(Setting::Stereo, Asked::OtherCamera, RunHas::Off);
+    }
+    if *learned_camera && run.learned_camera().is_none() {
+        let none = RunHas::Value("none".into());
+        return contradicts(Setting::LearnedCamera, Asked::Learned, none);
+    }
+    if let Some(motion) = view_motion {
+        let found = run.view_motion.name();
+        same(Setting::ViewMotion, motion.name().into(), found.into())?;
+    }
+    for term in with {
+        let mut other = run.clone();
+        other.with(term)?;
+        if other != *run {
+            return contradicts(Setting::With, term.clone(), RunHas::WithoutIt);
+        }
+    }
+    for term in without {
+        let mut other = run.clone();
+        other.without(term)?;
+        if other != *run {
+            return contradicts(Setting::Without, term.clone(), RunHas::WithIt);
+        }
+    }
+    for assignment in assignments {
+        let mut other = run.clone();
+        other.set(assignment)?;
+        if other != *run {
+            let asked = assignment.clone();
+            return contradicts(Setting::Assignment, asked, RunHas::AnotherValue);
+        }
+    }
+    if let Some(asked) = init {
+        same_start(run, asked)?;
+    }
+    if let Some(clock) = clock {
+        same_clock(run, *clock)?;
+    }
+    for topic in topics {
+        if !run.data.topics.contains(topic) {
+            let found = match run.data.topics.as_slice() {
+                [] => RunHas::NoTopics,
+                topics => RunHas::Value(topics.join(", ")),
+            };
+            return contradicts(Setting::Topic, topic.clone(), found);
+        }
+    }
+    move_recordings(&mut config, moved)?;
+    config.steps = steps.or(config.steps);
+    if let Some(epochs) = epochs {
+        (config.epochs, config.steps, config.min_steps) = (*epochs, None, 0);
+    }
+    Ok(config)
+}
+
+fn same_start(run: &TrainConfig, asked: &Path) -> Result<()> {
+    // `none`, and the names of embedded networks, are no paths.
+    let asked = match (Start::is_none(asked), &run.init_sha256) {
+        (true, _) | (false, Some(_)) => asked.to_owned(),
+        (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.to_owned()),
+    };
+    let found = run.init.as_deref().map_or("none".into(), path_text);
+    same(Setting::Init, path_text(&asked), found)
+}
+
+fn same_clock(run: &TrainConfig, asked: ClockAhead) -> Result<()> {
+    let in_ms = |s: f64| format!("{} ms", 1000.0 * s);
+    let found = run.data.camera_ahead_s.map(in_ms);
+    match asked {
+        ClockAhead::Measured if found.is_some() => Ok(()),
+        ClockAhead::Measured => {
+            let none = RunHas::Value("none".into());
+            contradicts(Setting::Clock, Asked::Measured, none)
+        }
+        ClockAhead::Seconds(ahead_s) => {
+            let found = found.unwrap_or("none".into());
+            same(Setting::Clock, in_ms(ahead_s), found)
+        }
+    }
+}
+
+/// The places where the same recordings are now.
+fn move_recordings(config: &mut TrainConfig, moved: &MovedRecordings) -> Result<()> {
+    let MovedRecordings {
+        data,
+        validation,
+        split,
+        validation_split,
+    } = moved;
+    let sets = !config.data.sets.is_empty();
+    if !data.is_empty() {
+        if sets {
+            return contradicts(Setting::Data, list(data), RunHas::OwnOfEachSet);
+        }
+        config.data.paths.clone_from(data);
+    }
+    if !validation.is_empty() {
+        if sets {
+            let asked = list(validation);
+            return contradicts(Setting::Validation, asked, RunHas::OwnOfEachSet);
+        }
+        if config.data.validation.is_empty() {
+            return contradicts(Setting::Validation, list(validation), RunHas::HeldOutEnd);
+        }
+        config.data.validation.clone_from(validation);
+    }
+    let data = &mut config.data;
+    let splits = [
+        (Setting::Split, &mut data.split, split),
+        (
+            Setting::ValidationSplit,
+            &mut data.validation_split,
+            validation_split,
+        ),
+    ];
+    for (setting, kept, split) in splits {
+        let Some(split) = split else { continue };
+        if kept.is_none() {
+            let found = if sets {
+                RunHas::OwnOfEachSet
+            } else {
+                RunHas::Nothing
+            };
+            return contradicts(setting, path_text(split), found);
+        }
+        *kept = Some(split.clone());
+    }
+    config.data.make_absolute();
+    Ok(())
+}
+
+/// What a configuration file may change, and that it says nothing else than the run's.
+fn take_file(
+    config: &mut TrainConfig,
+    path: &Path,
+    file: &TrainConfig,
+    moved: &MovedRecordings,
+) -> Result<()> {
+    (config.steps, config.epochs) = (file.steps, file.epochs);
+    config.min_steps = file.min_steps;
+    config.checkpoint_minutes = file.checkpoint_minutes;
+    // What a run fills in from its data, or is asked for beside the file, is not the file's to say.
+    let mut asked = file.clone();
+    asked.data.make_absolute();
+    asked.init.clone_from(&config.init);
+    asked.init_sha256.clone_from(&config.init_sha256);
+    if asked.pose_net.metres_per_unit == 0.0 {
+        asked.pose_net.metres_per_unit = config.pose_net.metres_per_unit;
+    }
+    for (asked, has) in asked.data.sets.iter_mut().zip(&config.data.sets) {
+        if asked.metres_per_unit == 0.0 {
+            asked.metres_per_unit = has.metres_per_unit;
+        }
+    }
+    let (asked_data, has) = (&mut asked.data, &config.data);
+    if !moved.data.is_empty() {
+        asked_data.paths.clone_from(&has.paths);
+    }
+    if !moved.validation.is_empty() {
+        asked_data.validation.clone_from(&has.validation);
+    }
+    if moved.split.is_some() {
+        asked_data.split.clone_from(&has.split);
+    }
+    if moved.validation_split.is_some() {
+        asked_data
+            .validation_split
+            .clone_from(&has.validation_split);
+    }
+    let mut has = config.clone();
+    (asked.data.camera, has.data.camera) = (camera_of(&asked), camera_of(&has));
+    let (asked, has) = (settings(&asked)?, settings(&has)?);
+    let keys = asked.keys().chain(has.keys());
+    for key in keys {
+        if asked.get(key) != has.get(key) {
+            let of = |settings: &BTreeMap<String, String>| {
+                let value = settings.get(key).map_or("nothing", String::as_str);
+                format!("{key} = {value}")
+            };
+            let file = Setting::File(path.to_owned());
+            return contradicts(file, of(&asked), RunHas::Value(of(&has)));
+        }
+    }
+    Ok(())
+}
+
+/// Every setting by its dotted key.
+fn settings(config: &TrainConfig) -> Result<BTreeMap<String, String>> {
+    fn add(all: &mut BTreeMap<String, String>, prefix: &str, table: &toml::Table) {
+        for (key, value) in table {
+            let key = format!("{prefix}{key}");
+            match value {
+                toml::Value::Table(inner) => add(all, &format!("{key}."), inner),
+                value => drop(all.insert(key, value.to_string())),
+            }
+        }
+    }
+    let mut all = BTreeMap::new();
+    add(&mut all, "", &toml::Table::try_from(config)?);
+    Ok(all)
+}
+
+/// Which cameras a run learns from; nothing said means 2.
+fn camera_of(config: &TrainConfig) -> String {
+    match config.data.camera.as_str() {
+        "" => "2".into(),
+        camera => camera.into(),
+    }
+}
+
+fn same(setting: Setting, asked: String, found: String) -> Result<()> {
+    if asked == found {
+        Ok(())
+    } else {
+        contradicts(setting, asked, RunHas::Value(found))
+    }
+}
+
+fn contradicts<T>(setting: Setting, asked: impl Into<Asked>, run: RunHas) -> Result<T> {
+    Err(Error::Contradiction(Contradiction {
+        setting,
+        asked: asked.into(),
+        run,
+    }))
+}
+
+fn list(paths: &[PathBuf]) -> String {
+    let paths: Vec<String> = paths.iter().map(|p| path_text(p)).collect();
+    paths.join(" ")
+}
+
+fn path_text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Which setting of a run names the recording, or the split, that `missing` is or lies within; `None` where none does.
+#[must_use]
+pub fn setting_of(missing: &Path, config: &TrainConfig) -> Option<Setting> {
+    let within = |given: &PathBuf| missing.starts_with(given);
+    let data = &config.data;
+    if data.paths.iter().any(within) {
+        Some(Setting::Data)
+    } else if data.validation.iter().any(within) {
+        Some(Setting::Validation)
+    } else if data.split.iter().any(within) {
+        Some(Setting::Split)
+    } else if data.validation_split.iter().any(within) {
+        Some(Setting::ValidationSplit)
+    } else if data.sets.iter().any(|set| {
+        let all = set.paths.iter().chain(&set.validation);
+        let mut all = all.chain(&set.split).chain(&set.validation_split);
+        all.any(within)
+    }) {
+        Some(Setting::DataSet)
+    } else {
+        None
+    }
+}

@@ -1,0 +1,46 @@
+//! Why there is nothing to learn from.
+
+use std::sync::Arc;
+
+/// Standard deviation of a distance, as a share of it, above which its sample is left out: metres that unsure teach no scale.
+pub(crate) const MOST_SIGMA_SHARE: f64 = 0.2;
+
+/// Why there is nothing to learn from.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SampleProblem {
+    /// A set of samples without one.
+    #[error("it is empty")]
+    Empty,
+    /// No drive was given.
+    #[error("it has no drive")]
+    NoDrive,
+    /// All samples are images of known depth.
+    #[error("nothing is learned from video")]
+    NoVideo,
+    /// What drives there are have no sample.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+    Skipped(Vec<Skipped>),
+}
+
+/// Why a drive has no sample, or lacks some.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum Skipped {
+    /// Distances that teach no scale.
+    #[error(
+        "{drive}: {unsure} of {of} samples have a distance that is known to no better than {:.0} %",
+        100.0 * MOST_SIGMA_SHARE
+    )]
+    UnsureDistances {
+        /// The drive.
+        drive: String,
+        /// Samples that are left out.
+        unsure: usize,
+        /// Samples that it has.
+        of: usize,
+    },
+    /// No sample of the drive can be made.
+    #[error(transparent)]
+    Drive(Arc<deepfusion_data::Error>),
+}
