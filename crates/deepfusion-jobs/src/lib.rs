@@ -15,7 +15,7 @@
 //! | [`int8`] | the ranges of what a network's convolutions read, for int8 |
 //! | [`averaging`] | the mean of several runs' weights |
 //! | [`packing`] | a run's network as a file of its own, with its card |
-//! | [`bench`] | how fast a network is, and every stage around it |
+//! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
     feature = "train",
