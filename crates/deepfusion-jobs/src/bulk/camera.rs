@@ -187,7 +187,7 @@ const MOST_OFF: f64 = 0.2;
 
 /// Whether a camera's numbers look like those of images of another size.
 #[must_use]
-pub fn looks_like_another_sizes(k: &Intrinsics) -> bool {
+pub fn looks_of_another_size(k: &Intrinsics) -> bool {
     let off = |c: f64, size: u32| c / f64::from(size) - 0.5;
     let (x, y) = (off(k.cx, k.width), off(k.cy, k.height));
     x * y > 0.0 && x.abs().min(y.abs()) > MOST_OFF

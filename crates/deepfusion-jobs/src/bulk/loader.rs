@@ -1,12 +1,10 @@
 //! An input as the network takes it: read, without its lens, with its camera.
 
-use deepfusion_data::{Error as DataError, load_photo};
+use deepfusion_data::{Error as DataError, RgbImage, load_photo};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_records::{FileMark, LiveMark};
 use deepfusion_runtime::{PreparedImage, Preparer};
 use deepfusion_video::LiveFrame;
-
-use deepfusion_data::RgbImage;
 
 use super::{CameraFrom, CameraSource, PinholeImage};
 use crate::{Error, Input, Result};

@@ -17,7 +17,7 @@ mod sidecars;
 mod video;
 
 pub use crate::error::UnfitCamera;
-pub use camera::{CameraFrom, CameraSource, LensFile, PinholeImage, looks_like_another_sizes};
+pub use camera::{CameraFrom, CameraSource, LensFile, PinholeImage, looks_of_another_size};
 pub use committer::{Written, commit, queue};
 pub use loader::{ImageLoader, LoadedImage};
 pub use manifest::{Entry, Lock, Manifest, State};

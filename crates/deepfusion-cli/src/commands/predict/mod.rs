@@ -14,7 +14,7 @@ use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{
     BulkJob, BulkProgress, CameraFrom, CameraSource, ImageLoader, LoadedImage, Lock, StartedJob,
-    Summary, commit, looks_like_another_sizes, queue, write_videos,
+    Summary, commit, looks_of_another_size, queue, write_videos,
 };
 use deepfusion_jobs::evaluation::augmentation;
 use deepfusion_jobs::outputs::{DepthOutput, DepthOutputs, DepthWriter, SeenDepth, is_output};
@@ -398,7 +398,7 @@ impl<'a> Job<'a> {
                 .call_once(|| warn_of_assumed_camera(input)),
             CameraFrom::Given => {
                 let camera = loaded.camera.as_ref();
-                if let Some(k) = camera.filter(|k| looks_like_another_sizes(k)) {
+                if let Some(k) = camera.filter(|k| looks_of_another_size(k)) {
                     let warn = || warn_of_another_size(&input.path, k);
                     self.size_warning.call_once(warn);
                 }
