@@ -48,12 +48,6 @@ pub(crate) enum CliError {
     #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
     NoRerun,
-    /// A folder or pattern without images.
-    #[error("{input}: no image (.png, .jpg, .jpeg) there")]
-    NoImages {
-        /// What was given.
-        input: String,
-    },
     /// A moment that is none on a log's clock.
     #[error("--start {word}: not a moment on the log's clock")]
     NotOnClock {
@@ -139,22 +133,6 @@ pub(crate) enum CliError {
     /// A precision that an engine does not have.
     #[error("`--precision bf16` is the fused engine's")]
     OnlyFused,
-    /// An output that another run made, or this one of another image.
-    #[error("{}: already exists, {why}", path.display())]
-    Stale {
-        /// The sidecar.
-        path: PathBuf,
-        /// In what it differs.
-        why: String,
-    },
-    /// A shard of a job beside shards of another.
-    #[error("{}: the shards of this folder were begun with {why}", path.display())]
-    OtherJob {
-        /// The other shard's manifest.
-        path: PathBuf,
-        /// In what it differs.
-        why: String,
-    },
     /// A recording that should not be trained on.
     #[error("{}: {errors} {} would make training fail or give a wrong scale", path.display(), if *errors == 1 { "error" } else { "errors" })]
     Unfit {
@@ -208,17 +186,6 @@ pub(crate) enum CliError {
         steps: usize,
         /// The command that goes on with it.
         go_on: String,
-    },
-    /// An option that is not what a resumed run has.
-    #[cfg(feature = "train")]
-    #[error("`{option}`: {asked} contradicts the run, which {run}")]
-    Contradicts {
-        /// The option.
-        option: String,
-        /// What it asks for.
-        asked: String,
-        /// What the run has or is.
-        run: deepfusion_jobs::training::resume::RunHas,
     },
     /// A recording of a resumed run that is not where it was.
     #[error("{}: no such file or folder, and {} learns from it", path.display(), run.display())]
@@ -313,9 +280,6 @@ impl Reportable for CliError {
             Self::NoRerun => Some(
                 "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
             ),
-            Self::NoImages { .. } => Some(
-                "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
-            ),
             Self::NoModelGiven => Some(
                 "train one (deepfusion train --data DRIVE), then give its folder: --model RUN".into(),
             ),
@@ -334,14 +298,6 @@ impl Reportable for CliError {
             Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
             Self::OnlyOrt => Some("add --engine ort, or leave out --ort-lib".into()),
             Self::OnlyFused => Some("give --engine fused --device cpu, or leave out --precision".into()),
-            Self::Stale { .. } => Some(
-                "--overwrite replaces what was made differently; or choose another folder".into(),
-            ),
-            Self::OtherJob { .. } => Some(
-                "start every shard with the same inputs and options; --overwrite begins anew, or choose \
-                 another folder"
-                    .into(),
-            ),
             Self::SomeFailed { hint, resumes, .. } => Some(match hint {
                 Some(hint) => format!("{hint}; then {}", again(*resumes)),
                 None => format!("mend them, then {}", again(*resumes)),
@@ -351,10 +307,6 @@ impl Reportable for CliError {
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
-            #[cfg(feature = "train")]
-            Self::Contradicts { .. } => {
-                Some("leave it out to go on with the run, or start a new one in another folder".into())
-            }
             Self::Moved { option: Some(option), .. } => Some(format!(
                 "if it was moved, say where it is now: {option} PATH; if its disk is not mounted, mount it"
             )),

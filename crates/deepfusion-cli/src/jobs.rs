@@ -3,37 +3,50 @@
 use std::path::Path;
 
 use deepfusion_hint::Hint;
+#[cfg(feature = "train")]
+use deepfusion_jobs::training::resume::{Asked, Contradiction, Setting};
 use deepfusion_jobs::{Error, OtherJob, StaleReason};
 use deepfusion_records::Difference;
 
-use crate::error::CliError;
-use crate::failure::{Exit, Failure, Reportable};
-
-/// An error whose message speaks of options here.
-pub(crate) fn in_words(error: Error) -> Failure {
-    let made_with = |what| options_of(what).to_owned();
-    match error {
-        Error::Stale {
-            path,
-            why: StaleReason::MadeWith(what),
-        } => {
-            let why = format!("made with {}", made_with(what));
-            CliError::Stale { path, why }.into()
-        }
-        Error::OtherJob {
-            path,
-            why: OtherJob::MadeWith(what),
-        } => {
-            let why = made_with(what);
-            CliError::OtherJob { path, why }.into()
-        }
-        other => other.into(),
-    }
-}
+use crate::failure::{Exit, Reportable, set_in_file};
 
 impl Reportable for Error {
+    /// With the options that are meant.
     fn message(&self) -> String {
-        wrapped(self).map_or_else(|| self.to_string(), Reportable::message)
+        match self {
+            Self::Stale {
+                path,
+                why: StaleReason::MadeWith(what),
+            } => format!(
+                "{}: already exists, made with {}",
+                path.display(),
+                options_of(*what)
+            ),
+            Self::OtherJob {
+                path,
+                why: OtherJob::MadeWith(what),
+            } => format!(
+                "{}: the shards of this folder were begun with {}",
+                path.display(),
+                options_of(*what)
+            ),
+            #[cfg(feature = "train")]
+            Self::Contradiction(Contradiction {
+                setting,
+                asked,
+                run,
+            }) => format!(
+                "`{}`: {} contradicts the run, which {run}",
+                option_of(setting),
+                typed(asked)
+            ),
+            #[cfg(feature = "train")]
+            Self::BesideSets { setting } => format!(
+                "setting `{}`: expected none beside [[data.sets]] in the config file: each set has its own, found both",
+                option_of(setting)
+            ),
+            other => wrapped(other).map_or_else(|| other.to_string(), Reportable::message),
+        }
     }
 
     /// With the options that do it.
@@ -61,6 +74,13 @@ impl Reportable for Error {
                 "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
             ),
             Self::CameraOf { source, .. } => source.remedy(),
+            Self::NoTopic { problem, .. } => {
+                Some(problem.hint().unwrap_or_else(|| set_in_file("data.topics")))
+            }
+            #[cfg(feature = "train")]
+            Self::BesideSets { .. } => {
+                Some("leave it out, or change the sets in the config file".into())
+            }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
                 "leave out sigma and confidence of --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
@@ -135,9 +155,69 @@ fn options_of(what: Difference) -> &'static str {
     }
 }
 
+/// What is typed to ask for it.
+#[cfg(feature = "train")]
+fn typed(asked: &Asked) -> String {
+    match asked {
+        Asked::Learned => "learn".into(),
+        Asked::Measured => "auto".into(),
+        other => other.to_string(),
+    }
+}
+
+/// The option that asks for a setting.
+#[cfg(feature = "train")]
+pub(crate) fn option_of(setting: &Setting) -> String {
+    match setting {
+        Setting::File(path) => return format!("--config {}", path.display()),
+        Setting::Preset => "--preset",
+        Setting::Size => "--size",
+        Setting::Batch => "--batch",
+        Setting::Seed => "--seed",
+        Setting::Learn => "--learn",
+        Setting::Camera => "--camera",
+        Setting::Stereo => "--stereo",
+        Setting::LearnedCamera => "--intrinsics",
+        Setting::ViewMotion => "--view-motion",
+        Setting::With => "--with",
+        Setting::Without => "--without",
+        Setting::Assignment => "--set",
+        Setting::Init => "--init",
+        Setting::Clock => "--clock-offset",
+        Setting::Topic => "--topic",
+        Setting::Data => "--data",
+        Setting::Validation => "--val-data",
+        Setting::Split => "--split",
+        Setting::ValidationSplit => "--val-split",
+        other => return other.to_string(),
+    }
+    .to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::failure::Failure;
+
+    #[cfg(feature = "train")]
+    #[test]
+    fn a_setting_is_its_option() {
+        let setting = Setting::ValidationSplit;
+        let error = Failure::from(Error::BesideSets { setting });
+        assert_eq!(
+            error.to_string(),
+            "setting `--val-split`: expected none beside [[data.sets]] in the config file: each set has its own, found both"
+        );
+        let error = Failure::from(Error::Contradiction(Contradiction {
+            setting: Setting::LearnedCamera,
+            asked: Asked::Learned,
+            run: deepfusion_jobs::training::resume::RunHas::Off,
+        }));
+        assert_eq!(
+            error.to_string(),
+            "`--intrinsics`: learn contradicts the run, which has it off"
+        );
+    }
 
     #[test]
     fn a_difference_names_its_option() {
@@ -145,7 +225,7 @@ mod tests {
             path: "a.json".into(),
             why: StaleReason::MadeWith(Difference::MaxDepth),
         };
-        let error = in_words(error);
+        let error = Failure::from(error);
         assert_eq!(
             error.to_string(),
             "a.json: already exists, made with another --max-depth"

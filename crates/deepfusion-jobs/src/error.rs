@@ -1,13 +1,18 @@
 use std::path::PathBuf;
 
+use deepfusion_data::NoNamedTopic;
 use deepfusion_hint::Hint;
 use deepfusion_records::Difference;
 
 use crate::bulk::Shard;
 
 mod camera;
+#[cfg(feature = "train")]
+mod contradiction;
 
 pub use self::camera::UnfitCamera;
+#[cfg(feature = "train")]
+pub use self::contradiction::{Asked, Contradiction, RunHas, Setting};
 
 /// What can go wrong with work over recordings and folders.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +43,14 @@ pub enum Error {
         path: PathBuf,
         /// Why it cannot be its camera, or what is wrong with the file that says it.
         source: Box<Error>,
+    },
+    /// A topic of bags that is not named as one.
+    #[error("setting `data.topics`: {text}: {problem}")]
+    NoTopic {
+        /// What stands in the configuration.
+        text: String,
+        /// What is wrong with it.
+        problem: NoNamedTopic,
     },
     /// A split of which not everything could be used, where everything has to be.
     #[error("{}: {found} of its {expected} frames {what}", split.display())]
@@ -269,7 +282,16 @@ pub enum Error {
     /// Something asked of a run that goes on, and that is not what it has.
     #[cfg(feature = "train")]
     #[error(transparent)]
-    Contradiction(crate::training::resume::Contradiction),
+    Contradiction(Contradiction),
+    /// Recordings, or something of how they are opened, that are asked for beside a configuration's data sets.
+    #[cfg(feature = "train")]
+    #[error(
+        "setting `{setting}`: expected none beside data.sets: each set has its own, found both"
+    )]
+    BesideSets {
+        /// What is asked for.
+        setting: Setting,
+    },
     /// Something that has no TOML form.
     #[error(transparent)]
     Toml(#[from] toml::ser::Error),
@@ -447,6 +469,9 @@ impl Hint for Error {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
             }
             Self::CameraOf { source, .. } => source.hint(),
+            Self::NoTopic { problem, .. } => {
+                Some(problem.hint().unwrap_or("set `data.topics` so in the configuration".into()))
+            }
             Self::Incomplete { .. } => {
                 Some("give the folder that holds every drive that the split names".into())
             }
@@ -526,6 +551,10 @@ impl Hint for Error {
             #[cfg(feature = "train")]
             Self::Contradiction(_) => {
                 Some("leave it out to go on with the run, or start a new one in another folder".into())
+            }
+            #[cfg(feature = "train")]
+            Self::BesideSets { .. } => {
+                Some("leave it out, or change the data sets that it is for".into())
             }
             #[cfg(feature = "train")]
             Self::NoResult { .. } => Some("delete it to run this row again".into()),

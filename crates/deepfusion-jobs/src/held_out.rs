@@ -12,6 +12,7 @@ use deepfusion_weights::Card;
 
 use crate::Result;
 use crate::evaluation::ImageRef;
+use crate::verdict::Unseen;
 
 #[cfg(feature = "train")]
 pub use of_run::{held_out, unseen_frames};
@@ -53,6 +54,24 @@ pub fn learned_from_none(
     })
 }
 
+/// Which of the recordings' frames a network's training did not see. `config`: its run's.
+///
+/// # Errors
+/// A run's findings that cannot be read.
+pub fn unseen_by(
+    model: &ModelSource,
+    config: &TrainConfig,
+    datasets: &[Dataset],
+) -> Result<Unseen> {
+    Ok(match model {
+        ModelSource::Run { folder, .. } => {
+            unseen_frames(config, &folder.read_findings()?.averaged, datasets)
+        }
+        ModelSource::Packed { network, .. } if unseen(&network.card, datasets) => Unseen::All,
+        ModelSource::Packed { .. } => Unseen::NotKnown,
+    })
+}
+
 /// What training took of a run's recordings is not known to a build without it.
 #[cfg(not(feature = "train"))]
 #[must_use]
@@ -72,6 +91,6 @@ pub fn unseen_frames(
     _: &TrainConfig,
     _: &[deepfusion_model::AveragedNetwork],
     _: &[Dataset],
-) -> crate::verdict::Unseen {
-    crate::verdict::Unseen::NotKnown
+) -> Unseen {
+    Unseen::NotKnown
 }

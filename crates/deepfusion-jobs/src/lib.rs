@@ -16,6 +16,7 @@
 //! | [`averaging`] | the mean of several runs' weights |
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
+//! | [`RunHistory`] | how a run learned, by what its folder keeps |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
     feature = "train",
@@ -62,6 +63,7 @@ pub mod outputs;
 pub mod packing;
 mod perception_settings;
 pub mod recordings;
+mod run_history;
 #[cfg(feature = "train")]
 pub mod samples;
 pub mod scene;
@@ -74,4 +76,5 @@ pub use error::{Error, NoMean, OtherJob, Result, StaleReason};
 pub use inputs::{Input, find_inputs};
 pub use model_facts::{ModelFacts, name_of};
 pub use perception_settings::perception_settings;
+pub use run_history::RunHistory;
 pub use target_finder::{PerceivedFrame, StartedFrame, TargetFinder, TargetSettings};

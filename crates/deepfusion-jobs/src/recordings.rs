@@ -3,13 +3,13 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{
-    Camera, Cameras, Dataset, Heading, NamedTopic, NoNamedTopic, OpenOptions, Split,
-};
+use deepfusion_data::{Camera, Cameras, Dataset, Heading, NamedTopic, OpenOptions, Split};
 use deepfusion_doctor::{heading, seen_turns};
-use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig, ViewMotion};
+use deepfusion_model::{
+    DataSetConfig, Error as ModelError, ExpectedSetting, TrainConfig, ViewMotion,
+};
 
-use crate::Result;
+use crate::{Error, Result};
 
 /// Opens the recordings at several paths, each drive and camera a data set.
 ///
@@ -232,17 +232,14 @@ fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
 /// Topics as configurations name them.
 ///
 /// # Errors
-/// One that is not written as [`NamedTopic`].
+/// [`Error::NoTopic`] for one that is not written as [`NamedTopic`].
 pub fn named_topics(topics: &[String]) -> Result<Vec<NamedTopic>> {
     let read = |text: &String| {
-        text.parse().map_err(|expected: NoNamedTopic| {
-            ModelError::Config {
-                field: "data.topics",
-                expected: expected.to_string(),
-                found: text.clone(),
-            }
-            .into()
-        })
+        text.parse::<NamedTopic>()
+            .map_err(|problem| Error::NoTopic {
+                text: text.clone(),
+                problem,
+            })
     };
     topics.iter().map(read).collect()
 }
@@ -257,10 +254,9 @@ fn open_options(
 ) -> Result<OpenOptions> {
     let camera: Cameras = match camera {
         "" => Cameras::default(),
-        text => text.parse().map_err(|_| ModelError::Config {
-            field: "data.camera",
-            expected: "2, 3 or both".into(),
-            found: text.into(),
+        text => text.parse().map_err(|_| {
+            let found = text.to_owned();
+            ModelError::config("data.camera", ExpectedSetting::Cameras, found)
         })?,
     };
     Ok(OpenOptions {
@@ -335,6 +331,15 @@ mod tests {
         let numbers = format!("{} {} {} {}", k.fx, k.fy, k.cx, k.cy + TOO_LOW_PX);
         fs::write(folder.join("intrinsics.txt"), numbers)?;
         Ok(folder)
+    }
+
+    #[test]
+    fn a_topic_that_is_none_is_named() {
+        let error = named_topics(&["/camera".to_owned()]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "setting `data.topics`: /camera: expected ROLE=NAME, such as image=/camera/front/image_raw"
+        );
     }
 
     fn ahead(drive: &Dataset) -> (f64, f64) {

@@ -3,9 +3,11 @@ use std::path::PathBuf;
 
 use crate::NetworkError;
 
+mod expected;
 mod run;
 mod setting;
 
+pub use self::expected::{AskedBy, ExpectedDataSet, ExpectedSetting, FoundSetting};
 pub use self::run::{CHECKPOINT_VERSION, CheckpointLacks, NoRun};
 pub use self::setting::{SettingProblem, TomlProblem};
 
@@ -19,15 +21,15 @@ pub enum Error {
         /// The setting's name, as in the file.
         field: &'static str,
         /// What would do.
-        expected: String,
+        expected: ExpectedSetting,
         /// What was found.
-        found: String,
+        found: FoundSetting,
     },
     /// A run of several data sets, and none of them named, or none of that name.
     #[error("data set: expected {expected}, found {found}")]
     DataSet {
         /// The names there are.
-        expected: String,
+        expected: ExpectedDataSet,
         /// The name asked for, or "none".
         found: String,
     },
@@ -119,6 +121,20 @@ pub enum Error {
 }
 
 impl Error {
+    /// A setting that means nothing, by its name in the file.
+    #[must_use]
+    pub fn config(
+        field: &'static str,
+        expected: impl Into<ExpectedSetting>,
+        found: impl Into<FoundSetting>,
+    ) -> Self {
+        Self::Config {
+            field,
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+
     /// A file that cannot be read or written; `action` is "read" or "write".
     #[must_use]
     pub fn io(path: &std::path::Path, action: &'static str, source: std::io::Error) -> Self {

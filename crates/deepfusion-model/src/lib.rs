@@ -15,7 +15,10 @@ mod stored;
 mod training;
 pub mod weights;
 
-pub use error::{CHECKPOINT_VERSION, CheckpointLacks, Error, NoRun, SettingProblem, TomlProblem};
+pub use error::{
+    AskedBy, CHECKPOINT_VERSION, CheckpointLacks, Error, ExpectedDataSet, ExpectedSetting,
+    FoundSetting, NoRun, SettingProblem, TomlProblem,
+};
 pub use graph::{depth_graph, depth_graph_with_uncertainty};
 pub use int8::{CalibrationProblem, Int8Calibration, UnreadableCalibration};
 pub use network::*;

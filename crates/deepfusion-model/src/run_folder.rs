@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use deepfusion_geometry::Intrinsics;
 
 use crate::weights::{Weights, read_safetensors_under};
-use crate::{CHECKPOINT_VERSION, Error, NoRun, TrainConfig, TrainFindings};
+use crate::{CHECKPOINT_VERSION, Error, ExpectedSetting, NoRun, TrainConfig, TrainFindings};
 
 /// Metadata: the lowest value that `best` was chosen by. Files of before are without it: what was chosen by then held
 /// terms that depth cannot change, and is not to be compared with.
@@ -153,11 +153,8 @@ impl RunFolder {
         config: &TrainConfig,
         findings: &TrainFindings,
     ) -> Result<(), Error> {
-        let found = findings.to_toml().map_err(|e| Error::Config {
-            field: "findings",
-            expected: "values that TOML can hold".into(),
-            found: e.to_string(),
-        })?;
+        let found = findings.to_toml();
+        let found = found.map_err(|e| Error::config("findings", ExpectedSetting::TomlValues, e))?;
         let text = config.to_toml()? + &found;
         let path = self.config_path();
         deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))

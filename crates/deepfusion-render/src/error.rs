@@ -5,14 +5,14 @@ use deepfusion_hint::Hint;
 #[non_exhaustive]
 pub enum Error {
     /// Two things that belong together are of different sizes.
-    #[error("{what} has {found} values, expected {expected}")]
+    #[error("{what} has {found} values, expected {}×{}", expected.0, expected.1)]
     Size {
         /// What does not fit.
         what: &'static str,
         /// How many values it has.
         found: usize,
-        /// How many it should have.
-        expected: String,
+        /// How many it should have: so many a row, and rows.
+        expected: (u32, u32),
     },
     /// A picture cannot be encoded.
     #[error("a picture of the report cannot be encoded")]
@@ -59,17 +59,13 @@ impl Hint for Error {
 }
 
 /// Fails where `found` is not width × height.
-pub(crate) fn require_size(
-    what: &'static str,
-    found: usize,
-    (width, height): (u32, u32),
-) -> Result<()> {
-    if found == width as usize * height as usize {
+pub(crate) fn require_size(what: &'static str, found: usize, expected: (u32, u32)) -> Result<()> {
+    if found == expected.0 as usize * expected.1 as usize {
         return Ok(());
     }
     Err(Error::Size {
         what,
         found,
-        expected: format!("{width}×{height}"),
+        expected,
     })
 }

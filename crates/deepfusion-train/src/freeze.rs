@@ -2,7 +2,7 @@
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
-use deepfusion_model::Error as ModelError;
+use deepfusion_model::{Error as ModelError, ExpectedSetting};
 
 use crate::{Error, Model, SampleSet, TrainConfig};
 
@@ -34,23 +34,17 @@ pub(crate) fn freeze(
         flow_decoder: model.flow_decoder.map(|net| freeze.under("flow", net)),
         ..model
     };
-    let wrong = |expected: &str, found: String| {
-        Error::from(ModelError::Config {
-            field: "freeze",
-            expected: expected.into(),
-            found,
-        })
+    let wrong = |expected: ExpectedSetting, found: String| {
+        Error::from(ModelError::config("freeze", expected, found))
     };
     if let Some((name, _)) = freeze.names.iter().find(|(_, found)| !found) {
-        let expected = "weights by their names, or by the beginning of them, as depth.encoder or depth.encoder.layer1";
-        return Err(wrong(expected, (*name).to_owned()));
+        return Err(wrong(ExpectedSetting::Weights, (*name).to_owned()));
     }
     if !train.samples.is_empty() && freeze.from_video == 0 {
-        return Err(wrong("weights left to learn from video", names.join(", ")));
+        return Err(wrong(ExpectedSetting::LeftForVideo, names.join(", ")));
     }
     if !train.depth.is_empty() && freeze.from_depth == 0 {
-        let expected = "weights left to learn from known depth";
-        return Err(wrong(expected, names.join(", ")));
+        return Err(wrong(ExpectedSetting::LeftForDepth, names.join(", ")));
     }
     Ok(model)
 }

@@ -5,12 +5,22 @@ use std::path::PathBuf;
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_doctor::common_camera_ahead;
 use deepfusion_jobs::recordings::open_recordings;
+#[cfg(feature = "train")]
+use deepfusion_jobs::training::resume::ClockAhead;
 
 use super::warnings;
 use crate::cli::ClockOffset;
 use crate::failure::Result;
-use crate::jobs;
 use crate::progress::say;
+
+/// What `--clock-offset` says.
+#[cfg(feature = "train")]
+pub(super) fn ahead(offset: ClockOffset) -> ClockAhead {
+    match offset {
+        ClockOffset::Auto => ClockAhead::Measured,
+        ClockOffset::Seconds(ahead_s) => ClockAhead::Seconds(ahead_s),
+    }
+}
 
 /// How far the camera's clock is said or measured to be ahead, in seconds; `None` where nothing is asked.
 pub(super) fn seconds(
@@ -27,7 +37,7 @@ pub(super) fn seconds(
                 camera_ahead_s: None,
                 ..options.clone()
             };
-            let datasets = open_recordings(paths, &options).map_err(jobs::in_words)?;
+            let datasets = open_recordings(paths, &options)?;
             measured(&datasets).map(Some)
         }
     }

@@ -78,10 +78,8 @@ fn pictures(args: &CompareArgs, recording: &Path) -> Result<Vec<Vec<Tile>>> {
     }
     let datasets = open_datasets(&[recording.to_owned()], None, Cameras::default())?;
     let Some(mut sheet) = ModelSheet::of(&datasets, usize::from(args.picture_count))? else {
-        return Err(CliError::NoImages {
-            input: recording.display().to_string(),
-        }
-        .into());
+        let input = recording.display().to_string();
+        return Err(deepfusion_jobs::Error::NoImages { input }.into());
     };
     let mut progress = Progress::new("predicting");
     for (done, run) in args.runs.iter().enumerate() {

@@ -14,7 +14,6 @@ use deepfusion_model::TrainConfig;
 use deepfusion_train::SampleSet;
 
 use super::warnings;
-use crate::jobs;
 
 /// Opens the recordings at several paths, each drive and camera a data set.
 pub(super) fn open_datasets(
@@ -32,21 +31,21 @@ pub(super) fn open_datasets(
 
 /// As [`open_datasets`], as the options say.
 pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    let datasets = recordings::open_recordings(paths, options).map_err(jobs::in_words)?;
+    let datasets = recordings::open_recordings(paths, options)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
 
 /// As [`open_recordings`], for what takes the vehicle's motion: where no mount is given, the one that the images show.
 pub(super) fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    let datasets = recordings::open_aimed(paths, options).map_err(jobs::in_words)?;
+    let datasets = recordings::open_aimed(paths, options)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
 
 /// As [`open_aimed`], for what measures by the vehicle's turns: without a yaw rate those that the images show.
 pub(super) fn open_with_yaw(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    let datasets = recordings::open_with_yaw(paths, options).map_err(jobs::in_words)?;
+    let datasets = recordings::open_with_yaw(paths, options)?;
     print_warnings(options, &datasets);
     Ok(datasets)
 }
@@ -55,7 +54,8 @@ pub(super) fn open_with_yaw(paths: &[PathBuf], options: &OpenOptions) -> Result<
 /// validation frames that are seen in training.
 #[cfg(feature = "train")]
 pub(super) fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
-    samples::open_samples(config, &mut print_warnings, &mut warn_of_sample).map_err(jobs::in_words)
+    let samples = samples::open_samples(config, &mut print_warnings, &mut warn_of_sample);
+    Ok(samples?)
 }
 
 /// Prints what may not be meant of the samples.

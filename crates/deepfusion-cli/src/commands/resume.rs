@@ -2,31 +2,18 @@
 
 use std::path::Path;
 
-use deepfusion_jobs::Error;
-use deepfusion_jobs::training::resume::{
-    self, Asked, ClockAhead, Contradiction, MovedRecordings, ResumeRequest, Setting,
-};
+use deepfusion_jobs::training::resume::{self, MovedRecordings, ResumeRequest, Setting};
 use deepfusion_model::{InputSize, TrainConfig};
 
-use crate::cli::{ClockOffset, TrainArgs};
+use super::clocks;
+use crate::cli::TrainArgs;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
+use crate::jobs::option_of;
 
 /// A run's configuration with what was asked for.
 pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
-    resume::go_on_with(run, &request(args)?).map_err(|error| match error {
-        Error::Contradiction(Contradiction {
-            setting,
-            asked,
-            run,
-        }) => CliError::Contradicts {
-            option: option_of(&setting),
-            asked: typed(asked),
-            run,
-        }
-        .into(),
-        other => other.into(),
-    })
+    Ok(resume::go_on_with(run, &request(args)?)?)
 }
 
 fn request(args: &TrainArgs) -> Result<ResumeRequest> {
@@ -91,50 +78,9 @@ fn request(args: &TrainArgs) -> Result<ResumeRequest> {
         without: without.clone(),
         assignments: set.clone(),
         init: init.clone(),
-        clock: clock_offset.as_ref().map(|offset| match offset {
-            ClockOffset::Auto => ClockAhead::Measured,
-            ClockOffset::Seconds(ahead_s) => ClockAhead::Seconds(*ahead_s),
-        }),
+        clock: clock_offset.map(clocks::ahead),
         topics: topics.iter().map(ToString::to_string).collect(),
     })
-}
-
-/// What is typed to ask for it.
-fn typed(asked: Asked) -> String {
-    match asked {
-        Asked::Value(value) => value,
-        Asked::Learned => "learn".into(),
-        Asked::Measured => "auto".into(),
-        other => other.to_string(),
-    }
-}
-
-/// The option that asks for a setting.
-fn option_of(setting: &Setting) -> String {
-    match setting {
-        Setting::File(path) => return format!("--config {}", path.display()),
-        Setting::Preset => "--preset",
-        Setting::Size => "--size",
-        Setting::Batch => "--batch",
-        Setting::Seed => "--seed",
-        Setting::Learn => "--learn",
-        Setting::Camera => "--camera",
-        Setting::Stereo => "--stereo",
-        Setting::LearnedCamera => "--intrinsics",
-        Setting::ViewMotion => "--view-motion",
-        Setting::With => "--with",
-        Setting::Without => "--without",
-        Setting::Assignment => "--set",
-        Setting::Init => "--init",
-        Setting::Clock => "--clock-offset",
-        Setting::Topic => "--topic",
-        Setting::Data => "--data",
-        Setting::Validation => "--val-data",
-        Setting::Split => "--split",
-        Setting::ValidationSplit => "--val-split",
-        other => return other.to_string(),
-    }
-    .to_owned()
 }
 
 /// Where an error is that one of the run's recordings is not there, one whose hint is the option that says where it is now.

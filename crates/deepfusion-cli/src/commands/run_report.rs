@@ -4,52 +4,12 @@ use std::path::Path;
 
 use deepfusion_eval::verdict::{SpeedRow, Verdict};
 use deepfusion_hint::count_of;
-use deepfusion_jobs::evaluation::Evaluated;
+use deepfusion_jobs::RunHistory;
+use deepfusion_jobs::evaluation::{ChosenImage, Evaluated, Standing};
 use deepfusion_perception::Reliability;
-use deepfusion_render::{HtmlReport, LearningLog, ReliabilityBin, ShownFrame};
-use serde::Deserialize;
+use deepfusion_render::{HtmlReport, ReliabilityBin, ShownFrame};
 
 use crate::failure::Result;
-/// How many of the best and of the worst frames are shown.
-const BEST: usize = 2;
-const WORST: usize = 3;
-
-/// An image of an evaluation, and why it is shown.
-pub(super) struct Choice {
-    /// Its place in [`Evaluated::images`].
-    pub image: usize,
-    /// Whether its clouds are shown, too.
-    pub clouds: bool,
-    /// Why it is shown, what it is called and what it scored.
-    pub title: String,
-}
-
-/// The best frames, the one in the middle (with its clouds) and the worst, by unscaled Abs Rel; none twice.
-pub(super) fn choose(evaluated: &Evaluated) -> Vec<Choice> {
-    let images = &evaluated.images;
-    let error = |i: &usize| images[*i].unscaled.abs_rel;
-    let mut order: Vec<usize> = (0..images.len()).collect();
-    order.sort_by(|a, b| error(a).total_cmp(&error(b)));
-    let n = order.len();
-    let middle = n / 2;
-    let best = (0..BEST.min(middle)).map(|rank| (rank, "Best"));
-    let worst = (n.saturating_sub(WORST).max(middle + 1)..n).map(|rank| (rank, "Worst"));
-    let typical = (n > 0).then_some((middle, "Median"));
-    let ranks = best.chain(typical).chain(worst.rev());
-    ranks
-        .map(|(rank, why)| {
-            let image = &images[order[rank]];
-            Choice {
-                image: order[rank],
-                clouds: why == "Median",
-                title: format!(
-                    "{why}: {}, Abs Rel {:.3} unscaled, {:.3} median-scaled, scale {:.3}",
-                    image.name, image.unscaled.abs_rel, image.median_scaled.abs_rel, image.ratio
-                ),
-            }
-        })
-        .collect()
-}
 
 /// Whether the depth's confidence keeps its promise, on frames that it was not learned from.
 pub(super) fn reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
@@ -189,15 +149,15 @@ pub(super) fn accuracy(page: HtmlReport, evaluated: &Evaluated) -> HtmlReport {
     page
 }
 
-/// Frames with their pictures, each chosen by [`choose`].
-pub(super) fn frames(page: HtmlReport, shown: &[(Choice, ShownFrame)]) -> Result<HtmlReport> {
+/// The best frames, a typical one, with its clouds, and the worst.
+pub(super) fn frames(page: HtmlReport, shown: &[(ChosenImage, ShownFrame)]) -> Result<HtmlReport> {
     let mut page = page.section("Best and worst frames").note(
         "By unscaled Abs Rel. Depth is coloured by the logarithm of metres, warm near and cold far; errors are blue where the \
          prediction is too near, red where it is too far.",
     );
-    for (choice, frame) in shown {
+    for (chosen, frame) in shown {
         page = page.frame(frame)?;
-        if choice.clouds {
+        if chosen.standing == Standing::Median {
             page = page.clouds(frame)?;
         }
     }
@@ -206,40 +166,22 @@ pub(super) fn frames(page: HtmlReport, shown: &[(Choice, ShownFrame)]) -> Result
 
 /// How a run learned, and its settings; nothing of a run that has no log.
 pub(super) fn training(mut page: HtmlReport, run: &Path) -> Result<HtmlReport> {
-    let config = std::fs::read_to_string(run.join("config.toml")).ok();
-    let log = run.join("log.csv");
-    if log.exists() {
-        let log = LearningLog::read(&log)?;
-        let images = config.as_deref().and_then(images_a_step);
+    let history = RunHistory::read(run)?;
+    if let Some(log) = &history.log {
         page = page
             .section("How it learned")
             .note(&format!(
                 "{}; training curves are means over stretches of steps, held out: the samples never trained on.",
                 count_of(log.steps(), "step")
             ))
-            .learning(&log, images);
+            .learning(log, history.images_a_step);
     }
-    if let Some(config) = config {
+    if let Some(settings) = &history.settings {
         page = page
             .section("Settings")
-            .settings("config.toml of the run", &config);
+            .settings("config.toml of the run", settings);
     }
     Ok(page)
-}
-
-/// Images that go through the network in a step, by a run's configuration.
-fn images_a_step(config: &str) -> Option<f64> {
-    #[derive(Deserialize)]
-    struct Batch {
-        batch: f64,
-        #[serde(default = "one")]
-        accumulate: f64,
-    }
-    fn one() -> f64 {
-        1.0
-    }
-    let batch: Batch = toml::from_str(config).ok()?;
-    Some(batch.batch * batch.accumulate)
 }
 
 /// The command that is running, as it could be typed again.
@@ -258,50 +200,4 @@ pub(super) fn command() -> String {
         .chain(words)
         .collect::<Vec<_>>()
         .join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use deepfusion_eval::{Evaluator, Grid, Prediction, Protocol};
-
-    fn evaluated(images: usize) -> Evaluated {
-        let mut evaluator = Evaluator::new(Protocol::default()).unwrap();
-        let truth = Grid::new(2, 1, vec![10.0, 20.0]).unwrap();
-        for i in 0..images {
-            let depth = Grid::new(2, 1, vec![10.0 + i as f64, 20.0]).unwrap();
-            let name = format!("{i}");
-            evaluator
-                .add(&name, &Prediction::Depth(depth), &truth)
-                .unwrap();
-        }
-        Evaluated {
-            report: evaluator.report().unwrap(),
-            images: evaluator.images().to_vec(),
-            points: Vec::new(),
-            places: Vec::new(),
-        }
-    }
-
-    #[test]
-    fn best_median_and_worst_are_shown_once() {
-        for (images, expected) in [
-            (1, vec![0]),
-            (2, vec![0, 1]),
-            (3, vec![0, 1, 2]),
-            (10, vec![0, 1, 5, 9, 8, 7]),
-        ] {
-            let choices = choose(&evaluated(images));
-            let chosen: Vec<usize> = choices.iter().map(|c| c.image).collect();
-            assert_eq!(chosen, expected);
-            assert_eq!(choices.iter().filter(|c| c.clouds).count(), 1);
-        }
-    }
-
-    #[test]
-    fn the_images_of_a_step_are_in_the_configuration() {
-        assert_eq!(images_a_step("batch = 4\naccumulate = 3\n"), Some(12.0));
-        assert_eq!(images_a_step("batch = 4\n"), Some(4.0));
-        assert_eq!(images_a_step("nothing"), None);
-    }
 }

@@ -1,11 +1,8 @@
-use deepfusion_data::Cameras;
-use deepfusion_hint::count_of;
-use deepfusion_jobs::recordings::{camera_word, training_recordings};
-use deepfusion_jobs::training::{Began, Pace, Start};
-use deepfusion_model::{
-    DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder,
-    TrainConfig, ViewMotion,
+use deepfusion_jobs::recordings::training_recordings;
+use deepfusion_jobs::training::{
+    AskedRecordings, Began, Pace, Start, TrainingPlan, leaves_turns_unused,
 };
+use deepfusion_model::{Preset, Reprojection, RunFolder, TrainConfig};
 use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 
 use super::recorder::Recorder;
@@ -16,7 +13,7 @@ use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{clock, say};
-use crate::{devices, interrupt, jobs, output};
+use crate::{devices, interrupt, output};
 
 /// `deepfusion train`.
 pub(super) fn run(args: &TrainArgs) -> Result<()> {
@@ -59,7 +56,7 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
             })?
         }
     };
-    say(&plan(&trainer));
+    say(&TrainingPlan::of(&trainer).to_string());
     if let Some(advice) = unused_turns(&trainer, args) {
         say(&advice);
     }
@@ -99,52 +96,13 @@ fn began_by_default(began: Began) {
 
 /// A preset takes PoseNet's pose because that is how its network was published, and the recordings know better.
 fn unused_turns(trainer: &Trainer, args: &TrainArgs) -> Option<String> {
-    let (config, samples) = (trainer.config(), trainer.samples());
     let by_default = args.view_motion.is_none() && args.config.is_none() && !args.resume;
-    let unused = config.view_motion == ViewMotion::PoseNet && config.loss.speed > 0.0;
-    let known = !samples.samples.is_empty() && samples.without_turns().is_empty();
-    (by_default && unused && known).then(|| {
+    (by_default && leaves_turns_unused(trainer)).then(|| {
         format!(
             "{} warps by PoseNet's pose, as published; these recordings have a yaw rate, and --view-motion auto learns metres in far fewer steps",
-            config.preset
+            trainer.config().preset
         )
     })
-}
-
-/// What will be done: the network, its images, and how many steps and why.
-fn plan(trainer: &Trainer) -> String {
-    let config = trainer.config();
-    let InputSize { width, height } = config.size;
-    let epochs = config.epochs * trainer.epoch_steps();
-    let steps = match config.steps {
-        None if epochs < config.min_steps => format!(
-            "{} (the least: {} epochs of so few images would be {epochs})",
-            count_of(trainer.steps(), "step"),
-            config.epochs
-        ),
-        None => count_of(config.epochs, "epoch"),
-        Some(steps) => count_of(steps, "step"),
-    };
-    let sets = 0..config.data.sets.len().max(1);
-    let learned = |from: fn(Learn) -> bool| sets.clone().any(|set| from(config.learn(set)));
-    let batches = [
-        (learned(Learn::from_motion), config.batch, "of video"),
-        (
-            learned(Learn::from_depth),
-            config.depth_batch(),
-            "of known depth",
-        ),
-    ];
-    let samples = batches
-        .iter()
-        .filter(|(learned, ..)| *learned)
-        .map(|(_, batch, kind)| format!("{} {kind}", batch * config.accumulate));
-    let samples: Vec<String> = samples.collect();
-    format!(
-        "{}: images of {width}x{height}, {} a step, {steps}",
-        config.preset,
-        samples.join(" and ")
-    )
 }
 
 /// Runs a trainer with its logs, to its last step or until it is asked to stop; with a `pace`, how long it will
@@ -213,84 +171,31 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     for assignment in &args.set {
         config.set(assignment)?;
     }
-    choose_recordings(&mut config.data, args)?;
+    asked_recordings(args).replace_in(&mut config.data)?;
     if args.clock_offset == Some(ClockOffset::Auto) {
         // Measured against what the recordings' own files say, and kept in the configuration as a number.
         config.data.camera_ahead_s = None;
         let mut measured = config.clone();
         // Turns of the images would be on the camera's clock.
         measured.data.measured_turns_only = true;
-        let datasets = training_recordings(&measured).map_err(jobs::in_words)?;
+        let datasets = training_recordings(&measured)?;
         let ahead_s = clocks::measured(datasets.iter().map(|(_, dataset)| dataset))?;
         config.data.camera_ahead_s = Some(ahead_s);
     }
     Ok(config)
 }
 
-/// The file's own recordings, each part of which an option replaces where it is given.
-fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), ModelError> {
-    let given = [
-        ("--data", !args.data.is_empty()),
-        ("--val-data", !args.val_data.is_empty()),
-        ("--split", args.split.is_some()),
-        ("--val-split", args.val_split.is_some()),
-        // The sets' own where each has one; else it is the camera of those that have none.
-        (
-            "--camera",
-            args.camera.is_some() && data.sets.iter().any(|set| !set.camera.is_empty()),
-        ),
-        ("--learn", args.learn.is_some()),
-        (
-            "--clock-offset",
-            args.clock_offset.is_some() && data.sets.iter().any(|set| set.camera_ahead_s.is_some()),
-        ),
-        (
-            "--topic",
-            !args.topics.is_empty() && data.sets.iter().any(|set| !set.topics.is_empty()),
-        ),
-    ];
-    for (field, given) in given {
-        if given && !data.sets.is_empty() {
-            return Err(ModelError::Config {
-                field,
-                expected: "none beside [[data.sets]] in the config file: each set has its own"
-                    .into(),
-                found: "both".into(),
-            });
-        }
+/// The recordings that options ask for.
+fn asked_recordings(args: &TrainArgs) -> AskedRecordings {
+    AskedRecordings {
+        paths: args.data.clone(),
+        validation: args.val_data.clone(),
+        split: args.split.clone(),
+        validation_split: args.val_split.clone(),
+        camera: args.camera,
+        stereo: args.stereo,
+        learn: args.learn,
+        clock: args.clock_offset.map(clocks::ahead),
+        topics: args.topics.clone(),
     }
-    if !args.data.is_empty() {
-        data.paths.clone_from(&args.data);
-    }
-    if !args.val_data.is_empty() {
-        data.validation.clone_from(&args.val_data);
-    }
-    if args.split.is_some() {
-        data.split.clone_from(&args.split);
-    }
-    if args.val_split.is_some() {
-        data.validation_split.clone_from(&args.val_split);
-    }
-    if let Some(ClockOffset::Seconds(ahead_s)) = args.clock_offset {
-        data.camera_ahead_s = Some(ahead_s);
-    }
-    if !args.topics.is_empty() {
-        data.topics = args.topics.iter().map(ToString::to_string).collect();
-    }
-    data.learn = args.learn.unwrap_or(data.learn);
-    if let Some(camera) = args.camera {
-        data.camera = camera_word(camera).into();
-    } else if args.stereo {
-        data.camera = camera_word(Cameras::Both).into();
-    } else if data.camera.is_empty() && data.sets.is_empty() {
-        data.camera = camera_word(Cameras::default()).into();
-    }
-    if data.paths.is_empty() && data.sets.is_empty() {
-        return Err(ModelError::Config {
-            field: "data",
-            expected: "--data, or data.paths or [[data.sets]] in the config file".into(),
-            found: "none".into(),
-        });
-    }
-    Ok(())
 }

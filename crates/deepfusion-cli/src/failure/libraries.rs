@@ -5,6 +5,7 @@ use std::path::Path;
 
 use deepfusion_data::{CalibrationSource, DatasetKind};
 use deepfusion_hint::Hint;
+use deepfusion_model::ExpectedSetting;
 
 use super::{Exit, Reportable};
 
@@ -237,6 +238,13 @@ impl Reportable for deepfusion_model::Error {
             Self::PresetAsKey { assignment } => {
                 format!("{assignment}: a preset is chosen with --preset or in the file")
             }
+            Self::Config {
+                field,
+                expected: ExpectedSetting::Recordings,
+                found,
+            } => format!(
+                "setting `{field}`: expected --data, or data.paths or [[data.sets]] in the config file, found {found}"
+            ),
             _ => self.to_string(),
         }
     }
@@ -252,7 +260,7 @@ impl Reportable for deepfusion_model::Error {
             Self::Config { field: "view_motion", .. } => Some(
                 "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
             ),
-            Self::Config { field, .. } => Some(option_of(field)),
+            Self::Config { field, .. } => Some(set_in_file(field)),
             Self::NotResumable { .. } => {
                 Some("start a new run from these weights with --init".into())
             }
@@ -277,7 +285,7 @@ impl Reportable for deepfusion_model::Error {
 }
 
 /// Where a key of the configuration is set.
-fn option_of(field: &str) -> String {
+pub(crate) fn set_in_file(field: &str) -> String {
     format!("set `{field}` so in the config file, or by its option; --help lists them")
 }
 
@@ -386,7 +394,7 @@ impl Reportable for deepfusion_train::Error {
             Self::NoSamples { .. } => self
                 .hint()
                 .map(|hint| format!("{hint}; `deepfusion data inspect` shows what is there")),
-            Self::Precision { .. } => Some(option_of("precision")),
+            Self::Precision { .. } => Some(set_in_file("precision")),
             Self::CameraKnown { .. } => Some(
                 "a camera that is known is better than one that is learned: leave --intrinsics learn out, or this recording".into(),
             ),

@@ -14,6 +14,7 @@ use anstyle::{AnsiColor, Style};
 
 pub(crate) use context::Context;
 pub use findings::in_options;
+pub(crate) use libraries::set_in_file;
 
 /// What a command returns.
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
@@ -202,14 +203,21 @@ mod tests {
         let foreign = Failure::from(foreign);
         assert_eq!(foreign.hint(), None);
         assert!(foreign.general_hint().contains("report"));
-        let config = deepfusion_model::Error::Config {
-            field: "batch",
-            expected: "at least 1".into(),
-            found: "0".into(),
-        };
+        let expected = deepfusion_model::ExpectedSetting::AtLeastOne;
+        let config = deepfusion_model::Error::config("batch", expected, "0".to_owned());
         assert!(Failure::from(config).hint().unwrap().contains("batch"));
-        let images = CliError::NoImages { input: "x".into() };
+        let images = deepfusion_jobs::Error::NoImages { input: "x".into() };
         assert!(Failure::from(images).hint().is_some());
+    }
+
+    #[test]
+    fn recordings_that_are_missing_are_an_option() {
+        use deepfusion_model::{Error, ExpectedSetting, FoundSetting};
+        let error = Error::config("data", ExpectedSetting::Recordings, FoundSetting::Nothing);
+        assert_eq!(
+            Failure::from(error).to_string(),
+            "setting `data`: expected --data, or data.paths or [[data.sets]] in the config file, found none"
+        );
     }
 
     #[test]

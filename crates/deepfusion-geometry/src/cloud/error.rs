@@ -1,8 +1,10 @@
 //! What can go wrong with a cloud or its file.
 
 mod ply;
+mod size;
 
 pub use self::ply::PlyProblem;
+pub use self::size::SizeProblem;
 
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
@@ -39,15 +41,8 @@ pub enum Error {
     #[error("PLY: {0}")]
     Ply(#[from] PlyProblem),
     /// A column, an image or a camera does not fit the points or the depth map.
-    #[error("{what}: {found}, expected {expected}")]
-    Size {
-        /// What has the wrong size.
-        what: &'static str,
-        /// Its size.
-        found: String,
-        /// The size it should have.
-        expected: String,
-    },
+    #[error(transparent)]
+    Size(#[from] SizeProblem),
 }
 
 /// A result with this crate's [`Error`].

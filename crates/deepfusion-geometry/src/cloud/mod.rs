@@ -9,5 +9,5 @@ mod pcd;
 mod ply;
 mod point_cloud;
 
-pub use error::{Error, PlyProblem, Result};
+pub use error::{Error, PlyProblem, Result, SizeProblem};
 pub use point_cloud::PointCloud;

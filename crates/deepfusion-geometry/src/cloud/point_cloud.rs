@@ -1,4 +1,4 @@
-use super::{Error, Result};
+use super::{Result, SizeProblem};
 use crate::{DepthMap, Intrinsics};
 
 /// Points and their attributes, column by column. Every column present has one entry per point.
@@ -25,7 +25,7 @@ impl PointCloud {
     /// `rgb` is the image of the same size, H×W×3 bytes.
     ///
     /// # Errors
-    /// [`Error::Size`] where the camera's or the image's size is not the depth map's.
+    /// [`Error::Size`](super::Error::Size) where the camera's or the image's size is not the depth map's.
     pub fn from_depth(
         depth: &DepthMap,
         k: &Intrinsics,
@@ -42,7 +42,7 @@ impl PointCloud {
     /// the pixels. Disparities that are not positive give no point.
     ///
     /// # Errors
-    /// [`Error::Size`] where the disparity's or the image's size is not the camera's.
+    /// [`Error::Size`](super::Error::Size) where the disparity's or the image's size is not the camera's.
     pub fn from_disparity(
         disparity: &[f32],
         k: &Intrinsics,
@@ -80,7 +80,7 @@ impl PointCloud {
     /// Checks that every column present has one entry per point.
     ///
     /// # Errors
-    /// [`Error::Size`], naming the column.
+    /// [`Error::Size`](super::Error::Size), naming the column.
     pub fn check(&self) -> Result<()> {
         let columns = [
             ("rgb", self.rgb.as_ref().map(Vec::len)),
@@ -92,13 +92,15 @@ impl PointCloud {
             ("confidence", self.confidence.as_ref().map(Vec::len)),
             ("sigma", self.sigma.as_ref().map(Vec::len)),
         ];
-        for (what, len) in columns {
-            if let Some(len) = len.filter(|len| *len != self.len()) {
-                return Err(Error::Size {
-                    what,
-                    found: format!("{len} entries"),
-                    expected: format!("one a point, {}", self.len()),
-                });
+        let points = self.len();
+        for (column, entries) in columns {
+            if let Some(entries) = entries.filter(|entries| *entries != points) {
+                let problem = SizeProblem::Column {
+                    column,
+                    entries,
+                    points,
+                };
+                return Err(problem.into());
             }
         }
         Ok(())
@@ -111,28 +113,19 @@ fn check_sizes(
     k: &Intrinsics,
     rgb: Option<&[u8]>,
 ) -> Result<()> {
-    if (k.width as usize, k.height as usize) != (width, height) {
-        return Err(Error::Size {
-            what: "camera intrinsics",
-            found: format!("{}x{}", k.width, k.height),
-            expected: format!("the depth map's {width}x{height}"),
-        });
+    let map = (width, height);
+    if (k.width as usize, k.height as usize) != map {
+        let camera = (k.width, k.height);
+        return Err(SizeProblem::Camera { camera, map }.into());
     }
     if values != width * height {
-        return Err(Error::Size {
-            what: "depth or disparity",
-            found: format!("{values} values"),
-            expected: format!("{} ({width}x{height})", width * height),
-        });
+        return Err(SizeProblem::Values { values, map }.into());
     }
     if let Some(bytes) = rgb
         && bytes.len() != width * height * 3
     {
-        return Err(Error::Size {
-            what: "colour image",
-            found: format!("{} bytes", bytes.len()),
-            expected: format!("{} ({width}x{height}x3)", width * height * 3),
-        });
+        let bytes = bytes.len();
+        return Err(SizeProblem::Colours { bytes, map }.into());
     }
     Ok(())
 }

@@ -22,7 +22,7 @@ pub use committer::{Written, commit, queue};
 pub use loader::{ImageLoader, LoadedImage};
 pub use manifest::{Entry, Lock, Manifest, State};
 pub use progress::{BulkProgress, Summary};
-pub use records::{RecordLines, record_line, record_path, write_record};
+pub use records::{RecordLines, record_line, record_lines_path, record_path, write_record};
 pub use resume::{BulkJob, StartedJob};
 pub use shard::Shard;
 pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};

@@ -13,6 +13,12 @@ pub fn record_path(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}_targets.json"))
 }
 
+/// Where the records of all frames lie, a line each.
+#[must_use]
+pub fn record_lines_path(folder: &Path) -> PathBuf {
+    folder.join("targets.jsonl")
+}
+
 /// A frame's record as one line.
 ///
 /// # Errors

@@ -1,33 +1,40 @@
 //! Evaluating predictions on recordings with ground truth, or on files of arrays.
 
+mod chosen_images;
 mod comparison;
 pub mod confidence;
 mod coverage;
 mod division;
 mod known_pixels;
 mod model_sheet;
+mod saved;
+mod shown_images;
 mod truth;
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage, ground_truth_names};
 use deepfusion_eval::{
     ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, MeanDepthBaseline, PostProcess,
-    Prediction, Protocol, Report, Sample, match_names,
+    Prediction, Protocol, Report, Sample, match_names, points_csv,
 };
 use deepfusion_geometry::Intrinsics;
 use deepfusion_runtime::{Augmentation, DepthEstimator};
 
-use crate::{Error, Result};
+use crate::{Error, Result, files};
 
+pub use self::chosen_images::{ChosenImage, Standing, chosen_images};
 pub use self::comparison::Comparison;
 pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
 pub use self::division::{Division, divide};
 pub use self::known_pixels::known_pixels;
 pub use self::model_sheet::ModelSheet;
+pub use self::saved::EvaluationRequest;
+pub use self::shown_images::{shown_of_arrays, shown_of_datasets};
 pub use self::truth::{
     Truth, array_places, baseline_from_arrays, baseline_from_datasets, baseline_from_training,
-    depth_map,
+    depth_map, has_truth,
 };
 
 /// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
@@ -55,6 +62,18 @@ pub struct Evaluated {
     pub points: Vec<DrawnPoint>,
     /// Where each image is.
     pub places: Vec<ImageRef>,
+}
+
+impl Evaluated {
+    /// Writes the drawn points as a table, a line each.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_points(&self, path: &Path) -> Result<()> {
+        let in_space = self.report.points.as_ref().is_some_and(|p| p.in_space);
+        let text = points_csv(&self.points, &self.images, in_space)?;
+        Ok(files::write(path, text)?)
+    }
 }
 
 /// The looks that a way of post-processing takes.
@@ -98,6 +117,23 @@ pub fn predict_by(
     let prediction = estimator.infer(&prepared)?;
     let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
     Ok(Prediction::Disparity(grid))
+}
+
+/// An image of a recording, and its disparity as [`predict_by`] gives it.
+///
+/// # Errors
+/// An image that cannot be read, and what [`predict_by`] says.
+pub fn predict_frame(
+    estimator: &mut DepthEstimator,
+    dataset: &Dataset,
+    frame: usize,
+    focal_correction: bool,
+    how: Option<PostProcess>,
+) -> Result<(RgbImage, Prediction)> {
+    let image = dataset.load_image(frame)?;
+    let camera = dataset.intrinsics(frame);
+    let prediction = predict_by(estimator, &image, &camera, focal_correction, how)?;
+    Ok((image, prediction))
 }
 
 /// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth; `progress` takes the frames done

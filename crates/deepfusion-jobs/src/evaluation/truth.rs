@@ -40,6 +40,15 @@ impl Truth {
     }
 }
 
+/// Whether recordings have ground truth of a kind, of any of their selected frames.
+#[must_use]
+pub fn has_truth(datasets: &[Dataset], kind: GtKind) -> bool {
+    datasets.iter().any(|dataset| {
+        let mut frames = dataset.selected().iter();
+        frames.any(|frame| dataset.has_ground_truth(*frame, kind))
+    })
+}
+
 /// The mean-depth baseline's scans: all of the given (training) recordings'.
 ///
 /// # Errors

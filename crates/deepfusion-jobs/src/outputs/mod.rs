@@ -7,9 +7,11 @@ mod depth;
 mod features;
 mod is_output;
 mod targets;
+mod unwritten;
 mod writer;
 
 pub use depth::{CloudLimits, DepthOutput, DepthOutputs};
 pub use is_output::is_output;
 pub use targets::{Drawing, TargetOutput, TargetScene, draw};
+pub use unwritten::require_unwritten;
 pub use writer::{DepthWriter, SeenDepth};

@@ -1,12 +1,17 @@
-//! Training runs around the trainer: what they start from, what they leave to be looked at, and the two that train more than once.
+//! Training runs around the trainer: what they learn from and start from, what they will do, what they leave to be looked at, and the two that
+//! train more than once.
 
 pub mod ablation;
 pub mod adaptation;
+mod asked_recordings;
+mod plan;
 pub mod resume;
 mod run_log;
 mod start;
 mod time_estimate;
 
+pub use asked_recordings::AskedRecordings;
+pub use plan::{RunLength, TrainingPlan, leaves_turns_unused};
 pub use run_log::RunLog;
 pub use start::{Began, Start};
 pub use time_estimate::{Choice, Pace, TimeEstimate};

@@ -1,7 +1,6 @@
 //! What may be asked of a run that goes on, and what contradicts it.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Cameras;
@@ -10,6 +9,8 @@ use deepfusion_model::{InputSize, Learn, Preset, TrainConfig, ViewMotion};
 use super::Start;
 use crate::recordings::camera_word;
 use crate::{Error, Result};
+
+pub use crate::error::{Asked, Contradiction, RunHas, Setting};
 
 /// What is asked of a run that goes on. It may be made longer, and its recordings may have moved; all else must be as the run has it, so
 /// that nothing is asked for in vain.
@@ -75,151 +76,6 @@ pub enum ClockAhead {
     Measured,
     /// Seconds.
     Seconds(f64),
-}
-
-/// A setting that something asked for.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Setting {
-    /// A configuration file.
-    File(PathBuf),
-    /// [`ResumeRequest::preset`].
-    Preset,
-    /// [`ResumeRequest::size`].
-    Size,
-    /// [`ResumeRequest::batch`].
-    Batch,
-    /// [`ResumeRequest::seed`].
-    Seed,
-    /// [`ResumeRequest::learn`].
-    Learn,
-    /// [`ResumeRequest::camera`].
-    Camera,
-    /// [`ResumeRequest::stereo`].
-    Stereo,
-    /// [`ResumeRequest::learned_camera`].
-    LearnedCamera,
-    /// [`ResumeRequest::view_motion`].
-    ViewMotion,
-    /// [`ResumeRequest::with`].
-    With,
-    /// [`ResumeRequest::without`].
-    Without,
-    /// [`ResumeRequest::assignments`].
-    Assignment,
-    /// [`ResumeRequest::init`].
-    Init,
-    /// [`ResumeRequest::clock`].
-    Clock,
-    /// [`ResumeRequest::topics`].
-    Topic,
-    /// [`MovedRecordings::data`].
-    Data,
-    /// [`MovedRecordings::validation`].
-    Validation,
-    /// [`MovedRecordings::split`].
-    Split,
-    /// [`MovedRecordings::validation_split`].
-    ValidationSplit,
-    /// A data set's own recordings and splits.
-    DataSet,
-}
-
-impl fmt::Display for Setting {
-    /// The key of a configuration, or the file.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::File(path) => return write!(f, "{}", path.display()),
-            Self::Preset => "preset",
-            Self::Size => "size",
-            Self::Batch => "batch",
-            Self::Seed => "seed",
-            Self::Learn => "data.learn",
-            Self::Camera => "data.camera",
-            Self::Stereo => "stereo",
-            Self::LearnedCamera => "assumed_camera.learn",
-            Self::ViewMotion => "view_motion",
-            Self::With | Self::Without => "loss",
-            Self::Assignment => "config.toml",
-            Self::Init => "init",
-            Self::Clock => "data.camera_ahead_s",
-            Self::Topic => "data.topics",
-            Self::Data => "data.paths",
-            Self::Validation => "data.validation",
-            Self::Split => "data.split",
-            Self::ValidationSplit => "data.validation_split",
-            Self::DataSet => "data.sets",
-        })
-    }
-}
-
-/// Something that is asked of a run and is not what it has.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{setting}: {asked} contradicts the run, which {run}")]
-pub struct Contradiction {
-    /// What was to be set.
-    pub setting: Setting,
-    /// To what.
-    pub asked: Asked,
-    /// What the run has.
-    pub run: RunHas,
-}
-
-/// What is asked for.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Asked {
-    /// This.
-    #[error("{0}")]
-    Value(String),
-    /// The other camera's view.
-    #[error("on")]
-    OtherCamera,
-    /// That the camera is learned.
-    #[error("to be learned")]
-    Learned,
-    /// That the clocks are compared.
-    #[error("to be measured")]
-    Measured,
-}
-
-impl From<String> for Asked {
-    fn from(value: String) -> Self {
-        Self::Value(value)
-    }
-}
-
-/// What a run has instead of what is asked for, in words that follow on "which".
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RunHas {
-    /// This.
-    #[error("has {0}")]
-    Value(String),
-    /// Nothing of the kind.
-    #[error("has none")]
-    Nothing,
-    /// It is switched off.
-    #[error("has it off")]
-    Off,
-    /// The term is not among its own.
-    #[error("is learned without it")]
-    WithoutIt,
-    /// The term is among its own.
-    #[error("is learned with it")]
-    WithIt,
-    /// The key has another value.
-    #[error("has another value in its config.toml")]
-    AnotherValue,
-    /// It names no topic.
-    #[error("names none")]
-    NoTopics,
-    /// It is validated on frames of its own drives.
-    #[error("is validated on the held-out end of each drive")]
-    HeldOutEnd,
-    /// Each of its data sets has its own.
-    #[error("has the data.sets of its config.toml, each with its own")]
-    OwnOfEachSet,
 }
 
 /// A run's configuration with what is asked of it.

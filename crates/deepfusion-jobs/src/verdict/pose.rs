@@ -24,7 +24,8 @@ pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
 }
 
 /// PoseNet's way from each frame that [`super::verdict`] looks at to the one before, against the vehicle's, by speed. Nothing of recordings with
-/// another focal length than the one trained with; for networks of which [`pose_net_is_metric`] holds.
+/// another focal length than the one trained with, nor of an imported PoseNet, whose unit is not known; for networks of which
+/// [`pose_net_is_metric`] holds.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -34,6 +35,9 @@ pub fn pose_speeds(
     unseen: &Unseen,
     options: &VerdictOptions,
 ) -> Result<Vec<SpeedRow>> {
+    if predictor.step == 0 {
+        return Ok(Vec::new());
+    }
     let mut logs = Vec::new();
     let targets = plan(datasets, unseen, options.blocks);
     for block in &targets.blocks {

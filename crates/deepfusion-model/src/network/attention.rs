@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NetworkError;
+use super::{ExpectedNetworkSetting as Expected, NetworkError};
 
 /// How the masks act on the feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -54,7 +54,7 @@ impl AttentionConfig {
             let found = self.reduction;
             return Err(NetworkError::config(
                 "attention.reduction",
-                "1 to 1024",
+                Expected::UpTo(1024),
                 found,
             ));
         }
@@ -62,7 +62,7 @@ impl AttentionConfig {
             let found = self.kernel;
             return Err(NetworkError::config(
                 "attention.kernel",
-                "odd, at most 15",
+                Expected::OddUpTo(15),
                 found,
             ));
         }

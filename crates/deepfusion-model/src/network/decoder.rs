@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NetworkError;
+use super::{ExpectedNetworkSetting as Expected, NetworkError};
 
 /// What a `DisparityDecoder` is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -29,7 +29,7 @@ impl DecoderConfig {
         if self.widths.iter().any(|width| !(1..=4096).contains(width)) {
             return Err(NetworkError::config(
                 "decoder.widths",
-                "five widths of 1 to 4096",
+                Expected::FiveWidths,
                 self.widths,
             ));
         }

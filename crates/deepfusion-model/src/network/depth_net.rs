@@ -5,8 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionConfig, DecoderConfig, DispNetConfig, HceConfig, InputNormalisation, LiteMonoConfig,
-    LiteMonoSize, NetworkError, RMsfmConfig, ResNetConfig, ResNetDepth,
+    AttentionConfig, DecoderConfig, DispNetConfig, ExpectedNetworkSetting as Expected, HceConfig,
+    InputNormalisation, LiteMonoConfig, LiteMonoSize, NetworkError, RMsfmConfig, ResNetConfig,
+    ResNetDepth,
 };
 
 /// ln b is held within these, in learning and in a prediction: errors of ln depth between 0.25 % and a factor of 7.
@@ -249,7 +250,7 @@ impl DepthNetConfig {
             None => Ok(()),
             Some((field, _)) => Err(NetworkError::config(
                 field,
-                "left as it is where there is a lite_mono, an r_msfm or a disp_net, which do not read it",
+                Expected::NotRead,
                 "another value",
             )),
         }
@@ -258,7 +259,7 @@ impl DepthNetConfig {
     fn validate_r_msfm(&self, r_msfm: &RMsfmConfig) -> Result<(), NetworkError> {
         r_msfm.validate()?;
         let refused = |field, found: &str| {
-            let expected = "absent where there is an r_msfm";
+            let expected = Expected::NotBesideRMsfm;
             Err(NetworkError::config(field, expected, found.to_owned()))
         };
         if self.lite_mono.is_some() {
@@ -281,7 +282,7 @@ impl DepthNetConfig {
             None => Ok(()),
             Some((field, _)) => Err(NetworkError::config(
                 field,
-                "absent where there is a disp_net",
+                Expected::NotBesideDispNet,
                 "another network",
             )),
         }
@@ -311,7 +312,7 @@ impl DepthNetConfig {
         if self.encoder.frames != 1 {
             return Err(NetworkError::config(
                 "encoder.frames",
-                "1 (a depth network sees one image)",
+                Expected::OneImage,
                 self.encoder.frames,
             ));
         }
@@ -319,14 +320,14 @@ impl DepthNetConfig {
         if !(min_m > 0.0 && max_m > min_m && max_m.is_finite()) {
             return Err(NetworkError::config(
                 "range",
-                "0 < min_m < max_m, finite",
+                Expected::DepthRange,
                 self.range,
             ));
         }
         match self.initial_depth_m {
             Some(depth) if !(depth > min_m && depth < max_m) => Err(NetworkError::config(
                 "initial_depth_m",
-                format!("between {min_m} and {max_m} m, the ends of the range"),
+                Expected::InRange { min_m, max_m },
                 depth,
             )),
             _ => Ok(()),

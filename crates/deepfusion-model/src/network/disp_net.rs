@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{InputSize, NetworkError};
+use super::{ExpectedNetworkSetting as Expected, InputSize, NetworkError};
 
 /// How often the image is halved, and enlarged again.
 pub const DISP_NET_LEVELS: usize = 7;
@@ -49,7 +49,7 @@ impl DispNetConfig {
         }
         Err(NetworkError::config(
             "disp_net.base_width",
-            "an even number, 2 to 256",
+            Expected::EvenUpTo(256),
             width,
         ))
     }

@@ -3,6 +3,10 @@ use std::path::PathBuf;
 
 use crate::weights::FormatProblem;
 
+mod expected;
+
+pub use self::expected::ExpectedNetworkSetting;
+
 /// What can go wrong when a network is configured, or when weights are read, written or fitted
 /// into a network.
 #[derive(Debug, thiserror::Error)]
@@ -14,7 +18,7 @@ pub enum NetworkError {
         /// The field's dotted name, such as `encoder.base_width`.
         field: &'static str,
         /// What would have been accepted.
-        expected: String,
+        expected: ExpectedNetworkSetting,
         /// The value found.
         found: String,
     },
@@ -181,12 +185,12 @@ pub enum ArchitectureProblem {
 impl NetworkError {
     pub(crate) fn config(
         field: &'static str,
-        expected: impl Into<String>,
+        expected: ExpectedNetworkSetting,
         found: impl std::fmt::Debug,
     ) -> Self {
         Self::Config {
             field,
-            expected: expected.into(),
+            expected,
             found: format!("{found:?}"),
         }
     }

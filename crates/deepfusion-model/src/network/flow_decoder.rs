@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NetworkError;
+use super::{ExpectedNetworkSetting as Expected, NetworkError};
 
 /// What a `FlowDecoder` is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -35,19 +35,19 @@ impl FlowDecoderConfig {
         if !(1..=16).contains(&self.radius) {
             return Err(NetworkError::config(
                 "flow_decoder.radius",
-                "1 to 16",
+                Expected::UpTo(16),
                 self.radius,
             ));
         }
         if !(1..=1024).contains(&self.feature_width) {
             let (field, found) = ("flow_decoder.feature_width", self.feature_width);
-            return Err(NetworkError::config(field, "1 to 1024", found));
+            return Err(NetworkError::config(field, Expected::UpTo(1024), found));
         }
         let fits = |width: &usize| (1..=4096).contains(width);
         if self.widths.is_empty() || !self.widths.iter().all(fits) {
             return Err(NetworkError::config(
                 "flow_decoder.widths",
-                "one width or more, of 1 to 4096",
+                Expected::OneWidth,
                 &self.widths,
             ));
         }

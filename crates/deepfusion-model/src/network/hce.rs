@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NetworkError;
+use super::{ExpectedNetworkSetting as Expected, NetworkError};
 
 /// What a `HierarchicalContext` is built from.
 ///
@@ -51,20 +51,20 @@ impl HceConfig {
         let in_range = |rate: &usize| (1..=64).contains(rate);
         if self.rates.len() > 8 || !self.rates.iter().all(in_range) {
             let found = &self.rates;
-            return Err(NetworkError::config(
-                "hce.rates",
-                "up to eight rates of 1 to 64",
-                found,
-            ));
+            return Err(NetworkError::config("hce.rates", Expected::Rates, found));
         }
         if !(1..=64).contains(&self.width_divisor) {
             let found = self.width_divisor;
-            return Err(NetworkError::config("hce.width_divisor", "1 to 64", found));
+            return Err(NetworkError::config(
+                "hce.width_divisor",
+                Expected::UpTo(64),
+                found,
+            ));
         }
         if !(1..=1024).contains(&self.min_width) {
             return Err(NetworkError::config(
                 "hce.min_width",
-                "1 to 1024",
+                Expected::UpTo(1024),
                 self.min_width,
             ));
         }

@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NetworkError;
+use super::{ExpectedNetworkSetting as Expected, NetworkError};
 
 /// ε of Lite-Mono's layer normalisations.
 pub const LAYER_NORM_EPSILON: f64 = 1e-6;
@@ -107,7 +107,7 @@ impl LiteMonoConfig {
         if !(1..=64).contains(&self.heads) {
             return Err(NetworkError::config(
                 "lite_mono.heads",
-                "1 to 64",
+                Expected::UpTo(64),
                 self.heads,
             ));
         }
@@ -117,10 +117,7 @@ impl LiteMonoConfig {
         if !self.widths.iter().all(whole) {
             return Err(NetworkError::config(
                 "lite_mono.widths",
-                format!(
-                    "three even widths of 2 to 2048, multiples of the {} heads",
-                    self.heads
-                ),
+                Expected::WidthsOfHeads { heads: self.heads },
                 self.widths,
             ));
         }
@@ -129,14 +126,14 @@ impl LiteMonoConfig {
         if !self.dilations.iter().all(fits) {
             return Err(NetworkError::config(
                 "lite_mono.dilations",
-                "for each of three stages up to 64 rates of 1 to 64",
+                Expected::RatesOfStages,
                 &self.dilations,
             ));
         }
         if !(1..=16).contains(&self.expansion) {
             return Err(NetworkError::config(
                 "lite_mono.expansion",
-                "1 to 16",
+                Expected::UpTo(16),
                 self.expansion,
             ));
         }

@@ -21,7 +21,7 @@ pub use cost::ModuleCost;
 pub use decoder::DecoderConfig;
 pub use depth_net::{DepthNetConfig, DepthScale, InputSize, LOG_SCALE_BOUNDS, UNCERTAINTY_PREFIX};
 pub use disp_net::{DISP_NET_DISPARITY, DISP_NET_KERNELS, DISP_NET_LEVELS, DispNetConfig};
-pub use error::{ArchitectureProblem, NetworkError};
+pub use error::{ArchitectureProblem, ExpectedNetworkSetting, NetworkError};
 pub use flow_decoder::FlowDecoderConfig;
 pub use hce::HceConfig;
 pub use lite_mono::{LAYER_NORM_EPSILON, LiteMonoConfig, LiteMonoSize, POSITION_CHANNELS};

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{InputNormalisation, NetworkError, ResNetConfig, ResNetDepth};
+use super::{
+    ExpectedNetworkSetting as Expected, InputNormalisation, NetworkError, ResNetConfig, ResNetDepth,
+};
 
 /// Channels between the layers of the pose decoder.
 pub const POSE_WIDTH: usize = 256;
@@ -71,24 +73,28 @@ impl PoseNetConfig {
         if self.encoder.frames < 2 {
             return Err(NetworkError::config(
                 "pose.encoder.frames",
-                "2 (a pose network sees a pair)",
+                Expected::Pair,
                 self.encoder.frames,
             ));
         }
         if self.explainability && self.encoder.is_dilated() {
             return Err(NetworkError::config(
                 "pose.encoder.output_stride",
-                "32 where explainability is on",
+                Expected::StrideOfMasks,
                 self.encoder.output_stride,
             ));
         }
         if !(1..=16).contains(&self.poses) {
-            return Err(NetworkError::config("pose.poses", "1 to 16", self.poses));
+            return Err(NetworkError::config(
+                "pose.poses",
+                Expected::UpTo(16),
+                self.poses,
+            ));
         }
         if !(self.metres_per_unit > 0.0 && self.metres_per_unit.is_finite()) {
             return Err(NetworkError::config(
                 "pose.metres_per_unit",
-                "a positive number of metres",
+                Expected::Metres,
                 self.metres_per_unit,
             ));
         }

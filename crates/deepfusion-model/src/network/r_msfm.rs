@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{InputSize, NetworkError};
+use super::{ExpectedNetworkSetting as Expected, InputSize, NetworkError};
 
 /// Channels of what the features become before they refine the disparity, and of the gated unit's state.
 pub const R_MSFM_STATE: usize = 128;
@@ -37,7 +37,7 @@ impl RMsfmConfig {
         }
         Err(NetworkError::config(
             "r_msfm.iterations",
-            "3 or 6",
+            Expected::Either(3, 6),
             self.iterations,
         ))
     }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NetworkError;
+use super::{ExpectedNetworkSetting as Expected, NetworkError};
 
 /// ε of every batch normalisation, PyTorch's default.
 pub const BATCH_NORM_EPSILON: f64 = 1e-5;
@@ -209,14 +209,14 @@ impl ResNetConfig {
         if !(1..=1024).contains(&self.base_width) {
             return Err(NetworkError::config(
                 "encoder.base_width",
-                "1 to 1024",
+                Expected::UpTo(1024),
                 self.base_width,
             ));
         }
         if !(1..=16).contains(&self.frames) {
             return Err(NetworkError::config(
                 "encoder.frames",
-                "1 to 16",
+                Expected::UpTo(16),
                 self.frames,
             ));
         }
@@ -224,7 +224,7 @@ impl ResNetConfig {
             let found = self.output_stride;
             return Err(NetworkError::config(
                 "encoder.output_stride",
-                "16 or 32",
+                Expected::Either(16, 32),
                 found,
             ));
         }
@@ -232,7 +232,7 @@ impl ResNetConfig {
             let found = self.multi_grid;
             return Err(NetworkError::config(
                 "encoder.multi_grid",
-                "three factors of 1 to 16",
+                Expected::MultiGrid,
                 found,
             ));
         }

@@ -4,7 +4,7 @@ use deepfusion_geometry::{HFOV_DEG, Intrinsics};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, TrainConfig};
+use crate::{Error, ExpectedSetting, TrainConfig};
 
 /// The camera of recordings of which nothing says it, and whether its focal length is learned: the last resort. Absent: such
 /// recordings are an error. The principal point is the middle of the images, and stays there.
@@ -69,24 +69,24 @@ impl AssumedCamera {
     /// # Errors
     /// [`Error::Config`] naming the first value that means nothing.
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        let fail = |field, expected: String, found: f64| {
-            Err(Error::Config {
-                field,
-                expected,
-                found: found.to_string(),
-            })
+        let fail = |field, expected: ExpectedSetting, found: f64| {
+            Err(Error::config(field, expected, found.to_string()))
         };
         let (least, most) = HFOV_DEG;
         if !(self.hfov_deg > least && self.hfov_deg < most) {
-            let expected = format!("above {least} and below {most} degrees");
+            let expected = ExpectedSetting::Degrees {
+                above: least,
+                below: most,
+            };
             return fail("assumed_camera.hfov_deg", expected, self.hfov_deg);
         }
         if !(0.2..=5.0).contains(&self.aspect) {
-            return fail("assumed_camera.aspect", "0.2 to 5".into(), self.aspect);
+            let expected = ExpectedSetting::Within { from: 0.2, to: 5.0 };
+            return fail("assumed_camera.aspect", expected, self.aspect);
         }
         let rate = self.learning_rate;
         if !(rate > 0.0 && rate <= 0.1) {
-            let expected = "above 0, at most 0.1".into();
+            let expected = ExpectedSetting::AboveZeroUpTo(0.1);
             return fail("assumed_camera.learning_rate", expected, rate);
         }
         Ok(())

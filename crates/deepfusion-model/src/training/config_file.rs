@@ -1,6 +1,6 @@
 //! Configurations as people write them: a whole file, some keys over a preset, or one key on the command line.
 
-use crate::{Compute, Error, Preset, SettingProblem, TrainConfig, TrainFindings};
+use crate::{Compute, Error, ExpectedSetting, Preset, SettingProblem, TrainConfig, TrainFindings};
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -103,11 +103,7 @@ fn parsed(text: &str) -> Value {
 }
 
 fn table_of(config: &TrainConfig) -> Result<Table, Error> {
-    Table::try_from(config).map_err(|e| Error::Config {
-        field: "config",
-        expected: "values that TOML can hold".into(),
-        found: e.to_string(),
-    })
+    Table::try_from(config).map_err(|e| Error::config("config", ExpectedSetting::TomlValues, e))
 }
 
 fn merge(base: &mut Table, over: Table) {

@@ -1,6 +1,6 @@
 //! Several data sets in one run, each with its own cameras, range of depths and unit of displacement.
 
-use crate::{Error, TrainConfig};
+use crate::{AskedBy, Error, ExpectedDataSet, ExpectedSetting, FoundSetting, TrainConfig};
 use deepfusion_geometry::{DepthRange, Intrinsics};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -180,6 +180,49 @@ impl DataSetConfig {
     pub fn validates(&self) -> bool {
         !self.validation.is_empty() || self.validation_split.is_some()
     }
+
+    /// What simulated views can be, and be beside.
+    fn validate_simulated(&self, simulated: &SimulatedConfig) -> Result<(), Error> {
+        let set = || self.name.clone();
+        if self.learn != Learn::Depth {
+            let found = FoundSetting::AnotherIn { set: set() };
+            return Err(Error::config(
+                "data.sets.learn",
+                AskedBy::NoNeighbours,
+                found,
+            ));
+        }
+        if !self.paths.is_empty() || self.validates() {
+            let found = FoundSetting::SomethingIn { set: set() };
+            return Err(Error::config(
+                "data.sets.paths",
+                AskedBy::SimulatedViews,
+                found,
+            ));
+        }
+        for (field, count) in [
+            ("data.sets.simulated.views", simulated.views),
+            (
+                "data.sets.simulated.views_per_world",
+                simulated.views_per_world,
+            ),
+        ] {
+            if count == 0 {
+                let expected = ExpectedSetting::AtLeastOne;
+                return Err(Error::config(field, expected, count.to_string()));
+            }
+        }
+        for (field, share) in [
+            ("data.sets.simulated.plain", simulated.plain),
+            ("data.sets.simulated.hills", simulated.hills),
+        ] {
+            if !(0.0..=1.0).contains(&share) {
+                let expected = ExpectedSetting::Within { from: 0.0, to: 1.0 };
+                return Err(Error::config(field, expected, share.to_string()));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl TrainConfig {
@@ -220,18 +263,15 @@ impl TrainConfig {
     /// # Errors
     /// [`Error::DataSet`] where the run has several sets and none is named, or none of that name.
     pub fn for_set(mut self, name: Option<&str>) -> Result<Self, Error> {
-        let names = || -> Vec<&str> { self.data.sets.iter().map(|s| s.name.as_str()).collect() };
         if self.data.sets.is_empty() && name.is_none() {
             return Ok(self);
         }
         let Some(set) = self.set_meant(name).cloned() else {
-            let expected = match names().as_slice() {
-                [] => "none: this run learned from one data set".to_owned(),
-                [only] => format!("{only}, the only one that this run learned from, or none"),
-                names => format!(
-                    "one of {}, as this run learned from several data sets and metres are each one's own",
-                    names.join(", ")
-                ),
+            let mut names: Vec<String> = self.data.sets.iter().map(|s| s.name.clone()).collect();
+            let expected = match names.len() {
+                0 => ExpectedDataSet::NoSets,
+                1 => ExpectedDataSet::Only(names.remove(0)),
+                _ => ExpectedDataSet::OneOf(names),
             };
             return Err(Error::DataSet {
                 expected,
@@ -247,29 +287,22 @@ impl TrainConfig {
     /// [`Error::Config`] naming the first set that means nothing.
     pub(crate) fn validate_sets(&self) -> Result<(), Error> {
         let sets = &self.data.sets;
-        let fail = |field, expected: &str, found: String| {
-            Err(Error::Config {
-                field,
-                expected: expected.into(),
-                found,
-            })
+        let fail = |field, expected: ExpectedSetting, found: FoundSetting| {
+            Err(Error::config(field, expected, found))
         };
         let aheads = sets.iter().filter_map(|s| s.camera_ahead_s);
         for ahead in aheads.chain(self.data.camera_ahead_s) {
             if !ahead.is_finite() {
-                return fail(
-                    "data.camera_ahead_s",
-                    "a time in seconds",
-                    ahead.to_string(),
-                );
+                let found = ahead.to_string().into();
+                return fail("data.camera_ahead_s", ExpectedSetting::Seconds, found);
             }
         }
         let splits = self.data.split.iter().chain(&self.data.validation_split);
         let own = self.data.paths.iter().chain(&self.data.validation);
         let beside = own.chain(splits).next();
         if !sets.is_empty() && beside.is_some() {
-            let expected = "none beside data.sets: each set has its own";
-            return fail("data.paths", expected, "some".into());
+            let expected = AskedBy::DataSets.into();
+            return fail("data.paths", expected, FoundSetting::Something);
         }
         let recorded = || sets.iter().filter(|s| s.simulated.is_none());
         let (validated, all) = (
@@ -277,60 +310,40 @@ impl TrainConfig {
             recorded().count(),
         );
         if validated != 0 && validated != all {
-            let found = format!("{validated} of {all} sets");
-            return fail(
-                "data.sets.validation",
-                "given for all sets or for none",
-                found,
-            );
+            let found = FoundSetting::SomeSets {
+                with: validated,
+                of: all,
+            };
+            let expected = ExpectedSetting::AllSetsOrNone;
+            return fail("data.sets.validation", expected, found);
         }
         for (i, set) in sets.iter().enumerate() {
             if set.name.is_empty() || sets[..i].iter().any(|s| s.name == set.name) {
-                let found = format!("'{}'", set.name);
-                return fail("data.sets.name", "a name of its own", found);
+                let found = format!("'{}'", set.name).into();
+                return fail("data.sets.name", ExpectedSetting::OwnName, found);
             }
             if let Some(simulated) = &set.simulated {
-                if set.learn != Learn::Depth {
-                    let found = format!("another in {}", set.name);
-                    let expected = "\"depth\" for simulated views, which have no neighbours";
-                    return fail("data.sets.learn", expected, found);
-                }
-                if !set.paths.is_empty() || set.validates() {
-                    let found = format!("some in {}", set.name);
-                    return fail("data.sets.paths", "none beside simulated views", found);
-                }
-                if simulated.views == 0 {
-                    return fail("data.sets.simulated.views", "at least 1", "0".into());
-                }
-                if simulated.views_per_world == 0 {
-                    let field = "data.sets.simulated.views_per_world";
-                    return fail(field, "at least 1", "0".into());
-                }
-                for (field, share) in [
-                    ("data.sets.simulated.plain", simulated.plain),
-                    ("data.sets.simulated.hills", simulated.hills),
-                ] {
-                    if !(0.0..=1.0).contains(&share) {
-                        return fail(field, "0 to 1", share.to_string());
-                    }
-                }
+                set.validate_simulated(simulated)?;
             }
             if set.paths.is_empty() && set.simulated.is_none() {
-                return fail(
-                    "data.sets.paths",
-                    "at least one",
-                    format!("none in {}", set.name),
-                );
+                let found = FoundSetting::NothingIn {
+                    set: set.name.clone(),
+                };
+                return fail("data.sets.paths", ExpectedSetting::OneRecording, found);
             }
             if !(set.metres_per_unit >= 0.0 && set.metres_per_unit.is_finite()) {
-                let found = set.metres_per_unit.to_string();
-                return fail("data.sets.metres_per_unit", "0 or more", found);
+                let (expected, found) = (ExpectedSetting::NotNegative, set.metres_per_unit);
+                return fail(
+                    "data.sets.metres_per_unit",
+                    expected,
+                    found.to_string().into(),
+                );
             }
             if let Some(DepthRange { min_m, max_m }) = set.range
                 && !(min_m > 0.0 && min_m < max_m && max_m.is_finite())
             {
-                let found = format!("{min_m} to {max_m}");
-                return fail("data.sets.range", "0 < min_m < max_m", found);
+                let found = format!("{min_m} to {max_m}").into();
+                return fail("data.sets.range", ExpectedSetting::DepthRange, found);
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-use crate::Error;
+use crate::{AskedBy, Error, ExpectedSetting};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -237,7 +237,8 @@ impl LossConfig {
         ];
         for (field, weight) in weights {
             if !(weight >= 0.0 && weight.is_finite()) {
-                return Err(wrong(field, "0 or more", weight.to_string()));
+                let expected = ExpectedSetting::NotNegative;
+                return Err(Error::config(field, expected, weight.to_string()));
             }
         }
         for (field, share) in [
@@ -246,12 +247,13 @@ impl LossConfig {
             ("loss.moving.warmup_share", self.moving.warmup_share),
         ] {
             if !(0.0..=1.0).contains(&share) {
-                return Err(wrong(field, "0 to 1", share.to_string()));
+                let expected = ExpectedSetting::Within { from: 0.0, to: 1.0 };
+                return Err(Error::config(field, expected, share.to_string()));
             }
         }
         if self.moving.enabled && self.flow.weight == 0.0 {
-            let expected = "false where loss.flow.weight is 0: the flow shows what is dynamic";
-            return Err(wrong("loss.moving.enabled", expected, "true".into()));
+            let found = "true".to_owned();
+            return Err(Error::config("loss.moving.enabled", AskedBy::NoFlow, found));
         }
         Ok(())
     }
@@ -265,17 +267,9 @@ fn is_zero(weight: &f64) -> bool {
     *weight == 0.0
 }
 
-fn wrong(field: &'static str, expected: &str, found: String) -> Error {
-    Error::Config {
-        field,
-        expected: expected.into(),
-        found,
-    }
-}
-
 fn unknown(field: &'static str, term: &str) -> Error {
-    let expected = format!("one of {}", LossConfig::TERMS.join(", "));
-    wrong(field, &expected, term.to_owned())
+    let known = LossConfig::TERMS.map(str::to_owned).to_vec();
+    Error::config(field, ExpectedSetting::OneOf(known), term.to_owned())
 }
 
 #[cfg(test)]

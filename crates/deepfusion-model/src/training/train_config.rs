@@ -1,4 +1,4 @@
-use crate::{AssumedCamera, DataSetConfig, Error, Learn, LossConfig, Preset};
+use crate::{AssumedCamera, DataSetConfig, Error, ExpectedSetting, Learn, LossConfig, Preset};
 use crate::{
     AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
     PoseNetConfig,
@@ -367,11 +367,8 @@ impl TrainConfig {
     /// # Errors
     /// [`Error::Config`] if a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, Error> {
-        toml::to_string_pretty(self).map_err(|e| Error::Config {
-            field: "config",
-            expected: "values that TOML can hold".into(),
-            found: e.to_string(),
-        })
+        toml::to_string_pretty(self)
+            .map_err(|e| Error::config("config", ExpectedSetting::TomlValues, e))
     }
 
     /// Switches a part of the depth network or a term of the loss on by its name, as the paper has it unless
@@ -478,10 +475,9 @@ fn in_turns(own: InputSize, others: &[InputSize], number: usize) -> InputSize {
 fn known(term: &str, field: &'static str) -> Result<&'static str, Error> {
     let terms = TrainConfig::TERMS;
     let found = terms.iter().find(|t| **t == term).copied();
-    found.ok_or_else(|| Error::Config {
-        field,
-        expected: format!("one of {}", terms.join(", ")),
-        found: term.to_owned(),
+    found.ok_or_else(|| {
+        let known = terms.map(str::to_owned).to_vec();
+        Error::config(field, ExpectedSetting::OneOf(known), term.to_owned())
     })
 }
 
@@ -608,7 +604,7 @@ mod tests {
                 panic!("{error}");
             };
             assert_eq!(*field, "view_motion");
-            assert_eq!(*found, format!("{motion:?}").to_lowercase());
+            assert_eq!(found.to_string(), format!("{motion:?}").to_lowercase());
             assert!(error.to_string().contains("posenet where loss.speed is 0"));
         }
     }

@@ -2,7 +2,7 @@
 
 use deepfusion_hint::count_of;
 
-use crate::{Error, Reprojection, TrainConfig, ViewMotion};
+use crate::{AskedBy, Error, ExpectedSetting, FoundSetting, Reprojection, TrainConfig, ViewMotion};
 
 impl TrainConfig {
     /// That video at several sizes has a canonical focal length: without it one sigmoid disparity would have to mean the same metres at
@@ -15,23 +15,16 @@ impl TrainConfig {
         if sizes == 0 || self.canonical_focal_px.is_some() {
             return Ok(());
         }
-        Err(Error::Config {
-            field: "augmentation.video_sizes",
-            expected: "none without canonical_focal_px".into(),
-            found: count_of(sizes, "size"),
-        })
+        fail(
+            "augmentation.video_sizes",
+            AskedBy::NoCanonicalFocal,
+            count_of(sizes, "size"),
+        )
     }
 
     /// # Errors
     /// [`Error::Config`] naming the first setting that means nothing.
     pub fn validate(&self) -> Result<(), Error> {
-        let fail = |field, expected: &str, found: String| {
-            Err(Error::Config {
-                field,
-                expected: expected.into(),
-                found,
-            })
-        };
         self.size.validate()?;
         self.depth_net.validate()?;
         self.pose_net.encoder.validate()?;
@@ -40,56 +33,38 @@ impl TrainConfig {
         self.validate_sets()?;
         let sets = 0..self.data.sets.len().max(1);
         if self.depth_net.uncertainty && !sets.into_iter().any(|set| self.learn(set).from_depth()) {
-            let expected = "false where nothing is learned from known depth: the head has nothing else to learn from";
-            return fail("depth_net.uncertainty", expected, "true".into());
+            let found = "true".to_owned();
+            return fail("depth_net.uncertainty", AskedBy::NoKnownDepth, found);
         }
         if !self.depth_net.is_resnet() && self.loss.flow.weight > 0.0 {
-            return fail(
-                "loss.flow.weight",
-                "0 where the depth network is no ResNet with its decoder: the flow decoder reads a ResNet's features",
-                self.loss.flow.weight.to_string(),
-            );
+            let found = self.loss.flow.weight.to_string();
+            return fail("loss.flow.weight", AskedBy::NoResNet, found);
         }
-        if self.batch == 0 {
-            return fail("batch", "at least 1", "0".into());
-        }
+        at_least_one("batch", self.batch)?;
         self.validate_stereo()?;
         if let Some(threads) = self.data.loader_threads
             && !(1..=1024).contains(&threads)
         {
-            return fail("data.loader_threads", "1 to 1024", threads.to_string());
+            let expected = ExpectedSetting::Within {
+                from: 1.0,
+                to: 1024.0,
+            };
+            return fail("data.loader_threads", expected, threads.to_string());
         }
-        if self.accumulate == 0 {
-            return fail("accumulate", "at least 1", "0".into());
-        }
-        if self.steps.unwrap_or(self.epochs) == 0 {
-            return fail("steps", "at least 1", "0".into());
-        }
-        if !(self.learning_rate > 0.0 && self.learning_rate.is_finite()) {
-            return fail("learning_rate", "above 0", self.learning_rate.to_string());
-        }
-        if let Some(focal) = self.canonical_focal_px
-            && !(focal > 0.0 && focal.is_finite())
-        {
-            return fail("canonical_focal_px", "above 0", focal.to_string());
+        at_least_one("accumulate", self.accumulate)?;
+        at_least_one("steps", self.steps.unwrap_or(self.epochs))?;
+        above_zero("learning_rate", self.learning_rate)?;
+        if let Some(focal) = self.canonical_focal_px {
+            above_zero("canonical_focal_px", focal)?;
         }
         if let Some(camera) = &self.assumed_camera {
             camera.validate()?;
         }
-        if self.learning_rate_steps == Some(0) {
-            return fail("learning_rate_steps", "at least 1", "0".into());
+        if let Some(steps) = self.learning_rate_steps {
+            at_least_one("learning_rate_steps", steps)?;
         }
-        if !(0.0..=1.0).contains(&self.learning_rate_drop) {
-            let found = self.learning_rate_drop.to_string();
-            return fail("learning_rate_drop", "0 to 1", found);
-        }
-        if !(0.0..=0.5).contains(&self.validation_share) {
-            return fail(
-                "validation_share",
-                "0 to 0.5",
-                self.validation_share.to_string(),
-            );
-        }
+        within("learning_rate_drop", self.learning_rate_drop, (0.0, 1.0))?;
+        within("validation_share", self.validation_share, (0.0, 0.5))?;
         let weights = [
             ("clip_norm", self.clip_norm),
             ("weight_decay", self.weight_decay),
@@ -100,116 +75,125 @@ impl TrainConfig {
         ];
         for (field, weight) in weights {
             if !(weight >= 0.0 && weight.is_finite()) {
-                return fail(field, "0 or more", weight.to_string());
+                return fail(field, ExpectedSetting::NotNegative, weight.to_string());
             }
         }
-        let zoom = self.augmentation.zoom;
+        let augmentation = &self.augmentation;
+        // Its own digits are found, not those of an f64.
+        let zoom = augmentation.zoom;
         if !(1.0..=8.0).contains(&zoom) {
-            return fail("augmentation.zoom", "1 to 8", zoom.to_string());
+            let expected = ExpectedSetting::Within { from: 1.0, to: 8.0 };
+            return fail("augmentation.zoom", expected, zoom.to_string());
         }
-        let video_sizes = &self.augmentation.video_sizes;
-        for size in self.augmentation.sizes.iter().chain(video_sizes) {
+        let video_sizes = &augmentation.video_sizes;
+        for size in augmentation.sizes.iter().chain(video_sizes) {
             size.validate()?;
         }
+        let brightness = f64::from(augmentation.brightness);
         for (field, share) in [
-            ("augmentation.jitter", self.augmentation.jitter),
-            (
-                "augmentation.brightness",
-                f64::from(self.augmentation.brightness),
-            ),
-            ("augmentation.hue", f64::from(self.augmentation.hue) * 2.0),
+            ("augmentation.jitter", augmentation.jitter),
+            ("augmentation.brightness", brightness),
+            ("augmentation.hue", f64::from(augmentation.hue) * 2.0),
         ] {
-            if !(0.0..=1.0).contains(&share) {
-                return fail(field, "0 to 1", share.to_string());
-            }
+            within(field, share, (0.0, 1.0))?;
         }
         // Without the speed term a run learns from images alone; and PoseNet would have no loss at all where
         // the vehicle's motion synthesises the views.
         if self.loss.speed == 0.0 && self.view_motion != ViewMotion::PoseNet {
             let found = format!("{:?}", self.view_motion).to_lowercase();
-            return fail("view_motion", "posenet where loss.speed is 0", found);
+            return fail("view_motion", AskedBy::NoSpeedLoss, found);
         }
         if self.loss.affine > 0.0 && self.reprojection != Reprojection::Bidirectional {
             let found = self.loss.affine.to_string();
-            return fail(
-                "loss.affine",
-                "0 where reprojection is not bidirectional: it compares both frames' depths",
-                found,
-            );
+            return fail("loss.affine", AskedBy::OneWay, found);
         }
         self.validate_explainability()?;
+        let found = || format!("{:?}", self.frames);
         match (self.reprojection, self.frames.as_slice()) {
-            (_, []) => fail("frames", "at least one offset", "[]".into()),
+            (_, []) => fail("frames", ExpectedSetting::OneOffset, found()),
             (_, frames) if frames.contains(&0) => {
-                fail("frames", "offsets other than 0", format!("{frames:?}"))
+                fail("frames", ExpectedSetting::OtherOffsets, found())
             }
-            (Reprojection::Bidirectional, frames) if frames != [1] => fail(
-                "frames",
-                "[1] for bidirectional reprojection",
-                format!("{frames:?}"),
-            ),
+            (Reprojection::Bidirectional, frames) if frames != [1] => {
+                fail("frames", AskedBy::BothWays, found())
+            }
             _ => Ok(()),
         }
     }
 
     /// Masks and their term need each other, and every source's own error; the automask compares the sources'.
     fn validate_explainability(&self) -> Result<(), Error> {
-        let fail = |field, expected: &str, found: String| {
-            Err(Error::Config {
-                field,
-                expected: expected.into(),
-                found,
-            })
-        };
         let weight = self.loss.explainability;
         let mean = self.reprojection == Reprojection::Mean;
         match (self.pose_net.explainability, weight > 0.0) {
             (true, false) => fail(
                 "loss.explainability",
-                "above 0 where pose_net.explainability is true: nothing else keeps the masks up",
+                AskedBy::MasksForTerm,
                 weight.to_string(),
             ),
-            (false, true) => fail(
-                "loss.explainability",
-                "0 where pose_net.explainability is false: there are no masks",
-                weight.to_string(),
-            ),
+            (false, true) => fail("loss.explainability", AskedBy::NoMasks, weight.to_string()),
             (true, true) if !mean => fail(
                 "reprojection",
-                "mean where pose_net.explainability is true",
+                AskedBy::MasksForMean,
                 format!("{:?}", self.reprojection).to_lowercase(),
             ),
-            _ if mean && self.loss.automask => fail(
-                "loss.automask",
-                "false where reprojection is mean",
-                "true".into(),
-            ),
+            _ if mean && self.loss.automask => {
+                fail("loss.automask", AskedBy::MeanOfSources, "true".to_owned())
+            }
             _ => Ok(()),
         }
     }
 
     /// What the other camera's view cannot be beside.
     fn validate_stereo(&self) -> Result<(), Error> {
-        let fail = |field, expected: &str, found: String| {
-            Err(Error::Config {
-                field,
-                expected: format!("{expected} where stereo is on"),
-                found,
-            })
-        };
         if !self.stereo {
             return Ok(());
         }
         if self.reprojection != Reprojection::Minimum {
             let found = format!("{:?}", self.reprojection).to_lowercase();
-            return fail("reprojection", "minimum", found);
+            return fail("reprojection", AskedBy::Stereo("minimum"), found);
         }
         if self.loss.flow.weight > 0.0 {
-            return fail("loss.flow.weight", "0", self.loss.flow.weight.to_string());
+            let found = self.loss.flow.weight.to_string();
+            return fail("loss.flow.weight", AskedBy::Stereo("0"), found);
         }
         if self.learned_camera().is_some() {
-            return fail("assumed_camera.learn", "false", "true".into());
+            let expected = AskedBy::Stereo("false");
+            return fail("assumed_camera.learn", expected, "true".to_owned());
         }
         Ok(())
+    }
+}
+
+fn fail(
+    field: &'static str,
+    expected: impl Into<ExpectedSetting>,
+    found: impl Into<FoundSetting>,
+) -> Result<(), Error> {
+    Err(Error::config(field, expected, found))
+}
+
+fn at_least_one(field: &'static str, count: usize) -> Result<(), Error> {
+    match count {
+        0 => fail(field, ExpectedSetting::AtLeastOne, count.to_string()),
+        _ => Ok(()),
+    }
+}
+
+fn above_zero(field: &'static str, value: f64) -> Result<(), Error> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        fail(field, ExpectedSetting::AboveZero, value.to_string())
+    }
+}
+
+/// Between two ends, which are included; NaN is not.
+fn within(field: &'static str, value: f64, (from, to): (f64, f64)) -> Result<(), Error> {
+    if (from..=to).contains(&value) {
+        Ok(())
+    } else {
+        let expected = ExpectedSetting::Within { from, to };
+        fail(field, expected, value.to_string())
     }
 }

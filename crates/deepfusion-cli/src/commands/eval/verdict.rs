@@ -2,7 +2,7 @@
 
 use deepfusion_data::Dataset;
 use deepfusion_eval::verdict::{NoCertificate, Verdict};
-use deepfusion_jobs::held_out::{unseen, unseen_frames};
+use deepfusion_jobs::held_out::unseen_by;
 use deepfusion_jobs::scene::motion_known;
 use deepfusion_jobs::verdict::{Unseen, VerdictOptions, verdict};
 use deepfusion_model::TrainConfig;
@@ -17,15 +17,6 @@ use crate::failure::Result;
 use crate::model::ModelFacts;
 use crate::output;
 use crate::progress::{Progress, say};
-
-/// Whether there is ground truth to compare with.
-pub(super) fn has_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
-    let known = |dataset: &Dataset| {
-        let mut frames = dataset.selected().iter();
-        frames.any(|frame| dataset.has_ground_truth(*frame, args.gt_depth))
-    };
-    args.gt.is_some() || datasets.iter().any(known)
-}
 
 /// Whether no verdict is wanted: it was declined, a split asks for its frames alone, or what is post-processed is no longer what the network
 /// says.
@@ -46,14 +37,7 @@ pub(super) fn of_model(
     let unseen = if args.assume_unseen {
         Unseen::All
     } else {
-        match model {
-            ModelSource::Run { folder, .. } => {
-                let averaged = folder.read_findings()?.averaged;
-                unseen_frames(estimator.config(), &averaged, datasets)
-            }
-            ModelSource::Packed { network, .. } if unseen(&network.card, datasets) => Unseen::All,
-            ModelSource::Packed { .. } => Unseen::NotKnown,
-        }
+        unseen_by(model, estimator.config(), datasets)?
     };
     let options = VerdictOptions::new(args.speed_error / 100.0, !args.no_focal_correction);
     let mut progress = Progress::new("judging without ground truth");
@@ -101,8 +85,6 @@ fn add_pose_speeds(
     }
     let device = crate::devices::open(args.engine.device)?;
     match PosePredictor::load(given, args.engine.set.as_deref(), &device) {
-        // The unit of an imported PoseNet is unknown.
-        Ok(predictor) if predictor.step == 0 => {}
         Ok(predictor) => {
             found.without_truth.pose_speeds = pose_speeds(&predictor, datasets, unseen, options)?;
         }

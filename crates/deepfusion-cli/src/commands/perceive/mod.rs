@@ -9,7 +9,10 @@ use std::time::Instant;
 use deepfusion_hint::count_of;
 use deepfusion_instances::InstanceModel;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
-use deepfusion_jobs::bulk::{RecordLines, record_line, record_path, write_record};
+use deepfusion_jobs::bulk::{
+    RecordLines, record_line, record_lines_path, record_path, write_record,
+};
+use deepfusion_jobs::outputs::require_unwritten;
 use deepfusion_jobs::scene::MotionTracker;
 use deepfusion_jobs::{
     Input, PerceivedFrame, StartedFrame, TargetFinder, TargetSettings, perception_settings,
@@ -18,7 +21,7 @@ use deepfusion_perception::PerceptionConfig;
 
 use super::live as sources;
 use super::predict::{Job, check_watched, find_inputs, warn_of_drift};
-use crate::cli::{PerceiveArgs, PredictionArgs};
+use crate::cli::PerceiveArgs;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
 use crate::model;
@@ -62,41 +65,22 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     if source.is_some() {
         deepfusion_jobs::live::make_room(out, prediction.overwrite)?;
     }
-    refuse_what_is_there(args, &job, &all)?;
+    // Nothing is overwritten unless asked, whoever wrote it.
+    if !prediction.overwrite {
+        require_unwritten(&job.writer, &args.save, &all)?;
+    }
     interrupt::catch("stopping after the frames at work");
     let work = Work {
         args,
         job: &job,
         all: &all,
-        lines: Mutex::new(RecordLines::begin(&out.join("targets.jsonl"))?),
+        lines: Mutex::new(RecordLines::begin(&record_lines_path(out))?),
         progress: Mutex::new(source.is_none().then(|| Progress::new("perceiving"))),
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
         Some(address) => work.go_live(&address, finder),
         None => work.go(finder),
-    }
-}
-
-/// Nothing is overwritten unless asked, whoever wrote it.
-fn refuse_what_is_there(args: &PerceiveArgs, job: &Job, all: &[Input]) -> Result<()> {
-    let PredictionArgs { out, overwrite, .. } = &args.prediction;
-    let of = |input: &Input| {
-        let name = &input.name;
-        let pictures = args.save.iter().map(|save| save.path(out, name));
-        let mut paths = job.writer.paths(input);
-        paths.extend(pictures);
-        paths.push(record_path(out, name));
-        paths
-    };
-    let mut paths = all.iter().flat_map(of).chain([out.join("targets.jsonl")]);
-    match paths.find(|path| !overwrite && path.exists()) {
-        Some(path) => Err(CliError::Exists {
-            path,
-            remedy: "allow it with --overwrite, or choose another folder",
-        }
-        .into()),
-        None => Ok(()),
     }
 }
 

@@ -31,7 +31,7 @@ use crate::error::CliError;
 use crate::failure::Result;
 use crate::model::{self, ModelFacts};
 use crate::progress::{Progress, say};
-use crate::{engine, interrupt, jobs, output};
+use crate::{engine, interrupt, output};
 
 /// What is the same for all images of a run.
 pub(super) struct Job<'a> {
@@ -74,12 +74,11 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     output::make_folder(out)?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(out, *shard)?;
-    let begun = job.bulk(args).begin(&all, &mine, args.json);
     let StartedJob {
         manifest,
         sidecars,
         todo,
-    } = begun.map_err(jobs::in_words)?;
+    } = job.bulk(args).begin(&all, &mine, args.json)?;
     let mut shown = Progress::new("predicting");
     let watcher = |done, total| shown.set(done, total);
     let progress = BulkProgress::new(out, manifest, sidecars, watcher);

@@ -1,4 +1,4 @@
-use deepfusion_model::{Error, Reprojection, TrainConfig};
+use deepfusion_model::{Error, ExpectedSetting, Reprojection, TrainConfig};
 use serde::{Deserialize, Serialize};
 
 /// One row of the table: what is switched on.
@@ -51,12 +51,8 @@ impl Row {
         let find = |name: &String| {
             let row = all.iter().find(|row| row.name() == *name).copied();
             row.ok_or_else(|| {
-                let known: Vec<String> = all.iter().map(|row| row.name()).collect();
-                Error::Config {
-                    field: "rows",
-                    expected: format!("one of {}", known.join(", ")),
-                    found: name.clone(),
-                }
+                let known = all.iter().map(|row| row.name()).collect();
+                Error::config("rows", ExpectedSetting::OneOf(known), name.clone())
             })
         };
         names.iter().map(find).collect()

@@ -1,0 +1,91 @@
+//! An evaluation as it is kept beside a run.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_data::{Cameras, Dataset};
+use deepfusion_eval::PostProcess;
+use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
+use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
+
+use super::Evaluated;
+use crate::held_out::learned_from_none;
+use crate::recordings::camera_word;
+use crate::{ModelFacts, Result, dates, name_of};
+
+/// How an evaluation of a network was asked for.
+#[derive(Debug, Clone)]
+pub struct EvaluationRequest<'a> {
+    /// The recordings.
+    pub data: &'a [PathBuf],
+    /// The split file, if any.
+    pub split: Option<&'a Path>,
+    /// The file of ground truth, if any; else the recordings' scans.
+    pub truth: Option<&'a Path>,
+    /// Which cameras.
+    pub camera: Cameras,
+    /// The numbers that the network is computed in.
+    pub precision: Precision,
+    /// Which of the data sets that the run learned its metres are of.
+    pub set: Option<&'a str>,
+    /// Whether depth is corrected for another focal length than the one trained on.
+    pub focal_correction: bool,
+    /// In how many ways the network looks at each image.
+    pub post_process: Option<PostProcess>,
+    /// The program that evaluates, with its version.
+    pub program: String,
+    /// What was typed.
+    pub command: String,
+}
+
+impl EvaluationRequest<'_> {
+    /// What was found of a network, as it is kept beside its run.
+    ///
+    /// # Errors
+    /// A checkpoint, or a run's findings, that cannot be read.
+    pub fn saved(
+        self,
+        model: &ModelSource,
+        estimator: &DepthEstimator,
+        datasets: &[Dataset],
+        evaluated: &Evaluated,
+    ) -> Result<SavedEvaluation> {
+        Ok(SavedEvaluation {
+            format_version: SAVED_VERSION,
+            measured: Measured {
+                data: self.data.iter().map(|path| absolute(path)).collect(),
+                split: self.split.map(absolute),
+                gt: self.truth.map(absolute),
+                camera: camera_word(self.camera).into(),
+                engine: format!("{} {}", estimator.engine(), self.precision.name()),
+                set: self.set.map(str::to_owned),
+                focal_correction: self.focal_correction,
+                post_process: self.post_process,
+                held_out: learned_from_none(
+                    model,
+                    estimator.config(),
+                    datasets,
+                    &evaluated.places,
+                )?,
+                program: self.program,
+                command: self.command,
+                time: dates::now(),
+            },
+            model: ModelFile {
+                sha256: model.sha256()?,
+                checkpoint: match model {
+                    ModelSource::Run { folder, kind, .. } => {
+                        name_of(&folder.checkpoint_path(*kind))
+                    }
+                    ModelSource::Packed { network, .. } => network.card.name.clone(),
+                },
+            },
+            report: evaluated.report.clone(),
+            images: evaluated.images.iter().map(FrameScore::from).collect(),
+        })
+    }
+}
+
+/// A path from the root; one whose working directory is gone stays.
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
