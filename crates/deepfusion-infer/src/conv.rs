@@ -1,11 +1,34 @@
-//! Common parts of all implementations of the convolution: its geometry on views, and the division into tasks.
+//! What every form of a convolution can do, and what all share: its geometry on views, the runs of its inputs, and the division
+//! into tasks.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::view::View;
+use crate::view::{Shared, View};
 use crate::{Activation, Border, Conv};
+
+/// A convolution ready to run on values stored as `E`.
+pub(crate) trait ConvForm<E> {
+    fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self;
+
+    /// Elements that it may read behind a buffer's last pixel, whose pixels are `pitch` elements apart.
+    fn overread(pitch: usize) -> usize;
+
+    /// What profiles call it.
+    fn name(&self) -> &'static str;
+
+    fn geometry(&self) -> &Geometry;
+
+    /// Its runs, if it also reads elements that belong to none of its inputs (`None` as a source). A form's results
+    /// depend on nothing but its inputs and the elements listed here.
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)>;
+
+    /// # Safety
+    /// `arena` must hold every view of the geometry, its border and `overread` behind its buffer included; nobody else
+    /// may use the output meanwhile, or write the others.
+    unsafe fn run(&self, arena: Shared<E>);
+}
 
 /// A convolution's place in the arena.
 #[derive(Debug, Clone)]

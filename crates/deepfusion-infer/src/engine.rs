@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::aligned::Aligned;
-use crate::conv_form::ConvForm;
+use crate::conv::ConvForm;
 use crate::element::{Bf16, Element};
 use crate::forms::{Bf16Conv, F32Conv, Int8Conv};
 use crate::movement::{self, Normalisation};

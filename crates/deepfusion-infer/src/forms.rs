@@ -1,6 +1,5 @@
 use crate::Conv;
-use crate::conv::{Geometry, Runs};
-use crate::conv_form::ConvForm;
+use crate::conv::{ConvForm, Geometry, Runs};
 use crate::direct::Direct;
 use crate::element::Bf16;
 use crate::head::Head;

@@ -6,7 +6,6 @@ mod aligned;
 mod bf16;
 mod channel_norm;
 mod conv;
-mod conv_form;
 mod convex;
 mod cross_covariance;
 mod depthwise;

@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use crate::aligned::Aligned;
-use crate::conv::Geometry;
-use crate::conv_form::ConvForm;
+use crate::conv::{ConvForm, Geometry};
 use crate::convex::ConvexUpsample;
 use crate::cross_covariance::CrossCovarianceStep;
 use crate::depthwise::DepthwiseStep;

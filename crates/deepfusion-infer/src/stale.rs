@@ -6,8 +6,7 @@
 
 use std::ops::Range;
 
-use crate::conv::{Geometry, Runs};
-use crate::conv_form::ConvForm;
+use crate::conv::{ConvForm, Geometry, Runs};
 use crate::element::Element;
 use crate::movement::for_border;
 use crate::plan::Step;

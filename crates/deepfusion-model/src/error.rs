@@ -1,15 +1,16 @@
+//! What can go wrong with a configuration, or with a run on disk.
+
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 use crate::NetworkError;
 
 mod expected;
-mod run;
-mod setting;
 
 pub use self::expected::{AskedBy, ExpectedDataSet, ExpectedSetting, FoundSetting};
-pub use self::run::{CHECKPOINT_VERSION, CheckpointLacks, NoRun};
-pub use self::setting::{SettingProblem, TomlProblem};
+
+/// The version of the checkpoint's layout; files of another version are refused.
+pub const CHECKPOINT_VERSION: u32 = 1;
 
 /// What can go wrong with a configuration, or with a run on disk.
 #[derive(Debug, thiserror::Error)]
@@ -183,4 +184,66 @@ impl Hint for Error {
             Self::Network(error) => error.hint(),
         }
     }
+}
+
+/// What the parser of TOML says of a text or a table, without the line break that ends it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .0.to_string().trim_end())]
+pub struct TomlProblem(pub Box<toml::de::Error>);
+
+impl From<toml::de::Error> for TomlProblem {
+    fn from(error: toml::de::Error) -> Self {
+        Self(Box::new(error))
+    }
+}
+
+/// Why a key cannot be set so.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SettingProblem {
+    /// There is no `=`.
+    #[error("expected KEY=VALUE")]
+    NoValue,
+    /// A key under one that is no table.
+    #[error("`{key}` is a value and no table")]
+    NoTable {
+        /// What is no table.
+        key: String,
+    },
+    /// Nothing has this name.
+    #[error("there is no key `{key}`")]
+    NoSuchKey {
+        /// The name.
+        key: String,
+    },
+    /// The key is unknown, or cannot have this value: what the parser says.
+    #[error("{}", .0.to_string().trim().replace('\n', " "))]
+    Value(Box<toml::de::Error>),
+    /// Something else decides it; what, in its caller's words.
+    #[error("{0}")]
+    DecidedElsewhere(&'static str),
+}
+
+/// Why a folder is no run's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoRun {
+    /// There is no such folder.
+    #[error("no such run")]
+    Missing,
+    /// It has no configuration.
+    #[error("this is no run: it has no config.toml")]
+    NoConfig,
+}
+
+/// What a checkpoint lacks that training needs to go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointLacks {
+    /// The optimiser's averages.
+    #[error("it has no optimiser state to go on with")]
+    OptimiserState,
+    /// The decoder of the flow.
+    #[error("it has no flow decoder, and this configuration trains one")]
+    FlowDecoder,
 }

@@ -35,8 +35,6 @@ mod shared_frames;
 mod source;
 mod stereo;
 mod trainer;
-mod unmeasured_turns;
-mod update;
 mod view_synthesis;
 mod window;
 mod workers;

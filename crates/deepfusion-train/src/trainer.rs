@@ -12,16 +12,16 @@ pub use validation::validation_loss;
 
 use crate::freeze::freeze;
 use crate::learned_focal::{self, check_camera};
+use crate::stereo;
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
     Sampler, StepOutcome, TrainConfig, TrainEvent, WorkersProblem,
 };
-use crate::{stereo, unmeasured_turns};
 use burn::tensor::Device;
 use deepfusion_model::{CheckpointLacks, Error as ModelError};
 use pace::{Pace, Smoothed};
-use start::{check_precision, check_samples, findings};
+use start::{check_precision, check_samples, findings, turns_warning};
 use std::path::Path;
 use std::time::Instant;
 use step::{Loaders, WorkerStep};
@@ -251,7 +251,7 @@ impl Trainer {
         });
         let warnings = [
             learned_focal::warning(&self.config, &self.train),
-            unmeasured_turns::warning(&self.config, &self.train),
+            turns_warning(&self.config, &self.train),
             stereo::warning(&self.config, &self.train),
         ];
         for message in warnings.into_iter().flatten() {

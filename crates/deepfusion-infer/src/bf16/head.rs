@@ -57,7 +57,7 @@ impl HeadDot {
     }
 
     /// # Safety
-    /// As [`crate::conv_form::ConvForm::run`]; the processor must have the instructions.
+    /// As [`crate::conv::ConvForm::run`]; the processor must have the instructions.
     pub(crate) unsafe fn run(&self, arena: Shared<Bf16>) {
         (0..self.geometry.out.height).into_par_iter().for_each(|y| {
             // SAFETY: the caller's promise; each row belongs to one task.

@@ -118,7 +118,7 @@ impl WinogradDot {
     }
 
     /// # Safety
-    /// As [`crate::conv_form::ConvForm::run`]; the processor must have the instructions.
+    /// As [`crate::conv::ConvForm::run`]; the processor must have the instructions.
     pub(crate) unsafe fn run(&self, arena: Shared<Bf16>) {
         let all = Tiles::new(&self.geometry, OUT).count();
         // Whole rounds for all threads, where there are few tasks.

@@ -94,7 +94,7 @@ impl ByteDot {
     }
 
     /// # Safety
-    /// As [`crate::conv_form::ConvForm::run`]; [`super::has_int8`] must hold.
+    /// As [`crate::conv::ConvForm::run`]; [`super::has_int8`] must hold.
     pub(super) unsafe fn run(&self, arena: Shared<Bf16>) {
         with_bytes(self.image.len, |bytes| {
             // SAFETY: the caller's promise.

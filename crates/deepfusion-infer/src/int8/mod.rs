@@ -12,8 +12,7 @@ use pulp::x86::V4;
 
 use crate::Conv;
 use crate::bf16::has_dot;
-use crate::conv::{Geometry, Runs};
-use crate::conv_form::ConvForm;
+use crate::conv::{ConvForm, Geometry, Runs};
 use crate::element::Bf16;
 use crate::forms::Bf16Conv;
 use crate::view::Shared;

@@ -13,9 +13,9 @@ mod transposed;
 
 use proptest::prelude::*;
 
+use crate::conv::ConvForm;
 #[cfg(target_arch = "x86_64")]
 use crate::conv::{Geometry, Runs};
-use crate::conv_form::ConvForm;
 use crate::dispatch::tests::{Level, with_level};
 use crate::element::Element;
 use crate::engine::Typed;

@@ -3,8 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::conv::{Geometry, Runs, padded_bias, weight};
-use crate::conv_form::ConvForm;
+use crate::conv::{ConvForm, Geometry, Runs, padded_bias, weight};
 use crate::element::{Bf16, Element};
 use crate::tile::LANES;
 use crate::view::Shared;

@@ -4,7 +4,7 @@ use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;
 use super::plain::Plain;
 use super::{attention, lite, network, odd_network, recurrent, transposed};
-use crate::conv_form::ConvForm;
+use crate::conv::ConvForm;
 use crate::element::{Bf16, Element};
 use crate::engine::Typed;
 use crate::forms::F32Conv;

@@ -1,10 +1,11 @@
 //! What must hold before a run begins, and what its samples say.
 
 use super::validation::no_samples;
-use crate::{Error, SampleSet, TrainConfig};
+use crate::{Error, SampleSet, TrainConfig, ViewMotion};
 use burn::tensor::Device;
 use deepfusion_model::{SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, supports};
+use std::collections::BTreeSet;
 
 /// Metres per unit of PoseNet's translation; 1 without video, where it does not matter.
 fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
@@ -64,4 +65,36 @@ pub(super) fn check_samples(
         return Err(Error::NoValidation);
     }
     Ok(())
+}
+
+impl SampleSet {
+    /// The names of the drives with samples of video whose turns are not known, in the order of their recordings.
+    #[must_use]
+    pub fn without_turns(&self) -> Vec<&str> {
+        let used: BTreeSet<usize> = self.samples.iter().map(|s| s.dataset).collect();
+        let drives = used
+            .into_iter()
+            .filter_map(|dataset| self.datasets.get(dataset));
+        drives
+            .filter(|drive| !drive.yaw_known())
+            .map(deepfusion_data::Dataset::name)
+            .collect()
+    }
+}
+
+/// With `auto`: which drives are warped by PoseNet's turns.
+pub(super) fn turns_warning(config: &TrainConfig, samples: &SampleSet) -> Option<String> {
+    if config.view_motion != ViewMotion::Auto {
+        return None;
+    }
+    let drives = samples.without_turns();
+    let first = drives.first()?;
+    let others = match drives.len() {
+        1 => String::new(),
+        2 => " and 1 other drive".into(),
+        n => format!(" and {} other drives", n - 1),
+    };
+    Some(format!(
+        "no turns are known of {first}{others}: warped by PoseNet's at the measured distance"
+    ))
 }

@@ -1,15 +1,18 @@
-//! What one worker learns from its part of a step, and the step of the optimiser.
+//! What one worker learns from its part of a step: losses, and their gradients by name; and the step of the optimiser.
 
 use super::Trainer;
 use crate::model::displacement_ratio;
-use crate::update::FOCAL;
 use crate::workers::WorkerGroup;
 use crate::{
-    BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LoaderProblem,
-    LossTerms, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
+    Adam, BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass,
+    LoaderProblem, LossTerms, Model, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
 };
+use burn::tensor::Tensor;
 use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops::autocast;
+
+/// The name of the focal length among parameters and moments.
+const FOCAL: &str = "focal";
 
 impl Trainer {
     /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches.
@@ -84,6 +87,34 @@ impl Trainer {
             Some(camera) => applied.map(|focal| focal.held_to(camera)),
             None => applied,
         };
+    }
+}
+
+impl Model {
+    /// Adds a loss' gradients to those of a step, `scale` times.
+    pub fn add_gradients(&self, total: &Tensor<1>, scale: f32, step: &mut NamedGradients) {
+        let mut raw = total.backward();
+        step.add("depth", &self.depth_net, &mut raw, scale);
+        step.add("pose", &self.pose_net, &mut raw, scale);
+        if let Some(decoder) = &self.flow_decoder {
+            step.add("flow", decoder, &mut raw, scale);
+        }
+        if let Some(focal) = &self.focal {
+            step.add(FOCAL, focal, &mut raw, scale);
+        }
+    }
+
+    /// The networks after a step of the optimiser. A learned focal length stays: its step is another.
+    #[must_use]
+    pub fn updated(self, adam: &mut Adam, step: &AdamStep, gradients: &NamedGradients) -> Self {
+        Self {
+            depth_net: adam.apply(step, "depth", self.depth_net, gradients),
+            pose_net: adam.apply(step, "pose", self.pose_net, gradients),
+            flow_decoder: self
+                .flow_decoder
+                .map(|decoder| adam.apply(step, "flow", decoder, gradients)),
+            ..self
+        }
     }
 }
 
