@@ -170,30 +170,42 @@ impl Layout {
         }
     }
 
-    /// Topics are a bag's alone: named for another recording they would silently say nothing.
+    /// Topics are a bag's alone, and a camera is given where the layout has none: for another recording they would silently say nothing.
     ///
     /// # Errors
-    /// [`Error::NoTopics`].
-    pub(crate) fn check_topics(&self, path: &Path, options: &OpenOptions) -> Result<()> {
-        match (self, options.topics.first()) {
-            (Self::Bags(_), _) | (_, None) => Ok(()),
-            (_, Some(topic)) => Err(Error::NoTopics {
+    /// [`Error::NoTopics`], [`Error::OwnCalibration`].
+    pub(crate) fn check_options(&self, path: &Path, options: &OpenOptions) -> Result<()> {
+        if let (false, Some(topic)) = (matches!(self, Self::Bags(_)), options.topics.first()) {
+            return Err(Error::NoTopics {
                 path: path.to_owned(),
                 layout: self.kind().label(),
                 topic: topic.clone(),
-            }),
+            });
         }
-    }
-
-    /// Opens what was found.
-    pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
-        self.check_topics(path, options)?;
         if options.gives_camera() && self.kind().brings_calibration() {
             return Err(Error::OwnCalibration {
                 path: path.to_owned(),
                 layout: self.kind().label(),
             });
         }
+        Ok(())
+    }
+
+    /// Each of several recordings by itself, with its file or folder. Those that have their tables in common stay one.
+    pub(crate) fn apart(self, path: &Path) -> Vec<(PathBuf, Self)> {
+        match self {
+            Self::Kitti(drives) => each(drives, |drive| drive.folder.clone(), Self::Kitti),
+            Self::KittiOdometry(sequences) => each(sequences, PathBuf::clone, Self::KittiOdometry),
+            Self::Kitti360(drives) => each(drives, |drive| drive.folder.clone(), Self::Kitti360),
+            Self::RgbD(sequences) => each(sequences, PathBuf::clone, Self::RgbD),
+            Self::Bags(bags) => each(bags, PathBuf::clone, Self::Bags),
+            whole => vec![(path.to_owned(), whole)],
+        }
+    }
+
+    /// Opens what was found.
+    pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
+        self.check_options(path, options)?;
         let one = |dataset: Result<Dataset>| Ok(vec![dataset?.select(path, options)?]);
         match self {
             Self::Kitti(drives) => kitti::open(path, drives, options),
@@ -207,6 +219,16 @@ impl Layout {
             Self::Video(place) => one(video::open(place, options)),
         }
     }
+}
+
+/// A layout of each, with its place.
+fn each<T>(
+    all: Vec<T>,
+    place: impl Fn(&T) -> PathBuf,
+    layout: impl Fn(Vec<T>) -> Layout,
+) -> Vec<(PathBuf, Layout)> {
+    let alone = |one: T| (place(&one), layout(vec![one]));
+    all.into_iter().map(alone).collect()
 }
 
 /// The path as it was given, links and all, since a bag's file lies beside the link; what it resolves to where the given
