@@ -33,6 +33,20 @@ pub fn inspect_with(
 ) -> Result<Inspection> {
     let layout = Layout::of(path)?;
     layout.check_options(path, options)?;
+    let passed_over = layout.passed_over(path);
+    let mut inspection = inspect_layout(path, layout, options, time_offset)?;
+    if let Some(first) = inspection.drives.first_mut() {
+        first.warnings.extend(passed_over);
+    }
+    Ok(inspection)
+}
+
+fn inspect_layout(
+    path: &Path,
+    layout: Layout,
+    options: &OpenOptions,
+    time_offset: impl FnOnce(&Dataset) -> Option<ClockOffset>,
+) -> Result<Inspection> {
     if let Layout::Comma(segment) = &layout
         && !comma::has_video(segment)
     {
