@@ -89,4 +89,26 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     );
     let strangers = ok(at, "weights average a strange --out strangers");
     assert!(strangers.stderr.contains("WARN"), "{}", strangers.stderr);
+
+    hides_the_embedded_network(at);
+}
+
+/// A run of an embedded network's name is taken for it, and not without a word.
+fn hides_the_embedded_network(at: &Path) {
+    let Some(name) = deepfusion_weights::names().next() else {
+        return;
+    };
+    ok(at, &format!("weights average a b --out {name}"));
+    let bench = |model: &str| ok(at, &format!("bench --model {model} --repeats 1")).stderr;
+    let train = format!(
+        "train --data third --size 96x64 --batch 2 --steps 1 --init {name} --out from-{name}"
+    );
+    let average = format!("weights average a {name} --out again");
+    for said in [bench(name), ok(at, &train).stderr, ok(at, &average).stderr] {
+        let about = said.lines().filter(|line| line.contains("WARN"));
+        let about: Vec<&str> = about.filter(|line| line.contains("embedded")).collect();
+        assert_eq!(about.len(), 1, "{said}");
+        assert!(about[0].contains(&format!("./{name}")), "{said}");
+    }
+    assert!(!bench(&format!("./{name}")).contains("WARN"));
 }

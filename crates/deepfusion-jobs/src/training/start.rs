@@ -10,6 +10,7 @@ use deepfusion_model::{
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_runtime::{
     Error as RuntimeError, ModelSource, embedded, embedded_names, embedded_unless_run,
+    hidden_by_run,
 };
 use deepfusion_train::{Checkpoints, Device, Error as TrainError, Model};
 use deepfusion_weights::Shipped;
@@ -106,7 +107,8 @@ impl Start {
 
     /// What is asked for, else what the configuration names, else, `by_default`, the embedded network that is built as the
     /// configuration's. A configuration read from a file that names nothing means nothing: a run that is repeated by its config.toml starts
-    /// as it did, whatever is embedded.
+    /// as it did, whatever is embedded. A name that is a run's folder here and an embedded network's elsewhere is a warning
+    /// ([`tracing::warn`]).
     ///
     /// # Errors
     /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`Error::OtherStart`] where a configuration began from other
@@ -169,6 +171,9 @@ impl Start {
             return Ok(Self::Packed { network, path });
         }
         if init.exists() {
+            if let Some(hidden) = hidden_by_run(init) {
+                tracing::warn!("{hidden}");
+            }
             return Ok(Self::Path(init.to_owned()));
         }
         Err(RuntimeError::NoSuchModel {
