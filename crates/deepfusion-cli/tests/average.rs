@@ -91,6 +91,19 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     assert!(strangers.stderr.contains("WARN"), "{}", strangers.stderr);
 
     hides_the_embedded_network(at);
+
+    // A mean has seen what its networks have: simulated drives, one that may be anything, and one without exact poses.
+    let pack = "weights pack --model mean --name blind --simulated-only --out blind --overwrite";
+    assert!(!ok(at, pack).stderr.contains("WARN"));
+    let poses = at.join("second/2026_01_01/2026_01_01_drive_0004_sync/poses.txt");
+    fs::remove_file(poses).unwrap();
+    fails(at, pack, &["second", "which is real", "--simulated-only"]);
+    fs::rename(at.join("second"), at.join("elsewhere")).unwrap();
+    let unsure = ok(at, pack).stderr;
+    assert!(
+        unsure.contains("WARN") && unsure.contains("second"),
+        "{unsure}"
+    );
 }
 
 /// A run of an embedded network's name is taken for it, and not without a word.
