@@ -48,7 +48,14 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
 
     // A run by its settings is not the mean of anything, and goes on.
     let from = format!("{train} --config mean/config.toml --data third");
-    ok(at, &format!("{from} --init mean --out on"));
+    let went_on = ok(at, &format!("{from} --init mean --out on"));
+    assert!(!went_on.stderr.contains("of a mean"), "{}", went_on.stderr);
+    // Else it would be the first network's run again.
+    fails(
+        at,
+        "train --config mean/config.toml --data nowhere --out off",
+        &["WARN", "mean of 2 networks", "--init mean ", "nowhere"],
+    );
     let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
     assert!(!on.contains("averaged"), "{on}");
     assert_eq!(held_out(at, "on", "second"), false, "by what it began from");

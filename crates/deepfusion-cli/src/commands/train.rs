@@ -1,7 +1,9 @@
+use std::path::Path;
+
 use deepfusion_data::Cameras;
 use deepfusion_hint::count_of;
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
-use deepfusion_jobs::training::{Began, Pace, Start};
+use deepfusion_jobs::training::{Began, Pace, SettingsOfMean, Start};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder,
     TrainConfig, ViewMotion,
@@ -177,9 +179,24 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
     Ok(summary)
 }
 
+/// Warns of settings that are another run's. Who says what to begin from has said what is meant.
+fn warn_of_mean(config: &Path, args: &TrainArgs) {
+    if args.init.is_none()
+        && let Ok(Some(mean)) = SettingsOfMean::of(config)
+    {
+        let folder = config.parent().filter(|folder| *folder != Path::new(""));
+        let folder = folder.unwrap_or(Path::new(".")).display();
+        tracing::warn!("{mean} (--init {folder} goes on from the mean)");
+    }
+}
+
 fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
-        Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
+        Some(path) => {
+            let config = TrainConfig::read_over_preset(path, args.device.compute())?;
+            warn_of_mean(path, args);
+            config
+        }
         None => {
             let preset = args.preset.unwrap_or(Preset::Tiny);
             preset.config_on(args.device.compute())

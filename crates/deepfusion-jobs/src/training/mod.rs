@@ -8,5 +8,5 @@ mod start;
 mod time_estimate;
 
 pub use run_log::RunLog;
-pub use start::{Began, Start};
+pub use start::{Began, SettingsOfMean, Start};
 pub use time_estimate::{Choice, Pace, TimeEstimate};
