@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use deepfusion_hint::count_of;
+
 use crate::failure::{Exit, Reportable};
 
 /// Failures that only the command line knows.
@@ -133,6 +135,18 @@ pub(crate) enum CliError {
     /// A precision that an engine does not have.
     #[error("`--precision bf16` is the fused engine's")]
     OnlyFused,
+    /// Recordings that cannot be read, beside others that can.
+    #[error("{}: {unreadable} of {} cannot be read", path.display(), count_of(*recordings, "recording"))]
+    Unreadable {
+        /// What was given.
+        path: PathBuf,
+        /// How many of them cannot.
+        unreadable: usize,
+        /// How many there are.
+        recordings: usize,
+        /// What to do about the first.
+        hint: Option<String>,
+    },
     /// A recording that should not be trained on.
     #[error("{}: {errors} {} would make training fail or give a wrong scale", path.display(), if *errors == 1 { "error" } else { "errors" })]
     Unfit {
@@ -303,6 +317,10 @@ impl Reportable for CliError {
                 None => format!("mend them, then {}", again(*resumes)),
             }),
             Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
+            Self::Unreadable { hint, .. } => Some(format!(
+                "each is listed with its reason; {}, or give the others by themselves",
+                hint.as_deref().unwrap_or("mend them")
+            )),
             Self::OutputsAlone { .. } => Some("give the images themselves, or another folder for the outputs".into()),
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),

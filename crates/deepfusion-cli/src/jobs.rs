@@ -89,6 +89,7 @@ impl Reportable for Error {
             Self::NothingToPack { .. } => {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
             }
+            Self::SawReal { .. } => Some("leave --simulated-only out".into()),
             #[cfg(feature = "train")]
             Self::NotJudged { .. } => Some(
                 "give longer drives with a speed, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),

@@ -5,7 +5,7 @@ use std::path::Path;
 use deepfusion_eval::PostProcess;
 pub(crate) use deepfusion_jobs::ModelFacts;
 use deepfusion_model::TrainConfig;
-use deepfusion_runtime::ModelSource;
+use deepfusion_runtime::{ModelSource, hidden_by_run};
 
 use crate::error::CliError;
 use crate::failure::Result;
@@ -17,8 +17,24 @@ use crate::progress::say;
 /// As [`ModelSource::named`]; [`CliError::NoModelGiven`] without `--model` where no network is embedded.
 pub(crate) fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
     match asked {
-        Some(model) => Ok(ModelSource::named(model)?),
+        Some(model) => named(model),
         None => embedded_default()?.ok_or_else(|| CliError::NoModelGiven.into()),
+    }
+}
+
+/// The network of a path or a name; warns where that could mean an embedded network as well as the run that is taken.
+///
+/// # Errors
+/// As [`ModelSource::named`].
+pub(crate) fn named(model: &Path) -> Result<ModelSource> {
+    warn_of_hidden(model);
+    Ok(ModelSource::named(model)?)
+}
+
+/// Warns where a name could mean an embedded network as well as the run that is taken.
+pub(crate) fn warn_of_hidden(model: &Path) {
+    if let Some(hidden) = hidden_by_run(model) {
+        tracing::warn!("{hidden}");
     }
 }
 

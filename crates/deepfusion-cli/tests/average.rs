@@ -48,7 +48,14 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
 
     // A run by its settings is not the mean of anything, and goes on.
     let from = format!("{train} --config mean/config.toml --data third");
-    ok(at, &format!("{from} --init mean --out on"));
+    let went_on = ok(at, &format!("{from} --init mean --out on"));
+    assert!(!went_on.stderr.contains("of a mean"), "{}", went_on.stderr);
+    // Else it would be the first network's run again.
+    fails(
+        at,
+        "train --config mean/config.toml --data nowhere --out off",
+        &["WARN", "mean of 2 networks", "--init mean ", "nowhere"],
+    );
     let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
     assert!(!on.contains("averaged"), "{on}");
     assert_eq!(held_out(at, "on", "second"), false, "by what it began from");
@@ -89,4 +96,39 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     );
     let strangers = ok(at, "weights average a strange --out strangers");
     assert!(strangers.stderr.contains("WARN"), "{}", strangers.stderr);
+
+    hides_the_embedded_network(at);
+
+    // A mean has seen what its networks have: simulated drives, one that may be anything, and one without exact poses.
+    let pack = "weights pack --model mean --name blind --simulated-only --out blind --overwrite";
+    assert!(!ok(at, pack).stderr.contains("WARN"));
+    let poses = at.join("second/2026_01_01/2026_01_01_drive_0004_sync/poses.txt");
+    fs::remove_file(poses).unwrap();
+    fails(at, pack, &["second", "which is real", "--simulated-only"]);
+    fs::rename(at.join("second"), at.join("elsewhere")).unwrap();
+    let unsure = ok(at, pack).stderr;
+    assert!(
+        unsure.contains("WARN") && unsure.contains("second"),
+        "{unsure}"
+    );
+}
+
+/// A run of an embedded network's name is taken for it, and not without a word.
+fn hides_the_embedded_network(at: &Path) {
+    let Some(name) = deepfusion_weights::names().next() else {
+        return;
+    };
+    ok(at, &format!("weights average a b --out {name}"));
+    let bench = |model: &str| ok(at, &format!("bench --model {model} --repeats 1")).stderr;
+    let train = format!(
+        "train --data third --size 96x64 --batch 2 --steps 1 --init {name} --out from-{name}"
+    );
+    let average = format!("weights average a {name} --out again");
+    for said in [bench(name), ok(at, &train).stderr, ok(at, &average).stderr] {
+        let about = said.lines().filter(|line| line.contains("WARN"));
+        let about: Vec<&str> = about.filter(|line| line.contains("embedded")).collect();
+        assert_eq!(about.len(), 1, "{said}");
+        assert!(about[0].contains(&format!("./{name}")), "{said}");
+    }
+    assert!(!bench(&format!("./{name}")).contains("WARN"));
 }

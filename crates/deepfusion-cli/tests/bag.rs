@@ -374,6 +374,35 @@ fn what_is_wrong_with_a_bag_is_said() {
     );
 }
 
+#[test]
+fn a_damaged_bag_does_not_hide_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --format bag --frames 6 --size 64x48",
+    );
+    std::fs::write(at.join("sim/damaged.bag"), b"a letter").unwrap();
+    let listed = run(at, "data inspect sim");
+    assert_eq!(listed.code, 1, "{}", listed.stderr);
+    for part in ["urban_0001", "damaged.bag", "not a ROS bag"] {
+        assert!(listed.stdout.contains(part), "{part}: {}", listed.stdout);
+    }
+    for part in ["sim: 1 of 2 recordings cannot be read", "hint: "] {
+        assert!(listed.stderr.contains(part), "{part}: {}", listed.stderr);
+    }
+    let listed = run(at, "data inspect sim --json");
+    assert_eq!(listed.code, 1, "{}", listed.stderr);
+    let seen: Value = serde_json::from_str(&listed.stdout).unwrap();
+    assert_eq!((&seen["frames"], &seen["kind"]), (&6.into(), &"bag".into()));
+    let damaged = seen["unreadable"][0]["path"].as_str().unwrap();
+    assert!(damaged.ends_with("damaged.bag"), "{damaged}");
+    // Of a part nothing is written.
+    let written = run(at, "data inspect sim --write-config --overwrite");
+    assert_eq!(written.code, 1, "{}", written.stderr);
+    assert!(!written.stderr.contains("written"), "{}", written.stderr);
+}
+
 /// Frames on /tf_static, CameraInfo and satellite positions at 1 Hz (`deepfusion-data/tests/reference/ros_drive.py`).
 #[test]
 fn a_bag_as_ros_records_it_is_trained_on_without_a_file_beside_it() {

@@ -154,6 +154,28 @@ fn a_camera_that_may_be_wrong_is_warned_of() {
     }
 }
 
+/// Of pictures like nothing that a network learned from the first is named, and done all the same.
+#[test]
+fn an_image_of_extreme_size_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("odd")).unwrap();
+    for (name, width, height) in [("a", 1, 1), ("b", 2000, 20), ("c", 320, 96)] {
+        let picture = image::RgbImage::new(width, height);
+        let path = at.join("odd").join(name).with_extension("png");
+        picture.save(path).unwrap();
+    }
+    let predict = |input: &str, out: &str| {
+        let args = format!("predict odd/{input} --model tiny --save npy --out {out}");
+        let said = ok(at, &args).stderr;
+        let about = |line: &&str| line.contains("WARN") && line.contains("learned from nothing");
+        said.lines().filter(about).count()
+    };
+    assert_eq!(predict("c.png", "fits"), 0);
+    assert_eq!(predict("", "all"), 1);
+    assert_eq!(outputs(&at.join("all")).len(), 6);
+}
+
 #[test]
 fn a_run_that_was_killed_goes_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -28,7 +28,8 @@ pub use dataset::{
     DriveInspection, Ego, EgoMotion, Frame, FrameImage, Heading, Inspection, IntrinsicsSummary,
     Mount, NamedTopic, NoMotion, NoNamedTopic, NoSuchCamera, OpenOptions, PLAUSIBLE_HEIGHT_M,
     Receiver, Recording, SeenTurn, Snippet, Source, SpeedRange, SpeedWarning, Split, SplitCoverage,
-    SplitEntry, Stream, TopicRole, grey_image, hold_out, road_camera_height, speed_unit_warning,
+    SplitEntry, Stream, TopicRole, Unreadable, grey_image, hold_out, road_camera_height,
+    speed_unit_warning,
 };
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use error::{

@@ -389,6 +389,47 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     assert!(error.contains("holds images"), "{error}");
 }
 
+/// Files that are no bags but by their names, before and behind a good one, and what is left of another.
+#[test]
+fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
+    let drive = Drive::new("", |bag| {
+        bag.twist("/vehicle/twist", 10.0);
+    });
+    let at = drive.folder.path();
+    let letter = "a letter";
+    for (name, text) in [
+        ("a.bag", letter),
+        ("m.bag", "#ROSBAG V2.0\n"),
+        ("z.bag", letter),
+    ] {
+        fs::write(at.join(name), text).unwrap();
+    }
+    let seen = inspect(at).unwrap();
+    assert_eq!((seen.drives.len(), seen.frames), (1, 25));
+    let files = seen.unreadable.iter().map(|one| one.path.file_name());
+    let files: Vec<_> = files.flatten().collect();
+    assert_eq!(files, ["a.bag", "m.bag", "z.bag"]);
+    let error = &seen.unreadable[0].error;
+    assert!(matches!(**error, Error::Bag(_)), "{error}");
+    let text = seen.to_string();
+    for part in ["25 frames", "z.bag", "not a ROS bag"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let json = serde_json::to_value(&seen).unwrap();
+    let said = json["unreadable"][2]["error"].as_str().unwrap();
+    assert!(said.contains("z.bag: not a ROS bag"), "{said}");
+
+    fs::remove_file(&drive.bag).unwrap();
+    let none = inspect(at).unwrap();
+    assert_eq!((none.drives.len(), none.unreadable.len()), (0, 3));
+    assert!(none.to_string().contains("nothing can be read"), "{none}");
+    // Alone it is an error.
+    for name in ["a.bag", "m.bag"] {
+        fs::remove_file(at.join(name)).unwrap();
+    }
+    assert!(matches!(inspect(at), Err(Error::Bag(_))));
+}
+
 #[test]
 fn a_twist_s_speed_is_scaled_like_any_other() {
     let sidecar = "[vehicle]\nspeed_scale = 0.9\n";

@@ -2,7 +2,7 @@
 
 use crate::common::{self, TinyDrive};
 use deepfusion_data::kitti::{Calibration, find_drives};
-use deepfusion_data::{Camera, Cameras, Dataset, Error, OpenOptions, inspect};
+use deepfusion_data::{Camera, Cameras, Dataset, Error, OpenOptions, inspect, inspect_with};
 use deepfusion_hint::Hint;
 use proptest::prelude::*;
 use std::fs;
@@ -373,6 +373,36 @@ fn an_inspection_counts_everything() {
     assert_eq!(json["kind"], "kitti_raw");
     assert_eq!(json["streams"][0]["type"], "image");
     assert_eq!(json["intrinsics"]["fx"], 36.0);
+}
+
+/// A drive that is broken hides no other of its date, and one without images is named.
+#[test]
+fn an_inspection_lists_what_cannot_be_read() {
+    let root = tempfile::tempdir().unwrap();
+    TinyDrive::default().write(root.path());
+    let other = |number: u32| {
+        let name = format!("2030_01_02/2030_01_02_drive_{number:04}_sync");
+        TinyDrive::default().write_as(root.path(), &name)
+    };
+    let (broken, empty) = (other(8), other(9));
+    fs::write(broken.join("image_02/timestamps.txt"), "yesterday\n").unwrap();
+    fs::remove_dir_all(empty.join("image_02/data")).unwrap();
+    let seen = inspect(root.path()).unwrap();
+    assert_eq!((seen.drives.len(), seen.frames), (1, 8));
+    let [unreadable] = seen.unreadable.as_slice() else {
+        panic!("{:?}", seen.unreadable)
+    };
+    assert!(unreadable.path.ends_with("2030_01_02_drive_0008_sync"));
+    assert!(matches!(*unreadable.error, Error::TimeStamp { .. }));
+    let warnings = seen.drives[0].warnings.join("\n");
+    assert!(warnings.contains("drive_0009_sync"), "{warnings}");
+    // A camera for drives that have theirs is not theirs to be wrong.
+    let given = OpenOptions {
+        hfov_deg: Some(90.0),
+        ..OpenOptions::default()
+    };
+    let error = inspect_with(root.path(), &given, |_| None).unwrap_err();
+    assert!(matches!(error, Error::OwnCalibration { .. }), "{error}");
 }
 
 #[test]

@@ -435,3 +435,47 @@ fn a_split_selects_by_the_folders_name() {
         "{error}"
     );
 }
+
+/// The folder is one recording, and others lie in it: that they are not read is said.
+#[test]
+fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
+    let root = tempfile::tempdir().unwrap();
+    let at = root.path();
+    write_drive(at, 4, 10.0, 0.0);
+    // Parts of it, and what is none of its kind.
+    for folder in ["depth", "notes", "out"] {
+        fs::create_dir(at.join(folder)).unwrap();
+    }
+    picture(0).save(at.join("notes/photo.png")).unwrap();
+    for file in ["predict-1-of-1.manifest.json", "drive.mp4"] {
+        fs::write(at.join("out").join(file), "").unwrap();
+    }
+    let said = |path: &Path| {
+        let warnings = open(path).warnings().to_vec();
+        let about = warnings.into_iter().filter(|w| w.contains("not read"));
+        about.collect::<Vec<_>>().join("\n")
+    };
+    assert_eq!(said(at), "");
+    write_drive(&at.join("second"), 4, 10.0, 0.0);
+    fs::create_dir(at.join("third")).unwrap();
+    fs::write(at.join("third/clip.MP4"), "").unwrap();
+    let expected =
+        "read as image folder alone; not read, though it looks like a recording: second, third";
+    assert!(said(at).starts_with(expected), "{}", said(at));
+    let noted = &inspect(at).unwrap().drives[0].warnings;
+    assert!(noted.contains(&said(at)), "{noted:?}");
+    // By itself it is all there is.
+    assert_eq!(said(&at.join("second")), "");
+
+    // KITTI's drives, and a film of them; what is in a drive is its own.
+    let root = tempfile::tempdir().unwrap();
+    let drive = TinyDrive::default().write(root.path());
+    write_drive(&drive.join("extra"), 4, 10.0, 0.0);
+    assert_eq!(said(root.path()), "");
+    fs::write(root.path().join("drive.mp4"), "").unwrap();
+    write_drive(&root.path().join("walk"), 4, 10.0, 0.0);
+    let expected =
+        "read as KITTI raw alone; not read, though it looks like a recording: drive.mp4, walk";
+    assert!(said(root.path()).starts_with(expected));
+    assert_eq!(said(&drive), "");
+}

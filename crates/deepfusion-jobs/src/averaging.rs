@@ -32,7 +32,7 @@ pub struct Averaged {
     pub checkpoint: PathBuf,
     /// What it is the mean of, in the order given.
     pub networks: Vec<AveragedNetwork>,
-    /// Whether all of them are known to come from one. Others' mean is worth nothing.
+    /// Whether all of them are known to come from one, or from one seed's first weights. Others' mean is worth nothing.
     pub related: bool,
     /// Whether some could say how sure they are and others could not, so that the mean cannot.
     pub lost_uncertainty: bool,

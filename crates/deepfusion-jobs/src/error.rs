@@ -152,6 +152,17 @@ pub enum Error {
         /// The checkpoint.
         path: PathBuf,
     },
+    /// A network that is to count as one that saw no real image, and did.
+    #[error(
+        "{} learned from {}, which is real: no exact poses lie there, as in simulated drives",
+        run.display(), recording.display()
+    )]
+    SawReal {
+        /// The run, which may be one that the network began from or is the mean of.
+        run: PathBuf,
+        /// The recording.
+        recording: PathBuf,
+    },
     /// Networks whose weights have no mean.
     #[error("{}: {why}", path.display())]
     NoMean {
@@ -494,6 +505,9 @@ impl Hint for Error {
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
+            Self::SawReal { .. } => Some(
+                "pack it without saying that it saw simulated images alone".into(),
+            ),
             Self::NoMean { why, .. } => Some(
                 match why {
                     NoMean::Packed => {

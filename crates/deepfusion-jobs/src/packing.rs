@@ -1,6 +1,8 @@
 //! A run's depth network as a file of its own, with a card that says what it is.
 
-use std::path::Path;
+mod past;
+
+use std::path::{Path, PathBuf};
 
 use deepfusion_data::to_network_input;
 use deepfusion_eval::compare::sha256_of_file;
@@ -29,15 +31,26 @@ pub struct PackOptions {
     pub recipe: Option<String>,
     /// Under which terms it may be used.
     pub licence: String,
-    /// Whether it learned from no real image.
+    /// Whether it learned from no real image. That is checked as far as its run, those it began from and those that it is the mean of can tell.
     pub simulated_only: bool,
+}
+
+/// What [`pack_run`] made.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct PackedRun {
+    /// The network with its card.
+    pub shipped: Shipped,
+    /// Where it is to count as one that saw no real image: the recordings and networks of its past of which nothing shows it. The card says it
+    /// all the same.
+    pub not_known_as_simulated: Vec<PathBuf>,
 }
 
 /// Packs the depth network of a run (its folder, or a checkpoint in it): kernels rounded to bf16, vectors in f32.
 ///
 /// # Errors
-/// [`Error::PackedAlready`], [`Error::NothingToPack`], and a run that cannot be read.
-pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
+/// [`Error::PackedAlready`], [`Error::NothingToPack`], [`Error::SawReal`], and a run that cannot be read.
+pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
     if Shipped::is_at(model) {
         let path = model.to_owned();
         return Err(Error::PackedAlready { path });
@@ -50,6 +63,11 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
         return Err(Error::NothingToPack { path: file });
     }
     let (config, mut findings) = (folder.read_config()?, folder.read_findings()?);
+    let not_known_as_simulated = if options.simulated_only {
+        past::not_known_as_simulated(folder.path(), &config, &findings)?
+    } else {
+        Vec::new()
+    };
     let (weights, state) = folder.load_depth_weights(kind)?;
     if state.focal_ratio.is_some()
         && let Some(camera) = folder.camera_of(&state, None)?
@@ -119,7 +137,10 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
             .to_run_table(&findings)
             .map_err(no_form("the run's configuration has no TOML form"))?,
     };
-    Ok(Shipped::new(card, bytes)?)
+    Ok(PackedRun {
+        shipped: Shipped::new(card, bytes)?,
+        not_known_as_simulated,
+    })
 }
 
 /// The names of the recordings that a run learned from, or those that it is the mean of, as far as these are there.

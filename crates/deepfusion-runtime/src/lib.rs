@@ -37,4 +37,7 @@ pub use ort::OrtRunner;
 pub use prediction::Prediction;
 pub use prepare::{PreparedImage, Preparer, View, fitting};
 pub use runner::{DepthRunner, FeatureMap, LayerMaps, NetworkOutput, RunnerPlan, metric_disparity};
-pub use source::{ModelSource, embedded, embedded_names, embedded_unless_run, unpacked};
+pub use source::{
+    HiddenByRun, ModelSource, embedded, embedded_names, embedded_unless_run, hidden_by_run,
+    unpacked,
+};

@@ -1,5 +1,6 @@
 //! Finds trained networks: by path, or by the name of an embedded one.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use deepfusion_geometry::Intrinsics;
@@ -42,8 +43,8 @@ impl ModelSource {
         }))
     }
 
-    /// Resolves a path or a name: a run or file that is there comes first, then an embedded network's name. A folder of images that has
-    /// an embedded network's name does not stand in its way.
+    /// Resolves a path or a name: a run or file that is there comes first, then an embedded network's name ([`hidden_by_run`] says where
+    /// both could be meant). A folder of images that has an embedded network's name does not stand in its way.
     ///
     /// # Errors
     /// [`Error::NoSuchModel`] for neither; [`RunFolder::open`]'s and [`Shipped::read`]'s for a path that holds no network.
@@ -176,12 +177,42 @@ pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights
 pub fn embedded_unless_run(
     model: &Path,
 ) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
-    let of_a_run = |path: &Path| path.ends_with("config.toml") || names_a_checkpoint(path);
-    let entries = std::fs::read_dir(model).into_iter().flatten();
-    if entries.flatten().any(|entry| of_a_run(&entry.path())) {
+    if holds_a_run(model) {
         return Ok(None);
     }
     embedded(model)
+}
+
+/// Whether a folder holds a run, or what is left of one.
+fn holds_a_run(folder: &Path) -> bool {
+    let of_a_run = |path: &Path| path.ends_with("config.toml") || names_a_checkpoint(path);
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    entries.flatten().any(|entry| of_a_run(&entry.path()))
+}
+
+/// An embedded network whose name means a run's folder here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HiddenByRun {
+    /// The name of both.
+    pub name: &'static str,
+}
+
+impl fmt::Display for HiddenByRun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = self.name;
+        write!(
+            f,
+            "`{name}` is taken for the run in the folder of that name, not for the embedded network: ./{name} means the run in any case; \
+             for the embedded one work in another folder, or rename the run's"
+        )
+    }
+}
+
+/// The embedded network that could be meant where [`ModelSource::named`] takes a run; `None` where a path says which.
+#[must_use]
+pub fn hidden_by_run(model: &Path) -> Option<HiddenByRun> {
+    let name = deepfusion_weights::names().find(|name| Path::new(name) == model)?;
+    holds_a_run(model).then_some(HiddenByRun { name })
 }
 
 /// The names of the embedded networks.

@@ -14,8 +14,8 @@ pub(crate) struct PredictionArgs {
     /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, an RGB-D folder, a folder with
-    /// dataset.toml. Recordings know their camera, and lens distortion is removed. Or one live source.
+    /// Images, folders of images, globs, or recordings: a drive of KITTI (raw, odometry, 360), a nuScenes folder, a bag, a video, a comma2k19
+    /// segment, an RGB-D folder, a folder with dataset.toml. Recordings know their camera, and lens distortion is removed. Or one live source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images [default: the recording's, else EXIF's focal length, else the one trained with is

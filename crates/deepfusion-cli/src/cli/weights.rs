@@ -119,7 +119,8 @@ pub(crate) struct PackArgs {
     /// The licence for its card.
     #[arg(long, value_name = "TERMS", default_value = env!("CARGO_PKG_LICENSE"))]
     pub licence: String,
-    /// Say in its card that it learned from no real image: real recordings then count as not seen in training.
+    /// Say in its card that it learned from no real image: real recordings then count as not seen in training. Refused where one of its
+    /// recordings, or of the runs that it began from or is the mean of, is real.
     #[arg(long)]
     pub simulated_only: bool,
     /// Replace files that are there.

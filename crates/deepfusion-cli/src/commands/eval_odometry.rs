@@ -16,7 +16,7 @@ use crate::allocator;
 use crate::cli::EvalOdometryArgs;
 use crate::error::CliError;
 use crate::failure::Result;
-use crate::model::ModelFacts;
+use crate::model::{self, ModelFacts};
 use crate::progress::Progress;
 use crate::{devices, output};
 
@@ -48,7 +48,7 @@ pub(super) fn run(args: &EvalOdometryArgs) -> Result<()> {
 fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     allocator::keep_memory();
     let model = args.model.as_deref().unwrap_or(Path::new("."));
-    let source = ModelSource::named(model)?;
+    let source = model::named(model)?;
     if let ModelSource::Packed { .. } = source {
         let model = source.name();
         return Err(CliError::NoPoseNet { model }.into());

@@ -1,7 +1,8 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{
-    Dataset, GtKind, OpenOptions, ground_truth_names, overlay, save_png, write_bag_config,
+    Dataset, GtKind, Inspection, OpenOptions, ground_truth_names, overlay, save_png,
+    write_bag_config,
 };
 use deepfusion_doctor::inspect;
 use deepfusion_hint::count_of;
@@ -9,7 +10,7 @@ use deepfusion_hint::count_of;
 use crate::cli::{CameraIntrinsics, InspectArgs};
 use crate::commands::clocks;
 use crate::error::CliError;
-use crate::failure::Result;
+use crate::failure::{Reportable, Result};
 use crate::output;
 use crate::progress::{Progress, say};
 
@@ -23,17 +24,24 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     };
     options.camera_ahead_s = clocks::seconds_of(args.clock_offset, &args.path, &options)?;
     let inspection = inspect(&args.path, &options)?;
+    if let Some(first) = inspection.unreadable.first() {
+        print(&inspection, args.json)?;
+        // Nothing is written of a part.
+        return Err(CliError::Unreadable {
+            path: args.path.clone(),
+            unreadable: inspection.unreadable.len(),
+            recordings: inspection.unreadable.len() + inspection.drives.len(),
+            hint: first.error.remedy(),
+        }
+        .into());
+    }
     // First of all, since it may be refused: what is printed then stands as it was read.
     let written = if args.write_config {
         write_config(args, &options)?
     } else {
         Vec::new()
     };
-    if args.json {
-        output::print_json(&inspection)?;
-    } else {
-        output::print(&inspection.to_string())?;
-    }
+    print(&inspection, args.json)?;
     for file in written {
         say(&format!("{} written", file.display()));
     }
@@ -47,6 +55,14 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+fn print(inspection: &Inspection, json: bool) -> Result<()> {
+    if json {
+        output::print_json(inspection)
+    } else {
+        output::print(&inspection.to_string())
+    }
 }
 
 /// The files beside the bags, written.

@@ -1,6 +1,8 @@
+use std::path::Path;
+
 use deepfusion_jobs::recordings::training_recordings;
 use deepfusion_jobs::training::{
-    AskedRecordings, Began, Pace, Start, TrainingPlan, leaves_turns_unused,
+    AskedRecordings, Began, Pace, SettingsOfMean, Start, TrainingPlan, leaves_turns_unused,
 };
 use deepfusion_model::{Preset, Reprojection, RunFolder, TrainConfig};
 use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
@@ -135,9 +137,24 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
     Ok(summary)
 }
 
+/// Warns of settings that are another run's. Who says what to begin from has said what is meant.
+fn warn_of_mean(config: &Path, args: &TrainArgs) {
+    if args.init.is_none()
+        && let Ok(Some(mean)) = SettingsOfMean::of(config)
+    {
+        let folder = config.parent().filter(|folder| *folder != Path::new(""));
+        let folder = folder.unwrap_or(Path::new(".")).display();
+        tracing::warn!("{mean} (--init {folder} goes on from the mean)");
+    }
+}
+
 fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
-        Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
+        Some(path) => {
+            let config = TrainConfig::read_over_preset(path, args.device.compute())?;
+            warn_of_mean(path, args);
+            config
+        }
         None => {
             let preset = args.preset.unwrap_or(Preset::Tiny);
             preset.config_on(args.device.compute())

@@ -1,8 +1,12 @@
 //! What is in a recording, as `data inspect` prints it.
 
 use super::kind::DatasetKind;
+use crate::Error;
 use deepfusion_geometry::Intrinsics;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What `data inspect` reports, of one drive or several.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,6 +29,36 @@ pub struct Inspection {
     pub duration_s: Option<f64>,
     /// Each drive by itself.
     pub drives: Vec<DriveInspection>,
+    /// Of several recordings those that cannot be read, which the figures above leave out; absent from JSON where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unreadable: Vec<Unreadable>,
+}
+
+/// One of several recordings, which cannot be read.
+#[derive(Debug, Clone, Serialize)]
+pub struct Unreadable {
+    /// Its file or folder.
+    #[serde(serialize_with = "path_text")]
+    pub path: PathBuf,
+    /// Why it cannot; its message in JSON.
+    #[serde(serialize_with = "text")]
+    pub error: Arc<Error>,
+}
+
+/// Errors are alike by what they say.
+impl PartialEq for Unreadable {
+    fn eq(&self, other: &Self) -> bool {
+        let said = |one: &Self| (one.path.clone(), one.error.to_string());
+        said(self) == said(other)
+    }
+}
+
+fn path_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    text(&path.display(), serializer)
+}
+
+fn text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(value)
 }
 
 /// One drive of an [`Inspection`].

@@ -1,6 +1,6 @@
 //! An inspection in words.
 
-use super::inspection::{Inspection, SpeedRange};
+use super::inspection::{Inspection, SpeedRange, Unreadable};
 use super::kind::DatasetKind;
 use deepfusion_hint::count_of;
 use std::fmt;
@@ -12,6 +12,9 @@ impl fmt::Display for Inspection {
             Some([w, h]) => {
                 let frames = count_of(self.frames, "frame");
                 writeln!(f, "{layout}, {frames} of {w}x{h}")?;
+            }
+            None if self.drives.is_empty() => {
+                writeln!(f, "{layout}, of which nothing can be read")?
             }
             None => writeln!(f, "{layout} without images")?,
         }
@@ -95,6 +98,12 @@ impl fmt::Display for Inspection {
             for warning in &drive.warnings {
                 writeln!(f, "  note      {warning}")?;
             }
+        }
+        for Unreadable { path, error } in &self.unreadable {
+            writeln!(f, "\n{}\n  cannot be read: {error}", path.display())?;
+        }
+        if self.drives.is_empty() {
+            return Ok(());
         }
         let width = self.streams.iter().map(|s| s.name.len()).max().unwrap_or(0);
         let width = width.max("stream".len());

@@ -29,6 +29,7 @@ pub use frame::{Frame, FrameImage};
 pub use heading::Heading;
 pub use inspection::{
     ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, Mount, SpeedRange, Stream,
+    Unreadable,
 };
 pub use kind::DatasetKind;
 pub use options::OpenOptions;

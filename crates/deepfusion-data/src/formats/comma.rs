@@ -161,6 +161,7 @@ pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection
             time_offset: None,
             warnings: Vec::new(),
         }],
+        unreadable: Vec::new(),
     })
 }
 

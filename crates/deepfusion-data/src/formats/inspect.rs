@@ -1,18 +1,21 @@
 //! What is in a recording.
 
+use super::files::name_of;
 use super::layout::Layout;
 use super::{bag, comma};
 use crate::{
     Cameras, ClockOffset, Dataset, DriveInspection, Error, GtKind, Inspection, IntrinsicsSummary,
-    OpenOptions, Result, SpeedRange,
+    NoFramesReason, OpenOptions, Result, SpeedRange, Stream, Unreadable,
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Looks into a recording of any layout that [`Dataset::open`] knows. A comma2k19 segment whose video is
-/// absent, and a bag without a camera, are reported by their other streams.
+/// absent, and a bag without a camera, are reported by their other streams. Where the path holds several recordings, those that cannot be
+/// read are [listed](Inspection::unreadable) beside the others; a nuScenes data set is one, as its scenes share their tables.
 ///
 /// # Errors
-/// As [`Dataset::open`]; times and speeds may be missing and are then reported as unknown.
+/// As [`Dataset::open`] of one recording; times and speeds may be missing and are then reported as unknown.
 pub fn inspect(path: &Path) -> Result<Inspection> {
     inspect_with(path, &OpenOptions::default(), |_| None)
 }
@@ -29,7 +32,21 @@ pub fn inspect_with(
     time_offset: impl FnOnce(&Dataset) -> Option<ClockOffset>,
 ) -> Result<Inspection> {
     let layout = Layout::of(path)?;
-    layout.check_topics(path, options)?;
+    layout.check_options(path, options)?;
+    let passed_over = layout.passed_over(path);
+    let mut inspection = inspect_layout(path, layout, options, time_offset)?;
+    if let Some(first) = inspection.drives.first_mut() {
+        first.warnings.extend(passed_over);
+    }
+    Ok(inspection)
+}
+
+fn inspect_layout(
+    path: &Path,
+    layout: Layout,
+    options: &OpenOptions,
+    time_offset: impl FnOnce(&Dataset) -> Option<ClockOffset>,
+) -> Result<Inspection> {
     if let Layout::Comma(segment) = &layout
         && !comma::has_video(segment)
     {
@@ -41,45 +58,130 @@ pub fn inspect_with(
     {
         return Ok(inspection);
     }
+    let kind = layout.kind();
+    let Found {
+        mut seen,
+        unreadable,
+        without_images,
+    } = look_into_all(path, layout, options)?;
+    // Measuring reads many pictures: of many drives the doctor reports it one by one.
+    if let [only] = seen.as_mut_slice() {
+        only.drive.time_offset = time_offset(&only.dataset);
+    }
+    if let Some(first) = seen.first_mut()
+        && !without_images.is_empty()
+    {
+        let names = without_images.join(", ");
+        let warning = format!("left out, as there are no images of a camera: {names}");
+        first.drive.warnings.push(warning);
+    }
+    let several = seen.len() > 1;
+    let mut streams = Vec::new();
+    for one in &mut seen {
+        for mut stream in std::mem::take(&mut one.streams) {
+            if several {
+                stream.name = format!("{}/{}", one.dataset.name(), stream.name);
+            }
+            streams.push(stream);
+        }
+    }
+    let k = seen.first().map(|first| first.dataset.intrinsics(0));
+    Ok(Inspection {
+        kind,
+        frames: seen.iter().map(|one| one.drive.frames).sum(),
+        size: k.map(|k| [k.width, k.height]),
+        intrinsics: k.map(IntrinsicsSummary::from),
+        streams,
+        speed_mps: SpeedRange::of(seen.iter().flat_map(|one| speeds(&one.dataset))),
+        distance_m: sum(seen.iter().map(|one| one.drive.distance_m)),
+        duration_s: sum(seen.iter().map(|one| one.drive.duration_s)),
+        drives: seen.into_iter().map(|one| one.drive).collect(),
+        unreadable,
+    })
+}
+
+/// What several recordings hold.
+#[derive(Default)]
+struct Found {
+    seen: Vec<Seen>,
+    unreadable: Vec<Unreadable>,
+    /// The names of those that can be read, and have no images.
+    without_images: Vec<String>,
+}
+
+/// A drive that was opened, and what is in it.
+struct Seen {
+    dataset: Dataset,
+    streams: Vec<Stream>,
+    drive: DriveInspection,
+}
+
+/// Looks into each recording by itself.
+///
+/// # Errors
+/// That of a single recording. Of several it stands among the others, for one that has no images as well where none has.
+fn look_into_all(path: &Path, layout: Layout, options: &OpenOptions) -> Result<Found> {
+    let recordings = layout.apart(path);
+    let several = recordings.len() > 1;
+    let (mut found, mut without_images) = (Found::default(), Vec::new());
+    for (path, recording) in recordings {
+        match look_into(&path, &recording, options) {
+            Ok(seen) => found.seen.extend(seen),
+            Err(error) if !several => return Err(error),
+            Err(error) if lacks_images(&error) => without_images.push((path, error)),
+            Err(error) => found.unreadable.push(unreadable((path, error))),
+        }
+    }
+    if found.seen.is_empty() {
+        found
+            .unreadable
+            .extend(without_images.into_iter().map(unreadable));
+    } else {
+        let names = without_images.iter().map(|(path, _)| name_of(path));
+        found.without_images = names.collect();
+    }
+    Ok(found)
+}
+
+fn unreadable((path, error): (PathBuf, Error)) -> Unreadable {
+    let error = Arc::new(error);
+    Unreadable { path, error }
+}
+
+/// Whether nothing is wrong with a recording but that no camera wrote into it. A bag without any topic is what is left of one.
+fn lacks_images(error: &Error) -> bool {
+    match error {
+        Error::NoImages { .. } => true,
+        Error::NoFrames {
+            reason: NoFramesReason::NoImageTopic { topics },
+            ..
+        } => !topics.is_empty(),
+        _ => false,
+    }
+}
+
+fn look_into(path: &Path, recording: &Layout, options: &OpenOptions) -> Result<Vec<Seen>> {
     let open = |camera| {
         let options = OpenOptions {
             camera,
             split: None,
             ..options.clone()
         };
-        layout.open(path, &options)
+        recording.open(path, &options)
     };
     let datasets = match open(Cameras::Left) {
         Err(Error::NoImages { .. }) => open(Cameras::Right),
         other => other,
     }?;
-    let mut streams = Vec::new();
-    let mut drives = Vec::new();
-    for dataset in &datasets {
-        for mut stream in dataset.streams()? {
-            if datasets.len() > 1 {
-                stream.name = format!("{}/{}", dataset.name(), stream.name);
-            }
-            streams.push(stream);
-        }
-        drives.push(look_at(dataset)?);
-    }
-    // Measuring reads many pictures: of many drives the doctor reports it one by one.
-    if let ([dataset], [drive]) = (datasets.as_slice(), drives.as_mut_slice()) {
-        drive.time_offset = time_offset(dataset);
-    }
-    let k = datasets[0].intrinsics(0);
-    Ok(Inspection {
-        kind: datasets[0].kind(),
-        frames: drives.iter().map(|d| d.frames).sum(),
-        size: Some([k.width, k.height]),
-        intrinsics: Some(IntrinsicsSummary::from(k)),
-        streams,
-        speed_mps: SpeedRange::of(datasets.iter().flat_map(speeds)),
-        distance_m: sum(drives.iter().map(|d| d.distance_m)),
-        duration_s: sum(drives.iter().map(|d| d.duration_s)),
-        drives,
-    })
+    let look = |dataset: Dataset| -> Result<Seen> {
+        let (streams, drive) = (dataset.streams()?, look_at(&dataset)?);
+        Ok(Seen {
+            dataset,
+            streams,
+            drive,
+        })
+    };
+    datasets.into_iter().map(look).collect()
 }
 
 /// Pairs slower than this are counted as unusable, as in training.

@@ -38,7 +38,7 @@ const CALIBRATION_REMEDY: &str =
 pub(crate) struct Drive {
     root: PathBuf,
     /// In `data_2d_raw`.
-    folder: PathBuf,
+    pub(crate) folder: PathBuf,
 }
 
 /// The drives at a path: those of a root, of its `data_2d_raw`, or the drive itself.

@@ -3,6 +3,7 @@
 use super::files::folders;
 use super::found_instead::FoundInstead;
 use super::kitti::{self, Drive, drive_around, find_drives};
+use super::neighbours::{Look, unread};
 use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
 use crate::{ConfigProblem, Dataset, DatasetKind, Error, OpenOptions, Result};
@@ -18,7 +19,8 @@ impl Dataset {
     /// selected frame, are left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be absent
-    /// (evaluation needs neither); where they are there, they must be readable.
+    /// (evaluation needs neither); where they are there, they must be readable. What looks like another recording in the folder and is not
+    /// read with this one stands among the [warnings](Self::warnings) of the first.
     ///
     /// # Errors
     /// [`Error::UnknownLayout`] where no layout fits, [`Error::FolderOfRecordings`], [`Error::NoSuchPath`], [`Error::Missing`]
@@ -29,7 +31,12 @@ impl Dataset {
     /// [`Error::Frames`], [`Error::NoTopics`], [`Error::Pose`], [`Error::Json`],
     /// [`Error::SeveralVersions`].
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
-        Layout::of(path)?.open(path, options)
+        let layout = Layout::of(path)?;
+        let mut datasets = layout.open(path, options)?;
+        if let (Some(first), Some(warning)) = (datasets.first_mut(), layout.passed_over(path)) {
+            first.warning(warning);
+        }
+        Ok(datasets)
     }
 
     /// The layout in which [`Self::open`] reads what is at a path, found without opening it.
@@ -170,30 +177,81 @@ impl Layout {
         }
     }
 
-    /// Topics are a bag's alone: named for another recording they would silently say nothing.
+    /// Topics are a bag's alone, and a camera is given where the layout has none: for another recording they would silently say nothing.
     ///
     /// # Errors
-    /// [`Error::NoTopics`].
-    pub(crate) fn check_topics(&self, path: &Path, options: &OpenOptions) -> Result<()> {
-        match (self, options.topics.first()) {
-            (Self::Bags(_), _) | (_, None) => Ok(()),
-            (_, Some(topic)) => Err(Error::NoTopics {
+    /// [`Error::NoTopics`], [`Error::OwnCalibration`].
+    pub(crate) fn check_options(&self, path: &Path, options: &OpenOptions) -> Result<()> {
+        if let (false, Some(topic)) = (matches!(self, Self::Bags(_)), options.topics.first()) {
+            return Err(Error::NoTopics {
                 path: path.to_owned(),
                 layout: self.kind().label(),
                 topic: topic.clone(),
-            }),
+            });
         }
-    }
-
-    /// Opens what was found.
-    pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
-        self.check_topics(path, options)?;
         if options.gives_camera() && self.kind().brings_calibration() {
             return Err(Error::OwnCalibration {
                 path: path.to_owned(),
                 layout: self.kind().label(),
             });
         }
+        Ok(())
+    }
+
+    /// What else lies in the folder at a path, looks like a recording and is not read, in a sentence; `None` where there is nothing of the
+    /// kind, and for a file.
+    pub(crate) fn passed_over(&self, path: &Path) -> Option<String> {
+        /// Names that are said.
+        const MOST: usize = 6;
+        let folder = path.canonicalize().ok()?;
+        // A bag of ROS 2 may be a folder of its files.
+        if !folder.is_dir() || [path, folder.as_path()].into_iter().any(bag::is_bag) {
+            return None;
+        }
+        let used: Vec<&Path> = match self {
+            Self::Kitti(drives) => drives.iter().map(|drive| drive.folder.as_path()).collect(),
+            Self::RgbD(places) | Self::Bags(places) => places.iter().map(|p| p.as_path()).collect(),
+            _ => Vec::new(),
+        };
+        let look = Look {
+            used: &used,
+            // A folder's own, or left out by its `dataset.toml`.
+            videos: !matches!(self, Self::Comma(_) | Self::Folder(_) | Self::Video(_)),
+            folders: match self {
+                Self::Kitti(_) => !used.contains(&folder.as_path()),
+                Self::RgbD(_) | Self::Bags(_) | Self::Folder(_) | Self::Video(_) => true,
+                _ => false,
+            },
+        };
+        let names = unread(&folder, look);
+        let said = names.get(..MOST).unwrap_or(&names).join(", ");
+        let more = match names.len().checked_sub(MOST) {
+            None | Some(0) => String::new(),
+            Some(more) => format!(" and {more} more"),
+        };
+        (!names.is_empty()).then(|| {
+            format!(
+                "read as {} alone; not read, though it looks like a recording: {said}{more} (give each by its own path)",
+                self.kind().label()
+            )
+        })
+    }
+
+    /// Each of several recordings by itself, with its file or folder. Those that have their tables in common stay one.
+    pub(crate) fn apart(self, path: &Path) -> Vec<(PathBuf, Self)> {
+        match self {
+            Self::Kitti(drives) => each(drives, |drive| drive.folder.clone(), Self::Kitti),
+            Self::KittiOdometry(sequences) => each(sequences, PathBuf::clone, Self::KittiOdometry),
+            Self::Kitti360(drives) => each(drives, |drive| drive.folder.clone(), Self::Kitti360),
+            Self::RgbD(sequences) => each(sequences, PathBuf::clone, Self::RgbD),
+            Self::Bags(bags) => each(bags, PathBuf::clone, Self::Bags),
+            whole => vec![(path.to_owned(), whole)],
+        }
+    }
+
+    /// Opens what was found.
+    pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
+        self.check_options(path, options)?;
         let one = |dataset: Result<Dataset>| Ok(vec![dataset?.select(path, options)?]);
         match self {
             Self::Kitti(drives) => kitti::open(path, drives, options),
@@ -207,6 +265,16 @@ impl Layout {
             Self::Video(place) => one(video::open(place, options)),
         }
     }
+}
+
+/// A layout of each, with its place.
+fn each<T>(
+    all: Vec<T>,
+    place: impl Fn(&T) -> PathBuf,
+    layout: impl Fn(Vec<T>) -> Layout,
+) -> Vec<(PathBuf, Layout)> {
+    let alone = |one: T| (place(&one), layout(vec![one]));
+    all.into_iter().map(alone).collect()
 }
 
 /// The path as it was given, links and all, since a bag's file lies beside the link; what it resolves to where the given

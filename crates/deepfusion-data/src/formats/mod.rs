@@ -13,6 +13,7 @@ pub mod kitti;
 mod kitti360;
 mod kitti_odometry;
 mod layout;
+mod neighbours;
 mod nuscenes;
 mod plain;
 mod pose_track;

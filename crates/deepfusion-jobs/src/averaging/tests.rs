@@ -103,14 +103,15 @@ fn shares_are_positive_and_one_for_each() {
     assert!(average(&[], None, &at.join("no")).is_err());
 }
 
-/// A seed's weights and another seed's, and a run of which nothing is left but its name.
+/// A seed's weights and another seed's or another network's, and a run of which nothing is left but its name.
 #[test]
 fn relatives_are_told_from_strangers() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
-    let from = |name: &str, init: Option<&str>| {
+    let from = |name: &str, init: Option<&str>, seed: u64| {
         run((&at.join(name), LAST), &LAYERS, STATE, |config, _| {
             config.init = init.map(|init| at.join(init));
+            config.seed = seed;
         })
     };
     let encoders = Checkpoint {
@@ -119,19 +120,36 @@ fn relatives_are_told_from_strangers() {
     };
     run((&at.join("imagenet"), LAST), &LAYERS, encoders, |_, _| {});
     std::fs::write(at.join("resnet18.pth"), b"PK").unwrap();
-    for (name, inits, related) in [
-        ("seeds", [None, None], false),
-        ("gone", [Some("gone/run"), Some("gone/run")], true),
-        ("encoders", [Some("imagenet"), Some("imagenet")], false),
-        (
-            "resnet",
-            [Some("resnet18.pth"), Some("resnet18.pth")],
-            false,
-        ),
+    for (name, init, seeds, related) in [
+        ("seeds", None, [1, 2], false),
+        ("seed", None, [1, 1], true),
+        ("gone", Some("gone/run"), [1, 2], true),
+        ("encoders", Some("imagenet"), [1, 2], false),
+        ("resnet", Some("resnet18.pth"), [1, 2], false),
     ] {
-        let both = [0, 1].map(|i| from(&format!("{name}{i}"), inits[i]));
+        let both = [0, 1].map(|i| from(&format!("{name}{i}"), init, seeds[i]));
         let made = average(&both, None, &at.join(name)).unwrap();
         assert_eq!(made.related, related, "{name}");
+    }
+    // A mean of them, and what went on from one, come from the same seed.
+    let on = from("on", Some("seed1"), 9);
+    let mean = average(&[at.join("seed"), on], None, &at.join("both"));
+    assert!(mean.unwrap().related);
+
+    // Weights of other projects, and a network that begins otherwise, have nothing of a seed in common with it.
+    let of_the_seed = at.join("seed0");
+    let imported = Checkpoint { step: 0, ..STATE };
+    let imported = run((&at.join("imported"), LAST), &LAYERS, imported, |c, _| {
+        c.seed = 1;
+    });
+    let other = run((&at.join("other"), LAST), &LAYERS, STATE, |c, _| {
+        c.seed = 1;
+        c.depth_net.initial_depth_m = Some(20.0);
+    });
+    for (name, stranger) in [("import", imported), ("start", other)] {
+        let both = [of_the_seed.clone(), stranger];
+        let made = average(&both, None, &at.join(name)).unwrap();
+        assert!(!made.related, "{name}");
     }
 }
 

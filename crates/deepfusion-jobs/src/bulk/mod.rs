@@ -6,6 +6,7 @@
 
 mod camera;
 mod committer;
+mod fit;
 mod loader;
 mod manifest;
 pub mod pipeline;
@@ -19,6 +20,7 @@ mod video;
 pub use crate::error::UnfitCamera;
 pub use camera::{CameraFrom, CameraSource, LensFile, PinholeImage, looks_of_another_size};
 pub use committer::{Written, commit, queue};
+pub use fit::PoorFit;
 pub use loader::{ImageLoader, LoadedImage};
 pub use manifest::{Entry, Lock, Manifest, State};
 pub use progress::{BulkProgress, Summary};

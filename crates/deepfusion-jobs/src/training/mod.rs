@@ -13,5 +13,5 @@ mod time_estimate;
 pub use asked_recordings::AskedRecordings;
 pub use plan::{RunLength, TrainingPlan, leaves_turns_unused};
 pub use run_log::RunLog;
-pub use start::{Began, Start};
+pub use start::{Began, SettingsOfMean, Start};
 pub use time_estimate::{Choice, Pace, TimeEstimate};

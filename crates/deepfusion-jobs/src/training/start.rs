@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_model::weights::{Weights, read_bytes};
 use deepfusion_model::{
-    CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder, TrainConfig,
+    CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder,
+    TrainConfig, TrainFindings,
 };
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_runtime::{
     Error as RuntimeError, ModelSource, embedded, embedded_names, embedded_unless_run,
+    hidden_by_run,
 };
 use deepfusion_train::{Checkpoints, Device, Error as TrainError, Model};
 use deepfusion_weights::Shipped;
@@ -97,6 +99,42 @@ impl fmt::Display for Began<'_> {
     }
 }
 
+/// The configuration of a run that was not trained, but is the mean of others' weights: its settings are those of the first, whose training
+/// they repeat.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SettingsOfMean {
+    /// The first network.
+    pub first: PathBuf,
+    /// Of how many it is the mean.
+    pub networks: usize,
+}
+
+impl SettingsOfMean {
+    /// Whether a configuration's file is one.
+    ///
+    /// # Errors
+    /// As [`TrainFindings::read`].
+    pub fn of(config: &Path) -> Result<Option<Self>> {
+        let averaged = TrainFindings::read(config)?.averaged;
+        Ok(averaged.first().map(|first| Self {
+            first: first.path.clone(),
+            networks: averaged.len(),
+        }))
+    }
+}
+
+impl fmt::Display for SettingsOfMean {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "this configuration is of a mean of {} networks: it has the settings of the first one, {}, and trains that one again",
+            self.networks,
+            self.first.display()
+        )
+    }
+}
+
 impl Start {
     /// Whether a wanted start is none at all: the word `none`.
     #[must_use]
@@ -106,7 +144,8 @@ impl Start {
 
     /// What is asked for, else what the configuration names, else, `by_default`, the embedded network that is built as the
     /// configuration's. A configuration read from a file that names nothing means nothing: a run that is repeated by its config.toml starts
-    /// as it did, whatever is embedded.
+    /// as it did, whatever is embedded. A name that is a run's folder here and an embedded network's elsewhere is a warning
+    /// ([`tracing::warn`]).
     ///
     /// # Errors
     /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`Error::OtherStart`] where a configuration began from other
@@ -169,6 +208,9 @@ impl Start {
             return Ok(Self::Packed { network, path });
         }
         if init.exists() {
+            if let Some(hidden) = hidden_by_run(init) {
+                tracing::warn!("{hidden}");
+            }
             return Ok(Self::Path(init.to_owned()));
         }
         Err(RuntimeError::NoSuchModel {
@@ -379,7 +421,7 @@ fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, ModelError
 mod tests {
     use super::*;
     use deepfusion_hint::Hint as _;
-    use deepfusion_model::Preset;
+    use deepfusion_model::{AveragedNetwork, Preset};
 
     /// Which presets could start from which: `light` is the shipped network's shape, Monodepth2's has the same tensors and other depths.
     #[test]
@@ -402,6 +444,31 @@ mod tests {
         let mut config = Preset::Light.config();
         config.with("attention").unwrap();
         assert!(!same_layers(&config.depth_net, &net(Preset::Light)));
+    }
+
+    #[test]
+    fn the_settings_of_a_mean_are_told_from_those_of_a_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = RunFolder::create(folder.path()).unwrap();
+        let part = |path: &str| AveragedNetwork {
+            path: path.into(),
+            sha256: None,
+            share: 0.5,
+        };
+        let averaged = vec![part("/first/best.safetensors"), part("/second")];
+        let mean = TrainFindings {
+            averaged,
+            ..TrainFindings::default()
+        };
+        let config = Preset::Tiny.config();
+        for (findings, of_mean) in [(mean, true), (TrainFindings::default(), false)] {
+            run.write_config(&config, &findings).unwrap();
+            let found = SettingsOfMean::of(&run.config_path()).unwrap();
+            let said = found.map(|mean| mean.to_string()).unwrap_or_default();
+            for part in ["mean of 2 networks", "/first/best.safetensors"] {
+                assert_eq!(said.contains(part), of_mean, "{said}");
+            }
+        }
     }
 
     #[test]

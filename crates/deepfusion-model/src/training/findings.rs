@@ -1,12 +1,13 @@
 //! What a run found out from its data, apart from what its configuration says.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use deepfusion_geometry::Intrinsics;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::{LearnedCamera, TrainConfig};
+use crate::Error;
 
 /// The table of a run's `config.toml` that holds it.
 const TABLE: &str = "findings";
@@ -64,6 +65,21 @@ pub struct SetFindings {
 }
 
 impl TrainFindings {
+    /// What a configuration's file holds of them, whether or not it names every key; nothing where it is no run's.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::ConfigFile`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let wrong = |e: toml::de::Error| Error::ConfigFile {
+            path: path.to_owned(),
+            reason: e.into(),
+        };
+        let mut table: Table = toml::from_str(&text).map_err(wrong)?;
+        let found = Self::take_from(&mut table).map_err(wrong)?;
+        Ok(found.unwrap_or_default())
+    }
+
     /// The configuration with the metres per unit that it leaves open.
     #[must_use]
     pub fn complete(&self, mut config: TrainConfig) -> TrainConfig {
@@ -263,6 +279,25 @@ mod tests {
             error.contains("line") && error.contains("batsch"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_files_findings_are_read_without_its_settings() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.toml");
+        let found = findings().to_toml().unwrap();
+        for settings in [config().to_toml().unwrap(), "preset = \"tiny\"\n".into()] {
+            std::fs::write(&path, format!("{settings}{found}")).unwrap();
+            assert_eq!(TrainFindings::read(&path).unwrap(), findings());
+            std::fs::write(&path, &settings).unwrap();
+            assert_eq!(
+                TrainFindings::read(&path).unwrap(),
+                TrainFindings::default()
+            );
+        }
+        std::fs::write(&path, "preset =").unwrap();
+        let error = TrainFindings::read(&path).unwrap_err().to_string();
+        assert!(error.contains("config.toml"), "{error}");
     }
 
     #[test]

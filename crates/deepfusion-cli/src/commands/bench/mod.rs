@@ -6,7 +6,7 @@ use deepfusion_hint::count_of;
 use deepfusion_jobs::bench::{IMAGES_PER_REPEAT, PICTURE_SIZE, Stages, StreetBench};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Preset, TrainConfig};
-use deepfusion_runtime::{DepthRunner, ModelSource, Precision};
+use deepfusion_runtime::{DepthRunner, Precision};
 use serde::Serialize;
 
 use self::modules::{Module, Modules};
@@ -130,7 +130,7 @@ fn profile_table(steps: &[(String, f64)]) -> String {
 /// The network asked for: its name, its configuration and what runs it.
 fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Box<dyn DepthRunner>)> {
     let model = match (&args.model, args.preset, args.size) {
-        (Some(model), ..) => Some(ModelSource::named(model)?),
+        (Some(model), ..) => Some(model::named(model)?),
         (None, None, None) => model::embedded_default()?,
         // The size is a preset's.
         (None, ..) => None,

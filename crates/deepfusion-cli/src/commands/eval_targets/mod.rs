@@ -13,7 +13,6 @@ use deepfusion_jobs::labelled::{
 use deepfusion_jobs::perception_settings;
 use deepfusion_perception::{ScoringRules, TargetScore};
 use deepfusion_render::box_overlay;
-use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
 use super::warnings;
@@ -88,7 +87,7 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
 fn source(args: &EvalTargetsArgs) -> Result<DepthSource> {
     Ok(match (args.depth, &args.model) {
         (None, Some(model)) => {
-            let model = ModelSource::named(model)?;
+            let model = model::named(model)?;
             let estimator = engine::load(&model, &args.engine)?;
             model::warn_of_one_size(&model, estimator.config(), args.post_process);
             DepthSource::Network(Box::new(PredictedDepth {

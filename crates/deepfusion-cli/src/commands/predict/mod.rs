@@ -13,8 +13,8 @@ use deepfusion_geometry::Intrinsics;
 use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{
-    BulkJob, BulkProgress, CameraFrom, CameraSource, ImageLoader, LoadedImage, Lock, StartedJob,
-    Summary, commit, looks_of_another_size, queue, write_videos,
+    BulkJob, BulkProgress, CameraFrom, CameraSource, ImageLoader, LoadedImage, Lock, PoorFit,
+    StartedJob, Summary, commit, looks_of_another_size, queue, write_videos,
 };
 use deepfusion_jobs::evaluation::augmentation;
 use deepfusion_jobs::outputs::{DepthOutput, DepthOutputs, DepthWriter, SeenDepth, is_output};
@@ -44,6 +44,8 @@ pub(super) struct Job<'a> {
     camera_warning: Once,
     /// Warns once of a camera that looks like that of images of another size.
     size_warning: Once,
+    /// Warns once of an image that the network learned from nothing like.
+    fit_warning: Once,
     /// Writes what is kept of each.
     pub writer: DepthWriter<'a>,
 }
@@ -370,6 +372,7 @@ impl<'a> Job<'a> {
             inspector,
             camera_warning: Once::new(),
             size_warning: Once::new(),
+            fit_warning: Once::new(),
             writer,
         })
     }
@@ -388,7 +391,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Reads an image, and warns where its camera may not be its own.
+    /// Reads an image, and warns where its camera may not be its own, or its size and shape are far from what the network takes.
     pub(super) fn load(&self, input: &Input) -> Result<(LoadedImage, PreparedImage)> {
         let (loaded, prepared) = self.loader.load(input)?;
         match loaded.camera_from {
@@ -405,7 +408,17 @@ impl<'a> Job<'a> {
             CameraFrom::Learned => self.camera_warning.call_once(warn_of_learned_camera),
             _ => {}
         }
+        self.warn_of_poor_fit(&input.path, &prepared);
         Ok((loaded, prepared))
+    }
+
+    /// Warns of the first image that is far from what the network takes.
+    fn warn_of_poor_fit(&self, image: &Path, prepared: &PreparedImage) {
+        if let Some(fit) = PoorFit::of(prepared) {
+            let warn =
+                || tracing::warn!("{}: {fit} (others like it are not named)", image.display());
+            self.fit_warning.call_once(warn);
+        }
     }
 
     /// What the network says about an image, and what its layers do where that is asked for.

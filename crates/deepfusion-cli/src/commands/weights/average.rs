@@ -2,11 +2,15 @@ use deepfusion_jobs::averaging;
 
 use crate::cli::AverageArgs;
 use crate::failure::Result;
+use crate::model::warn_of_hidden;
 use crate::output;
 use crate::progress::say;
 
 /// `deepfusion weights average`.
 pub(crate) fn run(args: &AverageArgs) -> Result<()> {
+    for model in &args.models {
+        warn_of_hidden(model);
+    }
     let made = averaging::average(&args.models, args.shares.as_deref(), &args.out)?;
     for network in &made.networks {
         say(&format!(

@@ -2,17 +2,17 @@ use deepfusion_data::OpenOptions;
 use deepfusion_hint::count_of;
 use deepfusion_jobs::find_inputs;
 use deepfusion_jobs::int8::{self, Int8Options};
-use deepfusion_runtime::ModelSource;
 
 use crate::cli::CalibrateWeightsArgs;
 use crate::commands::warnings;
 use crate::failure::Result;
+use crate::model;
 use crate::output;
 use crate::progress::Progress;
 
 /// `deepfusion weights calibrate`.
 pub(crate) fn run(args: &CalibrateWeightsArgs) -> Result<()> {
-    let model = ModelSource::named(&args.model)?;
+    let model = model::named(&args.model)?;
     // Before the images are looked for.
     int8::check(&model)?;
     let set = args.set.as_deref();

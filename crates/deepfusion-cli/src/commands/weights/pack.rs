@@ -1,4 +1,4 @@
-use deepfusion_jobs::packing::{PackOptions, pack_run};
+use deepfusion_jobs::packing::{PackOptions, PackedRun, pack_run};
 use deepfusion_weights::MAX_BYTES;
 
 use super::list::WeightsRow;
@@ -17,7 +17,17 @@ pub(crate) fn run(args: &PackArgs) -> Result<()> {
         licence: args.licence.clone(),
         simulated_only: args.simulated_only,
     };
-    let shipped = pack_run(&args.model, options)?;
+    let PackedRun {
+        shipped,
+        not_known_as_simulated,
+        ..
+    } = pack_run(&args.model, options)?;
+    for path in not_known_as_simulated {
+        tracing::warn!(
+            "{}: nothing shows whether its images were simulated; the card says so by your word (--simulated-only)",
+            path.display()
+        );
+    }
     let [card_path, weights_path] = shipped.write(&args.out, args.overwrite)?;
     let card = &shipped.card;
     say(&format!(

@@ -71,6 +71,7 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
         distance_m,
         duration_s,
         drives: vec![drive],
+        unreadable: Vec::new(),
     }))
 }
 

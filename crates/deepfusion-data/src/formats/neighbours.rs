@@ -1,0 +1,83 @@
+//! What lies in the folder of a recording, looks like another one, and is not read with it.
+
+use super::{comma, video};
+use crate::dataset_toml::FolderConfig;
+use std::path::Path;
+
+/// Endings of bags.
+const BAGS: [&str; 3] = ["bag", "mcap", "db3"];
+/// What folders of recordings hold.
+const MARKS: [&str; 9] = [
+    FolderConfig::NAME,
+    "speed.csv",
+    "image_02",
+    "image_03",
+    "sequences",
+    "data_2d_raw",
+    "v1.0-mini",
+    "v1.0-trainval",
+    "v1.0-test",
+];
+/// How the name of what `predict` keeps of its work ends: videos beside it are outputs.
+const OUTPUTS: &str = ".manifest.json";
+
+/// What is looked for in a recording's folder.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look<'a> {
+    /// Files and folders that are read.
+    pub(crate) used: &'a [&'a Path],
+    /// Whether a video is another recording.
+    pub(crate) videos: bool,
+    /// Whether a folder may be another recording, and not a part of this one.
+    pub(crate) folders: bool,
+}
+
+/// The names of what looks like recordings in a folder, in their order. It is judged by names alone: among them there may be a hundred
+/// thousand images.
+pub(crate) fn unread(folder: &Path, look: Look) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if is_hidden(&path) || look.used.iter().any(|used| used.starts_with(&path)) {
+            continue;
+        }
+        let is_folder = entry
+            .file_type()
+            .is_ok_and(|kind| kind.is_dir() || kind.is_symlink() && path.is_dir());
+        let is_recording = if is_folder {
+            look.folders && holds_a_recording(&path)
+        } else {
+            is_bag(&path) || look.videos && video::is_video(&path)
+        };
+        if is_recording {
+            found.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    found.sort();
+    found
+}
+
+fn holds_a_recording(folder: &Path) -> bool {
+    let mut found = comma::is_segment(folder);
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.ends_with(OUTPUTS) {
+            return false;
+        }
+        let is_file_of_one = !is_hidden(&path) && (is_bag(&path) || video::is_video(&path));
+        found |= MARKS.contains(&&*name) || is_file_of_one;
+    }
+    found
+}
+
+fn is_bag(path: &Path) -> bool {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    BAGS.contains(&ending.to_ascii_lowercase().as_str())
+}
+
+fn is_hidden(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name.as_encoded_bytes().starts_with(b".")
+}
