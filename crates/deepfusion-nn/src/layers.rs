@@ -287,13 +287,24 @@ impl BatchNorm2d {
     /// running ← (1 − m)·running + m·batch, visible to the next reader at once.
     fn move_statistics_towards(&self, batch: [Tensor<1>; 2], unbiased: f64) {
         let both = [&self.running_mean, &self.running_var];
-        let old = both.map(RunningState::value_sync);
+        let old = both.map(RunningState::value);
         let new = ops::running_statistics(old, batch, Self::MOMENTUM, unbiased);
         for (running, value) in both.into_iter().zip(new) {
-            running.update(value);
-            // `update` alone stays pending until the next step, and a checkpoint written in between would
-            // hold the statistics of the step before.
-            running.value_sync();
+            // `update` would divide the value by the number of threads that gave one, a launch each on a GPU, and stay pending until the
+            // next step. A clone shares the value.
+            running.clone().map(&mut Replace(Some(value)));
+        }
+    }
+}
+
+/// Puts a value in the place of a running statistic's.
+struct Replace(Option<Tensor<1>>);
+
+impl ModuleMapper for Replace {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        match self.0.take() {
+            Some(value) => param.map(|old| value.reshape(old.dims())),
+            None => param,
         }
     }
 }

@@ -11,8 +11,12 @@ use deepfusion_nn::ops::{self, ConvOptions};
 /// Differences of two ways of summing the same few hundred products in f32.
 const TOLERANCE: f32 = 2e-5;
 
-/// The device on which the kernels are checked.
+/// The device on which the kernels are checked: of a build for several, `cuda` where `DEEPFUSION_TEST_DEVICE` says so.
 fn device() -> Device {
+    #[cfg(feature = "cuda")]
+    if std::env::var("DEEPFUSION_TEST_DEVICE").is_ok_and(|name| name == "cuda") {
+        return Device::cuda(0).autodiff();
+    }
     #[cfg(feature = "vulkan")]
     return Device::vulkan(DeviceKind::DefaultDevice).autodiff();
     #[cfg(all(feature = "wgpu", not(feature = "vulkan")))]

@@ -26,7 +26,7 @@ pub fn shown_of_datasets(
     datasets: &[Dataset],
     truth: &mut Truth,
     evaluated: &Evaluated,
-    see: &mut dyn FnMut(&Dataset, usize) -> Result<(RgbImage, Prediction)>,
+    mut see: impl FnMut(&Dataset, usize) -> Result<(RgbImage, Prediction)>,
 ) -> Result<Vec<(ChosenImage, ShownFrame)>> {
     let names = ground_truth_names(datasets);
     let arrays = match truth {

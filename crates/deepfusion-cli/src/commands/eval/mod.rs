@@ -214,7 +214,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
         _ => None,
     };
     if let Some(path) = &args.report {
-        let shown = shown_of_datasets(&datasets, &mut truth, &evaluated, &mut |dataset, frame| {
+        let shown = shown_of_datasets(&datasets, &mut truth, &evaluated, |dataset, frame| {
             see(&mut estimator, dataset, frame)
         })?;
         let how = page::how_a_model_was_measured(args, &protocol, &saved);

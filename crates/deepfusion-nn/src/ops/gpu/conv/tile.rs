@@ -9,8 +9,9 @@ use super::super::grid::MOST_GROUPS;
 pub(super) const THREADS: usize = 256;
 /// Side of the square matrices that tensor cores multiply.
 pub(super) const SIDE: usize = 16;
-/// Groups that keep a large GPU busy.
+/// Groups that keep a large GPU busy: on tensor cores two for each of its 132 processors, as adding the parts of a sum up costs a launch more.
 const ENOUGH: usize = 512;
+const ENOUGH_ON_TENSOR_CORES: usize = 264;
 
 /// What a group of threads computes of a product.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -24,6 +25,7 @@ pub(super) struct Tile {
     pub(super) depth: usize,
     /// Whether weights are taken tap by tap, all channels of each, and not channel by channel.
     pub(super) tap_by_tap: bool,
+    on_tensor_cores: bool,
 }
 
 impl Tile {
@@ -36,6 +38,7 @@ impl Tile {
             own_columns: if tensor_cores { squares[1] } else { own[1] },
             depth: if tensor_cores { 32 } else { 16 },
             tap_by_tap: tensor_cores,
+            on_tensor_cores: tensor_cores,
         };
         let small = tile(64, 64, [4, 4], [1, 2]);
         let [large, small] = match rows {
@@ -73,7 +76,12 @@ impl Tile {
         depth: usize,
         least: usize,
     ) -> (usize, usize) {
-        let parts = ENOUGH
+        let enough = if self.on_tensor_cores {
+            ENOUGH_ON_TENSOR_CORES
+        } else {
+            ENOUGH
+        };
+        let parts = enough
             .div_ceil(self.count(rows, columns))
             .min(depth / least)
             .max(1);
