@@ -135,7 +135,7 @@ pub(crate) enum CliError {
     /// A precision that an engine does not have.
     #[error("`--precision bf16` is the fused engine's")]
     OnlyFused,
-    /// Recordings that cannot be read, beside others that can.
+    /// Several recordings, of which some cannot be read, or all for different reasons.
     #[error("{}: {unreadable} of {} cannot be read", path.display(), count_of(*recordings, "recording"))]
     Unreadable {
         /// What was given.
@@ -317,9 +317,10 @@ impl Reportable for CliError {
                 None => format!("mend them, then {}", again(*resumes)),
             }),
             Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
-            Self::Unreadable { hint, .. } => Some(format!(
-                "each is listed with its reason; {}, or give the others by themselves",
-                hint.as_deref().unwrap_or("mend them")
+            Self::Unreadable { unreadable, recordings, hint, .. } => Some(format!(
+                "each is listed with its reason; {}{}",
+                hint.as_deref().unwrap_or("mend them"),
+                if unreadable < recordings { ", or give the others by themselves" } else { "" }
             )),
             Self::OutputsAlone { .. } => Some("give the images themselves, or another folder for the outputs".into()),
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{fails, json, ok};
+use crate::support::{fails, json, ok, run};
 use serde_json::Value;
 
 /// Whether training saw the drive, as the evaluation says that a run keeps.
@@ -56,6 +56,17 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
         "train --config mean/config.toml --data nowhere --out off",
         &["WARN", "mean of 2 networks", "--init mean ", "nowhere"],
     );
+    // Elsewhere its folder is not known, and who wrote what to begin from meant it.
+    let settings = fs::read_to_string(at.join("mean/config.toml")).unwrap();
+    let chosen = format!("init = \"b\"\n{settings}");
+    for (text, warns) in [(settings, true), (chosen, false)] {
+        fs::write(at.join("copy.toml"), text).unwrap();
+        let off = run(at, "train --config copy.toml --data nowhere --out off");
+        assert!(off.stderr.contains("nowhere"), "{}", off.stderr);
+        let said = off.stderr.contains("mean of 2 networks");
+        assert_eq!(said, warns, "{}", off.stderr);
+        assert!(!off.stderr.contains("--init"), "{}", off.stderr);
+    }
     let on = fs::read_to_string(at.join("on/config.toml")).unwrap();
     assert!(!on.contains("averaged"), "{on}");
     assert_eq!(held_out(at, "on", "second"), false, "by what it began from");
@@ -99,18 +110,24 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
 
     hides_the_embedded_network(at);
 
-    // A mean has seen what its networks have: simulated drives, one that may be anything, and one without exact poses.
+    // A mean has seen what its networks have: simulated drives, one of which nothing shows it, one that bears the name of a day of
+    // KITTI's, and one that is gone.
     let pack = "weights pack --model mean --name blind --simulated-only --out blind --overwrite";
     assert!(!ok(at, pack).stderr.contains("WARN"));
-    let poses = at.join("second/2026_01_01/2026_01_01_drive_0004_sync/poses.txt");
-    fs::remove_file(poses).unwrap();
-    fails(at, pack, &["second", "which is real", "--simulated-only"]);
+    let is_unsure = || {
+        let unsure = ok(at, pack).stderr;
+        let about = unsure.contains("WARN") && unsure.contains("second");
+        assert!(about, "{unsure}");
+    };
+    let date = at.join("second/2026_01_01");
+    let drive = date.join("2026_01_01_drive_0004_sync");
+    fs::remove_file(drive.join("poses.txt")).unwrap();
+    is_unsure();
+    fs::rename(&drive, date.join("2011_09_26_drive_0004_sync")).unwrap();
+    let refused = ["second", "which is real", "KITTI raw", "--simulated-only"];
+    fails(at, pack, &refused);
     fs::rename(at.join("second"), at.join("elsewhere")).unwrap();
-    let unsure = ok(at, pack).stderr;
-    assert!(
-        unsure.contains("WARN") && unsure.contains("second"),
-        "{unsure}"
-    );
+    is_unsure();
 }
 
 /// A run of an embedded network's name is taken for it, and not without a word.
@@ -130,5 +147,7 @@ fn hides_the_embedded_network(at: &Path) {
         assert_eq!(about.len(), 1, "{said}");
         assert!(about[0].contains(&format!("./{name}")), "{said}");
     }
-    assert!(!bench(&format!("./{name}")).contains("WARN"));
+    for path in [format!("./{name}"), format!("{name}/")] {
+        assert!(!bench(&path).contains("WARN"), "{path}");
+    }
 }

@@ -388,7 +388,12 @@ fn a_damaged_bag_does_not_hide_the_others() {
     for part in ["urban_0001", "damaged.bag", "not a ROS bag"] {
         assert!(listed.stdout.contains(part), "{part}: {}", listed.stdout);
     }
-    for part in ["sim: 1 of 2 recordings cannot be read", "hint: "] {
+    for part in [
+        "sim: 1 of 2 recordings cannot be read",
+        "hint: each is listed with its reason",
+        "keeps its own ending",
+        "or give the others by themselves",
+    ] {
         assert!(listed.stderr.contains(part), "{part}: {}", listed.stderr);
     }
     let listed = run(at, "data inspect sim --json");
@@ -397,10 +402,54 @@ fn a_damaged_bag_does_not_hide_the_others() {
     assert_eq!((&seen["frames"], &seen["kind"]), (&6.into(), &"bag".into()));
     let damaged = seen["unreadable"][0]["path"].as_str().unwrap();
     assert!(damaged.ends_with("damaged.bag"), "{damaged}");
-    // Of a part nothing is written.
+    // Of a part nothing is written: beside neither of two bags that a file could be written for.
+    std::fs::remove_file(at.join("sim/damaged.bag")).unwrap();
+    let (bag, other) = (at.join("sim/urban_0001.bag"), at.join("sim/other.bag"));
+    std::fs::copy(&bag, &other).unwrap();
+    let camera =
+        "[camera]\nfx = 50.0\nfy = 50.0\ncx = 320.0\ncy = 240.0\nwidth = 640\nheight = 480\n";
+    std::fs::write(other.with_extension("toml"), camera).unwrap();
+    std::fs::remove_file(bag.with_extension("toml")).unwrap();
     let written = run(at, "data inspect sim --write-config --overwrite");
     assert_eq!(written.code, 1, "{}", written.stderr);
-    assert!(!written.stderr.contains("written"), "{}", written.stderr);
+    let said = "sim: 1 of 2 recordings cannot be read";
+    assert!(written.stderr.contains(said), "{}", written.stderr);
+    assert!(!bag.with_extension("toml").exists());
+    let kept = std::fs::read_to_string(other.with_extension("toml")).unwrap();
+    assert_eq!(kept, camera);
+    // Once nothing is wrong, both are.
+    std::fs::remove_file(other.with_extension("toml")).unwrap();
+    ok(at, "data inspect sim --write-config");
+    for bag in [bag, other] {
+        assert!(bag.with_extension("toml").exists(), "{}", bag.display());
+    }
+}
+
+/// Nothing is left to be given by itself where none can be read, and one reason is said as that of one recording.
+#[test]
+fn of_bags_that_cannot_be_read_the_reasons_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("sim")).unwrap();
+    for (name, text) in [
+        ("a", "a letter"),
+        ("b", "a letter"),
+        ("c", "#ROSBAG V2.0\n"),
+    ] {
+        std::fs::write(at.join("sim").join(name).with_extension("bag"), text).unwrap();
+    }
+    let listed = run(at, "data inspect sim");
+    assert_eq!(listed.code, 1, "{}", listed.stderr);
+    let said = "sim: 3 of 3 recordings cannot be read";
+    assert!(listed.stderr.contains(said), "{}", listed.stderr);
+    let others = listed.stderr.contains("the others");
+    assert!(!others, "{}", listed.stderr);
+    std::fs::remove_file(at.join("sim/c.bag")).unwrap();
+    fails(
+        at,
+        "data inspect sim",
+        &["a.bag: not a ROS bag", "keeps its own ending"],
+    );
 }
 
 /// Frames on /tf_static, CameraInfo and satellite positions at 1 Hz (`deepfusion-data/tests/reference/ros_drive.py`).

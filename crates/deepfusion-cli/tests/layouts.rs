@@ -99,3 +99,19 @@ fn a_sequence_is_learned_from_measured_and_followed() {
     assert_eq!(sidecars.as_array().unwrap().len(), 16);
     assert_eq!(sidecars[0]["intrinsics_from"], "recording");
 }
+
+/// What is not read with the drives is about their folder, and about none of them.
+#[test]
+fn what_is_passed_over_is_said_of_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --size 96x64");
+    fs::write(at.join("sim/drive.mp4"), "").unwrap();
+    let said = ok(at, "data convert sim copy").stderr;
+    let about = said.lines().filter(|line| line.contains("drive.mp4"));
+    let about: Vec<&str> = about.collect();
+    assert_eq!(about.len(), 1, "{said}");
+    let expected = "sim is read as KITTI raw alone; this in it looks like a recording and is not read: drive.mp4";
+    assert!(about[0].contains(expected), "{said}");
+    assert!(!about[0].contains("_sync"), "{said}");
+}

@@ -6,7 +6,7 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::streams::{brightness, piped, serve, stream, with_path};
+use crate::support::streams::{brightness, piped, serve, stream, stream_of, with_path};
 use crate::support::{Run, run};
 use serde_json::Value;
 
@@ -175,6 +175,18 @@ fn depth_of_a_stream_stops_where_it_is_told() {
     let files = files(&at.join("depth"));
     assert_eq!(files.len(), 9, "{files:?}");
     assert!(files.contains(&"live_video.mp4".to_owned()), "{files:?}");
+
+    // Frames of a shape that the network learned nothing like, and sees whole: either command warns of them once.
+    for command in ["predict", "perceive"] {
+        let args = format!(
+            "{command} --model run - --intrinsics 500,500,479.5,31.5 --stretch --out odd-{command}"
+        );
+        let odd = piped(at, &args, stream_of((960, 64), 3));
+        assert_eq!(odd.code, 0, "{}", odd.stderr);
+        let about = odd.stderr.lines();
+        let about = about.filter(|line| line.contains("learned from nothing"));
+        assert_eq!(about.count(), 1, "{}", odd.stderr);
+    }
 }
 
 #[test]

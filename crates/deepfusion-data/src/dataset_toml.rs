@@ -278,6 +278,24 @@ impl FolderConfig {
         Ok(paths.find(|path| path.exists()))
     }
 
+    /// The files and folders that are named here, of a recording in this folder, whether they are there or not.
+    pub(crate) fn places(&self, folder: &Path) -> Vec<PathBuf> {
+        let video = self.video.as_ref().map(|named| folder.join(named));
+        // A cache is named from where the video lies.
+        let beside = video.as_deref().and_then(Path::parent).unwrap_or(folder);
+        let cache = self.cache.as_ref().map(|named| beside.join(named));
+        let others = [
+            &self.images,
+            &self.speed,
+            &self.dbc,
+            &self.imu,
+            &self.calibration,
+            &self.depth,
+        ];
+        let others = others.into_iter().flatten().map(|named| folder.join(named));
+        others.chain(cache).chain(video).collect()
+    }
+
     /// A point of the vehicle in the camera; looking straight ahead at the vehicle's origin where nothing
     /// is said (the camera then moves as the vehicle does).
     pub(crate) fn cam_from_vehicle(&self) -> Se3 {

@@ -384,12 +384,15 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     );
     let seen = inspect(drive.folder.path()).unwrap();
     assert_eq!((seen.frames, seen.drives.len()), (all[0].frames().len(), 1));
+    assert!(seen.unreadable.is_empty(), "{:?}", seen.unreadable);
+    let noted = seen.drives[0].warnings.join("\n");
+    assert!(noted.contains("no images: lidar.bag"), "{noted}");
     // Alone it is what it is.
     let error = open(&other).unwrap_err().to_string();
     assert!(error.contains("holds images"), "{error}");
 }
 
-/// Files that are no bags but by their names, before and behind a good one, and what is left of another.
+/// Files that are no bags but by their names, before and behind a good one, and what is left of another, which has no images.
 #[test]
 fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
     let drive = Drive::new("", |bag| {
@@ -408,7 +411,9 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
     assert_eq!((seen.drives.len(), seen.frames), (1, 25));
     let files = seen.unreadable.iter().map(|one| one.path.file_name());
     let files: Vec<_> = files.flatten().collect();
-    assert_eq!(files, ["a.bag", "m.bag", "z.bag"]);
+    assert_eq!(files, ["a.bag", "z.bag"]);
+    let noted = seen.drives[0].warnings.join("\n");
+    assert!(noted.contains("no images: m.bag"), "{noted}");
     let error = &seen.unreadable[0].error;
     assert!(matches!(**error, Error::Bag(_)), "{error}");
     let text = seen.to_string();
@@ -416,18 +421,26 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
         assert!(text.contains(part), "{part}: {text}");
     }
     let json = serde_json::to_value(&seen).unwrap();
-    let said = json["unreadable"][2]["error"].as_str().unwrap();
+    let said = json["unreadable"][1]["error"].as_str().unwrap();
     assert!(said.contains("z.bag: not a ROS bag"), "{said}");
 
     fs::remove_file(&drive.bag).unwrap();
     let none = inspect(at).unwrap();
     assert_eq!((none.drives.len(), none.unreadable.len()), (0, 3));
     assert!(none.to_string().contains("nothing can be read"), "{none}");
-    // Alone it is an error.
-    for name in ["a.bag", "m.bag"] {
+    // One reason for all is an error, and so is a bag alone.
+    for name in ["m.bag", "a.bag"] {
         fs::remove_file(at.join(name)).unwrap();
+        let error = inspect(at).unwrap_err();
+        assert!(matches!(error, Error::Bag(_)), "{error}");
     }
-    assert!(matches!(inspect(at), Err(Error::Bag(_))));
+    // Of several without images, too.
+    fs::remove_file(at.join("z.bag")).unwrap();
+    for name in ["m.bag", "n.bag"] {
+        fs::write(at.join(name), "#ROSBAG V2.0\n").unwrap();
+    }
+    let error = inspect(at).unwrap_err();
+    assert!(matches!(error, Error::NoFrames { .. }), "{error}");
 }
 
 #[test]

@@ -375,7 +375,7 @@ fn an_inspection_counts_everything() {
     assert_eq!(json["intrinsics"]["fx"], 36.0);
 }
 
-/// A drive that is broken hides no other of its date, and one without images is named.
+/// A drive that is broken hides no other of its date, and those without images of the left camera, which is trained on, are named.
 #[test]
 fn an_inspection_lists_what_cannot_be_read() {
     let root = tempfile::tempdir().unwrap();
@@ -384,9 +384,10 @@ fn an_inspection_lists_what_cannot_be_read() {
         let name = format!("2030_01_02/2030_01_02_drive_{number:04}_sync");
         TinyDrive::default().write_as(root.path(), &name)
     };
-    let (broken, empty) = (other(8), other(9));
+    let (broken, empty, right) = (other(8), other(9), other(10));
     fs::write(broken.join("image_02/timestamps.txt"), "yesterday\n").unwrap();
     fs::remove_dir_all(empty.join("image_02/data")).unwrap();
+    fs::rename(right.join("image_02"), right.join("image_03")).unwrap();
     let seen = inspect(root.path()).unwrap();
     assert_eq!((seen.drives.len(), seen.frames), (1, 8));
     let [unreadable] = seen.unreadable.as_slice() else {
@@ -395,7 +396,9 @@ fn an_inspection_lists_what_cannot_be_read() {
     assert!(unreadable.path.ends_with("2030_01_02_drive_0008_sync"));
     assert!(matches!(*unreadable.error, Error::TimeStamp { .. }));
     let warnings = seen.drives[0].warnings.join("\n");
-    assert!(warnings.contains("drive_0009_sync"), "{warnings}");
+    for part in ["of camera 2", "drive_0009_sync", "drive_0010_sync"] {
+        assert!(warnings.contains(part), "{part}: {warnings}");
+    }
     // A camera for drives that have theirs is not theirs to be wrong.
     let given = OpenOptions {
         hfov_deg: Some(90.0),
@@ -403,6 +406,28 @@ fn an_inspection_lists_what_cannot_be_read() {
     };
     let error = inspect_with(root.path(), &given, |_| None).unwrap_err();
     assert!(matches!(error, Error::OwnCalibration { .. }), "{error}");
+}
+
+/// Where none has a left one, it is the right camera; what is wrong with all of them is one error.
+#[test]
+fn an_inspection_takes_the_right_camera_where_no_drive_has_a_left_one() {
+    let root = tempfile::tempdir().unwrap();
+    let drives = [7, 8].map(|number| {
+        let name = format!("2030_01_02/2030_01_02_drive_{number:04}_sync");
+        let drive = TinyDrive {
+            cameras: vec![3],
+            ..TinyDrive::default()
+        };
+        drive.write_as(root.path(), &name)
+    });
+    let seen = inspect(root.path()).unwrap();
+    let cameras: Vec<u8> = seen.drives.iter().map(|drive| drive.camera).collect();
+    assert_eq!((cameras, seen.frames), (vec![3, 3], 16));
+    for drive in &drives {
+        fs::remove_dir_all(drive.join("image_03/data")).unwrap();
+    }
+    let error = inspect(root.path()).unwrap_err();
+    assert!(matches!(error, Error::NoImages { .. }), "{error}");
 }
 
 #[test]

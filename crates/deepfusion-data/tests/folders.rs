@@ -459,9 +459,12 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     write_drive(&at.join("second"), 4, 10.0, 0.0);
     fs::create_dir(at.join("third")).unwrap();
     fs::write(at.join("third/clip.MP4"), "").unwrap();
-    let expected =
-        "read as image folder alone; not read, though it looks like a recording: second, third";
-    assert!(said(at).starts_with(expected), "{}", said(at));
+    let expected = format!(
+        "{} is read as image folder alone; these in it look like recordings and are not read: second, third (",
+        at.display()
+    );
+    assert!(said(at).starts_with(&expected), "{}", said(at));
+    assert_eq!(open(at).passed_over(), Some(said(at).as_str()));
     let noted = &inspect(at).unwrap().drives[0].warnings;
     assert!(noted.contains(&said(at)), "{noted:?}");
     // By itself it is all there is.
@@ -472,10 +475,22 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     let drive = TinyDrive::default().write(root.path());
     write_drive(&drive.join("extra"), 4, 10.0, 0.0);
     assert_eq!(said(root.path()), "");
+    // Of an output's name.
+    fs::write(root.path().join("drive_video.mp4"), "").unwrap();
+    assert_eq!(said(root.path()), "");
+    let expected = |rest: &str| {
+        format!(
+            "{} is read as KITTI raw alone; {rest}",
+            root.path().display()
+        )
+    };
     fs::write(root.path().join("drive.mp4"), "").unwrap();
+    let one = expected(
+        "this in it looks like a recording and is not read: drive.mp4 (give it by its own path)",
+    );
+    assert_eq!(said(root.path()), one);
     write_drive(&root.path().join("walk"), 4, 10.0, 0.0);
-    let expected =
-        "read as KITTI raw alone; not read, though it looks like a recording: drive.mp4, walk";
-    assert!(said(root.path()).starts_with(expected));
+    let both = expected("these in it look like recordings and are not read: drive.mp4, walk (");
+    assert!(said(root.path()).starts_with(&both));
     assert_eq!(said(&drive), "");
 }

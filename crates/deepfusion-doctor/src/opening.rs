@@ -76,6 +76,8 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         };
         let remedy = if damaged {
             "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
+        } else if survey.dataset.passed_over() == Some(warning.as_str()) {
+            "give what is to be read as well by its own path"
         } else {
             "see that it is so, or say otherwise in the file beside the recording"
         };

@@ -19,6 +19,7 @@ use deepfusion_model::{
 use deepfusion_runtime::{ModelSource, unpacked};
 use deepfusion_weights::Shipped;
 
+pub use self::ancestors::Kinship;
 use crate::{Error, NoMean, Result};
 
 /// The parts of a run's checkpoint beside the depth network that training goes on with.
@@ -32,8 +33,8 @@ pub struct Averaged {
     pub checkpoint: PathBuf,
     /// What it is the mean of, in the order given.
     pub networks: Vec<AveragedNetwork>,
-    /// Whether all of them are known to come from one, or from one seed's first weights. Others' mean is worth nothing.
-    pub related: bool,
+    /// What is known of where they come from.
+    pub kinship: Kinship,
     /// Whether some could say how sure they are and others could not, so that the mean cannot.
     pub lost_uncertainty: bool,
 }
@@ -76,7 +77,7 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
         }
     }
     let origins: Vec<AveragedNetwork> = sources.iter().zip(&shares).map(origin).collect();
-    let related = ancestors::are_related(&origins);
+    let kinship = ancestors::kinship(&origins);
 
     let weights: Vec<(&Weights, f64)> = networks
         .iter()
@@ -116,7 +117,7 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
     Ok(Averaged {
         checkpoint,
         networks: origins,
-        related,
+        kinship,
         lost_uncertainty,
     })
 }

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use deepfusion_data::NoNamedTopic;
+use deepfusion_data::{DatasetKind, NoNamedTopic};
 use deepfusion_hint::Hint;
 use deepfusion_records::Difference;
 
@@ -154,14 +154,16 @@ pub enum Error {
     },
     /// A network that is to count as one that saw no real image, and did.
     #[error(
-        "{} learned from {}, which is real: no exact poses lie there, as in simulated drives",
-        run.display(), recording.display()
+        "{} learned from {}, which is real: drives of {}",
+        run.display(), recording.display(), layout.label()
     )]
     SawReal {
         /// The run, which may be one that the network began from or is the mean of.
         run: PathBuf,
         /// The recording.
         recording: PathBuf,
+        /// Whose drives it is or has.
+        layout: DatasetKind,
     },
     /// Networks whose weights have no mean.
     #[error("{}: {why}", path.display())]

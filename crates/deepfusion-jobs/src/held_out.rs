@@ -28,14 +28,12 @@ pub fn is_run(path: &Path) -> bool {
 /// alone saw no recording that is surely real.
 #[must_use]
 pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
-    card.simulated_only && datasets.iter().all(surely_real)
-}
-
-/// Whether a recording was surely not simulated; of a bag that is not known.
-pub(crate) fn surely_real(dataset: &Dataset) -> bool {
     /// Exact poses, which no real drive has.
     const SIMULATED: &str = "poses.txt";
-    dataset.kind() != DatasetKind::Bag && !dataset.folder().join(SIMULATED).exists()
+    let surely_real = |dataset: &Dataset| {
+        dataset.kind() != DatasetKind::Bag && !dataset.folder().join(SIMULATED).exists()
+    };
+    card.simulated_only && datasets.iter().all(surely_real)
 }
 
 /// Whether a network learned from none of the evaluated images; `None` where that is not known. `config`: its run's.

@@ -211,7 +211,8 @@ impl fmt::Display for HiddenByRun {
 /// The embedded network that could be meant where [`ModelSource::named`] takes a run; `None` where a path says which.
 #[must_use]
 pub fn hidden_by_run(model: &Path) -> Option<HiddenByRun> {
-    let name = deepfusion_weights::names().find(|name| Path::new(name) == model)?;
+    // Not as paths, of which `street/` is equal to `street`: no name ends so.
+    let name = deepfusion_weights::names().find(|name| model.as_os_str() == *name)?;
     holds_a_run(model).then_some(HiddenByRun { name })
 }
 

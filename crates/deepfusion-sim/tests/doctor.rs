@@ -490,6 +490,27 @@ fn a_damaged_image_is_named() {
 }
 
 #[test]
+fn what_lies_beside_the_drives_is_given_by_its_own_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulation = Simulation::new(&config(Scene::Urban, 12)).unwrap();
+    let root = folder.path().join("kitti");
+    write_kitti(&simulation, &root, &mut |_, _| {}).unwrap();
+    std::fs::write(root.join("drive.mp4"), "").unwrap();
+    let diagnosis = doctor(&root, None);
+    let all = diagnosis.findings();
+    let (_, finding) = all
+        .iter()
+        .find(|(_, f)| f.what.contains("drive.mp4"))
+        .unwrap();
+    assert_eq!(
+        (finding.check, finding.severity),
+        ("opening", Severity::Note)
+    );
+    let remedy = finding.remedy.to_string();
+    assert!(remedy.contains("by its own path"), "{remedy}");
+}
+
+#[test]
 fn what_cannot_be_opened_is_a_finding() {
     let folder = tempfile::tempdir().unwrap();
     let diagnosis = doctor(folder.path(), None);

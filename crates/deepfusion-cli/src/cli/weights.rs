@@ -119,8 +119,9 @@ pub(crate) struct PackArgs {
     /// The licence for its card.
     #[arg(long, value_name = "TERMS", default_value = env!("CARGO_PKG_LICENSE"))]
     pub licence: String,
-    /// Say in its card that it learned from no real image: real recordings then count as not seen in training. Refused where one of its
-    /// recordings, or of the runs that it began from or is the mean of, is real.
+    /// Say in its card that it learned from no real image: real recordings then count as not seen in training. Refused where it, a run
+    /// that it began from, or one that it is the mean of learned from KITTI (raw, odometry, 360) or nuScenes; a warning names other
+    /// recordings of which nothing shows that they were simulated, as bags.
     #[arg(long)]
     pub simulated_only: bool,
     /// Replace files that are there.

@@ -138,13 +138,16 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
 }
 
 /// Warns of settings that are another run's. Who says what to begin from has said what is meant.
-fn warn_of_mean(config: &Path, args: &TrainArgs) {
+fn warn_of_mean(file: &Path, config: &TrainConfig, args: &TrainArgs) {
     if args.init.is_none()
-        && let Ok(Some(mean)) = SettingsOfMean::of(config)
+        && let Ok(Some(mean)) = SettingsOfMean::of(file, config)
     {
-        let folder = config.parent().filter(|folder| *folder != Path::new(""));
-        let folder = folder.unwrap_or(Path::new(".")).display();
-        tracing::warn!("{mean} (--init {folder} goes on from the mean)");
+        match &mean.folder {
+            Some(folder) => {
+                tracing::warn!("{mean} (--init {} goes on from the mean)", folder.display());
+            }
+            None => tracing::warn!("{mean}"),
+        }
     }
 }
 
@@ -152,7 +155,7 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
         Some(path) => {
             let config = TrainConfig::read_over_preset(path, args.device.compute())?;
-            warn_of_mean(path, args);
+            warn_of_mean(path, &config, args);
             config
         }
         None => {

@@ -18,6 +18,9 @@ pub(super) fn warn_once(warning: String) {
 /// Warns on stderr of what was taken for granted, looks odd or cannot be read: one line for what several recordings have
 /// in common.
 pub(super) fn print(datasets: &[Dataset]) {
+    for warning in datasets.iter().filter_map(Dataset::passed_over) {
+        warn_once(warning.to_owned());
+    }
     for (warning, places) in by_warning(datasets.iter().flat_map(warnings)) {
         let new: Vec<String> = places
             .into_iter()
@@ -52,12 +55,14 @@ fn by_warning(warnings: impl Iterator<Item = (String, String)>) -> Vec<(String, 
     found
 }
 
-/// The warnings on a recording, each with its file, or its folder where every image is a file.
+/// The warnings on a recording, each with its file, or its folder where every image is a file; not what was passed over, which names
+/// the folder that it is about.
 fn warnings(dataset: &Dataset) -> impl Iterator<Item = (String, String)> {
     let image = dataset.frames().first().map(|frame| &frame.image);
     let container = image.filter(|i| i.file().is_none()).map(|i| i.path());
     let place = container.unwrap_or(dataset.folder()).display();
-    let warnings = dataset.warnings().iter();
+    let about_it = move |warning: &&String| dataset.passed_over() != Some(warning.as_str());
+    let warnings = dataset.warnings().iter().filter(about_it);
     warnings.map(move |warning| (place.to_string(), warning.clone()))
 }
 

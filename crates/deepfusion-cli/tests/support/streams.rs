@@ -23,7 +23,11 @@ fn luma(number: usize) -> u8 {
 
 /// Frames of one grey each, as YUV4MPEG.
 pub(crate) fn stream(frames: usize) -> Vec<u8> {
-    let (w, h) = SIZE;
+    stream_of(SIZE, frames)
+}
+
+/// As [`stream`], of another size; both sides are even.
+pub(crate) fn stream_of((w, h): (usize, usize), frames: usize) -> Vec<u8> {
     let mut bytes = format!("YUV4MPEG2 W{w} H{h} F30:1 Ip A1:1 C420jpeg\n").into_bytes();
     for number in 0..frames {
         bytes.extend(b"FRAME\n");

@@ -85,6 +85,7 @@ pub struct Dataset {
     mount_assumed: bool,
     /// The recording's, and what was noticed about its neighbours.
     warnings: Vec<String>,
+    passed_over: Option<String>,
 }
 
 /// Between the samples of a track whose turns are those of a course, in seconds.
@@ -99,6 +100,7 @@ impl Dataset {
             selected: (0..parts.frames.len()).collect(),
             parts,
             warnings: recording.warnings().to_vec(),
+            passed_over: None,
             recording,
             receiver: Receiver::default(),
             camera_assumed: false,
@@ -516,6 +518,19 @@ impl Dataset {
     #[must_use]
     pub fn damage(&self) -> &[String] {
         self.recording.damage()
+    }
+
+    /// That of [`Self::warnings`] which says what else in the folder that was [opened](Self::open) looks like a recording and is not read. It
+    /// names the folder, and is about no single recording in it: the first of them has it.
+    #[must_use]
+    pub fn passed_over(&self) -> Option<&str> {
+        self.passed_over.as_deref()
+    }
+
+    /// Adds what is not read with it.
+    pub(crate) fn pass_over(&mut self, warning: String) {
+        self.warnings.push(warning.clone());
+        self.passed_over = Some(warning);
     }
 
     /// Adds what was noticed beside it.

@@ -66,7 +66,7 @@ fn text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::
 pub struct DriveInspection {
     /// The drive's name.
     pub name: String,
-    /// The camera looked at: 2, or 3 where there is only that. Layouts other than KITTI's have one, which counts as 2.
+    /// The camera looked at: 2, or 3 where no drive has images of 2. Layouts other than KITTI's have one, which counts as 2.
     pub camera: u8,
     /// Its images.
     pub frames: usize,

@@ -75,7 +75,11 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     .into_dataset()
 }
 
-fn images_folder(folder: &Path, config: &FolderConfig) -> Result<PathBuf> {
+/// Where the images are: a folder that `dataset.toml` names or that has a usual name, else the recording's own.
+///
+/// # Errors
+/// [`Error::Config`] where a named one is not there.
+pub(crate) fn images_folder(folder: &Path, config: &FolderConfig) -> Result<PathBuf> {
     let found = config.find(folder, "images", config.images.as_ref(), &FOLDERS)?;
     Ok(found
         .filter(|p| p.is_dir())

@@ -4,18 +4,20 @@ use super::files::name_of;
 use super::layout::Layout;
 use super::{bag, comma};
 use crate::{
-    Cameras, ClockOffset, Dataset, DriveInspection, Error, GtKind, Inspection, IntrinsicsSummary,
-    NoFramesReason, OpenOptions, Result, SpeedRange, Stream, Unreadable,
+    Cameras, ClockOffset, Dataset, DatasetKind, DriveInspection, Error, GtKind, Inspection,
+    IntrinsicsSummary, OpenOptions, Result, SpeedRange, Stream, Unreadable,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Looks into a recording of any layout that [`Dataset::open`] knows. A comma2k19 segment whose video is
 /// absent, and a bag without a camera, are reported by their other streams. Where the path holds several recordings, those that cannot be
-/// read are [listed](Inspection::unreadable) beside the others; a nuScenes data set is one, as its scenes share their tables.
+/// read are [listed](Inspection::unreadable) beside the others, and those without images are left out as [`Dataset::open`] leaves them out,
+/// with a note; a nuScenes data set is one, as its scenes share their tables.
 ///
 /// # Errors
-/// As [`Dataset::open`] of one recording; times and speeds may be missing and are then reported as unknown.
+/// As [`Dataset::open`] of one recording, and of several where none can be read and all for one reason; times and speeds may be missing and
+/// are then reported as unknown.
 pub fn inspect(path: &Path) -> Result<Inspection> {
     inspect_with(path, &OpenOptions::default(), |_| None)
 }
@@ -63,7 +65,7 @@ fn inspect_layout(
         mut seen,
         unreadable,
         without_images,
-    } = look_into_all(path, layout, options)?;
+    } = look_into_all(path, layout, options).or_one_reason()?;
     // Measuring reads many pictures: of many drives the doctor reports it one by one.
     if let [only] = seen.as_mut_slice() {
         only.drive.time_offset = time_offset(&only.dataset);
@@ -71,8 +73,14 @@ fn inspect_layout(
     if let Some(first) = seen.first_mut()
         && !without_images.is_empty()
     {
-        let names = without_images.join(", ");
-        let warning = format!("left out, as there are no images of a camera: {names}");
+        let which = match kind {
+            DatasetKind::Bag => String::new(),
+            _ => format!(" of camera {}", first.drive.camera),
+        };
+        let names = without_images.iter().map(|one| name_of(&one.path));
+        let names: Vec<String> = names.collect();
+        let names = names.join(", ");
+        let warning = format!("left out, as they give no images{which}: {names}");
         first.drive.warnings.push(warning);
     }
     let several = seen.len() > 1;
@@ -96,7 +104,7 @@ fn inspect_layout(
         distance_m: sum(seen.iter().map(|one| one.drive.distance_m)),
         duration_s: sum(seen.iter().map(|one| one.drive.duration_s)),
         drives: seen.into_iter().map(|one| one.drive).collect(),
-        unreadable,
+        unreadable: unreadable.into_iter().map(Unread::listed).collect(),
     })
 }
 
@@ -104,9 +112,85 @@ fn inspect_layout(
 #[derive(Default)]
 struct Found {
     seen: Vec<Seen>,
-    unreadable: Vec<Unreadable>,
-    /// The names of those that can be read, and have no images.
-    without_images: Vec<String>,
+    unreadable: Vec<Unread>,
+    /// Those with which nothing is wrong but that they have no images.
+    without_images: Vec<Unread>,
+}
+
+impl Found {
+    /// A recording, and what was seen of it.
+    fn add(&mut self, path: PathBuf, recording: Layout, looked: Result<Vec<Seen>>) {
+        let error = match looked {
+            Ok(seen) => {
+                self.seen.extend(seen);
+                return;
+            }
+            Err(error) => error,
+        };
+        let unread = Unread {
+            path,
+            recording,
+            error,
+        };
+        if unread.lacks_images() {
+            self.without_images.push(unread);
+        } else {
+            self.unreadable.push(unread);
+        }
+    }
+
+    /// What was found. Where nothing was seen, those without images are among what cannot be read.
+    ///
+    /// # Errors
+    /// The first where nothing was seen and one reason says why.
+    fn or_one_reason(mut self) -> Result<Self> {
+        if !self.seen.is_empty() {
+            return Ok(self);
+        }
+        let lack_images = self.unreadable.is_empty();
+        self.unreadable.append(&mut self.without_images);
+        let mut reasons = self.unreadable.iter().map(Unread::reason);
+        let first = reasons.next();
+        if lack_images || reasons.all(|reason| Some(reason) == first) {
+            let first = self.unreadable.into_iter().next();
+            return match first {
+                Some(first) => Err(first.error),
+                None => Ok(Self::default()),
+            };
+        }
+        Ok(self)
+    }
+}
+
+/// A recording that was not seen.
+struct Unread {
+    path: PathBuf,
+    recording: Layout,
+    error: Error,
+}
+
+impl Unread {
+    /// As [`Dataset::open`] leaves recordings out: drives without images of the camera, and bags that give none.
+    fn lacks_images(&self) -> bool {
+        match self.error {
+            Error::NoImages { .. } => true,
+            Error::NoFrames { .. } => self.recording.kind() == DatasetKind::Bag,
+            _ => false,
+        }
+    }
+
+    /// What is wrong, without the recording's own name.
+    fn reason(&self) -> String {
+        let path = self.path.display().to_string();
+        self.error.to_string().replace(&path, "")
+    }
+
+    fn listed(self) -> Unreadable {
+        Unreadable {
+            path: self.path,
+            error: Arc::new(self.error),
+        }
+    }
 }
 
 /// A drive that was opened, and what is in it.
@@ -116,63 +200,42 @@ struct Seen {
     drive: DriveInspection,
 }
 
-/// Looks into each recording by itself.
-///
-/// # Errors
-/// That of a single recording. Of several it stands among the others, for one that has no images as well where none has.
-fn look_into_all(path: &Path, layout: Layout, options: &OpenOptions) -> Result<Found> {
-    let recordings = layout.apart(path);
-    let several = recordings.len() > 1;
-    let (mut found, mut without_images) = (Found::default(), Vec::new());
-    for (path, recording) in recordings {
-        match look_into(&path, &recording, options) {
-            Ok(seen) => found.seen.extend(seen),
-            Err(error) if !several => return Err(error),
-            Err(error) if lacks_images(&error) => without_images.push((path, error)),
-            Err(error) => found.unreadable.push(unreadable((path, error))),
+/// Looks into each recording by itself. The left camera is the one that is trained on: the right one is looked at only where no recording
+/// has images of the left one.
+fn look_into_all(path: &Path, layout: Layout, options: &OpenOptions) -> Found {
+    let mut found = Found::default();
+    for (path, recording) in layout.apart(path) {
+        let looked = look_into(&path, &recording, Cameras::Left, options);
+        found.add(path, recording, looked);
+    }
+    if found.seen.is_empty() && found.unreadable.is_empty() {
+        for unread in std::mem::take(&mut found.without_images) {
+            let Unread {
+                path,
+                recording,
+                error,
+            } = unread;
+            let looked = match error {
+                Error::NoImages { .. } => look_into(&path, &recording, Cameras::Right, options),
+                other => Err(other),
+            };
+            found.add(path, recording, looked);
         }
     }
-    if found.seen.is_empty() {
-        found
-            .unreadable
-            .extend(without_images.into_iter().map(unreadable));
-    } else {
-        let names = without_images.iter().map(|(path, _)| name_of(path));
-        found.without_images = names.collect();
-    }
-    Ok(found)
+    found
 }
 
-fn unreadable((path, error): (PathBuf, Error)) -> Unreadable {
-    let error = Arc::new(error);
-    Unreadable { path, error }
-}
-
-/// Whether nothing is wrong with a recording but that no camera wrote into it. A bag without any topic is what is left of one.
-fn lacks_images(error: &Error) -> bool {
-    match error {
-        Error::NoImages { .. } => true,
-        Error::NoFrames {
-            reason: NoFramesReason::NoImageTopic { topics },
-            ..
-        } => !topics.is_empty(),
-        _ => false,
-    }
-}
-
-fn look_into(path: &Path, recording: &Layout, options: &OpenOptions) -> Result<Vec<Seen>> {
-    let open = |camera| {
-        let options = OpenOptions {
-            camera,
-            split: None,
-            ..options.clone()
-        };
-        recording.open(path, &options)
+fn look_into(
+    path: &Path,
+    recording: &Layout,
+    camera: Cameras,
+    options: &OpenOptions,
+) -> Result<Vec<Seen>> {
+    let options = OpenOptions {
+        camera,
+        split: None,
+        ..options.clone()
     };
-    let datasets = match open(Cameras::Left) {
-        Err(Error::NoImages { .. }) => open(Cameras::Right),
-        other => other,
-    }?;
     let look = |dataset: Dataset| -> Result<Seen> {
         let (streams, drive) = (dataset.streams()?, look_at(&dataset)?);
         Ok(Seen {
@@ -181,6 +244,7 @@ fn look_into(path: &Path, recording: &Layout, options: &OpenOptions) -> Result<V
             drive,
         })
     };
+    let datasets = recording.open(path, &options)?;
     datasets.into_iter().map(look).collect()
 }
 

@@ -20,7 +20,7 @@ impl Dataset {
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be absent
     /// (evaluation needs neither); where they are there, they must be readable. What looks like another recording in the folder and is not
-    /// read with this one stands among the [warnings](Self::warnings) of the first.
+    /// read with this one stands among the [warnings](Self::warnings) of the first ([`Self::passed_over`]).
     ///
     /// # Errors
     /// [`Error::UnknownLayout`] where no layout fits, [`Error::FolderOfRecordings`], [`Error::NoSuchPath`], [`Error::Missing`]
@@ -34,7 +34,7 @@ impl Dataset {
         let layout = Layout::of(path)?;
         let mut datasets = layout.open(path, options)?;
         if let (Some(first), Some(warning)) = (datasets.first_mut(), layout.passed_over(path)) {
-            first.warning(warning);
+            first.pass_over(warning);
         }
         Ok(datasets)
     }
@@ -198,8 +198,8 @@ impl Layout {
         Ok(())
     }
 
-    /// What else lies in the folder at a path, looks like a recording and is not read, in a sentence; `None` where there is nothing of the
-    /// kind, and for a file.
+    /// What else lies in the folder at a path, looks like a recording and is not read, in a sentence that names the folder; `None` where
+    /// there is nothing of the kind, and for a file.
     pub(crate) fn passed_over(&self, path: &Path) -> Option<String> {
         /// Names that are said.
         const MOST: usize = 6;
@@ -208,17 +208,13 @@ impl Layout {
         if !folder.is_dir() || [path, folder.as_path()].into_iter().any(bag::is_bag) {
             return None;
         }
-        let used: Vec<&Path> = match self {
-            Self::Kitti(drives) => drives.iter().map(|drive| drive.folder.as_path()).collect(),
-            Self::RgbD(places) | Self::Bags(places) => places.iter().map(|p| p.as_path()).collect(),
-            _ => Vec::new(),
-        };
+        let used = self.used(&folder);
         let look = Look {
             used: &used,
             // A folder's own, or left out by its `dataset.toml`.
             videos: !matches!(self, Self::Comma(_) | Self::Folder(_) | Self::Video(_)),
             folders: match self {
-                Self::Kitti(_) => !used.contains(&folder.as_path()),
+                Self::Kitti(_) => !used.contains(&folder),
                 Self::RgbD(_) | Self::Bags(_) | Self::Folder(_) | Self::Video(_) => true,
                 _ => false,
             },
@@ -229,12 +225,42 @@ impl Layout {
             None | Some(0) => String::new(),
             Some(more) => format!(" and {more} more"),
         };
-        (!names.is_empty()).then(|| {
-            format!(
-                "read as {} alone; not read, though it looks like a recording: {said}{more} (give each by its own path)",
-                self.kind().label()
-            )
-        })
+        let (these, are, each) = match names.len() {
+            0 => return None,
+            1 => ("this", "looks like a recording and is", "it"),
+            _ => ("these", "look like recordings and are", "each"),
+        };
+        // `.` and `..` name nothing.
+        let shown: &Path = match path.file_name() {
+            Some(_) => path,
+            None => &folder,
+        };
+        Some(format!(
+            "{} is read as {} alone; {these} in it {are} not read: {said}{more} (give {each} by its own path)",
+            shown.display(),
+            self.kind().label()
+        ))
+    }
+
+    /// Files and folders that are read of a recording in a folder, as far as they could be taken for other recordings.
+    fn used(&self, folder: &Path) -> Vec<PathBuf> {
+        match self {
+            Self::Kitti(drives) => drives.iter().map(|drive| drive.folder.clone()).collect(),
+            Self::RgbD(places) | Self::Bags(places) => places.clone(),
+            Self::Folder(_) | Self::Video(_) => {
+                let config = FolderConfig::read(folder).unwrap_or_default();
+                let mut places = config.places(folder);
+                if matches!(self, Self::Folder(_)) {
+                    places.extend(folder::images_folder(folder, &config).ok());
+                }
+                // Through `..` and links, too.
+                let resolved = places.iter().filter_map(|place| place.canonicalize().ok());
+                let resolved: Vec<PathBuf> = resolved.collect();
+                places.extend(resolved);
+                places
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// Each of several recordings by itself, with its file or folder. Those that have their tables in common stay one.
@@ -284,4 +310,61 @@ fn named(path: &Path, real: &Path) -> PathBuf {
     given
         .filter(|given| given.file_name().is_some())
         .unwrap_or_else(|| real.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// Empty files, with their folders.
+    fn write(at: &Path, files: &[&str]) {
+        for file in files {
+            let path = at.join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+    }
+
+    fn passed_over(at: &Path) -> Option<String> {
+        Layout::of(at).unwrap().passed_over(at)
+    }
+
+    #[test]
+    fn what_dataset_toml_names_is_read() {
+        let root = tempfile::tempdir().unwrap();
+        let at = root.path();
+        write(
+            at,
+            &[
+                "clips/drive.mp4",
+                "logs/speed.csv",
+                "unit/speed.csv",
+                "kept/speed.csv",
+            ],
+        );
+        // The cache from where the video lies.
+        let named = "video = 'clips/drive.mp4'\nspeed = './logs/speed.csv'\nimu = 'logs/../unit/speed.csv'\ncache = '../kept'\n";
+        fs::write(at.join(FolderConfig::NAME), named).unwrap();
+        assert_eq!(Layout::of(at).unwrap().kind(), DatasetKind::Video);
+        assert_eq!(passed_over(at), None);
+        // Nor are the outputs of a live run recordings.
+        write(at, &["live/live_video.mp4", "live/live-0.json"]);
+        assert_eq!(passed_over(at), None);
+        write(at, &["other/clip.mp4"]);
+        let expected = format!(
+            "{} is read as video alone; this in it looks like a recording and is not read: other (give it by its own path)",
+            at.display()
+        );
+        assert_eq!(passed_over(at), Some(expected));
+    }
+
+    #[test]
+    fn the_folder_of_the_images_is_read() {
+        let root = tempfile::tempdir().unwrap();
+        let at = root.path();
+        write(at, &["frames/0.png", "frames/0.mp4", "speed.csv"]);
+        assert_eq!(Layout::of(at).unwrap().kind(), DatasetKind::Folder);
+        assert_eq!(passed_over(at), None);
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::{comma, video};
 use crate::dataset_toml::FolderConfig;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Endings of bags.
 const BAGS: [&str; 3] = ["bag", "mcap", "db3"];
@@ -20,12 +20,14 @@ const MARKS: [&str; 9] = [
 ];
 /// How the name of what `predict` keeps of its work ends: videos beside it are outputs.
 const OUTPUTS: &str = ".manifest.json";
+/// How the names of the films end that `predict` makes, of live sources too, whose folder has no such file.
+const OUTPUT_FILM: &str = "_video.mp4";
 
 /// What is looked for in a recording's folder.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Look<'a> {
     /// Files and folders that are read.
-    pub(crate) used: &'a [&'a Path],
+    pub(crate) used: &'a [PathBuf],
     /// Whether a video is another recording.
     pub(crate) videos: bool,
     /// Whether a folder may be another recording, and not a part of this one.
@@ -47,7 +49,7 @@ pub(crate) fn unread(folder: &Path, look: Look) -> Vec<String> {
         let is_recording = if is_folder {
             look.folders && holds_a_recording(&path)
         } else {
-            is_bag(&path) || look.videos && video::is_video(&path)
+            is_bag(&path) || look.videos && is_film(&path)
         };
         if is_recording {
             found.push(entry.file_name().to_string_lossy().into_owned());
@@ -66,10 +68,16 @@ fn holds_a_recording(folder: &Path) -> bool {
         if name.ends_with(OUTPUTS) {
             return false;
         }
-        let is_file_of_one = !is_hidden(&path) && (is_bag(&path) || video::is_video(&path));
+        let is_file_of_one = !is_hidden(&path) && (is_bag(&path) || is_film(&path));
         found |= MARKS.contains(&&*name) || is_file_of_one;
     }
     found
+}
+
+/// Whether a file is named like a video that is no output.
+fn is_film(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+    video::is_video(path) && !name.ends_with(OUTPUT_FILM.as_bytes())
 }
 
 fn is_bag(path: &Path) -> bool {

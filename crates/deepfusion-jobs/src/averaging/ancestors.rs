@@ -6,10 +6,22 @@ use std::path::{Path, PathBuf};
 use deepfusion_model::{AveragedNetwork, RunFolder, TrainConfig};
 use deepfusion_weights::Shipped;
 
-/// Whether all networks come from one, as far as their configurations say: one of them from the other, or all from another one, be it the
-/// first weights of a seed.
-pub(super) fn are_related(networks: &[AveragedNetwork]) -> bool {
-    let mut common: Option<HashSet<String>> = None;
+/// What networks have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kinship {
+    /// All were trained from one network, or one of them is it.
+    Network,
+    /// Nothing but the random weights that they began with, of one seed. They are usually not in one valley: their mean is often worse than
+    /// each of them.
+    FirstWeights,
+    /// Nothing that is known. The mean of unrelated networks is worth nothing.
+    Unknown,
+}
+
+/// What networks have in common, as far as their configurations say: all come from one where one of them does from the other, or all from
+/// another one.
+pub(super) fn kinship(networks: &[AveragedNetwork]) -> Kinship {
+    let mut common: Option<HashSet<Ancestor>> = None;
     for network in networks {
         let mut found = HashSet::new();
         add(&network.path, network.sha256.as_deref(), &mut found);
@@ -18,24 +30,41 @@ pub(super) fn are_related(networks: &[AveragedNetwork]) -> bool {
             Some(common) => common.intersection(&found).cloned().collect(),
         });
     }
-    common.is_some_and(|common| !common.is_empty())
+    let common = common.unwrap_or_default();
+    let is_network = |ancestor: &Ancestor| matches!(ancestor, Ancestor::Network(_));
+    if common.iter().any(is_network) {
+        Kinship::Network
+    } else if common.is_empty() {
+        Kinship::Unknown
+    } else {
+        Kinship::FirstWeights
+    }
 }
 
-/// A network and those it came from: runs by their folders, packed networks by what is in them, the first weights of a seed by what they
-/// follow from. ImageNet's encoders are no ancestor: the rest of the network came from a seed.
-fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<String>) {
+/// What a network comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Ancestor {
+    /// A trained network: a run by its folder, a packed one by what is in it.
+    Network(String),
+    /// The first weights of a seed, by what they follow from.
+    FirstWeights(String),
+}
+
+/// A network and those it came from. ImageNet's encoders are no ancestor: the rest of the network came from a seed.
+fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
     if let Some(sha256) = sha256 {
-        found.insert(sha256.to_owned());
+        found.insert(Ancestor::Network(sha256.to_owned()));
         return;
     }
     if Shipped::is_at(path) {
-        found.extend(Shipped::read(path).map(|network| network.card.sha256));
+        let sha256 = Shipped::read(path).map(|network| network.card.sha256);
+        found.extend(sha256.map(Ancestor::Network));
         return;
     }
     let Ok((folder, kind)) = RunFolder::open(path) else {
         // A run that is not there any more still has its name; a file of a ResNet is no run.
         if !path.is_file() {
-            found.insert(name_of(path));
+            found.insert(Ancestor::Network(name_of(path)));
         }
         return;
     };
@@ -45,7 +74,7 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<String>) {
         return;
     }
     // Once around is enough.
-    if !found.insert(name_of(folder.path())) {
+    if !found.insert(Ancestor::Network(name_of(folder.path()))) {
         return;
     }
     let findings = folder.read_findings().unwrap_or_default();
@@ -64,11 +93,12 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<String>) {
 
 /// What the depth network's weights follow from where a run begins from nothing: its seed and its layers. The head for uncertainty is drawn
 /// last, and changes no other weight.
-fn first_weights(config: &TrainConfig) -> Option<String> {
+fn first_weights(config: &TrainConfig) -> Option<Ancestor> {
     let mut layers = config.depth_net.of_the_weights();
     layers.initial_depth_m = config.depth_net.initial_depth_m;
     let layers = serde_json::to_string(&layers).ok()?;
-    Some(format!("seed {}, {layers}", config.seed))
+    let of_seed = format!("seed {}, {layers}", config.seed);
+    Some(Ancestor::FirstWeights(of_seed))
 }
 
 /// A run's folder, by whichever way it was named.

@@ -66,7 +66,8 @@ fn depth_is_the_mean_and_the_rest_the_firsts() {
     );
     let both = [first, second.clone()];
     let made = average(&both, None, &at.join("mean")).unwrap();
-    assert!(made.related && !made.lost_uncertainty);
+    assert_eq!(made.kinship, Kinship::Network);
+    assert!(!made.lost_uncertainty);
     let found = read_safetensors(&made.checkpoint).unwrap();
     let expected = weights(&[("depth.a", &[2.0, 4.0]), ("pose.a", &[8.0])]);
     assert_eq!(found.tensors, expected.tensors);
@@ -87,7 +88,7 @@ fn depth_is_the_mean_and_the_rest_the_firsts() {
     // A mean comes from what it is the mean of, by whichever way that was named.
     let by_slash = at.join("second/../second/");
     let again = average(&[at.join("mean"), by_slash], None, &at.join("again"));
-    assert!(again.unwrap().related);
+    assert_eq!(again.unwrap().kinship, Kinship::Network);
 }
 
 #[test]
@@ -120,21 +121,27 @@ fn relatives_are_told_from_strangers() {
     };
     run((&at.join("imagenet"), LAST), &LAYERS, encoders, |_, _| {});
     std::fs::write(at.join("resnet18.pth"), b"PK").unwrap();
-    for (name, init, seeds, related) in [
-        ("seeds", None, [1, 2], false),
-        ("seed", None, [1, 1], true),
-        ("gone", Some("gone/run"), [1, 2], true),
-        ("encoders", Some("imagenet"), [1, 2], false),
-        ("resnet", Some("resnet18.pth"), [1, 2], false),
+    for (name, init, seeds, kinship) in [
+        ("seeds", None, [1, 2], Kinship::Unknown),
+        ("seed", None, [1, 1], Kinship::FirstWeights),
+        ("gone", Some("gone/run"), [1, 2], Kinship::Network),
+        ("encoders", Some("imagenet"), [1, 2], Kinship::Unknown),
+        ("resnet", Some("resnet18.pth"), [1, 2], Kinship::Unknown),
     ] {
         let both = [0, 1].map(|i| from(&format!("{name}{i}"), init, seeds[i]));
         let made = average(&both, None, &at.join(name)).unwrap();
-        assert_eq!(made.related, related, "{name}");
+        assert_eq!(made.kinship, kinship, "{name}");
     }
-    // A mean of them, and what went on from one, come from the same seed.
+    let of = |networks: [PathBuf; 2], name: &str| {
+        let made = average(&networks, None, &at.join(name)).unwrap();
+        made.kinship
+    };
+    // A mean of them and what went on from one come from that one, what went on from each from the seed alone.
     let on = from("on", Some("seed1"), 9);
-    let mean = average(&[at.join("seed"), on], None, &at.join("both"));
-    assert!(mean.unwrap().related);
+    let of_mean = of([at.join("seed"), on.clone()], "of-mean");
+    assert_eq!(of_mean, Kinship::Network);
+    let other = from("other-on", Some("seed0"), 8);
+    assert_eq!(of([on, other], "of-both"), Kinship::FirstWeights);
 
     // Weights of other projects, and a network that begins otherwise, have nothing of a seed in common with it.
     let of_the_seed = at.join("seed0");
@@ -147,9 +154,8 @@ fn relatives_are_told_from_strangers() {
         c.depth_net.initial_depth_m = Some(20.0);
     });
     for (name, stranger) in [("import", imported), ("start", other)] {
-        let both = [of_the_seed.clone(), stranger];
-        let made = average(&both, None, &at.join(name)).unwrap();
-        assert!(!made.related, "{name}");
+        let kinship = of([of_the_seed.clone(), stranger], name);
+        assert_eq!(kinship, Kinship::Unknown, "{name}");
     }
 }
 

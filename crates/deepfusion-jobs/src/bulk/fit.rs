@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use deepfusion_runtime::PreparedImage;
+use deepfusion_runtime::{PreparedImage, Preparer};
 
-/// The factor by which an image's aspect ratio may differ from the network's input's, as a fraction: 4:3 is exactly that far from 10:3.
+/// The factor by which two aspect ratios may differ, as a fraction: 4:3 is exactly that far from 10:3.
 const MOST_ASPECT: (u64, u64) = (5, 2);
 /// The part of an image that the network sees may be enlarged so many times, in either direction.
 const MOST_ENLARGED: u64 = 4;
@@ -18,55 +18,86 @@ pub struct PoorFit {
     pub seen: [u32; 2],
     /// Of the network's input.
     pub input: [u32; 2],
+    /// Of the images that the network learned from; `None` where it learned with many cameras, or nothing says it.
+    pub learned: Option<[u32; 2]>,
 }
 
 impl PoorFit {
-    /// Whether an image is one: its aspect ratio and that of the network's input differ by more than a factor of 2.5, or a side of the
-    /// part that the network sees is shorter than a quarter of the input's. A network that learned with many cameras has inputs of many shapes,
-    /// and is only asked about the one that fits the image best; of several input sizes the largest counts.
+    /// Whether an image that was prepared for a network is one: a side of the part that the network sees is shorter than a quarter of
+    /// the input's, or the part's aspect ratio differs by more than a factor of 2.5 from that of the images it learned from. Training
+    /// resizes those to its input whatever their shape, so the input says nothing of them.
+    ///
+    /// A network that learned with many cameras has inputs of many shapes: the aspect ratio of the one that fits the image best is then
+    /// what counts, of several input sizes the largest's. So is the input's where nothing says what the network learned from.
     #[must_use]
-    pub fn of(prepared: &PreparedImage) -> Option<Self> {
+    pub fn of(network: &Preparer, prepared: &PreparedImage) -> Option<Self> {
         let size = prepared.largest()?.size;
         let [_, _, width, height] = prepared.window;
+        let camera = network.training_camera;
+        let only = camera.filter(|_| network.canonical_focal_px.is_none());
         let fit = Self {
             image: prepared.image_size,
             seen: [width, height],
             input: [size.width as u32, size.height as u32],
+            learned: only.map(|k| [k.width, k.height]),
         };
-        let (wider, higher) = fit.aspects();
-        let (most, of) = MOST_ASPECT;
-        let odd = of * wider.max(higher) > most * wider.min(higher);
         let mut sides = fit.seen.iter().zip(&fit.input);
         let tiny = sides.any(|(seen, input)| MOST_ENLARGED * u64::from(*seen) < u64::from(*input));
-        (odd || tiny).then_some(fit)
+        (tiny || fit.is_odd()).then_some(fit)
     }
 
-    /// Two numbers whose ratio is the image's aspect ratio over the input's.
+    /// Whether the aspect ratio of what the network sees is too far from that of what it learned from, or of its input.
+    fn is_odd(&self) -> bool {
+        let (wider, higher) = self.aspects();
+        let (most, of) = MOST_ASPECT;
+        of * wider.max(higher) > most * wider.min(higher)
+    }
+
+    /// Two numbers whose ratio is that of the two aspect ratios.
     fn aspects(&self) -> (u64, u64) {
-        let ([w, h], [width, height]) = (self.image.map(u64::from), self.input.map(u64::from));
+        let [w, h] = self.seen.map(u64::from);
+        let [width, height] = self.learned.unwrap_or(self.input).map(u64::from);
         (w * height, h * width)
     }
 }
 
 impl fmt::Display for PoorFit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { image, seen, input } = self;
+        let Self {
+            image,
+            seen,
+            input,
+            learned,
+        } = self;
         let [w, h] = image;
         write!(f, "{w}x{h} pixels")?;
         if seen != image {
             write!(f, ", of which the network sees {}x{}", seen[0], seen[1])?;
         }
-        let (wider, higher) = self.aspects();
-        let ratio = wider.max(higher) as f64 / wider.min(higher).max(1) as f64;
         let times = |side: usize| f64::from(input[side]) / f64::from(seen[side].max(1));
         write!(
             f,
-            ", resized to {}x{} ({:.2} times the width, {:.2} times the height; the aspect ratios differ by a factor of {ratio:.1}): the network \
-             learned from nothing like it, and its depth means little",
+            ", resized to {}x{} ({:.2} times the width, {:.2} times the height",
             input[0],
             input[1],
             times(0),
             times(1)
+        )?;
+        if self.is_odd() {
+            write!(f, "; the aspect ratios of what the network sees and of ")?;
+            match learned {
+                Some([width, height]) => {
+                    write!(f, "the {width}x{height} images that it learned from")?;
+                }
+                None => write!(f, "its input")?,
+            }
+            let (wider, higher) = self.aspects();
+            let ratio = wider.max(higher) as f64 / wider.min(higher).max(1) as f64;
+            write!(f, " differ by a factor of {ratio:.1}")?;
+        }
+        write!(
+            f,
+            "): the network learned from nothing like it, and its depth means little"
         )
     }
 }
@@ -77,7 +108,7 @@ mod tests {
     use deepfusion_data::RgbImage;
     use deepfusion_geometry::Intrinsics;
     use deepfusion_model::InputSize;
-    use deepfusion_runtime::{Augmentation, Preparer};
+    use deepfusion_runtime::Augmentation;
 
     const NETWORK: Preparer = Preparer {
         size: InputSize {
@@ -89,9 +120,14 @@ mod tests {
         augmentation: Augmentation::NONE,
     };
 
-    fn fit(network: &Preparer, (width, height): (u32, u32)) -> Option<PoorFit> {
+    fn fit(network: &Preparer, size: (u32, u32)) -> Option<PoorFit> {
+        prepared(network, size, true)
+    }
+
+    /// Cut where the network wants another shape, or stretched.
+    fn prepared(network: &Preparer, (width, height): (u32, u32), crop: bool) -> Option<PoorFit> {
         let image = RgbImage::new(width, height);
-        PoorFit::of(&network.prepare(&image, None, true, true))
+        PoorFit::of(network, &network.prepare(&image, None, true, crop))
     }
 
     #[test]
@@ -121,21 +157,44 @@ mod tests {
         }
     }
 
-    /// A network of one camera cuts what has another shape, one of many cameras takes an input that fits.
+    /// Of a network of one camera: its own images fit, whatever the shape of its input. Another shape is cut to theirs; what is left may be
+    /// tiny.
     #[test]
-    fn it_depends_on_what_the_network_does_with_another_shape() {
-        let cuts = Preparer {
-            training_camera: Some(Intrinsics::centred(230.0, (320, 96))),
+    fn what_a_network_learned_from_fits() {
+        let own = Preparer {
+            size: InputSize {
+                width: 640,
+                height: 192,
+            },
+            training_camera: Some(Intrinsics::centred(900.0, (1280, 1024))),
             ..NETWORK
         };
-        let cut = fit(&cuts, (1080, 1920)).unwrap();
-        assert_eq!(cut.seen, [1080, 324]);
+        for size in [(1280, 1024), (640, 512)] {
+            for crop in [true, false] {
+                assert_eq!(prepared(&own, size, crop), None, "{size:?} {crop}");
+            }
+        }
+        for size in [(1280, 192), (1080, 1920)] {
+            assert_eq!(prepared(&own, size, true), None, "{size:?}");
+        }
+        let text = prepared(&own, (1280, 192), false).unwrap().to_string();
+        for part in [
+            "1280x192 pixels, resized to 640x192",
+            "sees and of the 1280x1024 images that it learned from differ by a factor of 5.3",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let cut = prepared(&own, (5000, 20), true).unwrap();
+        assert_eq!(cut.seen, [25, 20]);
         let text = cut.to_string();
-        assert!(
-            text.contains("of which the network sees 1080x324"),
-            "{text}"
-        );
+        assert!(text.contains("of which the network sees 25x20"), "{text}");
+        assert!(!text.contains("aspect"), "{text}");
+    }
+
+    #[test]
+    fn a_network_of_many_cameras_takes_an_input_that_fits() {
         let many = Preparer {
+            training_camera: Some(Intrinsics::centred(230.0, (320, 96))),
             canonical_focal_px: Some(185.0),
             ..NETWORK
         };

@@ -3,19 +3,19 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Cameras, Dataset, DatasetKind, OpenOptions};
+use deepfusion_data::kitti::{Drive, find_drives};
+use deepfusion_data::{Dataset, DatasetKind, Split};
 use deepfusion_model::{AveragedNetwork, RunFolder, TrainConfig, TrainFindings};
 use deepfusion_runtime::embedded;
 use deepfusion_weights::Shipped;
 
-use crate::held_out::surely_real;
 use crate::{Error, Result};
 
-/// Recordings and networks of a run's past of which nothing shows that their images were simulated: bags, what is not there any more,
-/// weights of other projects, packed networks whose cards do not say so.
+/// Recordings and networks of a run's past of which nothing shows that their images were simulated: what `simulate` did not write as KITTI raw,
+/// what is not there any more, weights of other projects, packed networks whose cards do not say so.
 ///
 /// # Errors
-/// [`Error::SawReal`] for a recording that is surely real.
+/// [`Error::SawReal`] for a recording that is known to be real.
 pub(super) fn not_known_as_simulated(
     run: &Path,
     config: &TrainConfig,
@@ -28,8 +28,10 @@ pub(super) fn not_known_as_simulated(
 
 #[derive(Default)]
 struct Past {
-    /// Runs and recordings that were looked at.
+    /// Runs that were looked at.
     seen: HashSet<PathBuf>,
+    /// Recordings that were, each with the split that selected its frames.
+    recordings: HashSet<(PathBuf, Option<PathBuf>)>,
     not_known: Vec<PathBuf>,
 }
 
@@ -44,13 +46,15 @@ impl Past {
             return Ok(());
         }
         let data = &config.data;
-        let of_sets = data.sets.iter().flat_map(|set| &set.paths);
-        for path in data.paths.iter().chain(of_sets) {
-            self.add_recording(run, path, config)?;
+        let of_sets = data.sets.iter().map(|set| (&set.paths, &set.split));
+        for (paths, split) in std::iter::once((&data.paths, &data.split)).chain(of_sets) {
+            for path in paths {
+                self.add_recording(run, path, split.as_deref())?;
+            }
         }
         if data.paths.is_empty() && data.sets.is_empty() && findings.averaged.is_empty() {
             // Imported: it learned elsewhere.
-            self.not_known.push(run.to_owned());
+            self.add_not_known(run);
         }
         if let Some(init) = &config.init {
             self.add_network(init, config.init_sha256.as_deref())?;
@@ -61,19 +65,21 @@ impl Past {
         Ok(())
     }
 
-    fn add_recording(&mut self, run: &Path, path: &Path, config: &TrainConfig) -> Result<()> {
-        if !self.seen.insert(path.to_owned()) {
+    fn add_recording(&mut self, run: &Path, path: &Path, split: Option<&Path>) -> Result<()> {
+        let selected = (path.to_owned(), split.map(Path::to_owned));
+        if !self.recordings.insert(selected) {
             return Ok(());
         }
-        match is_real(path, config) {
-            Some(true) => {
+        match images_of(path, split) {
+            Images::Real(layout) => {
                 return Err(Error::SawReal {
                     run: run.to_owned(),
                     recording: path.to_owned(),
+                    layout,
                 });
             }
-            Some(false) => {}
-            None => self.not_known.push(path.to_owned()),
+            Images::Simulated => {}
+            Images::NotKnown => self.add_not_known(path),
         }
         Ok(())
     }
@@ -91,9 +97,16 @@ impl Past {
         };
         let simulated = packed.is_some_and(|network| network.card.simulated_only);
         if !simulated {
-            self.not_known.push(path.to_owned());
+            self.add_not_known(path);
         }
         Ok(())
+    }
+
+    /// Once, however often it is in the run's past.
+    fn add_not_known(&mut self, path: &Path) {
+        if !self.not_known.iter().any(|known| known == path) {
+            self.not_known.push(path.to_owned());
+        }
     }
 
     fn add_run_at(&mut self, path: &Path) -> Result<()> {
@@ -103,31 +116,77 @@ impl Past {
             Some((folder, config, findings))
         };
         let Some((folder, config, findings)) = read() else {
-            self.not_known.push(path.to_owned());
+            self.add_not_known(path);
             return Ok(());
         };
         self.add_run(folder.path(), &config, &findings)
     }
 }
 
-/// Whether a recording is real; `None` where nothing shows it.
-fn is_real(path: &Path, config: &TrainConfig) -> Option<bool> {
-    // The exact motion lies beside a simulated drive's images, and within a bag.
-    if Dataset::kind_at(path).ok()? == DatasetKind::Bag {
-        return None;
+/// What is known of a recording's images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Images {
+    /// Of cameras, in a layout that is its authors' drives alone, or on a day of KITTI raw.
+    Real(DatasetKind),
+    /// Of `simulate`.
+    Simulated,
+    /// Of either: anybody may have written them.
+    NotKnown,
+}
+
+/// What is known of the images that a split selects at a path: by names and folders, none is opened.
+fn images_of(path: &Path, split: Option<&Path>) -> Images {
+    match Dataset::kind_at(path) {
+        Ok(
+            layout @ (DatasetKind::NuScenes | DatasetKind::Kitti360 | DatasetKind::KittiOdometry),
+        ) => Images::Real(layout),
+        Ok(DatasetKind::KittiRaw) => images_of_drives(path, split),
+        // A simulated bag says nothing of itself, and what became of it by `data convert` neither.
+        _ => Images::NotKnown,
     }
-    let options = OpenOptions {
-        camera: Cameras::Both,
-        assumed_camera: config.assumed_camera.map(|camera| camera.intrinsics()),
-        ..OpenOptions::default()
+}
+
+/// As [`images_of`], of drives in KITTI raw's layout: other programs write it, too, and `data convert` does of any recording.
+fn images_of_drives(path: &Path, split: Option<&Path>) -> Images {
+    let Ok(mut drives) = find_drives(path) else {
+        return Images::NotKnown;
     };
-    let datasets = Dataset::open(path, &options).ok()?;
-    Some(datasets.iter().any(surely_real))
+    // One that cannot be read any more may have selected any.
+    if let Some(split) = split.and_then(|split| Split::read(split).ok()) {
+        let named: HashSet<&str> = split.entries.iter().map(|e| e.folder.as_str()).collect();
+        drives.retain(|drive| named.contains(drive.split_name().as_str()));
+    }
+    if drives.iter().any(is_kittis_own) {
+        Images::Real(DatasetKind::KittiRaw)
+    } else if !drives.is_empty() && drives.iter().all(is_simulators) {
+        Images::Simulated
+    } else {
+        Images::NotKnown
+    }
+}
+
+/// Whether a drive has the name of a day on which KITTI was recorded.
+fn is_kittis_own(drive: &Drive) -> bool {
+    const DAYS: [&str; 5] = [
+        "2011_09_26_",
+        "2011_09_28_",
+        "2011_09_29_",
+        "2011_09_30_",
+        "2011_10_03_",
+    ];
+    DAYS.iter().any(|day| drive.name.starts_with(day))
+}
+
+/// Whether a drive has what `simulate` writes beside its images and nobody can record: exact poses, and exact masks of what moves.
+fn is_simulators(drive: &Drive) -> bool {
+    let has = |part: &str| drive.folder.join(part).exists();
+    has("poses.txt") && has("moving_02")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_data::OpenOptions;
     use deepfusion_model::Preset;
     use deepfusion_sim::{SimConfig, Simulation, write_kitti};
     use std::fs;
@@ -145,6 +204,16 @@ mod tests {
         let root = write_kitti(&simulation, at, &mut |_, _| ()).unwrap();
         let drive = &Dataset::open(&root, &OpenOptions::default()).unwrap()[0];
         drive.folder().to_owned()
+    }
+
+    /// A folder that looks like a sequence of KITTI odometry.
+    fn sequence(at: &Path) -> PathBuf {
+        let folder = at.join("sequences/00");
+        fs::create_dir_all(folder.join("image_2")).unwrap();
+        for name in ["calib.txt", "times.txt"] {
+            fs::write(folder.join(name), "").unwrap();
+        }
+        folder
     }
 
     /// A run that learned from a recording.
@@ -177,19 +246,24 @@ mod tests {
     fn a_mean_saw_what_its_networks_saw() {
         let at = tempfile::tempdir().unwrap();
         let at = at.path();
-        let (simulated, real) = (drive(&at.join("simulated")), drive(&at.join("real")));
-        fs::remove_file(real.join("poses.txt")).unwrap();
+        let simulated = drive(&at.join("simulated"));
+        let real = sequence(&at.join("real"));
         let first = trained_on(&at.join("first"), &simulated);
         let second = trained_on(&at.join("second"), &simulated);
         let third = trained_on(&at.join("third"), &real);
         let none: Vec<PathBuf> = Vec::new();
         assert_eq!(of_mean(&[first.clone(), second.clone()]).unwrap(), none);
         let refused = of_mean(&[first.clone(), third.clone()]).unwrap_err();
-        let Error::SawReal { run, recording } = &refused else {
+        let Error::SawReal {
+            run,
+            recording,
+            layout: DatasetKind::KittiOdometry,
+        } = &refused
+        else {
             panic!("{refused}");
         };
         assert_eq!((run, recording), (&third, &real));
-        // One that went on from the real drive.
+        // One that went on from the one with the real drive.
         let (folder, _) = RunFolder::open(&second).unwrap();
         let mut config = folder.read_settings().unwrap();
         config.init = Some(third);
@@ -202,12 +276,72 @@ mod tests {
         // A run and a recording that are gone, weights of nobody knows what.
         let gone = at.join("gone");
         let of_gone = trained_on(&at.join("fourth"), &gone.join("drive"));
-        let networks = [first, gone.clone(), of_gone];
+        let networks = [first, gone.clone(), gone.clone(), of_gone];
         let expected = vec![gone.clone(), gone.join("drive")];
         assert_eq!(of_mean(&networks).unwrap(), expected);
         let config = Preset::Tiny.config();
         let imported = not_known_as_simulated(&gone, &config, &TrainFindings::default());
         assert_eq!(imported.unwrap(), [gone]);
+    }
+
+    /// Images alone say nothing: what another simulator rendered, or `data convert` made of a bag, has no exact poses either.
+    #[test]
+    fn what_anybody_may_have_written_is_not_known() {
+        let at = tempfile::tempdir().unwrap();
+        let at = at.path();
+        let of = |recording: &Path| images_of(recording, None);
+        let converted = drive(&at.join("converted"));
+        assert_eq!(of(&converted), Images::Simulated);
+        fs::remove_file(converted.join("poses.txt")).unwrap();
+        assert_eq!(of(&converted), Images::NotKnown);
+        let pictures = at.join("pictures");
+        fs::create_dir(&pictures).unwrap();
+        fs::write(pictures.join("0.png"), "").unwrap();
+        for beside in ["notes.txt", "poses.txt"] {
+            fs::write(pictures.join(beside), "").unwrap();
+            assert_eq!(Dataset::kind_at(&pictures).unwrap(), DatasetKind::Folder);
+            assert_eq!(of(&pictures), Images::NotKnown, "{beside}");
+        }
+        let run = trained_on(&at.join("run"), &converted);
+        assert_eq!(of_mean(&[run]).unwrap(), [converted]);
+    }
+
+    /// A root of KITTI raw with a drive of its own, whose exact poses somebody added, and a simulated one.
+    #[test]
+    fn a_split_says_which_drives_were_learned_from() {
+        let at = tempfile::tempdir().unwrap();
+        let at = at.path().canonicalize().unwrap();
+        let root = at.join("raw");
+        let simulated = drive(&root);
+        let real = root.join("2011_09_26/2011_09_26_drive_0001_sync");
+        for folder in ["image_02/data", "moving_02"] {
+            fs::create_dir_all(real.join(folder)).unwrap();
+        }
+        fs::write(real.join("poses.txt"), "").unwrap();
+        let kittis = Images::Real(DatasetKind::KittiRaw);
+        assert_eq!(images_of(&root, None), kittis);
+        let split = |drive: &Path| {
+            let drive = drive.strip_prefix(&root).unwrap().display().to_string();
+            let file = at.join("split.txt");
+            fs::write(&file, format!("{drive} 0 l\n{drive} 1 l\n")).unwrap();
+            file
+        };
+        for (drive, expected) in [
+            (&simulated, Images::Simulated),
+            (&real, kittis),
+            (&root.join("another"), Images::NotKnown),
+        ] {
+            assert_eq!(images_of(&root, Some(&split(drive))), expected);
+        }
+        assert_eq!(images_of(&root, Some(&at.join("gone.txt"))), kittis);
+        let mut config = Preset::Tiny.config();
+        config.data.paths = vec![root.clone()];
+        let mut saw = |split: Option<PathBuf>| {
+            config.data.split = split;
+            not_known_as_simulated(Path::new("run"), &config, &TrainFindings::default())
+        };
+        assert!(saw(Some(split(&simulated))).unwrap().is_empty());
+        assert!(matches!(saw(None), Err(Error::SawReal { .. })));
     }
 
     #[test]
@@ -223,13 +357,20 @@ mod tests {
                 (network.card.sha256.clone(), true),
                 ("ab".repeat(32), false),
             ] {
-                (config.init, config.init_sha256) = (Some(name.clone()), Some(sha256));
-                let findings = TrainFindings::default();
+                (config.init, config.init_sha256) = (Some(name.clone()), Some(sha256.clone()));
+                // It is the mean of networks that began from the same one, and named once.
+                let part = AveragedNetwork {
+                    path: name.clone(),
+                    sha256: Some(sha256),
+                    share: 0.5,
+                };
+                let findings = TrainFindings {
+                    averaged: vec![part.clone(), part],
+                    ..TrainFindings::default()
+                };
                 let found = not_known_as_simulated(Path::new("run"), &config, &findings);
-                assert_eq!(
-                    found.unwrap().is_empty(),
-                    known && network.card.simulated_only
-                );
+                let known = known && network.card.simulated_only;
+                assert_eq!(found.unwrap().len(), usize::from(!known));
             }
         }
     }

@@ -108,20 +108,51 @@ pub struct SettingsOfMean {
     pub first: PathBuf,
     /// Of how many it is the mean.
     pub networks: usize,
+    /// The mean's own folder, where the file is its `config.toml` and its weights are there.
+    pub folder: Option<PathBuf>,
 }
 
 impl SettingsOfMean {
-    /// Whether a configuration's file is one.
+    /// Whether a configuration that was read from a file is one. One that names something else to begin from than the first network's run
+    /// does is not: somebody chose it.
     ///
     /// # Errors
     /// As [`TrainFindings::read`].
-    pub fn of(config: &Path) -> Result<Option<Self>> {
-        let averaged = TrainFindings::read(config)?.averaged;
-        Ok(averaged.first().map(|first| Self {
+    pub fn of(file: &Path, config: &TrainConfig) -> Result<Option<Self>> {
+        let averaged = TrainFindings::read(file)?.averaged;
+        let Some(first) = averaged.first() else {
+            return Ok(None);
+        };
+        let first_run = RunFolder::open(&first.path).and_then(|(run, _)| run.read_settings());
+        let is_chosen = config.init.is_some()
+            && first_run.is_ok_and(|run| beginning(&run) != beginning(config));
+        Ok((!is_chosen).then(|| Self {
             first: first.path.clone(),
             networks: averaged.len(),
+            folder: run_around(file),
         }))
     }
+}
+
+/// What a configuration begins from, by whichever folder it was written in.
+fn beginning(config: &TrainConfig) -> (Option<PathBuf>, Option<String>) {
+    let mut config = config.clone();
+    config.make_absolute();
+    (config.init, config.init_sha256)
+}
+
+/// The run of which a file is the configuration, if its weights are there.
+fn run_around(file: &Path) -> Option<PathBuf> {
+    let folder = file.parent()?;
+    let folder = if folder == Path::new("") {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let (run, _) = RunFolder::open(folder).ok()?;
+    let is_its = run.config_path().file_name() == file.file_name();
+    let has_weights = run.checkpoint_path(run.preferred()).is_file();
+    (is_its && has_weights).then(|| folder.to_owned())
 }
 
 impl fmt::Display for SettingsOfMean {
@@ -463,12 +494,51 @@ mod tests {
         let config = Preset::Tiny.config();
         for (findings, of_mean) in [(mean, true), (TrainFindings::default(), false)] {
             run.write_config(&config, &findings).unwrap();
-            let found = SettingsOfMean::of(&run.config_path()).unwrap();
+            let found = SettingsOfMean::of(&run.config_path(), &config).unwrap();
             let said = found.map(|mean| mean.to_string()).unwrap_or_default();
             for part in ["mean of 2 networks", "/first/best.safetensors"] {
                 assert_eq!(said.contains(part), of_mean, "{said}");
             }
         }
+    }
+
+    /// Its own folder is known while its file lies there beside weights; a beginning that the first network had not was chosen.
+    #[test]
+    fn settings_of_a_mean_say_where_it_is_unless_somebody_chose_a_beginning() {
+        let at = tempfile::tempdir().unwrap();
+        let at = at.path();
+        let first = RunFolder::create(&at.join("first")).unwrap();
+        let mut config = Preset::Tiny.config();
+        config.init = Some(at.join("street"));
+        first
+            .write_config(&config, &TrainFindings::default())
+            .unwrap();
+        let findings = TrainFindings {
+            averaged: vec![AveragedNetwork {
+                path: first.checkpoint_path(CheckpointKind::Best),
+                sha256: None,
+                share: 1.0,
+            }],
+            ..TrainFindings::default()
+        };
+        let mean = RunFolder::create(&at.join("mean")).unwrap();
+        mean.write_config(&config, &findings).unwrap();
+        let file = mean.config_path();
+        let folder = |file: &Path, config: &TrainConfig| {
+            let found = SettingsOfMean::of(file, config).unwrap();
+            found.map(|mean| mean.folder)
+        };
+        assert_eq!(folder(&file, &config), Some(None), "no weights");
+        std::fs::write(mean.checkpoint_path(CheckpointKind::Last), b"").unwrap();
+        assert_eq!(folder(&file, &config), Some(Some(at.join("mean"))));
+        for copy in [at.join("mean/copy.toml"), at.join("copy.toml")] {
+            std::fs::copy(&file, &copy).unwrap();
+            assert_eq!(folder(&copy, &config), Some(None), "{}", copy.display());
+        }
+        config.init = Some(at.join("mean"));
+        assert_eq!(folder(&file, &config), None);
+        config.init = None;
+        assert!(folder(&file, &config).is_some());
     }
 
     #[test]

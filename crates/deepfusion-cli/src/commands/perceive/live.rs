@@ -25,7 +25,7 @@ impl Work<'_> {
                 frame.arrived,
                 LiveMark::of_arrival(frame.arrived_at, frame.dropped),
             );
-            let (loaded, prepared) = self.job.loader.load_live(frame)?;
+            let (loaded, prepared) = self.job.load_live(&input, frame)?;
             let started = StartedFrame {
                 input,
                 loaded,

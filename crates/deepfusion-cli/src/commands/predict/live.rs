@@ -43,8 +43,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
             frame.arrived,
             LiveMark::of_arrival(frame.arrived_at, frame.dropped),
         );
-        let (mut loaded, prepared) = job.loader.load_live(frame)?;
-        job.warn_of_poor_fit(&input.path, &prepared);
+        let (mut loaded, prepared) = job.load_live(&input, frame)?;
         let seen = job.see(&mut estimator, &prepared)?;
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
         loaded.live = Some(LiveMark { latency_ms, ..mark });

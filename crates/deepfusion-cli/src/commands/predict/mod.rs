@@ -22,7 +22,7 @@ use deepfusion_jobs::scene::{DepthWatch, unwatched};
 use deepfusion_jobs::{Error, Input};
 use deepfusion_runtime::ModelSource;
 use deepfusion_runtime::{DepthEstimator, PreparedImage};
-use deepfusion_video::{Address, can_write_video};
+use deepfusion_video::{Address, LiveFrame, can_write_video};
 
 use super::live as sources;
 use super::warnings;
@@ -412,9 +412,20 @@ impl<'a> Job<'a> {
         Ok((loaded, prepared))
     }
 
+    /// Takes a live source's frame, and warns where its size and shape are far from what the network takes.
+    pub(super) fn load_live(
+        &self,
+        input: &Input,
+        frame: LiveFrame,
+    ) -> Result<(LoadedImage, PreparedImage)> {
+        let (loaded, prepared) = self.loader.load_live(frame)?;
+        self.warn_of_poor_fit(&input.path, &prepared);
+        Ok((loaded, prepared))
+    }
+
     /// Warns of the first image that is far from what the network takes.
     fn warn_of_poor_fit(&self, image: &Path, prepared: &PreparedImage) {
-        if let Some(fit) = PoorFit::of(prepared) {
+        if let Some(fit) = PoorFit::of(&self.loader.preparer, prepared) {
             let warn =
                 || tracing::warn!("{}: {fit} (others like it are not named)", image.display());
             self.fit_warning.call_once(warn);

@@ -1,4 +1,4 @@
-use deepfusion_jobs::averaging;
+use deepfusion_jobs::averaging::{Kinship, average};
 
 use crate::cli::AverageArgs;
 use crate::failure::Result;
@@ -11,7 +11,7 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
     for model in &args.models {
         warn_of_hidden(model);
     }
-    let made = averaging::average(&args.models, args.shares.as_deref(), &args.out)?;
+    let made = average(&args.models, args.shares.as_deref(), &args.out)?;
     for network in &made.networks {
         say(&format!(
             "{:.3} of {}",
@@ -19,10 +19,14 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
             network.path.display()
         ));
     }
-    if !made.related {
-        tracing::warn!(
+    match made.kinship {
+        Kinship::Network => {}
+        Kinship::FirstWeights => tracing::warn!(
+            "these networks have only their first random weights in common, those of one seed; the mean of such networks is often worse than either: measure it"
+        ),
+        Kinship::Unknown => tracing::warn!(
             "nothing shows that these networks were trained from the same one; the mean of unrelated networks is worthless"
-        );
+        ),
     }
     if made.lost_uncertainty {
         tracing::warn!("not all of them say how sure they are, so the mean does not");
@@ -31,7 +35,7 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
         return output::print_json(&serde_json::json!({
             "checkpoint": made.checkpoint,
             "networks": made.networks,
-            "related": made.related,
+            "related": made.kinship == Kinship::Network,
         }));
     }
     output::print(&format!("{}\n", made.checkpoint.display()))

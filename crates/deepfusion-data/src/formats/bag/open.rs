@@ -46,9 +46,7 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
         (None, Some(error)) => Err(error),
         (Some(first), _) if !without_camera.is_empty() => {
             let names = without_camera.join(", ");
-            first.warning(format!(
-                "left out, as none of their topics holds images: {names}"
-            ));
+            first.warning(format!("left out, as they give no images: {names}"));
             Ok(datasets)
         }
         _ => Ok(datasets),
