@@ -25,6 +25,7 @@
 /// assert_eq!(count_of(1, "frame"), "1 frame");
 /// assert_eq!(count_of(0_u64, "yaw rate"), "0 yaw rates");
 /// assert_eq!(count_of(2_usize, "fix"), "2 fixes");
+/// assert_eq!(count_of(2_usize, "epoch"), "2 epochs");
 /// ```
 #[must_use]
 pub fn count_of<N>(count: N, noun: &str) -> String
@@ -33,7 +34,7 @@ where
 {
     let ending = if count == N::from(1) {
         ""
-    } else if noun.ends_with(['s', 'x']) || noun.ends_with("ch") {
+    } else if noun.ends_with(['s', 'x']) || (noun.ends_with("ch") && !noun.ends_with("epoch")) {
         "es"
     } else {
         "s"
