@@ -16,6 +16,7 @@
 //! | [`averaging`] | the mean of several runs' weights |
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
+//! | [`machine`] | what this machine has: vector instructions, memory, disk |
 //! | [`RunHistory`] | how a run learned, by what its folder keeps |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
@@ -56,6 +57,7 @@ pub mod int8;
 pub mod intervals;
 pub mod labelled;
 pub mod live;
+pub mod machine;
 mod model_facts;
 #[cfg(feature = "train")]
 pub mod odometry;

@@ -29,6 +29,30 @@ pub(super) enum After {
 }
 
 impl ModuleCost {
+    /// Several parts as one.
+    #[must_use]
+    pub fn sum(name: impl Into<String>, parts: &[Self]) -> Self {
+        let sum = |of: fn(&Self) -> u64| parts.iter().map(of).sum::<u64>();
+        Self {
+            name: name.into(),
+            parameters: sum(|part| part.parameters),
+            multiply_adds: sum(|part| part.multiply_adds),
+            values: sum(|part| part.values),
+        }
+    }
+
+    /// Its parameters in f32, in MB of 2²⁰ bytes.
+    #[must_use]
+    pub fn weights_mb(&self) -> f64 {
+        megabytes(self.parameters)
+    }
+
+    /// What its operations give for one image in f32, in MB of 2²⁰ bytes.
+    #[must_use]
+    pub fn values_mb(&self) -> f64 {
+        megabytes(self.values)
+    }
+
     pub(super) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -74,6 +98,11 @@ impl ModuleCost {
     pub(super) fn give(&mut self, channels: usize, pixels: usize) {
         self.values += (channels * pixels) as u64;
     }
+}
+
+/// MB of numbers in f32.
+fn megabytes(numbers: u64) -> f64 {
+    numbers as f64 * 4.0 / (1024.0 * 1024.0)
 }
 
 impl ResNetConfig {
@@ -280,5 +309,26 @@ impl PoseNetConfig {
             After::Bias,
         );
         all.give(2, size.width * size.height);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_add_up_and_have_a_size_in_memory() {
+        let part = |name: &str, parameters, values| ModuleCost {
+            name: name.into(),
+            parameters,
+            multiply_adds: 10 * parameters,
+            values,
+        };
+        let parts = [part("a", 1 << 18, 1 << 20), part("b", 1 << 19, 0)];
+        let whole = ModuleCost::sum("both", &parts);
+        assert_eq!(whole.name, "both");
+        assert_eq!(whole.parameters, (1 << 18) + (1 << 19));
+        assert_eq!(whole.multiply_adds, 10 * whole.parameters);
+        assert_eq!((whole.weights_mb(), whole.values_mb()), (3.0, 4.0));
     }
 }

@@ -3,12 +3,15 @@
 
 mod cases;
 mod inputs;
+mod summary;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use burn::tensor::Device;
 use inputs::{Inputs, Outcome};
+
+pub use summary::DeviceCheck;
 
 /// How far a device may be from the processor, over the largest value: both round in single precision, in another order.
 pub const TOLERANCE: f64 = 1e-3;

@@ -4,6 +4,7 @@ mod modules;
 
 use deepfusion_hint::count_of;
 use deepfusion_jobs::bench::{IMAGES_PER_REPEAT, PICTURE_SIZE, Stages, StreetBench};
+use deepfusion_jobs::machine;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Preset, TrainConfig};
 use deepfusion_runtime::{DepthRunner, Precision};
@@ -44,7 +45,7 @@ struct Report {
 pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let (name, config, mut runner) = network(args)?;
     let modules = Modules::new(&config);
-    let table = modules.table();
+    let (whole, table) = (modules.whole(), modules.table());
     let repeats = args.repeats.max(1);
     let bench = StreetBench::new(&config)?;
     let stages = bench.stages(&mut *runner, repeats)?;
@@ -62,12 +63,12 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         device: args.engine.device.to_string(),
         network: name,
         size: [config.size.width, config.size.height],
-        parameters: modules.parameters(),
-        multiply_adds: modules.multiply_adds(),
-        modules: modules.into_list(),
+        parameters: whole.parameters,
+        multiply_adds: whole.multiply_adds,
+        modules: modules.list(),
         latency_ms: stages.sum(),
         fps: bench.overlapped_fps(&mut *runner, repeats)?,
-        peak_rss_mb: peak_rss_mb(),
+        peak_rss_mb: machine::peak_rss_mb(),
         peak_device_mb: runner.peak_device_bytes().map(devices::megabytes),
         profile_ms,
         stages_ms: stages,
@@ -170,12 +171,4 @@ fn first_weights(config: &TrainConfig) -> Result<Weights> {
 fn first_weights(_: &TrainConfig) -> Result<Weights> {
     let what = "--preset";
     Err(crate::error::CliError::BuiltWithoutTraining { what }.into())
-}
-
-/// The most memory this process ever had, where the system reports it (Linux).
-pub(super) fn peak_rss_mb() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib / 1024.0)
 }

@@ -1,10 +1,9 @@
 //! What each part of a run's networks costs, as a table.
 
-use deepfusion_model::ModuleCost;
-use deepfusion_model::TrainConfig;
+use deepfusion_model::{ModuleCost, TrainConfig};
 use serde::Serialize;
 
-/// A part of the networks.
+/// A part of the networks, as `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Module {
     name: String,
@@ -19,15 +18,14 @@ pub(super) struct Module {
     values_mb: f64,
 }
 
-impl From<ModuleCost> for Module {
-    fn from(cost: ModuleCost) -> Self {
-        let megabytes = |numbers: u64| numbers as f64 * 4.0 / (1024.0 * 1024.0);
+impl From<&ModuleCost> for Module {
+    fn from(cost: &ModuleCost) -> Self {
         Self {
-            weights_mb: megabytes(cost.parameters),
-            values_mb: megabytes(cost.values),
-            name: cost.name,
+            name: cost.name.clone(),
             parameters: cost.parameters,
             multiply_adds: cost.multiply_adds,
+            weights_mb: cost.weights_mb(),
+            values_mb: cost.values_mb(),
         }
     }
 }
@@ -35,59 +33,46 @@ impl From<ModuleCost> for Module {
 /// The depth network's parts in the order in which they run, and the pose network, which only trains.
 #[derive(Debug)]
 pub(super) struct Modules {
-    pub depth: Vec<Module>,
-    pub pose: Module,
+    depth: Vec<ModuleCost>,
+    pose: ModuleCost,
 }
 
 impl Modules {
     pub(super) fn new(config: &TrainConfig) -> Self {
-        let depth = config.depth_net.costs(config.size);
         Self {
-            depth: depth.into_iter().map(Module::from).collect(),
-            pose: config.pose_net.cost(config.size).into(),
+            depth: config.depth_net.costs(config.size),
+            pose: config.pose_net.cost(config.size),
         }
     }
 
-    /// Of the depth network.
-    pub(super) fn parameters(&self) -> u64 {
-        self.depth.iter().map(|m| m.parameters).sum()
-    }
-
-    /// Of the depth network, for one image.
-    pub(super) fn multiply_adds(&self) -> u64 {
-        self.depth.iter().map(|m| m.multiply_adds).sum()
+    /// The depth network as one.
+    pub(super) fn whole(&self) -> ModuleCost {
+        ModuleCost::sum("depth network", &self.depth)
     }
 
     /// All of them.
-    pub(super) fn into_list(self) -> Vec<Module> {
-        self.depth.into_iter().chain([self.pose]).collect()
+    pub(super) fn list(&self) -> Vec<Module> {
+        let all = self.depth.iter().chain([&self.pose]);
+        all.map(Module::from).collect()
     }
 
     pub(super) fn table(&self) -> String {
-        let row = |m: &Module| {
+        let row = |m: &ModuleCost| {
             format!(
                 "{:18} {:10.3} {:12.3} {:11.1} {:10.1}\n",
                 m.name,
                 m.parameters as f64 / 1e6,
                 m.multiply_adds as f64 / 1e9,
-                m.weights_mb,
-                m.values_mb
+                m.weights_mb(),
+                m.values_mb()
             )
-        };
-        let sum = |of: fn(&Module) -> f64| self.depth.iter().map(of).sum();
-        let whole = Module {
-            name: "depth network".into(),
-            parameters: self.parameters(),
-            multiply_adds: self.multiply_adds(),
-            weights_mb: sum(|m| m.weights_mb),
-            values_mb: sum(|m| m.values_mb),
         };
         let head = format!(
             "{:18} {:>10} {:>12} {:>11} {:>10}\n",
             "module", "M params", "G mult-adds", "weights MB", "values MB"
         );
         let parts: String = self.depth.iter().map(row).collect();
-        format!("{head}{parts}{}{}", row(&whole), row(&self.pose))
+        format!("{head}{parts}{}{}", row(&self.whole()), row(&self.pose))
     }
 }
 
@@ -117,14 +102,17 @@ mod tests {
         ] {
             assert!(table.contains(part), "{table}");
         }
-        let (parameters, multiply_adds) = (modules.parameters(), modules.multiply_adds());
-        let all = modules.into_list();
+        let whole = modules.whole();
+        let all = modules.list();
         let (pose, depth) = all.split_last().unwrap();
         assert_eq!(pose.name, "pose_net");
-        assert_eq!(depth.iter().map(|m| m.parameters).sum::<u64>(), parameters);
+        assert_eq!(
+            depth.iter().map(|m| m.parameters).sum::<u64>(),
+            whole.parameters
+        );
         assert_eq!(
             depth.iter().map(|m| m.multiply_adds).sum::<u64>(),
-            multiply_adds
+            whole.multiply_adds
         );
     }
 }

@@ -5,7 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use deepfusion_train::device_check::{
-    NeededBy, OperationCheck, TOLERANCE, check_operation, operations,
+    DeviceCheck, NeededBy, OperationCheck, TOLERANCE, check_operation, operations,
 };
 use serde::{Deserialize, Serialize};
 
@@ -59,12 +59,12 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
             "", "forward", "backward"
         ))?;
     }
-    let mut checks = Vec::new();
+    let mut found = DeviceCheck::default();
     let done = |check: OperationCheck| {
         if !json {
             output::print(&line(&check))?;
         }
-        checks.push(check);
+        found.operations.push(check);
         Ok(())
     };
     if chosen.backend == Backend::Cpu {
@@ -76,17 +76,17 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
         in_processes(chosen, done)?;
     }
     if json {
-        output::print_json(&report(chosen, &checks))?;
+        output::print_json(&report(chosen, &found))?;
     }
-    let wrong = checks.iter().filter(|check| !check.is_right()).count();
+    let wrong = found.wrong();
     if wrong == 0 {
         return Ok(());
     }
     Err(CliError::DeviceDiffers {
         device: chosen.to_string(),
         wrong,
-        of: checks.len(),
-        remedy: remedy(&checks),
+        of: found.operations.len(),
+        remedy: remedy(&found),
     }
     .into())
 }
@@ -224,8 +224,8 @@ fn line(check: &OperationCheck) -> String {
     }
 }
 
-fn report(chosen: ComputeDevice, checks: &[OperationCheck]) -> Report {
-    let rows = checks.iter().map(|check| Row {
+fn report(chosen: ComputeDevice, found: &DeviceCheck) -> Report {
+    let rows = found.operations.iter().map(|check| Row {
         operation: check.operation,
         right: check.is_right(),
         forward: Some(check.forward).filter(|error| *error < f64::MAX),
@@ -235,33 +235,18 @@ fn report(chosen: ComputeDevice, checks: &[OperationCheck]) -> Report {
     Report {
         device: chosen.to_string(),
         tolerance: TOLERANCE,
-        predict: predicts(checks),
-        train: trains(checks),
+        predict: found.predicts(),
+        train: found.trains(),
         operations: rows.collect(),
     }
 }
 
-/// The operations that something needs.
-fn of(checks: &[OperationCheck], needs: NeededBy) -> impl Iterator<Item = &OperationCheck> {
-    checks.iter().filter(move |check| check.needed_by == needs)
-}
-
-fn predicts(checks: &[OperationCheck]) -> bool {
-    of(checks, NeededBy::Network).all(OperationCheck::forward_is_right)
-}
-
-fn trains(checks: &[OperationCheck]) -> bool {
-    [NeededBy::Network, NeededBy::Views, NeededBy::Learning]
-        .into_iter()
-        .all(|needs| of(checks, needs).all(OperationCheck::is_right))
-}
-
 /// What to do without on this device.
-fn remedy(checks: &[OperationCheck]) -> String {
-    if !predicts(checks) {
+fn remedy(found: &DeviceCheck) -> String {
+    if !found.predicts() {
         return "use `--device cpu`: depth would not be what was trained; another backend or a newer driver may be right".into();
     }
-    if !trains(checks) {
+    if !found.trains() {
         return "predict on it, and train with `--device cpu`: its gradients or losses are not to be relied on".into();
     }
     let without = [
@@ -273,9 +258,7 @@ fn remedy(checks: &[OperationCheck]) -> String {
         (NeededBy::RMsfm, "no r-msfm preset"),
         (NeededBy::DispNet, "not the preset sfmlearner"),
     ];
-    let wrong = without
-        .iter()
-        .filter(|(needs, _)| !of(checks, *needs).all(OperationCheck::is_right));
+    let wrong = without.iter().filter(|(needs, _)| !found.is_right(*needs));
     let wrong: Vec<&str> = wrong.map(|(_, remedy)| *remedy).collect();
     format!("train on it with {}", wrong.join(", "))
 }
@@ -284,7 +267,7 @@ fn remedy(checks: &[OperationCheck]) -> String {
 mod tests {
     use super::*;
 
-    fn checks(wrong: &[(NeededBy, bool)]) -> Vec<OperationCheck> {
+    fn found(wrong: &[(NeededBy, bool)]) -> DeviceCheck {
         let all = [
             NeededBy::Network,
             NeededBy::LiteMono,
@@ -298,20 +281,22 @@ mod tests {
             NeededBy::MixedPrecision,
         ];
         let check = |needed_by| {
-            let found = wrong.iter().find(|(needs, _)| *needs == needed_by);
+            let wrong = wrong.iter().find(|(needs, _)| *needs == needed_by);
             OperationCheck {
                 operation: "any",
                 needed_by,
-                forward: if found.is_some_and(|(_, forward)| *forward) {
+                forward: if wrong.is_some_and(|(_, forward)| *forward) {
                     0.1
                 } else {
                     0.0
                 },
-                backward: Some(if found.is_some() { 0.1 } else { 0.0 }),
+                backward: Some(if wrong.is_some() { 0.1 } else { 0.0 }),
                 failure: None,
             }
         };
-        all.map(check).to_vec()
+        DeviceCheck {
+            operations: all.map(check).to_vec(),
+        }
     }
 
     #[test]
@@ -347,11 +332,9 @@ mod tests {
 
     #[test]
     fn what_to_do_without_follows_from_what_differs() {
-        let of = |wrong: &[(NeededBy, bool)]| remedy(&checks(wrong));
+        let of = |wrong: &[(NeededBy, bool)]| remedy(&found(wrong));
         assert!(of(&[(NeededBy::Network, true)]).contains("--device cpu"));
-        let gradients = checks(&[(NeededBy::Network, false)]);
-        assert!(predicts(&gradients) && !trains(&gradients));
-        assert!(remedy(&gradients).starts_with("predict on it"));
+        assert!(of(&[(NeededBy::Network, false)]).starts_with("predict on it"));
         assert!(of(&[(NeededBy::Views, true)]).starts_with("predict on it"));
         let parts = of(&[(NeededBy::Flow, true), (NeededBy::Affine, false)]);
         assert_eq!(

@@ -1,8 +1,10 @@
 //! What this machine has for the program: `deepfusion doctor` without a recording.
 
-use std::fmt::Write as _;
-use std::process::{Command, Stdio};
+use std::fmt::{Display, Write as _};
 
+use deepfusion_jobs::machine::{
+    InstructionSet, Memory, free_disk_mb, instruction_sets, version_of,
+};
 use serde::Serialize;
 
 use crate::devices::Backend;
@@ -35,6 +37,18 @@ struct Tool {
     what: String,
 }
 
+impl Tool {
+    fn of<E: Display>(found: Result<String, E>) -> Self {
+        match found {
+            Ok(what) => Self { found: true, what },
+            Err(why) => Self {
+                found: false,
+                what: why.to_string(),
+            },
+        }
+    }
+}
+
 /// Prints it.
 pub(super) fn run(json: bool) -> Result<()> {
     let machine = Machine::inspect();
@@ -47,18 +61,19 @@ pub(super) fn run(json: bool) -> Result<()> {
 
 impl Machine {
     fn inspect() -> Self {
-        let (memory_total_mb, memory_free_mb) = memory_mb();
+        let memory = Memory::now();
+        let simd = instruction_sets().into_iter().map(InstructionSet::name);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             cores: std::thread::available_parallelism().map_or(1, Into::into),
-            simd: simd(),
+            simd: simd.collect(),
             devices: devices(),
-            memory_total_mb,
-            memory_free_mb,
-            ffmpeg: program("ffmpeg"),
-            ffprobe: program("ffprobe"),
+            memory_total_mb: memory.total_mb,
+            memory_free_mb: memory.free_mb,
+            ffmpeg: Tool::of(version_of("ffmpeg")),
+            ffprobe: Tool::of(version_of("ffprobe")),
             onnx_runtime: onnx_runtime(),
-            disk_free_mb: disk_free_mb(),
+            disk_free_mb: free_disk_mb(),
         }
     }
 
@@ -116,110 +131,14 @@ impl Machine {
     }
 }
 
-fn simd() -> Vec<&'static str> {
-    #[cfg(target_arch = "x86_64")]
-    {
-        let has = [
-            ("avx2", std::is_x86_feature_detected!("avx2")),
-            ("fma", std::is_x86_feature_detected!("fma")),
-            ("avx512f", std::is_x86_feature_detected!("avx512f")),
-            ("avx512bf16", std::is_x86_feature_detected!("avx512bf16")),
-            ("amx-bf16", cpu_flags().contains(" amx_bf16")),
-        ];
-        has.into_iter()
-            .filter(|(_, has)| *has)
-            .map(|(name, _)| name)
-            .collect()
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        if cfg!(target_feature = "neon") {
-            vec!["neon"]
-        } else {
-            Vec::new()
-        }
-    }
-}
-
-/// The processor's flags as Linux lists them; empty elsewhere.
-#[cfg(target_arch = "x86_64")]
-fn cpu_flags() -> String {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let flags = text.lines().find(|line| line.starts_with("flags"));
-    flags.unwrap_or_default().to_owned()
-}
-
 /// What `--device` takes in this build.
 fn devices() -> Vec<&'static str> {
     let built = Backend::ALL.into_iter().filter(|(.., built)| *built);
     built.map(|(_, name, ..)| name).collect()
 }
 
-/// Whole and available memory, MB, as Linux reports it.
-fn memory_mb() -> (Option<u64>, Option<u64>) {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let of = |key: &str| {
-        let line = text.lines().find_map(|line| line.strip_prefix(key))?;
-        let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;
-        Some(kilobytes / 1024)
-    };
-    (of("MemTotal:"), of("MemAvailable:"))
-}
-
-/// A program's first line for `-version`.
-fn program(name: &str) -> Tool {
-    let output = Command::new(name)
-        .arg("-version")
-        .stdin(Stdio::null())
-        .output();
-    match output {
-        Ok(output) if output.status.success() => Tool {
-            found: true,
-            what: String::from_utf8_lossy(&output.stdout)
-                .lines()
-                .next()
-                .unwrap_or_default()
-                .to_owned(),
-        },
-        Ok(output) => Tool {
-            found: false,
-            what: format!("`{name} -version` fails ({})", output.status),
-        },
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Tool {
-            found: false,
-            what: "not on the PATH".into(),
-        },
-        Err(error) => Tool {
-            found: false,
-            what: error.to_string(),
-        },
-    }
-}
-
 /// The library as `--engine ort` finds it.
 fn onnx_runtime() -> Tool {
-    match deepfusion_onnx::runtime::find(None) {
-        Ok(library) => Tool {
-            found: true,
-            what: format!("{} at {}", library.version, library.path.display()),
-        },
-        Err(error) => Tool {
-            found: false,
-            what: error.to_string(),
-        },
-    }
-}
-
-/// Free space of the current folder's disk, MB, as `df` reports it.
-fn disk_free_mb() -> Option<u64> {
-    let output = Command::new("df").args(["-Pk", "."]).output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    let kilobytes: u64 = text
-        .lines()
-        .nth(1)?
-        .split_whitespace()
-        .nth(3)?
-        .parse()
-        .ok()?;
-    Some(kilobytes / 1024)
+    let found = deepfusion_onnx::runtime::find(None);
+    Tool::of(found.map(|library| format!("{} at {}", library.version, library.path.display())))
 }
