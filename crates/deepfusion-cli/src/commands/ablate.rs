@@ -1,12 +1,13 @@
 //! `deepfusion ablate`: the on/off table of the paper's Table 3, row by row.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use deepfusion_data::OpenOptions;
-use deepfusion_jobs::recordings::camera_word;
-use deepfusion_jobs::training::ablation::{OpenRun, Plan, Row, Run, RunResult, table, text};
-use deepfusion_model::{Preset, SettingProblem, TrainConfig, ViewMotion};
+use deepfusion_jobs::training::ablation::{
+    OpenRun, Plan, PlanRequest, Run, RunResult, TableDecides, table, text,
+};
+use deepfusion_model::{Error as ModelError, SettingProblem, TrainConfig};
 use deepfusion_runtime::ModelSource;
 
 use super::recordings::{open_samples, print_warnings, warn_of_sample};
@@ -14,7 +15,7 @@ use super::{resume, train};
 use crate::cli::{AblateArgs, EngineArgs};
 use crate::devices::{self, ComputeDevice};
 use crate::error::CliError;
-use crate::failure::Result;
+use crate::failure::{Failure, Result};
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
 
@@ -30,7 +31,7 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
         }
         (out, plan)
     } else {
-        let plan = new_plan(args)?;
+        let plan = request(args)?.plan().map_err(in_options)?;
         (output::run_folder(args.out.as_deref(), "ablate")?, plan)
     };
     let configs = plan.row_configs()?;
@@ -69,66 +70,47 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
     }
 }
 
-fn new_plan(args: &AblateArgs) -> Result<Plan> {
-    let mut config = match &args.config {
-        Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
-        None => {
-            let preset = args.preset.unwrap_or(Preset::Light);
-            let mut config = preset.config_on(args.device.compute());
-            // A measured motion in the warp would teach the rows without the speed loss, too; and masks of dynamic pixels
-            // are no part of the flow loss.
-            config.view_motion = ViewMotion::PoseNet;
-            config.loss.moving.enabled = false;
-            config
-        }
+fn request(args: &AblateArgs) -> Result<PlanRequest> {
+    let file = match &args.config {
+        Some(path) => Some(TrainConfig::read_over_preset(path, args.device.compute())?),
+        None => None,
     };
-    for term in &args.with {
-        config.with(term)?;
-    }
-    for term in &args.without {
-        config.without(term)?;
-    }
-    config.view_motion = args.view_motion.unwrap_or(config.view_motion);
-    if let Some(size) = args.size {
-        config.size.width = size.width as usize;
-        config.size.height = size.height as usize;
-    }
-    config.batch = args.batch.unwrap_or(config.batch);
-    for assignment in &args.set {
-        if let Some(reason) = decided_by_the_table(assignment) {
-            let (assignment, reason) =
-                (assignment.clone(), SettingProblem::DecidedElsewhere(reason));
-            return Err(deepfusion_model::Error::Setting { assignment, reason }.into());
-        }
-        config.set(assignment)?;
-    }
-    config.data.paths.clone_from(&args.data);
-    config.data.camera = camera_word(args.camera).into();
-    // Every row begins anew.
-    (config.init, config.init_sha256) = (None, None);
-    // It may be resumed from any folder.
-    config.make_absolute();
-    let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
-    Ok(Plan {
-        budget: args.budget.unwrap_or(0).max(1),
-        seeds: args.seeds.unwrap_or(1).max(1) as u64,
-        rows: Row::named(&args.rows)?,
-        eval_data: args.eval_data.iter().map(absolute).collect(),
-        config,
+    Ok(PlanRequest {
+        file: file.map(Box::new),
+        preset: args.preset,
+        compute: args.device.compute(),
+        with: args.with.clone(),
+        without: args.without.clone(),
+        view_motion: args.view_motion,
+        size: args.size.map(train::input_size),
+        batch: args.batch,
+        assignments: args.set.clone(),
+        data: args.data.clone(),
+        camera: args.camera,
+        eval_data: args.eval_data.clone(),
+        rows: args.rows.clone(),
+        budget: args.budget.unwrap_or(0),
+        seeds: args.seeds.unwrap_or(1) as u64,
     })
 }
 
-/// Why a key cannot be set for all rows, where it cannot.
-fn decided_by_the_table(assignment: &str) -> Option<&'static str> {
-    let key = assignment.split('=').next().unwrap_or_default().trim();
-    match key {
-        "steps" | "epochs" | "min_steps" => Some("--budget says how long every run learns"),
-        "seed" => Some("--seeds says how often a row is run, and with which seeds"),
-        "init" | "init_sha256" => Some("every run begins from nothing"),
-        "data.paths" => Some("the recordings are those of --data"),
-        "data.camera" => Some("the cameras are those of --camera"),
-        _ => None,
-    }
+/// Where a key was set that the table decides: by which option it does.
+fn in_options(error: deepfusion_jobs::Error) -> Failure {
+    let deepfusion_jobs::Error::Model(ModelError::Setting { assignment, .. }) = &error else {
+        return error.into();
+    };
+    let Some(decides) = TableDecides::about(assignment) else {
+        return error.into();
+    };
+    let reason = SettingProblem::DecidedElsewhere(match decides {
+        TableDecides::Length => "--budget says how long every run learns",
+        TableDecides::Seed => "--seeds says how often a row is run, and with which seeds",
+        TableDecides::Recordings => "the recordings are those of --data",
+        TableDecides::Cameras => "the cameras are those of --camera",
+        other => other.reason(),
+    });
+    let assignment = assignment.clone();
+    ModelError::Setting { assignment, reason }.into()
 }
 
 /// Trains and measures one run, or as much of it as is not done yet.

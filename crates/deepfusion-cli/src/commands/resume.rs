@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use deepfusion_jobs::training::resume::{self, MovedRecordings, ResumeRequest, Setting};
-use deepfusion_model::{InputSize, TrainConfig};
+use deepfusion_model::TrainConfig;
 
 use super::clocks;
+use super::train::input_size;
 use crate::cli::TrainArgs;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
@@ -63,10 +64,7 @@ fn request(args: &TrainArgs) -> Result<ResumeRequest> {
         steps: *steps,
         epochs: *epochs,
         preset: *preset,
-        size: size.map(|size| InputSize {
-            width: size.width as usize,
-            height: size.height as usize,
-        }),
+        size: size.map(input_size),
         batch: *batch,
         seed: *seed,
         learn: *learn,

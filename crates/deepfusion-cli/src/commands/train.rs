@@ -1,17 +1,17 @@
 use std::path::Path;
 
-use deepfusion_jobs::recordings::training_recordings;
 use deepfusion_jobs::training::{
-    AskedRecordings, Began, Pace, SettingsOfMean, Start, TrainingPlan, leaves_turns_unused,
+    AskedRecordings, Began, Pace, SettingsOfMean, Start, StartRequest, TrainingPlan,
+    leaves_turns_unused,
 };
-use deepfusion_model::{Preset, Reprojection, RunFolder, TrainConfig};
+use deepfusion_model::{InputSize, RunFolder, TrainConfig};
 use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 
 use super::recorder::Recorder;
 use super::recordings::open_samples;
 use super::{clocks, resume};
 use crate::allocator;
-use crate::cli::{ClockOffset, TrainArgs};
+use crate::cli::{Size, TrainArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{clock, say};
@@ -26,7 +26,7 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     };
     let mut config = match &resumed {
         Some(folder) => resume::with_options(&folder.read_settings()?, args)?,
-        None => start_config(args)?,
+        None => request(args)?.config(|datasets| clocks::measured(datasets.iter()))?,
     };
     config.validate()?;
     let sets = open_samples(&config).map_err(|error| match &resumed {
@@ -151,58 +151,39 @@ fn warn_of_mean(file: &Path, config: &TrainConfig, args: &TrainArgs) {
     }
 }
 
-fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
-    let mut config = match &args.config {
+fn request(args: &TrainArgs) -> Result<StartRequest> {
+    let file = match &args.config {
         Some(path) => {
             let config = TrainConfig::read_over_preset(path, args.device.compute())?;
             warn_of_mean(path, &config, args);
-            config
+            Some(Box::new(config))
         }
-        None => {
-            let preset = args.preset.unwrap_or(Preset::Tiny);
-            preset.config_on(args.device.compute())
-        }
+        None => None,
     };
-    if let Some(size) = args.size {
-        config.size.width = size.width as usize;
-        config.size.height = size.height as usize;
+    Ok(StartRequest {
+        file,
+        preset: args.preset,
+        compute: args.device.compute(),
+        steps: args.steps,
+        epochs: args.epochs,
+        size: args.size.map(input_size),
+        batch: args.batch,
+        seed: args.seed,
+        learned_camera: args.intrinsics.is_some(),
+        view_motion: args.view_motion,
+        with: args.with.clone(),
+        without: args.without.clone(),
+        assignments: args.set.clone(),
+        recordings: asked_recordings(args),
+    })
+}
+
+/// A network's size as it is asked for.
+pub(super) fn input_size(size: Size) -> InputSize {
+    InputSize {
+        width: size.width as usize,
+        height: size.height as usize,
     }
-    config.steps = args.steps.or(config.steps);
-    if let Some(epochs) = args.epochs {
-        (config.epochs, config.steps, config.min_steps) = (epochs, None, 0);
-    }
-    config.batch = args.batch.unwrap_or(config.batch);
-    config.seed = args.seed.unwrap_or(config.seed);
-    for term in &args.with {
-        config.with(term)?;
-    }
-    for term in &args.without {
-        config.without(term)?;
-    }
-    if args.stereo {
-        (config.stereo, config.reprojection) = (true, Reprojection::Minimum);
-    }
-    // Said last: a motion that contradicts a term left out is an error, and not silently another one.
-    config.view_motion = args.view_motion.unwrap_or(config.view_motion);
-    if args.intrinsics.is_some() {
-        let camera = config.assumed_camera.get_or_insert_default();
-        camera.learn = true;
-    }
-    for assignment in &args.set {
-        config.set(assignment)?;
-    }
-    asked_recordings(args).replace_in(&mut config.data)?;
-    if args.clock_offset == Some(ClockOffset::Auto) {
-        // Measured against what the recordings' own files say, and kept in the configuration as a number.
-        config.data.camera_ahead_s = None;
-        let mut measured = config.clone();
-        // Turns of the images would be on the camera's clock.
-        measured.data.measured_turns_only = true;
-        let datasets = training_recordings(&measured)?;
-        let ahead_s = clocks::measured(datasets.iter().map(|(_, dataset)| dataset))?;
-        config.data.camera_ahead_s = Some(ahead_s);
-    }
-    Ok(config)
 }
 
 /// The recordings that options ask for.

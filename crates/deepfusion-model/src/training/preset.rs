@@ -51,9 +51,10 @@ pub enum Preset {
 }
 
 /// What a run computes on, as far as a preset's sizes follow it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Compute {
     /// A few cores.
+    #[default]
     Processor,
     /// A graphics card.
     Gpu,

@@ -1,8 +1,9 @@
 //! The on/off table of the paper's Table 3: runs of an equal budget that differ in one part each, measured alike.
 //!
-//! A [`Plan`] is kept beside its table, so that it can be gone on with: [`Plan::run`] says of each row and seed whether it is done, and if not
+//! What is asked of a new table ([`PlanRequest`]) gives a plan. A [`Plan`] is kept beside its table, so that it can be gone on with: [`Plan::run`] says of each row and seed whether it is done, and if not
 //! gives the [`OpenRun`] to train and measure.
 
+mod request;
 mod rows;
 mod run;
 mod table;
@@ -14,6 +15,7 @@ use deepfusion_hint::count_of;
 use deepfusion_model::{Error as ModelError, TrainConfig};
 use serde::{Deserialize, Deserializer, Serialize};
 
+pub use self::request::{PlanRequest, TableDecides};
 pub use self::rows::Row;
 pub use self::run::{OpenRun, Run};
 pub use self::table::{RunResult, Spread, TableRow, table, text};

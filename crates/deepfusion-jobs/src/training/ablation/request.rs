@@ -1,0 +1,215 @@
+//! What may be asked of a new table, and the plan that follows from it.
+
+use std::path::PathBuf;
+
+use deepfusion_data::Cameras;
+use deepfusion_model::{
+    Compute, Error as ModelError, InputSize, Preset, SettingProblem, TrainConfig, ViewMotion,
+};
+
+use super::{Plan, Row};
+use crate::Result;
+use crate::recordings::camera_word;
+
+/// What is asked of a new table. What is not asked for is as its file or its preset has it.
+#[derive(Debug, Clone, Default)]
+pub struct PlanRequest {
+    /// A configuration file, read over its preset.
+    pub file: Option<Box<TrainConfig>>,
+    /// A preset, where there is no file; none means [`Preset::Light`].
+    pub preset: Option<Preset>,
+    /// What the runs compute on, as a preset's sizes follow it.
+    pub compute: Compute,
+    /// Parts that all rows have.
+    pub with: Vec<String>,
+    /// Parts that no row has.
+    pub without: Vec<String>,
+    /// The pose used for warping; none means the file's, else PoseNet's.
+    pub view_motion: Option<ViewMotion>,
+    /// The size of the network's input.
+    pub size: Option<InputSize>,
+    /// Samples of a batch.
+    pub batch: Option<usize>,
+    /// Keys with values, as `batch=4`.
+    pub assignments: Vec<String>,
+    /// Recordings to train on.
+    pub data: Vec<PathBuf>,
+    /// Their cameras.
+    pub camera: Cameras,
+    /// Recordings to measure on; empty: those trained on.
+    pub eval_data: Vec<PathBuf>,
+    /// Names of rows; empty: those of the paper's table.
+    pub rows: Vec<String>,
+    /// Optimiser steps of every run, at least one.
+    pub budget: usize,
+    /// Runs of every row, at least one.
+    pub seeds: u64,
+}
+
+impl PlanRequest {
+    /// The plan. Its paths are absolute, so that it can be gone on with from any folder.
+    ///
+    /// # Errors
+    /// A term or a key that there is not; [`SettingProblem::DecidedElsewhere`] for a key that [`TableDecides`]; as [`Row::named`].
+    pub fn plan(&self) -> Result<Plan> {
+        let mut config = match &self.file {
+            Some(file) => (**file).clone(),
+            None => {
+                let preset = self.preset.unwrap_or(Preset::Light);
+                let mut config = preset.config_on(self.compute);
+                // A measured motion in the warp would teach the rows without the speed loss, too; and masks of dynamic pixels
+                // are no part of the flow loss.
+                config.view_motion = ViewMotion::PoseNet;
+                config.loss.moving.enabled = false;
+                config
+            }
+        };
+        for term in &self.with {
+            config.with(term)?;
+        }
+        for term in &self.without {
+            config.without(term)?;
+        }
+        config.view_motion = self.view_motion.unwrap_or(config.view_motion);
+        config.size = self.size.unwrap_or(config.size);
+        config.batch = self.batch.unwrap_or(config.batch);
+        for assignment in &self.assignments {
+            if let Some(decides) = TableDecides::about(assignment) {
+                return Err(ModelError::Setting {
+                    assignment: assignment.clone(),
+                    reason: SettingProblem::DecidedElsewhere(decides.reason()),
+                }
+                .into());
+            }
+            config.set(assignment)?;
+        }
+        config.data.paths.clone_from(&self.data);
+        config.data.camera = camera_word(self.camera).into();
+        // Every row begins anew.
+        (config.init, config.init_sha256) = (None, None);
+        config.make_absolute();
+        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        Ok(Plan {
+            budget: self.budget.max(1),
+            seeds: self.seeds.max(1),
+            rows: Row::named(&self.rows)?,
+            eval_data: self.eval_data.iter().map(absolute).collect(),
+            config,
+        })
+    }
+}
+
+/// What a table decides of its runs' settings, so that no key sets it for all rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum TableDecides {
+    /// How long a run learns.
+    Length,
+    /// Its seed.
+    Seed,
+    /// What it begins from.
+    Start,
+    /// What it learns from.
+    Recordings,
+    /// Their cameras.
+    Cameras,
+}
+
+impl TableDecides {
+    /// What it decides of the key of an assignment, as `seed=3`.
+    #[must_use]
+    pub fn about(assignment: &str) -> Option<Self> {
+        let key = assignment.split('=').next().unwrap_or_default().trim();
+        match key {
+            "steps" | "epochs" | "min_steps" => Some(Self::Length),
+            "seed" => Some(Self::Seed),
+            "init" | "init_sha256" => Some(Self::Start),
+            "data.paths" => Some(Self::Recordings),
+            "data.camera" => Some(Self::Cameras),
+            _ => None,
+        }
+    }
+
+    /// By what.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::Length => "the table's budget says how long every run learns",
+            Self::Seed => "the table's seeds say how often a row is run, and with which seeds",
+            Self::Start => "every run begins from nothing",
+            Self::Recordings => "the recordings are those of the table",
+            Self::Cameras => "the cameras are those of the table",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request() -> PlanRequest {
+        PlanRequest {
+            data: vec!["street".into()],
+            ..PlanRequest::default()
+        }
+    }
+
+    /// What would teach a row more than its own parts is off, unless somebody asks for it.
+    #[test]
+    fn a_preset_loses_what_would_blur_the_rows_and_a_file_keeps_it() {
+        let plan = request().plan().unwrap();
+        assert_eq!((plan.budget, plan.seeds, plan.rows.len()), (1, 1, 8));
+        assert_eq!(plan.config.preset, Preset::Light);
+        assert_eq!(plan.config.view_motion, ViewMotion::PoseNet);
+        assert!(!plan.config.loss.moving.enabled);
+        assert!(plan.config.data.paths[0].is_absolute());
+        let file = TrainConfig {
+            view_motion: ViewMotion::Distance,
+            init: Some("other".into()),
+            ..Preset::Paper.config()
+        };
+        assert!(file.loss.moving.enabled);
+        let by_file = PlanRequest {
+            file: Some(Box::new(file)),
+            ..request()
+        };
+        let config = by_file.plan().unwrap().config;
+        assert_eq!(config.view_motion, ViewMotion::Distance);
+        assert!(config.loss.moving.enabled);
+        assert_eq!(config.init, None);
+        let asked = PlanRequest {
+            view_motion: Some(ViewMotion::PoseNet),
+            without: vec!["moving".into()],
+            ..by_file
+        };
+        let config = asked.plan().unwrap().config;
+        assert_eq!(config.view_motion, ViewMotion::PoseNet);
+        assert!(!config.loss.moving.enabled);
+    }
+
+    #[test]
+    fn what_the_table_decides_is_no_setting_of_its_rows() {
+        let with = |assignment: &str| {
+            let assignments = vec![assignment.to_owned()];
+            let request = PlanRequest {
+                assignments,
+                ..request()
+            };
+            request.plan()
+        };
+        let config = with("loss.smoothness=0.02").unwrap().config;
+        assert_eq!(config.loss.smoothness, 0.02);
+        for (assignment, decides) in [
+            ("min_steps = 3", TableDecides::Length),
+            ("seed=3", TableDecides::Seed),
+            ("init=\"a\"", TableDecides::Start),
+            ("data.paths=[]", TableDecides::Recordings),
+            ("data.camera=\"3\"", TableDecides::Cameras),
+        ] {
+            assert_eq!(TableDecides::about(assignment), Some(decides));
+            let error = with(assignment).unwrap_err().to_string();
+            assert!(error.contains(assignment), "{error}");
+            assert!(error.contains(decides.reason()), "{error}");
+        }
+    }
+}
