@@ -22,6 +22,7 @@ mod truth;
 pub use camera::{CalibrationSource, CameraCalibration, Lens, calibration_near, camera_info_yaml};
 pub use convert::{
     Converted, VELOCITY, convert_to_bag, convert_to_kitti, export_gt, ground_truth_names,
+    write_overlays,
 };
 pub use dataset::{
     CalibrationPlace, Camera, CameraPath, Cameras, ClockOffset, Dataset, DatasetKind, DatasetParts,

@@ -3,7 +3,8 @@
 use crate::common::{self, TinyDrive};
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{
-    Camera, Cameras, Dataset, Error, GtKind, OpenOptions, export_gt, overlay, read_depth_png,
+    Camera, Cameras, Dataset, Error, GtKind, OpenOptions, export_gt, load_rgb, overlay,
+    read_depth_png, write_overlays,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -168,6 +169,33 @@ fn several_drives_or_cameras_show_in_the_names() {
         export(&both),
         ["image_02/0000000001", "image_03/0000000001"]
     );
+}
+
+#[test]
+fn every_scan_is_drawn_on_its_image() {
+    let root = tempfile::tempdir().unwrap();
+    let tiny = |scans| TinyDrive {
+        frames: vec![0, 1],
+        scans,
+        ..TinyDrive::default()
+    };
+    let drive = tiny(vec![1]).write_as(root.path(), "2030_01_02/a_sync");
+    let without = tiny(vec![]).write_as(root.path(), "2030_01_02/b_sync");
+    let out = root.path().join("overlays");
+    let draw = |path: &Path| {
+        let mut steps = Vec::new();
+        let mut progress = |done, all| steps.push((done, all));
+        let written = write_overlays(path, &OpenOptions::default(), &out, &mut progress);
+        (written, steps)
+    };
+    let (written, steps) = draw(&root.path().join("2030_01_02"));
+    assert_eq!((written.unwrap(), steps.last()), (1, Some(&(4, 4))));
+    let picture = load_rgb(&out.join("a_sync/0000000001.png")).unwrap();
+    let plain = open(&drive, Cameras::Left)[0].load_image(1).unwrap();
+    assert_eq!(picture.dimensions(), plain.dimensions());
+    assert_ne!(picture, plain);
+    let (none, _) = draw(&without);
+    assert!(matches!(none, Err(Error::NoScans { frames: 2, .. })));
 }
 
 #[test]

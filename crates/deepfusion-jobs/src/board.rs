@@ -1,19 +1,22 @@
-//! The board of a calibration in pictures and videos.
+//! The board of a calibration in pictures and videos, and the camera by it.
+
+mod left_out;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deepfusion_calibrate::{
-    Board, BoardDetection, Candidate, Error as BoardError, LEAST_VIEWS, View, find_board, pick,
-    sharpness,
+    Board, BoardDetection, Calibration, Candidate, Error as BoardError, LEAST_VIEWS, LensModel,
+    View, calibrate, find_board, pick, sharpness,
 };
-use deepfusion_data::{OpenOptions, load_photo, load_rgb};
+use deepfusion_data::{Lens, OpenOptions, load_photo, load_rgb};
+use deepfusion_geometry::Distortion;
 use deepfusion_video::VideoFrames;
 use image::GrayImage;
 use image::imageops::grayscale;
 use rayon::prelude::*;
-use serde::Serialize;
 
+pub use self::left_out::{LeftOut, LeftOutReason};
 use crate::{Error, Result, find_inputs};
 
 /// Endings of pictures and videos.
@@ -24,15 +27,6 @@ const PARTS: usize = 200;
 const FRAMES_OF_A_PART: usize = 4;
 /// Pictures that are in memory at once.
 const BATCH: usize = 8;
-
-/// A picture without the board.
-#[derive(Debug, Clone, Serialize)]
-pub struct LeftOut {
-    /// The picture.
-    pub name: String,
-    /// Why.
-    pub why: String,
-}
 
 /// How far the search for the board is.
 #[derive(Debug, Clone, Copy)]
@@ -143,6 +137,28 @@ impl BoardViews {
             }
         }
         .into())
+    }
+
+    /// The camera that explains the views, and its lens. Its warnings also say what the pictures alone know, and whether images can be
+    /// corrected with the lens.
+    ///
+    /// # Errors
+    /// As [`Self::require_enough`] and [`calibrate`]; [`BoardError::Undetermined`] for a lens that is none.
+    pub fn calibrate(&self, board: &Board, model: LensModel) -> Result<(Calibration, Distortion)> {
+        self.require_enough(board)?;
+        let mut found = calibrate(&self.views, board, self.size, model)?;
+        found.warnings.extend(self.turned());
+        let lens = found
+            .distortion()
+            .map_err(|problem| BoardError::Undetermined {
+                problem: problem.into(),
+            })?;
+        if let Err(problem) = Lens::new(found.intrinsics, &lens) {
+            found.warnings.push(format!(
+                "images cannot be corrected with this lens: {problem}; show the board nearer to the image's border"
+            ));
+        }
+        Ok((found, lens))
     }
 
     fn add_pictures(
@@ -279,14 +295,20 @@ impl BoardViews {
                 }
                 if corners * 2 < board.corners() {
                     // A fence has some, too.
-                    "no board".into()
+                    LeftOutReason::NoBoard
                 } else if c > longer || r > shorter {
-                    format!("a grid of {c}x{r}")
+                    LeftOutReason::OtherGrid {
+                        columns: c,
+                        rows: r,
+                    }
                 } else {
-                    format!("{corners} of {} corners", board.corners())
+                    LeftOutReason::Part {
+                        corners: *corners,
+                        of: board.corners(),
+                    }
                 }
             }
-            _ => "no board".into(),
+            _ => LeftOutReason::NoBoard,
         };
         self.left_out.push(LeftOut { name, why });
     }

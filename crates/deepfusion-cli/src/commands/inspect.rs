@@ -1,9 +1,6 @@
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use deepfusion_data::{
-    Dataset, GtKind, Inspection, OpenOptions, ground_truth_names, overlay, save_png,
-    write_bag_config,
-};
+use deepfusion_data::{Inspection, OpenOptions, write_bag_config, write_overlays};
 use deepfusion_doctor::inspect;
 use deepfusion_hint::count_of;
 
@@ -47,7 +44,10 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     }
     if args.overlay {
         let folder = output::run_folder(args.out.as_deref(), "inspect")?;
-        let pictures = write_overlays(&args.path, &options, &folder)?;
+        let mut progress = Progress::new("drawing");
+        let mut drawn = |done, total| progress.set(done, total);
+        let pictures = write_overlays(&args.path, &options, &folder, &mut drawn)?;
+        drop(progress);
         say(&format!(
             "{} in {}",
             count_of(pictures, "picture"),
@@ -76,41 +76,4 @@ fn write_config(args: &InspectArgs, options: &OpenOptions) -> Result<Vec<PathBuf
         .into(),
         other => other.into(),
     })
-}
-
-/// A picture for every frame with ground truth; how many.
-fn write_overlays(path: &Path, options: &OpenOptions, folder: &Path) -> Result<usize> {
-    let datasets = Dataset::open(path, options)?;
-    let names = ground_truth_names(&datasets);
-    let total = names.iter().map(Vec::len).sum();
-    let (mut done, mut written) = (0, 0);
-    let mut progress = Progress::new("drawing");
-    for (dataset, names) in datasets.iter().zip(&names) {
-        for (&frame, name) in dataset.selected().iter().zip(names) {
-            if let Some(depth) = dataset.ground_truth(frame, GtKind::Z)? {
-                let picture = overlay(&dataset.load_image(frame)?, &depth)?;
-                save_png(&picture, &picture_path(folder, name)?)?;
-                written += 1;
-            }
-            done += 1;
-            progress.set(done, total);
-        }
-    }
-    if written == 0 {
-        return Err(deepfusion_data::Error::NoScans {
-            path: path.to_owned(),
-            frames: total,
-        }
-        .into());
-    }
-    Ok(written)
-}
-
-/// `<folder>/<name>.png`, where the name may hold the drive's folder.
-fn picture_path(folder: &Path, name: &str) -> Result<PathBuf> {
-    let path = folder.join(format!("{name}.png"));
-    if let Some(parent) = path.parent() {
-        std::fs::create_dir_all(parent).map_err(|e| deepfusion_data::Error::file(parent, e))?;
-    }
-    Ok(path)
 }

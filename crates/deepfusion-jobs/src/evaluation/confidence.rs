@@ -10,8 +10,7 @@ use image::imageops::flip_horizontal;
 use serde::{Deserialize, Serialize};
 
 use super::division::divide;
-use super::known_pixels::known_pixels;
-use super::{Evaluated, ImageRef, Truth};
+use super::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files::write;
 use crate::{Error, Result};
 

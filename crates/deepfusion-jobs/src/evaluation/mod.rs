@@ -5,7 +5,6 @@ mod comparison;
 pub mod confidence;
 mod coverage;
 mod division;
-mod known_pixels;
 mod model_sheet;
 mod saved;
 mod shown_images;
@@ -28,13 +27,12 @@ pub use self::chosen_images::{ChosenImage, Standing, chosen_images};
 pub use self::comparison::Comparison;
 pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
 pub use self::division::{Division, divide};
-pub use self::known_pixels::known_pixels;
 pub use self::model_sheet::ModelSheet;
 pub use self::saved::EvaluationRequest;
 pub use self::shown_images::{shown_of_arrays, shown_of_datasets};
 pub use self::truth::{
     Truth, array_places, baseline_from_arrays, baseline_from_datasets, baseline_from_training,
-    depth_map, has_truth,
+    depth_map, has_truth, known_pixels,
 };
 
 /// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.

@@ -1,15 +1,20 @@
-//! Where the true depth comes from, and the mean depth of scans as a baseline.
+//! Where the true depth comes from, of which pixels of a prediction it is known, and the mean depth of scans as a baseline.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
 
 use deepfusion_data::{Dataset, GtKind};
 use deepfusion_eval::{ArraySet, Grid, MeanDepthBaseline};
 use deepfusion_geometry::DepthMap;
 use deepfusion_model::TrainConfig;
+use deepfusion_runtime::Prediction;
 
 use crate::Result;
 use crate::recordings::training_recordings;
+
+/// Pixels taken of each frame by [`known_pixels`], at most.
+const PIXELS: usize = 4_000;
 
 /// Where the truth comes from.
 pub enum Truth {
@@ -108,4 +113,26 @@ pub fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> HashMap<String
             .zip(0..arrays.len())
             .collect(),
     }
+}
+
+/// The network's pixels, by their place in [`Prediction::disparity`], with the true depth in metres: evenly among those of the
+/// truth that are within the range, some thousands. The truth is of the whole image, and so is the prediction.
+#[must_use]
+pub fn known_pixels(truth: &Grid, seen: &Prediction, range_m: &Range<f64>) -> Vec<(usize, f64)> {
+    let known: Vec<(usize, f64)> = truth
+        .values()
+        .iter()
+        .enumerate()
+        .filter(|(_, z)| range_m.contains(*z))
+        .map(|(i, z)| (i, *z))
+        .collect();
+    let step = known.len().div_ceil(PIXELS).max(1);
+    let (width, height) = (truth.width(), truth.height());
+    let place = |(i, z): (usize, f64)| {
+        // The network's pixel at the truth's.
+        let u = (2 * (i % width) + 1) * seen.width / (2 * width);
+        let v = (2 * (i / width) + 1) * seen.height / (2 * height);
+        (v * seen.width + u, z)
+    };
+    known.into_iter().step_by(step).map(place).collect()
 }

@@ -3,8 +3,8 @@
 mod page;
 mod summary;
 
-use deepfusion_calibrate::{Board, Calibration, Error, calibrate};
-use deepfusion_data::{Lens, camera_info_yaml};
+use deepfusion_calibrate::{Board, Calibration};
+use deepfusion_data::camera_info_yaml;
 use deepfusion_hint::count_of;
 use deepfusion_jobs::board::{LeftOut, SearchProgress, find_views};
 use serde::Serialize;
@@ -66,17 +66,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         },
     )?;
     drop(progress);
-    seen.require_enough(&board)?;
-    let mut found = calibrate(&seen.views, &board, seen.size, args.model())?;
-    found.warnings.extend(seen.turned());
-    let lens = found.distortion().map_err(|problem| Error::Undetermined {
-        problem: problem.into(),
-    })?;
-    if let Err(problem) = Lens::new(found.intrinsics, &lens) {
-        found.warnings.push(format!(
-            "images cannot be corrected with this lens: {problem}; show the board nearer to the image's border"
-        ));
-    }
+    let (found, lens) = seen.calibrate(&board, args.model())?;
     let name = output::name_of(args.inputs[0].as_ref());
     let yaml = camera_info_yaml(&name, &found.intrinsics, &lens, &comments(&found, &board));
     output::write(&args.out, yaml)?;

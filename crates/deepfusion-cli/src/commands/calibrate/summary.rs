@@ -65,7 +65,7 @@ pub(super) fn rows(report: &Report) -> Vec<(String, String)> {
     let without = report
         .left_out
         .iter()
-        .map(|l| (l.name.as_str(), l.why.clone()));
+        .map(|l| (l.name.as_str(), l.why.to_string()));
     let out: Vec<_> = disagree.chain(without).collect();
     for (name, why) in out.iter().take(NAMED) {
         row("", format!("left out: {name} ({why})"));

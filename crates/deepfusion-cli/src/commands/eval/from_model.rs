@@ -1,0 +1,316 @@
+//! A network measured on recordings.
+
+use deepfusion_data::{Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_eval::compare::SavedEvaluation;
+use deepfusion_eval::verdict::Verdict;
+use deepfusion_eval::{ArraySet, Prediction, Protocol};
+use deepfusion_hint::count_of;
+use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
+use deepfusion_jobs::evaluation::{
+    Evaluated, EvaluationRequest, Truth, baseline_from_arrays, baseline_from_training, check_used,
+    default_crop, evaluate_datasets, expected_frames, has_truth, predict_frame, shown_of_datasets,
+};
+use deepfusion_jobs::intervals;
+use deepfusion_jobs::recordings::read_split;
+use deepfusion_perception::Reliability;
+use deepfusion_runtime::{DepthEstimator, ModelSource};
+
+use super::{Found, page, verdict, write_points};
+use crate::cli::{CameraIntrinsics, EvalArgs};
+use crate::commands::recordings::{open_recordings, open_with_yaw};
+use crate::commands::used_checkpoint::UsedCheckpoint;
+use crate::commands::{clocks, run_report, warnings};
+use crate::engine;
+use crate::error::CliError;
+use crate::failure::Result;
+use crate::model::{self, ModelFacts};
+use crate::progress::{Progress, say};
+
+/// A network, and the recordings that it is measured on.
+struct Opened {
+    model: ModelSource,
+    estimator: DepthEstimator,
+    options: OpenOptions,
+    datasets: Vec<Dataset>,
+}
+
+/// What was measured, and against what.
+struct Measured {
+    protocol: Protocol,
+    truth: Truth,
+    evaluated: Evaluated,
+}
+
+/// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
+/// all of its ground truth counts.
+pub(super) fn found(args: &EvalArgs) -> Result<Found> {
+    let mut opened = open(args)?;
+    let verdict = verdict::of_model(args, &opened.model, &mut opened.estimator, &opened.datasets)?;
+    if verdict.is_some() && !with_truth(args, &opened.datasets) {
+        let checkpoint = UsedCheckpoint::of(&opened.estimator, &opened.model);
+        return verdict::alone(args, &opened.model, verdict, checkpoint);
+    }
+    let mut measured = measure(args, &mut opened)?;
+    measure_intervals(args, &mut opened, &mut measured)?;
+    write_points(args, &measured.evaluated)?;
+    let saved = keep(args, &opened, &measured.evaluated)?;
+    let reliability = calibrate_confidence(args, &mut opened, &mut measured)?;
+    let without_truth = (reliability.as_deref(), verdict.as_ref());
+    write_page(args, &mut opened, &mut measured, &saved, without_truth)?;
+    Ok(Found {
+        checkpoint: Some(UsedCheckpoint::of(&opened.estimator, &opened.model)),
+        report: Some(measured.evaluated.report),
+        verdict,
+    })
+}
+
+/// Opens the network and the recordings; what cannot be kept afterwards is refused before anything is measured.
+fn open(args: &EvalArgs) -> Result<Opened> {
+    let model = model::chosen(args.model.as_deref())?;
+    if args.calibrate_confidence && model.folder().is_none() {
+        let (option, model) = ("--calibrate-confidence", model.name());
+        return Err(CliError::NoRunFolder { option, model }.into());
+    }
+    let estimator = engine::load(&model, &args.engine)?;
+    model::warn_of_one_size(&model, estimator.config(), args.post_process);
+    if args.calibrate_uncertainty {
+        check_calibration(&model, &estimator)?;
+    }
+    let mut options = OpenOptions {
+        camera: args.camera,
+        split: read_split(args.split.as_deref())?,
+        intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        hfov_deg: args.hfov,
+        topics: args.topics.clone(),
+        assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
+        ..OpenOptions::default()
+    };
+    options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
+    let datasets = if verdict::is_declined(args) {
+        open_recordings(&args.data, &options)?
+    } else {
+        open_with_yaw(&args.data, &options)?
+    };
+    Ok(Opened {
+        model,
+        estimator,
+        options,
+        datasets,
+    })
+}
+
+/// That a network's intervals can be calibrated at all.
+fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<()> {
+    if !estimator.knows_uncertainty() {
+        return Err(deepfusion_jobs::Error::NoUncertainty.into());
+    }
+    match model.folder() {
+        Some(_) => Ok(()),
+        None => Err(CliError::NoRunFolder {
+            option: "--calibrate-uncertainty",
+            model: model.name(),
+        }
+        .into()),
+    }
+}
+
+/// Whether depth is compared with ground truth: there is some, or a figure was asked for that needs it, which is an error where there is none.
+fn with_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
+    let needs_truth = args.gt_depth == GtKind::Annotated || args.points_out.is_some();
+    needs_truth || args.gt.is_some() || has_truth(datasets, args.gt_depth)
+}
+
+/// An image and its prediction, as the arguments want it.
+fn see(
+    args: &EvalArgs,
+    estimator: &mut DepthEstimator,
+    dataset: &Dataset,
+    frame: usize,
+) -> deepfusion_jobs::Result<(RgbImage, Prediction)> {
+    let (correct, how) = (!args.no_focal_correction, args.post_process);
+    predict_frame(estimator, dataset, frame, correct, how)
+}
+
+/// Compares depth with ground truth, beside the mean-depth baseline.
+fn measure(args: &EvalArgs, opened: &mut Opened) -> Result<Measured> {
+    let Opened {
+        estimator,
+        options,
+        datasets,
+        ..
+    } = opened;
+    let expected = expected_frames(options, datasets, args.strict)?;
+    let mut truth = match &args.gt {
+        Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
+        None => Truth::Scans(args.gt_depth),
+    };
+    let baseline = match &args.trivial {
+        Some(path) => Some(baseline_from_arrays(path)?),
+        None => baseline_from_training(estimator.config(), args.gt_depth),
+    };
+    let protocol = args.protocol(default_crop(datasets));
+    let mut progress = Progress::new("evaluating");
+    let mut evaluated = evaluate_datasets(
+        datasets,
+        &mut truth,
+        &protocol,
+        baseline,
+        &mut |dataset, frame| {
+            see(args, estimator, dataset, frame).map(|(_, prediction)| prediction)
+        },
+        &mut |done, total| progress.set(done, total),
+    )?;
+    evaluated.report.expected = expected;
+    if let Some(shortfall) = check_used(options, datasets, evaluated.report.n, args.strict)? {
+        warnings::warn_once(shortfall.to_string());
+    }
+    Ok(Measured {
+        protocol,
+        truth,
+        evaluated,
+    })
+}
+
+/// Adds whether the network's intervals hold, and calibrates them where that is asked for. They are those of its own prediction alone.
+fn measure_intervals(args: &EvalArgs, opened: &mut Opened, measured: &mut Measured) -> Result<()> {
+    let knows = opened.estimator.knows_uncertainty();
+    if !knows || args.gt.is_some() || args.post_process.is_some() {
+        return Ok(());
+    }
+    let kept = intervals::measure(
+        (&opened.model, &mut opened.estimator),
+        &opened.datasets,
+        &mut measured.truth,
+        &mut measured.evaluated,
+        (&measured.protocol, !args.no_focal_correction),
+        args.calibrate_uncertainty,
+    )?;
+    if let Some((found, path)) = kept {
+        say(&format!(
+            "intervals calibrated on {} of {}, kept as {}; the figures below are of the same pixels: measure on other drives",
+            count_of(found.pixels, "pixel"),
+            count_of(found.drives, "drive"),
+            path.display()
+        ));
+    }
+    Ok(())
+}
+
+/// Keeps what was found beside the run.
+fn keep(args: &EvalArgs, opened: &Opened, evaluated: &Evaluated) -> Result<SavedEvaluation> {
+    let Opened {
+        model,
+        estimator,
+        datasets,
+        ..
+    } = opened;
+    let saved = request(args).saved(model, estimator, datasets, evaluated)?;
+    match model.folder().map(|folder| saved.write(folder)) {
+        Some(Ok(path)) => say(&format!("kept as {}", path.display())),
+        // A run on a disk that cannot be written is measured all the same.
+        Some(Err(error)) => tracing::warn!("the result is not kept beside the run: {error}"),
+        None => say(&format!(
+            "not kept: `{}` has no run's folder; --json prints what `compare` reads",
+            model.name()
+        )),
+    }
+    Ok(saved)
+}
+
+/// How a network is measured, as its evaluation keeps it.
+fn request(args: &EvalArgs) -> EvaluationRequest<'_> {
+    EvaluationRequest {
+        data: &args.data,
+        split: args.split.as_deref(),
+        truth: args.gt.as_deref(),
+        camera: args.camera,
+        precision: args.engine.precision,
+        set: args.engine.set.as_deref(),
+        focal_correction: !args.no_focal_correction,
+        post_process: args.post_process,
+        program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
+        command: run_report::command(),
+    }
+}
+
+/// Learns a pixel's confidence where that is asked for; gives how it holds.
+fn calibrate_confidence(
+    args: &EvalArgs,
+    opened: &mut Opened,
+    measured: &mut Measured,
+) -> Result<Option<Vec<Reliability>>> {
+    let (true, Some(folder)) = (args.calibrate_confidence, opened.model.folder()) else {
+        return Ok(None);
+    };
+    let calibrated = confidence::calibrate(
+        &mut opened.estimator,
+        &opened.datasets,
+        &mut measured.truth,
+        &measured.evaluated,
+        !args.no_focal_correction,
+        folder,
+    )?;
+    Ok(calibrated.map(print_calibrated))
+}
+
+/// Says what the confidence was learned from; gives how it holds.
+fn print_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
+    let Calibrated {
+        confidence,
+        path,
+        by_drive,
+        reliability,
+    } = calibrated;
+    let judged_by = match (confidence.held_out, by_drive) {
+        (0, _) => "none left to judge it by".to_owned(),
+        (n, true) => format!("judged by {n} of other drives"),
+        (n, false) => format!("judged by {n} of another part"),
+    };
+    say(&format!(
+        "confidence learned from {}, {judged_by}, kept as {}",
+        count_of(confidence.frames, "frame"),
+        path.display()
+    ));
+    reliability
+}
+
+/// Writes the page where `--report` asks for it.
+fn write_page(
+    args: &EvalArgs,
+    opened: &mut Opened,
+    measured: &mut Measured,
+    saved: &SavedEvaluation,
+    (reliability, verdict): (Option<&[Reliability]>, Option<&Verdict>),
+) -> Result<()> {
+    let Some(path) = &args.report else {
+        return Ok(());
+    };
+    let Opened {
+        model,
+        estimator,
+        datasets,
+        ..
+    } = opened;
+    let Measured {
+        protocol,
+        truth,
+        evaluated,
+    } = measured;
+    let shown = shown_of_datasets(datasets, truth, evaluated, |dataset, frame| {
+        see(args, estimator, dataset, frame)
+    })?;
+    let how = page::how_a_model_was_measured(args, protocol, saved);
+    let mut page = page::of(args, &model.name(), evaluated, &shown, &how)?;
+    if let Some(bins) = reliability {
+        page = run_report::reliability(page, bins);
+    }
+    if let Some(found) = verdict {
+        page = run_report::verdict(page, found);
+    }
+    if let Some(folder) = model.folder() {
+        page = run_report::training(page, folder)?;
+    }
+    page.write(path)?;
+    say(&format!("report  {}", path.display()));
+    Ok(())
+}

@@ -1,0 +1,78 @@
+//! Pictures without the whole board, and why.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+/// A picture without the board.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// The picture.
+    pub name: String,
+    /// Why.
+    pub why: LeftOutReason,
+}
+
+/// Why a picture shows no whole board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LeftOutReason {
+    /// It shows none, or too few corners to be one.
+    NoBoard,
+    /// A grid with more corners on a side than the board.
+    OtherGrid {
+        /// Corners from left to right.
+        columns: usize,
+        /// Corners from top to bottom.
+        rows: usize,
+    },
+    /// A part of the board.
+    Part {
+        /// Corners that were found.
+        corners: usize,
+        /// Corners of the board.
+        of: usize,
+    },
+}
+
+impl fmt::Display for LeftOutReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoBoard => f.write_str("no board"),
+            Self::OtherGrid { columns, rows } => write!(f, "a grid of {columns}x{rows}"),
+            Self::Part { corners, of } => write!(f, "{corners} of {of} corners"),
+        }
+    }
+}
+
+/// As its words.
+impl Serialize for LeftOutReason {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_is_written_in_words() {
+        let (columns, rows) = (11, 6);
+        for (why, said) in [
+            (LeftOutReason::NoBoard, "no board"),
+            (LeftOutReason::OtherGrid { columns, rows }, "a grid of 11x6"),
+            (
+                LeftOutReason::Part {
+                    corners: 40,
+                    of: 54,
+                },
+                "40 of 54 corners",
+            ),
+        ] {
+            let name = "a.png".to_owned();
+            let written = serde_json::to_value(LeftOut { name, why }).unwrap();
+            assert_eq!(written, serde_json::json!({"name": "a.png", "why": said}));
+        }
+    }
+}
