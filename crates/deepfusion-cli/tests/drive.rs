@@ -114,6 +114,27 @@ fn a_simulated_drive_is_inspected_exported_and_scored() {
     );
 }
 
+/// People who move have KITTI's names among the labels; without the option there are none.
+#[test]
+fn people_ride_and_walk_where_they_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let labels = |options: &str| {
+        let made = json(
+            at,
+            &format!("simulate --frames 2 --seed 3 --size 64x48 --scan-every 0 --json {options}"),
+        );
+        let drive = Path::new(made["drive"].as_str().unwrap()).to_owned();
+        std::fs::read_to_string(at.join(drive).join("tracklet_labels.xml")).unwrap()
+    };
+    let is_named = |labels: &str| {
+        let names = ["Pedestrian", "Cyclist"].map(|name| format!("<objectType>{name}<"));
+        names.iter().any(|name| labels.contains(name))
+    };
+    assert!(is_named(&labels("--out with --riders 12")));
+    assert!(!is_named(&labels("--out without")));
+}
+
 /// Velocities stand beside the depths and are never taken for some.
 #[test]
 fn a_bag_s_velocities_are_exported_beside_its_depths() {

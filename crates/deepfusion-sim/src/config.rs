@@ -76,6 +76,11 @@ impl Scene {
         })
     }
 
+    /// Whether people ride and walk there.
+    pub(crate) fn has_riders(self) -> bool {
+        !matches!(self, Self::Garage | Self::Motorway | Self::Indoor)
+    }
+
     /// How fast it is driven through, as a share of what a street allows.
     pub(crate) fn pace(self) -> f64 {
         match self {
@@ -138,6 +143,9 @@ pub struct SimConfig {
     pub height: u32,
     /// Number of moving cars.
     pub moving_cars: usize,
+    /// Number of people who ride bicycles in traffic, walk along pavements and cross the road; fewer where a street has no room for
+    /// them.
+    pub riders: usize,
     /// Frames per second; the actual intervals vary by ±1 ms around 1 / `fps`.
     pub fps: f64,
     /// The kind of scene.
@@ -162,6 +170,7 @@ impl Default for SimConfig {
             width: 640,
             height: 192,
             moving_cars: 0,
+            riders: 0,
             fps: 10.0,
             scene: Scene::Urban,
             sensors: Sensors::Kitti,
@@ -214,6 +223,18 @@ impl SimConfig {
             "moving_cars",
             self.moving_cars.to_string(),
             "0 to 1000",
+        )?;
+        check(
+            self.riders <= 1000,
+            "riders",
+            self.riders.to_string(),
+            "0 to 1000",
+        )?;
+        check(
+            self.riders == 0 || self.scene.has_riders(),
+            "riders",
+            self.riders.to_string(),
+            "0 in garages, in rooms and on motorways",
         )?;
         check(
             self.fps >= 2.0 && self.fps <= 100.0,
@@ -285,6 +306,21 @@ mod tests {
                     ..base()
                 },
                 "moving_cars",
+            ),
+            (
+                SimConfig {
+                    riders: 5000,
+                    ..base()
+                },
+                "riders",
+            ),
+            (
+                SimConfig {
+                    riders: 1,
+                    scene: Scene::Garage,
+                    ..base()
+                },
+                "riders",
             ),
             (
                 SimConfig {

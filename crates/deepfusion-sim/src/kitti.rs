@@ -23,7 +23,8 @@ const BATCH: usize = 8;
 /// Below `out/2026_01_01`: the three calibration files and `2026_01_01_drive_<seed>_sync` with `image_02` (PNG), `oxts`,
 /// `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame), `proj_depth/groundtruth/image_02` (dense exact camera z,
 /// 16-bit PNG, metres × 256, 0 beyond 255 m), `moving_02` (255 on dynamic objects), `tracklet_labels.xml` (exact boxes of
-/// everything in reach, in the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`), and `poses.txt`
+/// everything in reach, in the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`,
+/// and with [`crate::SimConfig::riders`] `Cyclist` and `Pedestrian`), and `poses.txt`
 /// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line). With a second camera ([`crate::SimConfig::stereo_baseline_m`])
 /// its pictures are in `image_03`.
 ///

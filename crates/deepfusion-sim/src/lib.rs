@@ -19,7 +19,8 @@
 //! # Consistency
 //! Textures are attached to the surfaces and never depend on the viewer, and what a pixel cannot
 //! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
-//! one. Shadows under moving cars move with them; the mask of moving pixels holds the cars only.
+//! one. Shadows under moving cars move with them; the mask of moving pixels holds the cars and the
+//! people who ride and walk. Whatever moves is a rigid body: nobody pedals or swings their arms.
 
 mod can;
 mod config;
@@ -33,6 +34,7 @@ mod motion;
 mod oxts;
 mod primitive;
 mod render;
+mod riders;
 mod rig;
 mod road;
 mod scanner;

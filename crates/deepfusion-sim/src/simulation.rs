@@ -5,7 +5,9 @@ use crate::imu::{self, BodyMotion, ImuReading};
 use crate::light::GroundLight;
 use crate::motion::Drive;
 use crate::oxts::OxtsReading;
+use crate::primitive::Primitive;
 use crate::render::Cores;
+use crate::riders::Riders;
 use crate::rig::{Rig, kitti_like_intrinsics, umad_like_intrinsics};
 use crate::road::Road;
 use crate::scene::{SceneObject, Variety, World};
@@ -50,6 +52,7 @@ pub struct Simulation {
     light: GroundLight,
     drive: Drive,
     traffic: Traffic,
+    riders: Riders,
     rig: Rig,
     intrinsics: Intrinsics,
     times: Vec<f64>,
@@ -83,10 +86,18 @@ impl Simulation {
         };
         let drive = Drive::simulate(&mut rng, &road, duration_s, config.scene.pace());
         road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
-        let world = World::furnish_varied(road, config.seed, config.scene, variety);
+        let mut world = World::furnish_varied(road, config.seed, config.scene, variety);
+        let people = if config.riders > 0 {
+            world.people()
+        } else {
+            Vec::new()
+        };
         let light = GroundLight::bake(&world, Cores::All);
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
+        let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x0B1C_E5A0);
+        let way = (&drive, duration_s);
+        let riders = Riders::along(&mut rng, &world, &people, way, &traffic, config.riders);
         let (width, height) = (config.width, config.height);
         let (rig, intrinsics) = match config.sensors {
             Sensors::Kitti => (
@@ -104,6 +115,7 @@ impl Simulation {
             light,
             drive,
             traffic,
+            riders,
             rig,
             intrinsics,
             times,
@@ -204,12 +216,12 @@ impl Simulation {
     /// What a camera sees from a pose, in the world of a frame's time.
     fn seen_from(&self, frame: usize, world_from_cam: Se3) -> SimFrame {
         let time_s = self.times[frame];
-        let solids = self.traffic.solids(&self.world, time_s);
+        let solids = self.moving_solids(time_s);
         let picture = render::render(
             &self.world,
             &self.light,
             &solids,
-            &self.traffic.objects(&self.world, time_s),
+            &self.moving_objects(time_s),
             &world_from_cam,
             &self.intrinsics,
         );
@@ -229,7 +241,7 @@ impl Simulation {
     /// Where there is no such frame.
     #[must_use]
     pub fn velodyne(&self, frame: usize) -> PointCloud {
-        let solids = self.traffic.solids(&self.world, self.times[frame]);
+        let solids = self.moving_solids(self.times[frame]);
         let key = hash(frame as i32, 29, self.world.seed);
         velodyne::scan(
             &self.world,
@@ -245,7 +257,7 @@ impl Simulation {
     /// with each point's ground truth.
     #[must_use]
     pub fn fmcw(&self, time_s: f64) -> FmcwScan {
-        let solids = |time_s| self.traffic.solids(&self.world, time_s);
+        let solids = |time_s| self.moving_solids(time_s);
         let velo_from_imu = self.rig.velo_from_imu;
         let motion = BodyMotion::at(|t| self.imu_at(t) * velo_from_imu.inverse(), time_s);
         let (now, later) = (solids(time_s), solids(time_s + VELOCITY_STEP_S));
@@ -332,7 +344,23 @@ impl Simulation {
     #[must_use]
     pub fn objects(&self, frame: usize) -> Vec<SceneObject> {
         let mut objects = self.world.objects.clone();
-        objects.extend(self.traffic.objects(&self.world, self.times[frame]));
+        objects.extend(self.moving_objects(self.times[frame]));
+        objects
+    }
+
+    /// The solids of everything that moves, at a time.
+    fn moving_solids(&self, time_s: f64) -> Vec<Primitive> {
+        let mut solids = self.traffic.solids(&self.world, time_s);
+        solids.extend(self.riders.solids(&self.world, time_s));
+        solids
+    }
+
+    /// The boxes of everything that moves, at a time.
+    fn moving_objects(&self, time_s: f64) -> Vec<SceneObject> {
+        let mut objects = self.traffic.objects(&self.world, time_s);
+        // After everything that stands, and the cars.
+        let first_id = self.world.objects.len() + self.traffic.count();
+        objects.extend(self.riders.objects(&self.world, time_s, first_id));
         objects
     }
 }

@@ -163,6 +163,11 @@ impl Traffic {
         traffic
     }
 
+    /// How many cars there are, those included that are not on the street at a time.
+    pub(crate) fn count(&self) -> usize {
+        self.cars.len()
+    }
+
     /// The cars that are on the street at a time.
     fn present<'a>(
         &'a self,

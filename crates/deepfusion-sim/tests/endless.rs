@@ -418,6 +418,50 @@ fn a_share_of_the_views_in_the_open_has_hills() {
     assert!((0.25..0.55).contains(&(f64::from(hilly as u32) / f64::from(open as u32))));
 }
 
+/// People ride and walk where they are asked for, and leave everything but what they hide as it is.
+#[test]
+fn a_share_of_the_views_has_people_who_ride_and_walk() {
+    let stream = |riders| {
+        endless(EndlessConfig {
+            width: 64,
+            height: 48,
+            worlds_at_once: 8,
+            plain: 0.2,
+            riders,
+            ..small()
+        })
+    };
+    let (none, some, all) = (stream(0.0), stream(0.4), stream(1.0));
+    let (mut with, mut half, mut seen) = (0, 0, 0);
+    for index in 0..96 {
+        let (a, b, c) = (none.view(index), some.view(index), all.view(index));
+        assert_eq!(a.riders, 0);
+        assert_same(if b.riders > 0 { &c } else { &a }, &b);
+        assert_eq!(a.world_from_cam, c.world_from_cam);
+        let mut hidden = 0;
+        for (i, depth) in c.depth.data.iter().enumerate() {
+            let behind = a.depth.data[i];
+            if *depth == behind {
+                assert_eq!(a.moving[i], c.moving[i]);
+            } else {
+                assert!(c.moving[i] && *depth > 0.0, "view {index}, pixel {i}");
+                assert!(behind == 0.0 || *depth < behind, "{depth} before {behind}");
+                hidden += 1;
+            }
+        }
+        assert!(hidden == 0 || c.riders > 0);
+        assert!(
+            c.riders == 0 || !matches!(c.scene, Scene::Garage | Scene::Indoor | Scene::Motorway)
+        );
+        with += usize::from(c.riders > 0);
+        half += usize::from(b.riders > 0);
+        seen += usize::from(hidden > 2);
+    }
+    println!("{half} of {with} views have people, {seen} of the latter show some");
+    assert!(with > 15 && seen > 4, "{with} {seen}");
+    assert!((0.15..0.65).contains(&(half as f64 / with as f64)));
+}
+
 /// Two cars' cameras: every view is one's whole image, from where it hangs.
 #[test]
 fn known_cameras_take_all_views() {

@@ -11,6 +11,7 @@ mod doctor;
 mod doctor_faults;
 mod endless;
 mod kitti_layout;
+mod riders;
 mod seen_turns;
 mod umad_bag;
 mod umad_dataset;

@@ -312,6 +312,7 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
                 views_per_world: simulated.views_per_world,
                 plain: simulated.plain,
                 hills: simulated.hills,
+                riders: simulated.riders,
                 formation: simulated.formation,
                 scenes: scenes.clone(),
                 without: without.clone(),

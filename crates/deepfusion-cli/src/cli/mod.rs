@@ -177,6 +177,9 @@ pub(crate) struct SimulateArgs {
     /// Number of cars that move.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub moving_cars: usize,
+    /// Number of people who ride bicycles, walk along pavements and cross the road.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub riders: usize,
     /// Size of the pictures [default: 640x192; UMAD's 640x480 in a bag].
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,

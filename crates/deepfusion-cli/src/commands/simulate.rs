@@ -84,6 +84,7 @@ fn config(args: &SimulateArgs) -> SimConfig {
         width,
         height,
         moving_cars: args.moving_cars,
+        riders: args.riders,
         fps: args.fps.unwrap_or(fps),
         scene: args.scene,
         sensors: args.sensors.unwrap_or(sensors),

@@ -64,6 +64,9 @@ pub struct SimulatedConfig {
     pub plain: f64,
     /// Share of the varied views in the open whose road rises and falls ahead of the camera.
     pub hills: f64,
+    /// Share of the varied views on streets and country roads in which people ride bicycles ahead of the camera and towards it, walk along pavements
+    /// and cross the road.
+    pub riders: f64,
     /// Whether a camera's image formation (exposure, noise, blur, JPEG and so on) is applied.
     pub formation: bool,
     /// The kinds of scene that worlds are of, each as often as the others: `urban`, `park`, `garage`, `commercial`, `night`, `motorway`,
@@ -124,6 +127,7 @@ impl Default for SimulatedConfig {
             views_per_world: 24,
             plain: 0.0,
             hills: 0.0,
+            riders: 0.0,
             formation: true,
             scenes: Vec::new(),
             without: Vec::new(),
@@ -215,6 +219,7 @@ impl DataSetConfig {
         for (field, share) in [
             ("data.sets.simulated.plain", simulated.plain),
             ("data.sets.simulated.hills", simulated.hills),
+            ("data.sets.simulated.riders", simulated.riders),
         ] {
             if !(0.0..=1.0).contains(&share) {
                 let expected = ExpectedSetting::Within { from: 0.0, to: 1.0 };
@@ -425,13 +430,14 @@ mod tests {
             [[sets]]
             name = "streets"
             learn = "depth"
-            simulated = { seed = 1, views = 4000, hills = 0.3, without = ["weather"] }
+            simulated = { seed = 1, views = 4000, hills = 0.3, riders = 0.2, without = ["weather"] }
         "#;
         let mut config = Preset::Tiny.config();
         config.data = toml::from_str(text).unwrap();
         config.validate().unwrap();
         let of = |config: &TrainConfig| config.data.sets[0].simulated.clone().unwrap();
         assert_eq!((of(&config).hills, of(&config).formation), (0.3, true));
+        assert_eq!(of(&config).riders, 0.2);
         assert_eq!(of(&config).without, ["weather"]);
         let kept = config.to_toml().unwrap();
         assert_eq!(toml::from_str::<TrainConfig>(&kept).unwrap(), config);
@@ -443,6 +449,12 @@ mod tests {
         });
         let error = config.validate().unwrap_err().to_string();
         assert!(error.contains("`data.sets.simulated.hills`"), "{error}");
+        config.data.sets[0].simulated = Some(SimulatedConfig {
+            riders: -0.1,
+            ..SimulatedConfig::default()
+        });
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains("`data.sets.simulated.riders`"), "{error}");
     }
 
     #[test]

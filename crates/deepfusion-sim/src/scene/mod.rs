@@ -236,6 +236,15 @@ impl World {
         world
     }
 
+    /// Models of the people who may ride and walk through it: a varied world's own crowd, others for a plain one.
+    pub(crate) fn people(&mut self) -> Vec<cars::CarModel> {
+        if self.crowd.is_empty() {
+            variety::crowd(self)
+        } else {
+            self.crowd.clone()
+        }
+    }
+
     /// Where traffic drives: the camera's own lane and the one beside it, unless the world has more.
     pub(crate) fn lanes(&self) -> Vec<Lane> {
         if !self.lanes.is_empty() {

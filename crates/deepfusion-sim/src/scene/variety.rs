@@ -23,8 +23,9 @@ mod sweep;
 mod tests;
 
 use super::World;
+use super::cars::CarModel;
 use crate::config::Scene;
-use rand::Rng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use site::{Kit, Site};
@@ -105,6 +106,13 @@ impl Variety {
     }
 }
 
+/// People for a world that is not varied, drawn apart. Their materials come after the world's own, so that nothing else changes.
+pub(super) fn crowd(world: &mut World) -> Vec<CarModel> {
+    let mut rng = ChaCha8Rng::seed_from_u64(u64::from(world.seed) ^ 0xC40D_0000_0000);
+    let kit = Kit::new(world, &mut rng, &Variety::none());
+    people::models(world, &mut rng, &kit)
+}
+
 /// Fills a varied world.
 pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety) {
     let kit = Kit::new(world, rng, variety);
@@ -123,7 +131,7 @@ pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety
         Scene::Indoor => indoor::furnish(&mut site),
         Scene::Garage => {
             // Whatever is too long for a bay or too high for the ceiling stays out.
-            let fits = |m: &super::cars::CarModel| m.size[0] < 5.1 && m.size[2] < 2.2;
+            let fits = |m: &CarModel| m.size[0] < 5.1 && m.size[2] < 2.2;
             site.world.models.retain(fits);
             super::garage::furnish(site.world, site.rng);
         }

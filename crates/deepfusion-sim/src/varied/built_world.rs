@@ -9,6 +9,7 @@ use crate::motion::Drive;
 use crate::primitive::V3;
 use crate::render::Cores;
 use crate::road::Road;
+use crate::scene::cars::CarModel;
 use crate::scene::{Variety, World};
 use crate::traffic::Traffic;
 use rand::Rng;
@@ -34,6 +35,8 @@ pub(super) struct BuiltWorld {
     density: f64,
     /// Whether its views are rendered as in [`crate::Simulation`].
     pub plain: bool,
+    /// Models of the people who may ride and walk there; none where nobody does.
+    pub people: Vec<CarModel>,
     /// Cameras are placed from 0 to here, metres along the street.
     pub length: f64,
 }
@@ -82,12 +85,18 @@ impl BuiltWorld {
         if !plain {
             world.sun = without.sun(sun(&mut rng), world.sun);
         }
+        let people = if config.riders > 0.0 && !plain && scene.has_riders() {
+            world.people()
+        } else {
+            Vec::new()
+        };
         let light = GroundLight::bake(&world, Cores::One);
         Self {
             world,
             light,
             density: rng.random(),
             plain,
+            people,
             length,
         }
     }

@@ -33,6 +33,9 @@ pub struct EndlessConfig {
     pub plain: f64,
     /// Share of the varied views in the open whose road rises and falls ahead of the camera.
     pub hills: f64,
+    /// Share of the varied views on streets and country roads in which people ride bicycles ahead of the camera and towards it, walk
+    /// along pavements and cross the road.
+    pub riders: f64,
     /// The kinds of scene that worlds are of, each as often as the others; none: all, streets most often, `daylight` of them by day.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub scenes: Vec<Scene>,
@@ -58,6 +61,7 @@ impl Default for EndlessConfig {
             formation: true,
             plain: 0.0,
             hills: 0.0,
+            riders: 0.0,
             scenes: Vec::new(),
             without: Vec::new(),
             cameras: Vec::new(),
@@ -112,6 +116,7 @@ impl EndlessConfig {
             ("daylight", self.daylight),
             ("plain", self.plain),
             ("hills", self.hills),
+            ("riders", self.riders),
         ] {
             check(
                 (0.0..=1.0).contains(&share),
@@ -219,6 +224,13 @@ mod tests {
                     ..base()
                 },
                 "hills",
+            ),
+            (
+                EndlessConfig {
+                    riders: -1.0,
+                    ..base()
+                },
+                "riders",
             ),
         ];
         for (config, name) in bad {

@@ -12,6 +12,7 @@ mod formation;
 mod hills;
 mod ingredient;
 mod mounted;
+mod riders;
 mod schedule;
 mod weather;
 mod wet;
@@ -19,6 +20,7 @@ mod wet;
 use crate::Result;
 use crate::config::Scene;
 use crate::render::{self, Air, Cores, Edges, RenderInput};
+use crate::riders::Riders;
 use built_world::BuiltWorld;
 use cache::Cache;
 use camera::Mount;
@@ -63,6 +65,8 @@ pub struct View {
     /// Whether the road rises or falls ahead of the camera. The ground below the camera is level, and the only one at the
     /// world's z = 0.
     pub hills: bool,
+    /// How many people ride and walk around the camera.
+    pub riders: usize,
 }
 
 /// An endless stream of views.
@@ -134,6 +138,13 @@ impl Endless {
             moving.clear();
             cars.clear();
         }
+        let riders = if without.moves() {
+            riders::of_view(config, index, &place, &viewpoint.world_from_cam, &cars)
+        } else {
+            Riders::default()
+        };
+        moving.extend(riders.solids(world, 0.0));
+        cars.extend(riders.objects(world, 0.0, world.objects.len() + traffic.count()));
 
         let mut rng = generator(config.seed, index, 0x5EA);
         let (weather, air) = if place.plain {
@@ -181,6 +192,7 @@ impl Endless {
             height_m: viewpoint.height,
             grey: formed && formation.is_grey(),
             hills: !folds.creases.is_empty(),
+            riders: riders.count(),
         }
     }
 }

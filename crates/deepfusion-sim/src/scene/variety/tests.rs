@@ -5,7 +5,6 @@ use crate::primitive::{Primitive, Shape};
 use crate::render::gather;
 use crate::road::Road;
 use nalgebra::Vector3;
-use rand::SeedableRng;
 
 fn world(scene: Scene, seed: u64) -> World {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
