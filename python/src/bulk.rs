@@ -1,7 +1,6 @@
 //! Many images: while the network looks at one, the next are read and the last is made depth.
 
 use std::collections::VecDeque;
-use std::num::NonZero;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -9,6 +8,7 @@ use std::thread;
 use deepfusion::DepthEstimator;
 use deepfusion::data::RgbImage;
 use deepfusion::geometry::Intrinsics;
+use deepfusion::jobs::bulk::pipeline::Threads;
 use deepfusion::runtime::{Augmentation, PreparedImage, Preparer};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -52,8 +52,7 @@ pub struct Predictions {
 impl Predictions {
     /// The threads end when this goes.
     pub fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
-        let cores = thread::available_parallelism().map_or(1, NonZero::get);
-        let readers = (cores / 4).clamp(1, 8);
+        let readers = Threads::for_this_machine().before;
         let (to_read, images) = channel::<(Source, Answer)>();
         let (to_network, read) = sync_channel::<LoadedImage>(readers);
         let (to_finish, seen) = sync_channel(2);

@@ -14,6 +14,8 @@ use crate::sync::{folder_of, publish, sync_files, sync_folder};
 pub struct Partial {
     temporary: PathBuf,
     target: PathBuf,
+    /// Whether readers know the temporary name, and an earlier writer may have left it.
+    watched: bool,
 }
 
 impl Partial {
@@ -29,6 +31,20 @@ impl Partial {
         Self {
             temporary: target.with_file_name(name),
             target: target.to_owned(),
+            watched: false,
+        }
+    }
+
+    /// The target's name with `.partial` behind it, for a file that readers watch while it grows. It has one writer at a time; what a killed one
+    /// left there is replaced. Nothing is created yet.
+    #[must_use]
+    pub fn watched(target: &Path) -> Self {
+        let mut name = target.file_name().unwrap_or_default().to_owned();
+        name.push(".partial");
+        Self {
+            temporary: target.with_file_name(name),
+            target: target.to_owned(),
+            watched: true,
         }
     }
 
@@ -43,7 +59,11 @@ impl Partial {
     /// # Errors
     /// The system's error, for instance if there is no such folder.
     pub fn create(&self) -> io::Result<File> {
-        File::create_new(&self.temporary)
+        if self.watched {
+            File::create(&self.temporary)
+        } else {
+            File::create_new(&self.temporary)
+        }
     }
 
     /// Syncs the content, renames the file to its target and syncs the folder.
@@ -250,5 +270,30 @@ mod tests {
         let older = Path::new("out/.a_depth.png.17-3.partial");
         assert_eq!(Partial::target_of(older), Some("a_depth.png"));
         assert_eq!(Partial::target_of(Path::new("out/.a.partial")), None);
+    }
+
+    #[test]
+    fn a_watched_file_grows_under_a_name_that_readers_know() {
+        let dir = tempfile::tempdir().unwrap();
+        let (target, known) = (
+            dir.path().join("a.jsonl"),
+            dir.path().join("a.jsonl.partial"),
+        );
+        std::fs::write(&known, "of a writer that was killed").unwrap();
+        let partial = Partial::watched(&target);
+        let mut file = partial.create().unwrap();
+        file.write_all(b"new").unwrap();
+        drop(file);
+        assert_eq!(partial.path(), known);
+        assert_eq!(std::fs::read(&known).unwrap(), b"new");
+        assert!(!target.exists());
+        partial.publish().unwrap();
+        assert_eq!(names(dir.path()), ["a.jsonl"]);
+        // One that is given up is gone; what was there before stays.
+        let partial = Partial::watched(&target);
+        drop(partial.create().unwrap());
+        drop(partial);
+        assert_eq!(names(dir.path()), ["a.jsonl"]);
+        assert_eq!(std::fs::read(&target).unwrap(), b"new");
     }
 }

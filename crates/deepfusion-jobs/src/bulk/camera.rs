@@ -1,6 +1,6 @@
 //! The camera of an input: given, read from a calibration file, or assumed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use deepfusion_data::{Camera, CameraCalibration, Lens, RgbImage, kitti::Calibration};
@@ -9,6 +9,17 @@ use sha2::{Digest, Sha256};
 
 use crate::error::UnfitCamera;
 use crate::{Error, Result};
+
+/// The camera that was given for all inputs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum GivenCamera {
+    /// fx, fy, cx, cy in pixels, for images of any size.
+    Numbers([f64; 4]),
+    /// The field of view from left to right in degrees, for images of any size.
+    Hfov(f64),
+    /// A calibration file; of KITTI's also the folder.
+    File(PathBuf),
+}
 
 /// Where the inputs' camera comes from.
 #[derive(Debug, Clone)]
@@ -30,21 +41,27 @@ pub enum CameraSource {
 }
 
 impl CameraSource {
-    /// Numbers that were given (fx, fy, cx, cy), else a calibration file; `trained` where there is neither.
+    /// The camera that was given; where none was, the one that the network was trained with, or that its run `learned`.
     ///
     /// # Errors
     /// A file that cannot be read, or is no calibration.
-    pub fn new(
-        given: Option<[f64; 4]>,
-        file: Option<&Path>,
+    pub fn chosen(
+        given: Option<&GivenCamera>,
         trained: Option<Intrinsics>,
+        learned: bool,
     ) -> Result<Self> {
-        if let Some(k) = given {
-            return Ok(Self::Given(k));
-        }
-        let Some(path) = file else {
-            return Ok(trained.map_or(Self::Unknown, Self::Trained));
-        };
+        Ok(match (given, trained) {
+            (Some(GivenCamera::Numbers(k)), _) => Self::Given(*k),
+            (Some(GivenCamera::Hfov(degrees)), _) => Self::Hfov(*degrees),
+            (Some(GivenCamera::File(path)), _) => Self::of_file(path)?,
+            (None, Some(k)) if learned => Self::Learned(k),
+            (None, Some(k)) => Self::Trained(k),
+            (None, None) => Self::Unknown,
+        })
+    }
+
+    /// KITTI's calibration by its folder or its file, or a calibration tool's file.
+    fn of_file(path: &Path) -> Result<Self> {
         if !(path.is_dir()
             || path
                 .file_name()
@@ -196,7 +213,7 @@ pub fn looks_of_another_size(k: &Intrinsics) -> bool {
 /// A calibration tool's file: OpenCV's, ROS's, Kalibr's, or four numbers.
 #[derive(Debug)]
 pub struct LensFile {
-    path: std::path::PathBuf,
+    path: PathBuf,
     /// Of the file: outputs made with another are others.
     pub sha256: String,
     /// Made for the first image's size.
@@ -238,5 +255,36 @@ fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
         cy: centre(k.cy, k.height, height),
         width,
         height,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_given_comes_before_what_the_network_knows() {
+        let trained = Some(Intrinsics::centred(900.0, (1280, 1024)));
+        let chosen = |given: Option<GivenCamera>, trained, learned| {
+            CameraSource::chosen(given.as_ref(), trained, learned)
+        };
+        let numbers = GivenCamera::Numbers([900.0, 900.0, 639.5, 511.5]);
+        for (given, trained, learned, from) in [
+            (Some(numbers), trained, true, CameraFrom::Given),
+            (
+                Some(GivenCamera::Hfov(90.0)),
+                None,
+                false,
+                CameraFrom::Given,
+            ),
+            (None, trained, true, CameraFrom::Learned),
+            (None, trained, false, CameraFrom::Assumed),
+            (None, None, false, CameraFrom::Unknown),
+        ] {
+            assert_eq!(chosen(given, trained, learned).unwrap().from(), from);
+        }
+        let nowhere = Some(GivenCamera::File("nowhere.yaml".into()));
+        let error = chosen(nowhere, trained, false).unwrap_err();
+        assert!(error.to_string().contains("nowhere.yaml"), "{error}");
     }
 }

@@ -1,11 +1,15 @@
 //! Many images in, their outputs exactly once: what is there is looked at, what is missing is made, on any number of machines.
 //!
 //! An image's sidecar is written last, when its outputs are on the disk, and is the mark of its being done. [`BulkJob::begin`] decides
-//! by it and the outputs' checksums alone; the [`Manifest`]s are for people and for telling jobs apart. [`pipeline::run`] overlaps
-//! reading, the network and writing; [`commit`] writes the sidecars; [`BulkProgress`] counts.
+//! by it and the outputs' checksums alone; the [`Manifest`]s are for people and for telling jobs apart. A [`DepthJob`] is what all images have in
+//! common. [`predict`] makes their depth, [`perceive`] their targets, in order and anew each time: [`pipeline::run`] overlaps reading, the
+//! network and writing; [`commit`] writes the sidecars; [`BulkProgress`] counts.
 
 mod camera;
 mod committer;
+mod depth_job;
+mod depth_run;
+mod depth_settings;
 mod fit;
 mod loader;
 mod manifest;
@@ -15,11 +19,20 @@ mod records;
 mod resume;
 mod shard;
 mod sidecars;
+mod target_run;
+#[cfg(test)]
+mod tests;
 mod video;
+mod warnings;
 
 pub use crate::error::UnfitCamera;
-pub use camera::{CameraFrom, CameraSource, LensFile, PinholeImage, looks_of_another_size};
+pub use camera::{
+    CameraFrom, CameraSource, GivenCamera, LensFile, PinholeImage, looks_of_another_size,
+};
 pub use committer::{Written, commit, queue};
+pub use depth_job::{DepthJob, ShowLayers};
+pub use depth_run::predict;
+pub use depth_settings::DepthSettings;
 pub use fit::PoorFit;
 pub use loader::{ImageLoader, LoadedImage};
 pub use manifest::{Entry, Lock, Manifest, State};
@@ -28,4 +41,6 @@ pub use records::{RecordLines, record_line, record_lines_path, record_path, writ
 pub use resume::{BulkJob, StartedJob};
 pub use shard::Shard;
 pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};
+pub use target_run::{TargetSummary, WrittenTargets, perceive};
 pub use video::{VIDEO_ENDING, write_one_video, write_videos};
+pub use warnings::{ImageWarning, Warn};

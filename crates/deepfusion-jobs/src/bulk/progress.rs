@@ -18,6 +18,8 @@ type Watcher<'a> = Box<dyn FnMut(usize, usize) + Send + 'a>;
 /// What is known of a run's images. Threads share it. `E` is what fails.
 pub struct BulkProgress<'a, E> {
     folder: &'a Path,
+    /// An error in a line.
+    why: fn(&E) -> String,
     state: Mutex<Shared<'a, E>>,
 }
 
@@ -50,12 +52,14 @@ pub struct Summary<E> {
 }
 
 impl<'a, E: From<Error>> BulkProgress<'a, E> {
-    /// For a manifest that may have images done already; `watcher` sees the images done or failed, and all.
+    /// For a manifest that may have images done already; `why` puts an error into a line of the manifest, `watcher` sees the images done or
+    /// failed, and all.
     #[must_use]
     pub fn new(
         folder: &'a Path,
         manifest: Manifest,
         sidecars: Vec<Option<Sidecar>>,
+        why: fn(&E) -> String,
         watcher: impl FnMut(usize, usize) + Send + 'a,
     ) -> Self {
         let state = Shared {
@@ -69,6 +73,7 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         };
         Self {
             folder,
+            why,
             state: Mutex::new(state),
         }
     }
@@ -90,8 +95,9 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         self.report(&mut state);
     }
 
-    /// An image cannot be predicted; the others can. The manifest keeps `why`.
-    pub fn failed(&self, image: usize, error: E, why: String) {
+    /// An image cannot be predicted; the others can. The manifest keeps why.
+    pub fn failed(&self, image: usize, error: E) {
+        let why = (self.why)(&error);
         let mut state = self.lock();
         let entry = &mut state.manifest.images[image];
         entry.state = State::Failed;

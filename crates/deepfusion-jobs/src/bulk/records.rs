@@ -1,8 +1,11 @@
 //! Targets on the disk: a JSON object a frame, and a line of all of them.
 
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use deepfusion_data::Error as DataError;
+use deepfusion_fs::Partial;
 use deepfusion_records::FrameRecord;
 
 use crate::Result;
@@ -33,33 +36,37 @@ pub fn record_line(record: &FrameRecord) -> Result<String> {
 /// Where it cannot be written.
 pub fn write_record(record: &FrameRecord, path: &Path) -> Result<()> {
     let text = serde_json::to_string_pretty(record)? + "\n";
-    let failed = |e| deepfusion_data::Error::file(path, e);
+    let failed = |e| DataError::file(path, e);
     deepfusion_fs::write_unsynced(path, failed, |out| {
         out.write_all(text.as_bytes()).map_err(failed)
     })?;
     Ok(())
 }
 
-/// All frames, a line each, growing beside its final place.
+/// All frames, a line each, growing beside their final place under a name that readers can watch. Gone again unless it is finished.
 pub struct RecordLines {
     path: PathBuf,
-    partial: PathBuf,
-    file: BufWriter<std::fs::File>,
+    /// Closed before its name changes or goes: it stands above `partial`.
+    file: BufWriter<File>,
+    partial: Partial,
+    empty: bool,
 }
 
 impl RecordLines {
-    /// Begins the file that will be at `path`.
+    /// Begins the file that will be at `path`; it grows as the same name with `.partial` behind it.
     ///
     /// # Errors
     /// Where it cannot be written.
     pub fn begin(path: &Path) -> Result<Self> {
-        let partial = path.with_extension("jsonl.partial");
-        let file = std::fs::File::create(&partial)
-            .map_err(|e| deepfusion_data::Error::file(&partial, e))?;
+        let partial = Partial::watched(path);
+        let file = partial
+            .create()
+            .map_err(|e| DataError::file(partial.path(), e))?;
         Ok(Self {
             path: path.to_owned(),
-            partial,
             file: BufWriter::new(file),
+            partial,
+            empty: true,
         })
     }
 
@@ -68,25 +75,58 @@ impl RecordLines {
     /// # Errors
     /// Where it cannot be written.
     pub fn add(&mut self, line: &str) -> Result<()> {
-        let failed = |e| deepfusion_data::Error::file(&self.partial, e);
+        let failed = |e| DataError::file(self.partial.path(), e);
         // Line by line: who watches the file sees whole frames.
         self.file.write_all(line.as_bytes()).map_err(failed)?;
-        Ok(self.file.flush().map_err(failed)?)
+        self.file.flush().map_err(failed)?;
+        self.empty = false;
+        Ok(())
     }
 
-    /// Takes it away: nothing came.
-    pub fn discard(self) {
-        // What is left is an empty file that the next run takes over.
-        let _ = std::fs::remove_file(&self.partial);
-    }
-
-    /// Puts it in its place.
+    /// Puts it in its place; where no line came, it is taken away.
     ///
     /// # Errors
     /// Where it cannot be written.
     pub fn finish(self) -> Result<()> {
-        deepfusion_fs::publish(&self.partial, &self.path)
-            .map_err(|e| deepfusion_data::Error::file(&self.path, e))?;
-        Ok(())
+        let Self {
+            path,
+            file,
+            partial,
+            empty,
+        } = self;
+        drop(file);
+        if empty {
+            return Ok(());
+        }
+        let published = partial.publish();
+        Ok(published.map_err(|e| DataError::file(&path, e))?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_seen_as_they_come_and_stay_once_finished() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = record_lines_path(folder.path());
+        let growing = folder.path().join("targets.jsonl.partial");
+        let mut lines = RecordLines::begin(&path).unwrap();
+        lines.add("{}\n").unwrap();
+        assert_eq!(std::fs::read(&growing).unwrap(), b"{}\n");
+        assert!(!path.exists());
+        lines.finish().unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"{}\n");
+        assert!(!growing.exists());
+    }
+
+    #[test]
+    fn without_a_line_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = record_lines_path(folder.path());
+        RecordLines::begin(&path).unwrap().finish().unwrap();
+        drop(RecordLines::begin(&path).unwrap());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

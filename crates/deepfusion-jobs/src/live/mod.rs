@@ -1,11 +1,16 @@
-//! A camera or a stream: always the newest frame, how late it is, and room for what comes of it.
+//! A camera or a stream: always the newest frame, how late it is, and room for what comes of it: depth ([`predict`]) or targets
+//! ([`perceive`]).
 
+mod depth;
 mod feed;
 mod figures;
 mod folder;
+mod targets;
 
+pub use depth::{LiveDepth, predict};
 pub use feed::{Ending, Feed, Until, run};
 pub use folder::{VIDEO, make_room};
+pub use targets::{LiveTargets, perceive};
 
 use deepfusion_video::{Address, LiveFrame};
 

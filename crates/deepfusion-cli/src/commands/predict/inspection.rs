@@ -1,43 +1,26 @@
 //! What shows a network's layers: the training framework, in a build that has it.
 
+use crate::failure::Result;
+use deepfusion_jobs::bulk::ShowLayers;
+use deepfusion_model::StoredNetwork;
+
+use crate::devices::ComputeDevice;
+
 #[cfg(feature = "train")]
-mod imp {
-    use crate::failure::Result;
-    use deepfusion_model::StoredNetwork;
+pub(super) fn open(network: &StoredNetwork, device: ComputeDevice) -> Result<ShowLayers> {
+    use deepfusion_model::InputSize;
+    use deepfusion_train::Inspector;
 
-    use crate::devices::{self, ComputeDevice};
-
-    pub(crate) use deepfusion_train::Inspector;
-
-    pub(crate) fn open(network: &StoredNetwork, device: ComputeDevice) -> Result<Inspector> {
-        Ok(Inspector::new(network, &devices::open(device)?)?)
-    }
+    let inspector = Inspector::new(network, &crate::devices::open(device)?)?;
+    Ok(Box::new(move |image: &[f32], size: InputSize| {
+        inspector.inspect(image, size)
+    }))
 }
 
 #[cfg(not(feature = "train"))]
-mod imp {
-    use crate::failure::Result;
-    use deepfusion_model::{InputSize, StoredNetwork};
-    use deepfusion_runtime::LayerMaps;
-
-    use crate::devices::ComputeDevice;
-    use crate::error::CliError;
-
-    /// There is none.
-    pub(crate) enum Inspector {}
-
-    impl Inspector {
-        pub(crate) fn inspect(&self, _: &[f32], _: InputSize) -> Vec<LayerMaps> {
-            match *self {}
-        }
+pub(super) fn open(_: &StoredNetwork, _: ComputeDevice) -> Result<ShowLayers> {
+    Err(crate::error::CliError::BuiltWithoutTraining {
+        what: "--save features",
     }
-
-    pub(crate) fn open(_: &StoredNetwork, _: ComputeDevice) -> Result<Inspector> {
-        Err(CliError::BuiltWithoutTraining {
-            what: "--save features",
-        }
-        .into())
-    }
+    .into())
 }
-
-pub(super) use imp::{Inspector, open};

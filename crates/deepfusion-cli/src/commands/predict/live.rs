@@ -1,16 +1,13 @@
 //! Depth of a camera or a stream.
 
-use std::sync::{Mutex, PoisonError};
-
 use deepfusion_hint::count_of;
-use deepfusion_jobs::bulk::{CameraSource, LoadedImage, Lock, write_one_video};
-use deepfusion_jobs::outputs::{DepthOutput, SeenDepth};
-use deepfusion_jobs::{Error, Input, live};
-use deepfusion_records::LiveMark;
+use deepfusion_jobs::bulk::{CameraSource, Lock};
+use deepfusion_jobs::{Error, live};
+use deepfusion_records::Sidecar;
 use deepfusion_runtime::ModelSource;
-use deepfusion_video::{Address, LiveFrame, shown_for};
+use deepfusion_video::Address;
 
-use super::{Job, check_watched, print_videos};
+use super::{check_watched, job, print_videos};
 use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::open;
 use crate::error::CliError;
@@ -29,7 +26,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     // They are nowhere else, and depth is little without them.
     let mut outputs = args.outputs();
     outputs.frames = true;
-    let job = Job::new(prediction, outputs, model, &estimator)?;
+    let job = job(prediction, outputs, model, &estimator)?;
     if args.cloud() && matches!(job.loader.camera, CameraSource::Unknown) {
         return Err(Error::NoCamera.into());
     }
@@ -37,53 +34,30 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     let _lock = Lock::take(out, args.shard)?;
     interrupt::catch("stopping after the frames at work");
     let mut feed = open(address, &prediction.live)?;
-    let look = |frame: LiveFrame| {
-        let input = live::input(address, &frame);
-        let (arrived, mark) = (
-            frame.arrived,
-            LiveMark::of_arrival(frame.arrived_at, frame.dropped),
-        );
-        let (mut loaded, prepared) = job.load_live(&input, frame)?;
-        let seen = job.see(&mut estimator, &prepared)?;
-        let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
-        loaded.live = Some(LiveMark { latency_ms, ..mark });
-        Ok(((input, loaded, seen), latency_ms))
-    };
-    // Name and time of each frame that was written.
-    let done = Mutex::new(Vec::new());
-    let write = |(input, loaded, seen): (Input, LoadedImage, SeenDepth)| -> Result<()> {
-        let sidecar = job.writer.write(&input, &loaded, &seen)?;
-        let mark = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
-        let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
-        done.push((input.name, mark));
-        drop(done);
+    let written = |sidecar: &Sidecar| -> Result<()> {
         if args.json {
-            output::print(&(serde_json::to_string(&sidecar)? + "\n"))
+            output::print(&(serde_json::to_string(sidecar)? + "\n"))
         } else {
             Ok(())
         }
     };
-    let ending = live::run(&mut feed, look, write, say);
-    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let seen = live::predict(&job, &mut estimator, address, &mut feed, written, say);
     if let Some(figures) = feed.summary() {
-        let ended = ending
-            .as_ref()
-            .map_or("the source was lost", |e| e.as_str());
+        let ended = seen.ending.as_ref();
         say(&format!(
-            "{} written to {} ({ended}): {figures}",
-            count_of(done.len(), "image"),
-            out.display()
+            "{} written to {} ({}): {figures}",
+            count_of(seen.frames(), "image"),
+            out.display(),
+            ended.map_or("the source was lost", |e| e.as_str())
         ));
     }
     let mut filmed = Ok(());
     if args.video() {
-        let times: Vec<Option<f64>> = done.iter().map(|(_, time)| *time).collect();
-        let shown = done.iter().map(|(name, _)| name.as_str());
-        let pictures = DepthOutput::SideBySide.ending();
-        filmed = write_one_video(out, shown.zip(shown_for(&times)), pictures, live::VIDEO)
+        filmed = seen
+            .write_video(out)
             .map(|video| print_videos(video.as_slice()))
             .map_err(Into::into);
     }
     // Why the source ended comes first: a full disk ends the video, too.
-    ending.and(filmed)
+    seen.ending.and(filmed)
 }

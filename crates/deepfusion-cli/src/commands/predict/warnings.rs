@@ -1,0 +1,39 @@
+//! What may be wrong with the metres of a run's images, said with the options that mend it.
+
+use deepfusion_jobs::bulk::ImageWarning;
+
+/// Warns on stderr.
+pub(super) fn print(warning: ImageWarning) {
+    match warning {
+        ImageWarning::AssumedCamera { calibration } => {
+            let remedy = match calibration {
+                Some(file) => format!("is this its calibration? --calib {}", file.display()),
+                None => "give --intrinsics, --hfov or --calib".into(),
+            };
+            tracing::warn!(
+                "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
+                 only as right as that is (camera_known: false; {remedy})"
+            );
+        }
+        ImageWarning::LearnedCamera => tracing::warn!(
+            "no intrinsics given: the camera that the run learned is taken, so the metres are only as right as that is \
+             (camera_known: false; give --intrinsics, --hfov or --calib)"
+        ),
+        ImageWarning::OtherSize { image, camera: k } => tracing::warn!(
+            "{}: the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
+             Metres are then wrong by the ratio of the two sizes",
+            image.display(),
+            k.cx,
+            k.cy,
+            k.width,
+            k.height
+        ),
+        ImageWarning::PoorFit { image, fit } => {
+            tracing::warn!("{}: {fit} (others like it are not named)", image.display());
+        }
+        ImageWarning::Drift { frame, ratio } => tracing::warn!(
+            "{frame}: the scale has drifted: by the road, metres are {ratio:.2} times their initial size. Were the images zoomed, the camera \
+             moved, or is the speed wrong? (scale_monitor in each frame's JSON; --correct-scale brings depth back)"
+        ),
+    }
+}

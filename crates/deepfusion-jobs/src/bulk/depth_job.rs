@@ -1,0 +1,183 @@
+//! What is the same for all images of a run: how they are read, looked at and written.
+
+use std::path::Path;
+
+use deepfusion_model::InputSize;
+use deepfusion_motion::ScaleMonitorConfig;
+use deepfusion_runtime::{DepthEstimator, LayerMaps, ModelSource, PreparedImage};
+use deepfusion_video::LiveFrame;
+
+use super::warnings::Warnings;
+use super::{BulkJob, DepthSettings, ImageLoader, LoadedImage, Shard, Warn};
+use crate::outputs::{DepthOutput, DepthOutputs, DepthWriter, SeenDepth};
+use crate::scene::DepthWatch;
+use crate::{Error, Input, ModelFacts, Result};
+
+/// Shows what a network's layers do: of an image 3×H×W at this size, RGB in [0, 1], channel by channel.
+pub type ShowLayers = Box<dyn Fn(&[f32], InputSize) -> Vec<LayerMaps> + Sync>;
+
+/// Depth of many images through one network, into one folder. Threads share it.
+pub struct DepthJob<'a> {
+    /// Reads each image.
+    pub loader: ImageLoader,
+    /// Writes what is kept of each.
+    pub writer: DepthWriter<'a>,
+    show_layers: Option<ShowLayers>,
+    scale: ScaleMonitorConfig,
+    correct_scale: bool,
+    warnings: Warnings<'a>,
+}
+
+impl<'a> DepthJob<'a> {
+    /// The work that these settings ask of a network; `estimator` runs that of `model`. What may be wrong with an image's metres goes to
+    /// `warn`.
+    ///
+    /// # Errors
+    /// [`Error::NoUncertainty`] for outputs that need it of a network that does not know it; a camera's file that cannot be read; what is
+    /// kept beside the network and cannot be read.
+    pub fn new(
+        settings: DepthSettings,
+        folder: &'a Path,
+        outputs: DepthOutputs,
+        model: &'a ModelSource,
+        estimator: &DepthEstimator,
+        warn: Warn<'a>,
+    ) -> Result<Self> {
+        if outputs.need_uncertainty() && !estimator.knows_uncertainty() {
+            return Err(Error::NoUncertainty);
+        }
+        let loader = settings.loader(estimator)?;
+        let writer = DepthWriter {
+            folder,
+            made_with: settings.made_with(&outputs, model, estimator, &loader.camera)?,
+            outputs,
+            intervals: model.interval_factors()?,
+            scale: model.scale(
+                settings.set.as_deref(),
+                settings.focal_correction,
+                settings.post_process,
+                estimator.step,
+            )?,
+            model,
+            step: estimator.step,
+        };
+        Ok(Self {
+            loader,
+            writer,
+            show_layers: None,
+            scale: settings.scale,
+            correct_scale: settings.correct_scale,
+            warnings: Warnings::new(warn),
+        })
+    }
+
+    /// Whether pictures of the network's layers are kept. They need [`Self::with_layers`].
+    #[must_use]
+    pub fn keeps_layers(&self) -> bool {
+        let save = self.writer.outputs.save();
+        save.contains(&DepthOutput::Features)
+    }
+
+    /// The same with what shows the network's layers.
+    #[must_use]
+    pub fn with_layers(self, show: ShowLayers) -> Self {
+        Self {
+            show_layers: Some(show),
+            ..self
+        }
+    }
+
+    /// What there is of the job in its folder.
+    #[must_use]
+    pub fn bulk(&self, shard: Shard, overwrite: bool, videos: bool) -> BulkJob<'_> {
+        // Of a frame of a film more is kept than of a photograph: whatever it may be.
+        let save = self.writer.outputs.of_image(false).into_iter();
+        BulkJob {
+            folder: self.writer.folder,
+            endings: save.map(DepthOutput::ending).collect(),
+            made_with: &self.writer.made_with,
+            overwrite,
+            shard,
+            videos,
+        }
+    }
+
+    /// Reads an image; warns where its camera may not be its own, or its size and shape are far from what the network takes.
+    ///
+    /// # Errors
+    /// As [`ImageLoader::load`].
+    pub fn load(&self, input: &Input) -> Result<(LoadedImage, PreparedImage)> {
+        let (loaded, prepared) = self.loader.load(input)?;
+        self.warnings.of_camera(input, &loaded);
+        self.warn_of_fit(&input.path, &prepared);
+        Ok((loaded, prepared))
+    }
+
+    /// Takes a live source's frame; warns where its size and shape are far from what the network takes.
+    ///
+    /// # Errors
+    /// As [`ImageLoader::load_live`].
+    pub fn load_live(
+        &self,
+        input: &Input,
+        frame: LiveFrame,
+    ) -> Result<(LoadedImage, PreparedImage)> {
+        let (loaded, prepared) = self.loader.load_live(frame)?;
+        self.warn_of_fit(&input.path, &prepared);
+        Ok((loaded, prepared))
+    }
+
+    fn warn_of_fit(&self, image: &Path, prepared: &PreparedImage) {
+        let network = &self.loader.preparer;
+        self.warnings.of_fit(image, network, prepared);
+    }
+
+    /// What the network says about an image, and what its layers do where that is kept.
+    ///
+    /// # Errors
+    /// What the network's engine says.
+    pub fn see(
+        &self,
+        estimator: &mut DepthEstimator,
+        prepared: &PreparedImage,
+    ) -> Result<SeenDepth> {
+        Ok(SeenDepth {
+            prediction: estimator.infer(prepared)?,
+            layers: match (&self.show_layers, prepared.largest()) {
+                (Some(show), Some(view)) => show(&view.input, view.size),
+                _ => Vec::new(),
+            },
+            scale: None,
+        })
+    }
+
+    /// The watch over the metres, from the first frame on.
+    pub(super) fn watch(&self) -> DepthWatch {
+        DepthWatch::new(self.scale.clone(), self.correct_scale)
+    }
+
+    /// As [`Self::see`], of the next image of those whose metres are watched; warns where they have changed.
+    ///
+    /// # Errors
+    /// As [`Self::see`].
+    pub(super) fn see_next(
+        &self,
+        estimator: &mut DepthEstimator,
+        watch: &mut DepthWatch,
+        input: &Input,
+        (loaded, prepared): (&LoadedImage, &PreparedImage),
+    ) -> Result<SeenDepth> {
+        let mut seen = self.see(estimator, prepared)?;
+        let (image, camera) = (&loaded.image, loaded.camera);
+        seen.scale = watch.observe(input, image, camera, &mut seen.prediction);
+        self.warn_of_drift(&input.name, watch.first_drift());
+        Ok(seen)
+    }
+
+    /// Warns where metres were found to be so many times their first size.
+    pub(crate) fn warn_of_drift(&self, frame: &str, drift: Option<f64>) {
+        if let Some(ratio) = drift {
+            self.warnings.of_drift(frame, ratio);
+        }
+    }
+}

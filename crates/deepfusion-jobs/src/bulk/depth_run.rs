@@ -1,0 +1,54 @@
+//! Depth of many images: while the network looks at one, the next are read and the last are written.
+
+use deepfusion_runtime::{DepthEstimator, PreparedImage};
+
+use super::pipeline::{self, Threads};
+use super::{BulkProgress, DepthJob, LoadedImage, commit, queue};
+use crate::outputs::SeenDepth;
+use crate::{Error, Input, Result};
+
+/// Predicts those images `todo` of `mine` that are not done, and writes what is kept of each; an image's sidecar last, when the rest is on
+/// the disk. What becomes of them goes to `progress`: an image that cannot be read fails by itself, where nothing can be predicted or written
+/// the run ends. It also ends, with what is at work, where `stop` says so.
+///
+/// # Panics
+/// Where a thread of it panics.
+pub fn predict<E: From<Error> + Send>(
+    job: &DepthJob<'_>,
+    estimator: &mut DepthEstimator,
+    mine: &[&Input],
+    todo: &[usize],
+    progress: &BulkProgress<'_, E>,
+    stop: &(dyn Fn() -> bool + Sync),
+) {
+    let load = |i: usize| match job.load(mine[todo[i]]) {
+        Ok((loaded, prepared)) => Some((i, loaded, prepared)),
+        Err(error) => {
+            progress.failed(todo[i], error.into());
+            None
+        }
+    };
+    let mut watch = job.watch();
+    let infer = |(i, loaded, prepared): (usize, LoadedImage, PreparedImage)| {
+        let input = mine[todo[i]];
+        let seen = job.see_next(estimator, &mut watch, input, (&loaded, &prepared));
+        (loaded, seen)
+    };
+    let (to_disk, written) = queue();
+    let write = move |i: usize, (loaded, seen): (LoadedImage, Result<SeenDepth>)| {
+        let input = mine[todo[i]];
+        match seen.and_then(|seen| job.writer.write_outputs(input, &loaded, &seen)) {
+            // Fails only where the other thread has panicked, which ends the program below.
+            Ok(sidecar) => drop(to_disk.send((todo[i], sidecar))),
+            Err(error) => progress.stop(error.into()),
+        }
+    };
+    let stop = || stop() || progress.stopped();
+    let threads = Threads::for_this_machine();
+    std::thread::scope(|scope| {
+        scope.spawn(|| commit(progress, mine, &written));
+        pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
+        // The committer ends with the last image written.
+        drop(write);
+    });
+}

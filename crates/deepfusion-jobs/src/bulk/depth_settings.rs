@@ -1,0 +1,95 @@
+//! How images become depth, and what of it their outputs depend on.
+
+use deepfusion_eval::PostProcess;
+use deepfusion_motion::ScaleMonitorConfig;
+use deepfusion_records::MadeWith;
+use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
+
+use super::{CameraSource, GivenCamera, ImageLoader};
+use crate::evaluation::augmentation;
+use crate::outputs::DepthOutputs;
+use crate::{ModelFacts, Result};
+
+/// How images become depth.
+#[derive(Debug, Clone)]
+pub struct DepthSettings {
+    /// The camera of inputs that do not say it themselves.
+    pub camera: Option<GivenCamera>,
+    /// Whether depth is corrected for another focal length than the one trained on.
+    pub focal_correction: bool,
+    /// Whether images of another aspect ratio are stretched, and not cut.
+    pub stretch: bool,
+    /// In how many ways the network looks at each image; `None`: in one.
+    pub post_process: Option<PostProcess>,
+    /// How the scale is watched, where a recording's motion is known.
+    pub scale: ScaleMonitorConfig,
+    /// Whether depth is brought back where its scale has drifted.
+    pub correct_scale: bool,
+    /// The data set, of those that the network learned from, whose metres are meant.
+    pub set: Option<String>,
+    /// In which numbers the network computes.
+    pub precision: Precision,
+    /// The name of what it computes on.
+    pub device: String,
+}
+
+impl DepthSettings {
+    /// What reads the images.
+    ///
+    /// # Errors
+    /// A camera's file that cannot be read; several input sizes of a network that has one.
+    pub(super) fn loader(&self, estimator: &DepthEstimator) -> Result<ImageLoader> {
+        let trained = estimator.training_camera();
+        let camera_learned = estimator.config().learned_camera().is_some();
+        Ok(ImageLoader {
+            camera: CameraSource::chosen(self.camera.as_ref(), trained, camera_learned)?,
+            camera_learned,
+            preparer: estimator.augmented(augmentation(self.post_process))?,
+            focal_correction: self.focal_correction,
+            crop: !self.stretch,
+        })
+    }
+
+    /// What the outputs depend on, beside the image.
+    ///
+    /// # Errors
+    /// Weights that cannot be read.
+    pub(super) fn made_with(
+        &self,
+        outputs: &DepthOutputs,
+        model: &ModelSource,
+        estimator: &DepthEstimator,
+        camera: &CameraSource,
+    ) -> Result<MadeWith> {
+        Ok(MadeWith {
+            version: env!("CARGO_PKG_VERSION").into(),
+            weights: model.content_sha256(self.precision)?,
+            engine: format!("{} on {}", estimator.engine(), self.device),
+            save: outputs.save().iter().map(|s| s.name().to_owned()).collect(),
+            max_depth_m: outputs.limits.max_depth_m,
+            max_sigma: outputs.limits.max_sigma,
+            intrinsics: match camera {
+                CameraSource::Given(k) => Some(*k),
+                CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
+                CameraSource::Hfov(_)
+                | CameraSource::Lens(_)
+                | CameraSource::Trained(_)
+                | CameraSource::Learned(_)
+                | CameraSource::Unknown => None,
+            },
+            hfov_deg: match camera {
+                CameraSource::Hfov(degrees) => Some(*degrees),
+                _ => None,
+            },
+            calibration_sha256: match camera {
+                CameraSource::Lens(file) => Some(file.sha256.clone()),
+                _ => None,
+            },
+            focal_correction: self.focal_correction,
+            stretch: self.stretch,
+            correct_scale: self.correct_scale,
+            post_process: self.post_process,
+            set: self.set.clone(),
+        })
+    }
+}

@@ -1,0 +1,170 @@
+//! Runs over a few small pictures, through the embedded `tiny`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use deepfusion_data::{RgbImage, save_png};
+use deepfusion_motion::ScaleMonitorConfig;
+use deepfusion_perception::PerceptionConfig;
+use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
+
+use super::*;
+use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs};
+use crate::{Error, Input, Result, TargetFinder, TargetSettings};
+
+const CAMERA: [f64; 4] = [56.0, 56.0, 47.0, 31.0];
+
+fn network() -> (ModelSource, DepthEstimator) {
+    let model = ModelSource::named(Path::new("tiny")).unwrap();
+    let network = model.load(None).unwrap();
+    let estimator = DepthEstimator::fused(network, Precision::F32).unwrap();
+    (model, estimator)
+}
+
+fn settings(camera: Option<GivenCamera>) -> DepthSettings {
+    DepthSettings {
+        camera,
+        focal_correction: true,
+        stretch: false,
+        post_process: None,
+        scale: ScaleMonitorConfig::default(),
+        correct_scale: false,
+        set: None,
+        precision: Precision::F32,
+        device: "cpu".into(),
+    }
+}
+
+fn outputs() -> DepthOutputs {
+    let limits = CloudLimits {
+        max_depth_m: 80.0,
+        max_sigma: None,
+    };
+    DepthOutputs::of([DepthOutput::Npy], true, limits)
+}
+
+/// Inputs of these names in a folder with two pictures, `a` and `b`.
+fn inputs(folder: &Path, names: &[&str]) -> Vec<Input> {
+    let path = |name: &str| folder.join(format!("{name}.png"));
+    for name in ["a", "b"] {
+        if !path(name).exists() {
+            save_png(&RgbImage::new(96, 64), &path(name)).unwrap();
+        }
+    }
+    let input = |name: &&str| Input {
+        path: path(name),
+        name: (*name).to_owned(),
+        frame: None,
+    };
+    names.iter().map(input).collect()
+}
+
+fn folder_for_outputs(folder: &Path) -> PathBuf {
+    let out = folder.join("out");
+    std::fs::create_dir_all(&out).unwrap();
+    out
+}
+
+/// Depth of images of a folder, and what was warned of.
+fn depth_of(folder: &Path, names: &[&str]) -> (Summary<Error>, Vec<ImageWarning>) {
+    let (model, mut estimator) = network();
+    let given = Mutex::new(Vec::new());
+    let warn = |warning: ImageWarning| given.lock().unwrap().push(warning);
+    let out = folder_for_outputs(folder);
+    let settings = settings(None);
+    let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, &warn).unwrap();
+    let all = inputs(folder, names);
+    let mine: Vec<&Input> = all.iter().collect();
+    let begun = job
+        .bulk(Shard::WHOLE, false, false)
+        .begin(&all, &mine, true);
+    let StartedJob {
+        manifest,
+        sidecars,
+        todo,
+    } = begun.unwrap();
+    let why = |error: &Error| error.to_string();
+    let progress = BulkProgress::new(&out, manifest, sidecars, why, |_, _| ());
+    predict(&job, &mut estimator, &mine, &todo, &progress, &|| false);
+    let summary = progress.finish();
+    drop(job);
+    (summary, given.into_inner().unwrap())
+}
+
+#[test]
+fn depth_is_made_once_and_warned_of_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (summary, warned) = depth_of(at, &["a", "b", "missing"]);
+    assert_eq!((summary.done, summary.total), (2, 3));
+    assert!(summary.stopped_by.is_none());
+    let failed: Vec<usize> = summary.failures.iter().map(|(i, _)| *i).collect();
+    assert_eq!(failed, [2]);
+    let assumed = |w: &&ImageWarning| matches!(w, ImageWarning::AssumedCamera { .. });
+    assert_eq!(warned.iter().filter(assumed).count(), 1, "{warned:?}");
+    let made_at = || {
+        let made = std::fs::metadata(at.join("out/a_depth.npy")).unwrap();
+        made.modified().unwrap()
+    };
+    let before = made_at();
+    // What is done is not looked at again.
+    let (again, warned) = depth_of(at, &["a", "b"]);
+    assert_eq!((again.done, again.sidecars.len()), (2, 2));
+    assert!(warned.is_empty(), "{warned:?}");
+    assert_eq!(made_at(), before);
+}
+
+/// Targets of two images and one that is not there; `told` hears of each frame that is written.
+fn targets_of(
+    folder: &Path,
+    told: impl FnMut(WrittenTargets<'_>) -> Result<()> + Send,
+) -> TargetSummary<Error> {
+    let (model, mut estimator) = network();
+    let out = folder_for_outputs(folder);
+    let settings = settings(Some(GivenCamera::Numbers(CAMERA)));
+    let warn = |_: ImageWarning| ();
+    let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, &warn).unwrap();
+    let settings = TargetSettings {
+        perception: PerceptionConfig::predicted(),
+        instances: None,
+        scale: ScaleMonitorConfig::default(),
+        correct_scale: false,
+        draw: Vec::new(),
+    };
+    let finder = TargetFinder::open(&model, &mut estimator, settings).unwrap();
+    let all = inputs(folder, &["a", "missing", "b"]);
+    perceive(&job, finder, &all, &|| false, told).unwrap()
+}
+
+#[test]
+fn targets_are_written_and_told_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut told = Vec::new();
+    let mut lines = String::new();
+    let summary = targets_of(folder.path(), |frame| {
+        told.push((frame.done, frame.total));
+        lines += frame.line;
+        Ok(())
+    });
+    assert_eq!((summary.done, summary.total), (2, 3));
+    assert_eq!(summary.unreadable.len(), 1);
+    assert!(summary.stopped_by.is_none() && summary.median_latency_ms().is_some());
+    // The one that is missing was found so at some time before the last.
+    assert_eq!(told.last(), Some(&(3, 3)));
+    let names: Vec<bool> = lines.lines().map(|line| line.contains("\"a\"")).collect();
+    assert_eq!(names, [true, false]);
+    let out = folder.path().join("out");
+    let written = std::fs::read_to_string(out.join("targets.jsonl")).unwrap();
+    assert_eq!(written, lines);
+    for file in ["a.json", "a_depth.npy", "a_targets.json", "b.json"] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn a_run_ends_where_nobody_can_be_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let summary = targets_of(folder.path(), |_| Err(Error::NoCamera));
+    assert!(matches!(summary.stopped_by, Some(Error::NoCamera)));
+    assert_eq!(summary.done, 0);
+}

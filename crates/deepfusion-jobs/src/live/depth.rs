@@ -1,0 +1,105 @@
+//! Depth of a live source.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use deepfusion_records::{LiveMark, Sidecar};
+use deepfusion_runtime::DepthEstimator;
+use deepfusion_video::{Address, LiveFrame, shown_for};
+
+use super::{Ending, Feed, VIDEO, input, run};
+use crate::bulk::{DepthJob, LoadedImage, write_one_video};
+use crate::outputs::{DepthOutput, SeenDepth};
+use crate::{Error, Input, Result};
+
+/// What came of a live source's depth. `E` is what fails.
+pub struct LiveDepth<E> {
+    /// Name and time of arrival, seconds since 1970, of each frame that was written.
+    written: Vec<(String, Option<f64>)>,
+    /// Why the source was left, or what failed.
+    pub ending: Result<Ending, E>,
+}
+
+/// A frame that was looked at.
+struct SeenFrame {
+    input: Input,
+    loaded: LoadedImage,
+    seen: SeenDepth,
+}
+
+/// Predicts the newest frame of a source again and again, and writes what is kept of each; `written` sees the sidecars. What was written
+/// stays, also where the source is lost. As [`run`].
+///
+/// # Panics
+/// Where the thread that writes panics.
+pub fn predict<E: From<Error> + Send>(
+    job: &DepthJob<'_>,
+    estimator: &mut DepthEstimator,
+    address: &Address,
+    feed: &mut Feed,
+    written: impl Fn(&Sidecar) -> Result<(), E> + Sync,
+    say: impl Fn(&str),
+) -> LiveDepth<E> {
+    let look_at = |frame: LiveFrame| -> Result<(SeenFrame, f64), E> {
+        Ok(look(job, estimator, address, frame)?)
+    };
+    let done = Mutex::new(Vec::new());
+    let write = |frame: SeenFrame| -> Result<(), E> {
+        let SeenFrame {
+            input,
+            loaded,
+            seen,
+        } = frame;
+        let sidecar = job.writer.write(&input, &loaded, &seen)?;
+        let arrived = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
+        let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.push((input.name, arrived));
+        drop(done);
+        written(&sidecar)
+    };
+    let ending = run(feed, look_at, write, say);
+    let written = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    LiveDepth { written, ending }
+}
+
+/// What the network says of a frame, and the milliseconds from its arrival to that.
+fn look(
+    job: &DepthJob<'_>,
+    estimator: &mut DepthEstimator,
+    address: &Address,
+    frame: LiveFrame,
+) -> Result<(SeenFrame, f64)> {
+    let input = input(address, &frame);
+    let arrived = frame.arrived;
+    let mark = LiveMark::of_arrival(frame.arrived_at, frame.dropped);
+    let (mut loaded, prepared) = job.load_live(&input, frame)?;
+    let seen = job.see(estimator, &prepared)?;
+    let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+    loaded.live = Some(LiveMark { latency_ms, ..mark });
+    let frame = SeenFrame {
+        input,
+        loaded,
+        seen,
+    };
+    Ok((frame, latency_ms))
+}
+
+impl<E> LiveDepth<E> {
+    /// Frames that were written.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.written.len()
+    }
+
+    /// The video of the frames beside their depth, each shown for as long as until the next came: [`VIDEO`] in the folder of their pictures.
+    /// Gives its path and its frames; `None` where there are none.
+    ///
+    /// # Errors
+    /// What ffmpeg says.
+    pub fn write_video(&self, folder: &Path) -> Result<Option<(PathBuf, usize)>> {
+        let times: Vec<Option<f64>> = self.written.iter().map(|(_, time)| *time).collect();
+        let names = self.written.iter().map(|(name, _)| name.as_str());
+        let pictures = DepthOutput::SideBySide.ending();
+        write_one_video(folder, names.zip(shown_for(&times)), pictures, VIDEO)
+    }
+}

@@ -1,0 +1,52 @@
+use std::sync::{Mutex, PoisonError};
+
+use super::DepthWriter;
+use crate::bulk::{RecordLines, record_line, record_lines_path, record_path, write_record};
+use crate::{PerceivedFrame, Result};
+
+/// Writes what was found in frame after frame: pictures, depth, targets, and the file of all targets.
+pub struct TargetWriter<'a> {
+    depth: &'a DepthWriter<'a>,
+    lines: Mutex<RecordLines>,
+}
+
+impl<'a> TargetWriter<'a> {
+    /// Begins the file of all targets, where the depth is written.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn begin(depth: &'a DepthWriter<'a>) -> Result<Self> {
+        let lines = RecordLines::begin(&record_lines_path(depth.folder))?;
+        Ok(Self {
+            depth,
+            lines: Mutex::new(lines),
+        })
+    }
+
+    /// Writes a frame, its line last, and gives that line. Nothing is waited for until it is on the disk.
+    ///
+    /// # Errors
+    /// As [`DepthWriter::write`].
+    pub fn write(&self, found: &PerceivedFrame) -> Result<String> {
+        let (folder, input) = (self.depth.folder, &found.input);
+        for (form, picture) in &found.pictures {
+            picture.save(&form.path(folder, &input.name))?;
+        }
+        self.depth.write(input, &found.loaded, &found.seen)?;
+        write_record(&found.record, &record_path(folder, &input.name))?;
+        let line = record_line(&found.record)?;
+        // Who panicked added whole lines only.
+        let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        lines.add(&line)?;
+        Ok(line)
+    }
+
+    /// Puts the file of all targets in its place; where there was no frame, it is taken away.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn finish(self) -> Result<()> {
+        let lines = self.lines.into_inner();
+        lines.unwrap_or_else(PoisonError::into_inner).finish()
+    }
+}
