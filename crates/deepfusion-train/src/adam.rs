@@ -5,7 +5,7 @@ use crate::{Error, Model};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Gradients, Tensor, TensorData};
 use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
-use deepfusion_nn::ops::has_kernels;
+use deepfusion_nn::ops::{self, has_kernels};
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -21,7 +21,8 @@ struct Moments {
 /// Adam (Kingma and Ba), β₁ = 0.9, β₂ = 0.999, ε = 1e-8, with the gradient clipped by its norm.
 ///
 /// The moments are kept by the parameters' names. On the processor the update is one pass over parameter, gradient and moments; on a GPU
-/// all of them stay there, and a step reads one number from it: the gradient's norm.
+/// all of them stay there, and a step needs one number from it, the gradient's norm: it decides whether there is a step, and by how much the
+/// gradient is shortened.
 #[derive(Debug, Clone, Default)]
 pub struct Adam {
     moments: BTreeMap<String, Moments>,
@@ -73,10 +74,26 @@ impl NamedGradients {
 
     /// All values one after the other, in the order of the names.
     pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
+        // Those on the device in one transfer.
+        let on_device = self.0.values().filter_map(|values| match values {
+            Values::Host(_) => None,
+            Values::Device(values) => Some(values.clone()),
+        });
+        let on_device: Vec<Tensor<1>> = on_device.collect();
+        let read = if on_device.is_empty() {
+            Vec::new()
+        } else {
+            to_vec(Tensor::cat(on_device, 0))
+        };
+        let mut rest = read.as_slice();
         for values in self.0.values() {
             match values {
                 Values::Host(values) => flat.extend_from_slice(values),
-                Values::Device(values) => flat.extend(to_vec(values.clone())),
+                Values::Device(values) => {
+                    let (own, others) = rest.split_at(values.dims()[0]);
+                    flat.extend_from_slice(own);
+                    rest = others;
+                }
             }
         }
     }
@@ -94,7 +111,14 @@ impl NamedGradients {
         }
     }
 
-    fn norm(&self) -> f64 {
+    pub(crate) fn norm(&self) -> f64 {
+        let (on_host, on_device) = self.squares();
+        let on_device = on_device.map_or(0.0, |sum| f64::from(sum.into_scalar::<f32>()));
+        (on_host + on_device).sqrt()
+    }
+
+    /// The sum of squares: of the values in main memory, and, if there are any, of those on the device, one value there.
+    pub(crate) fn squares(&self) -> (f64, Option<Tensor<1>>) {
         let mut on_host = 0.0;
         let mut on_device = Vec::new();
         for values in self.0.values() {
@@ -103,7 +127,8 @@ impl NamedGradients {
                 Values::Device(values) => on_device.push(values.clone()),
             }
         }
-        (on_host + on_device::sum_of_squares(&on_device)).sqrt()
+        let on_device = (!on_device.is_empty()).then(|| ops::sum_of_squares(&on_device));
+        (on_host, on_device)
     }
 }
 
@@ -161,7 +186,17 @@ impl Adam {
         clip_norm: f64,
         weight_decay: f64,
     ) -> (StepOutcome, Option<AdamStep>) {
-        let norm = gradients.norm();
+        self.begin_with_norm(gradients.norm(), learning_rate, clip_norm, weight_decay)
+    }
+
+    /// The same where the gradient's norm is known.
+    pub(crate) fn begin_with_norm(
+        &mut self,
+        norm: f64,
+        learning_rate: f64,
+        clip_norm: f64,
+        weight_decay: f64,
+    ) -> (StepOutcome, Option<AdamStep>) {
         if !norm.is_finite() {
             return (StepOutcome::Skipped, None);
         }

@@ -2,6 +2,7 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_nn::ops::is_cpu;
 
 use crate::{
     AssumedCamera, Error, SampleProblem, SampleSet, SnippetBatch, TrainConfig, ViewMotion,
@@ -28,6 +29,9 @@ impl LearnedFocal {
     #[must_use]
     pub(crate) fn held_to(self, camera: &AssumedCamera) -> Self {
         let (least, most) = camera.ratios();
+        if !is_cpu(&self.log_ratio.val().device()) {
+            return self.clamped(least, most);
+        }
         let bound = self.ratio().clamp(least, most);
         if bound == self.ratio() {
             return self;
@@ -35,6 +39,15 @@ impl LearnedFocal {
         let device = self.log_ratio.val().device();
         Self {
             log_ratio: Param::from_data(TensorData::from([bound.ln() as f32]), &device),
+        }
+    }
+
+    /// The same where the number is, so that a step on a GPU does not wait for it.
+    fn clamped(self, least: f64, most: f64) -> Self {
+        let (least, most) = (least.ln() as f32, most.ln() as f32);
+        let held = |log: Tensor<1>| log.inner().clamp(least, most).autodiff().require_grad();
+        Self {
+            log_ratio: self.log_ratio.map(held),
         }
     }
 
@@ -145,4 +158,30 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
          view_motion auto, determine it much better"
             .into()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a GPU does without reading the number is what the processor does.
+    #[test]
+    fn both_ways_hold_the_focal_length() {
+        let device = Device::flex().autodiff();
+        let camera = AssumedCamera::default();
+        let (least, most) = camera.ratios();
+        for (log_ratio, expected) in [(-9.0_f32, least), (0.1, 0.1_f64.exp()), (9.0, most)] {
+            let focal = || LearnedFocal {
+                log_ratio: Param::from_data(TensorData::from([log_ratio]), &device),
+            };
+            let held = focal().held_to(&camera).ratio();
+            let clamped = focal().clamped(least, most);
+            assert!((clamped.ratio() - held).abs() < 1e-5 * held, "{held}");
+            assert!((held - expected).abs() < 1e-5 * held, "{held} {expected}");
+            assert!(
+                clamped.log_ratio.val().is_require_grad(),
+                "it goes on learning"
+            );
+        }
+    }
 }

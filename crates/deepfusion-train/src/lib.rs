@@ -35,6 +35,7 @@ mod shared_frames;
 mod source;
 mod stereo;
 mod trainer;
+mod unread;
 mod view_synthesis;
 mod window;
 mod workers;

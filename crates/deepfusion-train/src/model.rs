@@ -53,18 +53,13 @@ pub struct ForwardPass {
     pub inverse_intrinsics: Tensor<3>,
 }
 
-/// Share of the predicted displacement that the loss saw: for the scale ratio.
-pub(crate) fn displacement_ratio(pass: &ForwardPass, batch: &SnippetBatch) -> f64 {
+/// The batch's displacements that the loss saw, measured and predicted, each summed, one value in metres: for the scale ratio.
+pub(crate) fn displacements(pass: &ForwardPass, batch: &SnippetBatch) -> [Tensor<1>; 2] {
     // The other camera's view is no motion.
     let in_time = pass.motions.iter().take(batch.distance_m.len());
     let predicted = in_time.map(|m| m.distance().narrow(0, 0, batch.len()));
-    let [predicted, measured] = [predicted.collect(), batch.distance_m.clone()]
-        .map(|distances: Vec<Tensor<1>>| Tensor::cat(distances, 0).sum().detach().inner());
-    // Both numbers in one transfer from the device.
-    let numbers = Tensor::cat(vec![measured, predicted], 0).into_data();
-    let mut numbers = numbers.iter::<f32>().map(f64::from);
-    let (measured, predicted) = (numbers.next(), numbers.next());
-    measured.unwrap_or(f64::NAN) / predicted.unwrap_or(f64::NAN).max(1e-9)
+    [batch.distance_m.clone(), predicted.collect()]
+        .map(|distances: Vec<Tensor<1>>| Tensor::cat(distances, 0).sum())
 }
 
 impl Model {

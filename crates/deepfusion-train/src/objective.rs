@@ -3,6 +3,7 @@
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
 use crate::model::swap_halves;
+use crate::unread::{TermField, Unread};
 use crate::{
     CompareAt, DepthBatch, ForwardPass, Model, Motion, SnippetBatch, Synthesised, synthesise,
 };
@@ -59,6 +60,20 @@ impl Model {
     /// The loss of a forward pass.
     #[must_use]
     pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, schedule: Schedule) -> BatchLoss {
+        let (loss, unread) = self.loss_on_device(pass, batch, schedule);
+        BatchLoss {
+            terms: unread.read().terms,
+            ..loss
+        }
+    }
+
+    /// The same with its terms still on the device: those of the [`BatchLoss`] are zero.
+    pub(crate) fn loss_on_device(
+        &self,
+        pass: &ForwardPass,
+        batch: &SnippetBatch,
+        schedule: Schedule,
+    ) -> (BatchLoss, Unread) {
         let settings = &self.config.loss;
         let motions = self.warp_poses(pass, batch);
         let targets = pyramid(pass.targets.clone());
@@ -134,19 +149,31 @@ impl Model {
                 sum.add(Some(apart), weight, |terms| &mut terms.agreement);
             }
         }
-        let (total, terms, _) = sum.read(None);
-        BatchLoss {
+        let (total, unread) = sum.end();
+        let loss = BatchLoss {
             total,
-            terms,
+            terms: LossTerms::default(),
             finest: output,
             warped,
             moving: masks.and_then(|masks| masks.into_iter().next()),
-        }
+        };
+        (loss, unread)
     }
 
     /// The loss of images whose depth is known, and the network's prediction for them.
     #[must_use]
     pub fn learn_depth(&self, batch: &DepthBatch) -> DepthPass {
+        let (pass, unread) = self.learn_depth_on_device(batch);
+        let numbers = unread.read();
+        DepthPass {
+            terms: numbers.terms,
+            scale_ratio: numbers.scale_ratio,
+            ..pass
+        }
+    }
+
+    /// The same with its numbers still on the device: the terms of the [`DepthPass`] are zero, its ratio NaN.
+    pub(crate) fn learn_depth_on_device(&self, batch: &DepthBatch) -> (DepthPass, Unread) {
         // At weight 0 the head for uncertainty learns alone: what has no gradient is not even decayed.
         let alone = self.config.loss.depth.weight == 0.0 && self.depth_net.uncertainty.is_some();
         let images = batch.network.clone();
@@ -175,13 +202,15 @@ impl Model {
         let likelihood =
             log_scale.map(|b| losses::uncertainty(inverse[0].clone(), b, &batch.truth));
         sum.add(likelihood, 1.0, |terms| &mut terms.uncertainty);
-        let (total, terms, bias) = sum.read(Some(found.bias));
-        DepthPass {
+        let (total, mut unread) = sum.end();
+        unread.note_bias(found.bias);
+        let pass = DepthPass {
             total,
-            terms,
-            scale_ratio: (-bias).exp(),
+            terms: LossTerms::default(),
+            scale_ratio: f64::NAN,
             metric_disparity: inverse[0].clone().detach(),
-        }
+        };
+        (pass, unread)
     }
 
     /// The sources warped by one of the disparities, and their errors.
@@ -466,14 +495,11 @@ fn agreement(
     })
 }
 
-/// Where a term stands among the others.
-type TermField = fn(&mut LossTerms) -> &mut f64;
-
-/// The sum that is differentiated, and its terms, which stay on the device until all are read at once.
+/// The sum that is differentiated, and its terms, which stay on the device until they are read.
 #[derive(Default)]
 struct Sum {
     total: Option<Tensor<1>>,
-    terms: Vec<(TermField, Tensor<1>)>,
+    terms: Unread,
 }
 
 impl Sum {
@@ -490,24 +516,15 @@ impl Sum {
 
     /// Keeps a value that is no part of the sum.
     fn note(&mut self, value: Tensor<1>, field: TermField) {
-        self.terms.push((field, value.detach().inner()));
+        self.terms.note(field, value);
     }
 
-    /// The sum, its terms as numbers, and one number more (NaN if none is asked for): a single transfer from the device.
+    /// The sum, and its terms.
     #[expect(clippy::expect_used, reason = "every loss has a term")]
-    fn read(mut self, other: Option<Tensor<1>>) -> (Tensor<1>, LossTerms, f64) {
+    fn end(mut self) -> (Tensor<1>, Unread) {
         let total = self.total.expect("a loss has a term at least");
-        self.terms
-            .push((|terms| &mut terms.total, total.clone().detach().inner()));
-        let (fields, mut values): (Vec<_>, Vec<_>) = self.terms.into_iter().unzip();
-        values.extend(other.map(|other| other.detach().inner()));
-        let values = Tensor::cat(values, 0).into_data();
-        let mut values = values.iter::<f32>().map(f64::from);
-        let mut terms = LossTerms::default();
-        for (field, value) in fields.iter().zip(values.by_ref()) {
-            *field(&mut terms) = value;
-        }
-        (total, terms, values.next().unwrap_or(f64::NAN))
+        self.terms.note(|terms| &mut terms.total, total.clone());
+        (total, self.terms)
     }
 }
 

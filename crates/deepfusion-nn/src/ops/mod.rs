@@ -43,8 +43,9 @@ pub use composed::{
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
-/// Whether it is the processor, on which the kernels run.
-fn is_cpu(device: &Device) -> bool {
+/// Whether it is the processor, on which the CPU's kernels run.
+#[must_use]
+pub fn is_cpu(device: &Device) -> bool {
     matches!(
         device.clone().inner().as_dispatch(),
         DispatchDevice::Flex(_)

@@ -4,14 +4,6 @@ use burn::tensor::Tensor;
 use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops;
 
-/// The sum of squares of all values: one number is read from the device, whatever their count.
-pub(super) fn sum_of_squares(values: &[Tensor<1>]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    f64::from(ops::sum_of_squares(values).into_scalar::<f32>())
-}
-
 /// [`deepfusion_kernels::adam`] of one parameter, which comes back ready to learn again, with its moments.
 pub(super) fn update<const D: usize>(
     step: &AdamStep,

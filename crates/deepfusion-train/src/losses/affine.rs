@@ -1,7 +1,8 @@
 use super::flow::{pixel_grid, visible};
+use super::median::medians;
 use crate::Motion;
 use crate::model::swap_halves;
-use burn::tensor::{Bool, Int, Tensor};
+use burn::tensor::{Bool, Tensor};
 use deepfusion_nn::ops;
 
 /// ε of the loss, as a share of the median depth, and the ridge of the fit, as a share of the mean depth.
@@ -39,33 +40,10 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
     let variance = mean(dx.clone().powi_scalar(2)) + ridge;
     let a = mean(dx.clone().mul(dy.clone())).div(variance);
     let residual = mean(dx.mul(a).sub(dy).abs());
-    let median = medians(&y, &inside);
+    let median = medians(&y, &inside, width);
     let spread = mean(y.sub(median.clone()).mul(inside).abs());
     let floor = median.abs().mul_scalar(FLATNESS).add_scalar(1e-6);
     (residual + floor.clone()).div(spread + floor).mean()
-}
-
-/// The median of each row's values inside, N×1; of an even number the upper one of the middle two. A row without any
-/// gives its first value.
-fn medians(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
-    let [n, pixels] = values.dims();
-    let device = values.device().inner();
-    let read = |t: &Tensor<2>| -> Vec<f32> { t.clone().into_data().iter::<f32>().collect() };
-    let (plain, inside) = (read(values), read(inside));
-    let rows = plain.chunks_exact(pixels).zip(inside.chunks_exact(pixels));
-    let places: Vec<i64> = rows
-        .map(|(row, inside)| {
-            let mut kept: Vec<usize> = (0..pixels).filter(|i| inside[*i] > 0.5).collect();
-            if kept.is_empty() {
-                return 0;
-            }
-            let middle = kept.len() / 2;
-            let by_value = |a: &usize, b: &usize| row[*a].total_cmp(&row[*b]);
-            *kept.select_nth_unstable_by(middle, by_value).1 as i64
-        })
-        .collect();
-    let places = Tensor::<1, Int>::from_data(places.as_slice(), &device);
-    values.clone().gather(1, places.reshape([n, 1]))
 }
 
 /// The pixels at which two frames' depths can be compared: in view, not occluded in the other frame (its own depth

@@ -6,6 +6,7 @@ mod depth;
 mod explainability;
 mod flow;
 mod mean;
+mod median;
 mod moving;
 mod reprojection;
 mod smoothness;

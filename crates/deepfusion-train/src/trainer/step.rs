@@ -1,7 +1,8 @@
 //! What one worker learns from its part of a step: losses, and their gradients by name; and the step of the optimiser.
 
 use super::Trainer;
-use crate::model::displacement_ratio;
+use crate::model::displacements;
+use crate::unread::{Unread, read_at_once};
 use crate::workers::WorkerGroup;
 use crate::{
     Adam, BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass,
@@ -16,26 +17,43 @@ const FOCAL: &str = "focal";
 
 impl Trainer {
     /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] of the first batch with such a loss, else that of a batch that could not be made.
     pub(super) fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<WorkerStep, Error> {
         let mut learned = WorkerStep::default();
+        let learning = self.learn_batches(loaders, schedule, &mut learned);
+        // Of what failed, a loss that waits to be read was the first.
+        self.read(&mut learned)?;
+        learning.map(|()| learned)
+    }
+
+    fn learn_batches(
+        &self,
+        loaders: &Loaders,
+        schedule: Schedule,
+        learned: &mut WorkerStep,
+    ) -> Result<(), Error> {
         let scale = 1.0 / self.config.accumulate as f64;
         for _ in 0..self.config.accumulate {
             if let Some(loader) = &loaders.video {
                 let batch = self.model.see(next(|| loader.next(&self.device))?);
                 learned.images += batch.len() * (1 + batch.offsets.len());
-                let (pass, loss) = autocast(self.config.precision, || {
+                let (pass, loss, mut numbers) = autocast(self.config.precision, || {
                     let pass = self.model.forward(&batch);
-                    let loss = self.model.loss(&pass, &batch, schedule);
-                    (pass, loss)
+                    let (loss, numbers) = self.model.loss_on_device(&pass, &batch, schedule);
+                    (pass, loss, numbers)
                 });
-                self.check_finite(&loss.terms, &batch.names)?;
-                learned.losses.add(&loss.terms, scale);
-                learned.monitors.valid.push(loss.terms.valid_share);
-                learned.monitors.moving.push(loss.terms.moving_share);
-                learned
-                    .monitors
-                    .ratio
-                    .push(displacement_ratio(&pass, &batch));
+                numbers.note_displacements(displacements(&pass, &batch));
+                self.note(
+                    learned,
+                    UnreadBatch {
+                        numbers,
+                        names: batch.names.clone(),
+                        is_video: true,
+                        says_scale: true,
+                    },
+                )?;
                 self.model
                     .add_gradients(&loss.total, scale as f32, &mut learned.gradients);
                 // The pass's first target is the batch's first sample.
@@ -46,12 +64,18 @@ impl Trainer {
             if let Some(loader) = &loaders.depth {
                 let batch = next(|| loader.next(&self.device))?;
                 learned.images += batch.len();
-                let pass = autocast(self.config.precision, || self.model.learn_depth(&batch));
-                self.check_finite(&pass.terms, &batch.names)?;
-                learned.losses.add(&pass.terms, scale);
-                if loaders.video.is_none() {
-                    learned.monitors.ratio.push(pass.scale_ratio);
-                }
+                let (pass, numbers) = autocast(self.config.precision, || {
+                    self.model.learn_depth_on_device(&batch)
+                });
+                self.note(
+                    learned,
+                    UnreadBatch {
+                        numbers,
+                        names: batch.names.clone(),
+                        is_video: false,
+                        says_scale: loaders.video.is_none(),
+                    },
+                )?;
                 self.model
                     .add_gradients(&pass.total, scale as f32, &mut learned.gradients);
                 learned.names.extend(batch.names.iter().cloned());
@@ -59,7 +83,45 @@ impl Trainer {
                 learned.panel = panel.or(Some(PanelInput::Depth(Box::new((pass, batch)))));
             }
         }
-        Ok(learned)
+        Ok(())
+    }
+
+    /// Keeps a batch's numbers. Where they are not read late, they are read now.
+    fn note(&self, learned: &mut WorkerStep, batch: UnreadBatch) -> Result<(), Error> {
+        learned.unread.push(batch);
+        if self.reads_late {
+            return Ok(());
+        }
+        self.read(learned)
+    }
+
+    /// Reads the numbers of the batches that wait for it: a single transfer from the device. Where they are read late it is the step's only
+    /// one, and a single worker's norm of the gradient is in it, too. A step needs it before it changes anything: a loss that is not finite
+    /// ends the run, such a gradient skips the step, and Adam counts those that were made.
+    fn read(&self, learned: &mut WorkerStep) -> Result<(), Error> {
+        let batches = std::mem::take(&mut learned.unread);
+        // What several workers clip is the mean of their gradients.
+        let norm_is_due = self.reads_late && self.workers.count() == 1;
+        let squares = norm_is_due.then(|| learned.gradients.squares());
+        let on_device = squares.as_ref().and_then(|squares| squares.1.clone());
+        let unread: Vec<&Unread> = batches.iter().map(|batch| &batch.numbers).collect();
+        let (numbers, on_device) = read_at_once(&unread, on_device);
+        let scale = 1.0 / self.config.accumulate as f64;
+        for (batch, numbers) in batches.iter().zip(numbers) {
+            let terms = &numbers.terms;
+            self.check_finite(terms, &batch.names)?;
+            learned.losses.add(terms, scale);
+            if batch.is_video {
+                learned.monitors.valid.push(terms.valid_share);
+                learned.monitors.moving.push(terms.moving_share);
+            }
+            if batch.says_scale {
+                learned.monitors.ratio.push(numbers.scale_ratio);
+            }
+        }
+        learned.gradient_norm =
+            squares.map(|(on_host, _)| (on_host + on_device.unwrap_or(0.0)).sqrt());
+        Ok(())
     }
 
     /// # Errors
@@ -156,6 +218,20 @@ pub(super) struct WorkerStep {
     pub(super) images: usize,
     pub(super) panel: Option<PanelInput>,
     pub(super) monitors: Monitors,
+    /// Norm of the gradients, where it was read with the losses.
+    pub(super) gradient_norm: Option<f64>,
+    /// Batches of which losses and monitors lack the numbers.
+    unread: Vec<UnreadBatch>,
+}
+
+/// A batch whose numbers are still on the device.
+struct UnreadBatch {
+    numbers: Unread,
+    /// Drives and frames.
+    names: Vec<String>,
+    is_video: bool,
+    /// Whether its scale is the run's: that of known depth is only without video.
+    says_scale: bool,
 }
 
 /// Figures of each batch that are smoothed over the steps.

@@ -1,6 +1,6 @@
 //! The mean loss over the samples that are held out.
 
-use crate::model::displacement_ratio;
+use crate::model::displacements;
 use crate::{
     BatchLoader, DepthLoader, Error, LossTerms, Model, SampleProblem, SampleSet, Schedule,
     TrainConfig,
@@ -35,8 +35,10 @@ pub fn validation_loss(
         while let Some(batch) = loader.next(&device) {
             let batch = model.see(batch?);
             let pass = model.forward(&batch);
-            let terms = model.loss(&pass, &batch, schedule).terms;
-            mean.add(batch.len(), &terms, displacement_ratio(&pass, &batch));
+            let (_, mut unread) = model.loss_on_device(&pass, &batch, schedule);
+            unread.note_displacements(displacements(&pass, &batch));
+            let numbers = unread.read();
+            mean.add(batch.len(), &numbers.terms, numbers.scale_ratio);
         }
         scale_ratio = Some(mean.ratio / mean.count);
         terms.add(&mean.terms, 1.0 / mean.count);
