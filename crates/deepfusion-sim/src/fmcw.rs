@@ -16,9 +16,11 @@ const LINE_STEP_DEG: f32 = 0.08;
 /// Elevation of the topmost line, degrees: two thirds of the field of view lie below the horizon.
 const TOP_DEG: f32 = 3.2;
 
-/// Field of view to the sides, degrees, and the angle between two columns.
+/// Field of view to the sides, degrees.
 const WIDTH_DEG: f32 = 100.0;
-const COLUMN_STEP_DEG: f32 = 0.1;
+
+/// Angle between two columns of the sensor, degrees.
+pub(crate) const COLUMN_STEP_DEG: f32 = 0.1;
 
 /// Nearest and farthest range it reports, metres.
 const RANGE: (f32, f32) = (1.0, 150.0);
@@ -72,16 +74,17 @@ impl MovingSolids {
     }
 }
 
-/// One scan at one instant. `velocity` is that of the sensor over ground, world axes, m/s; `key` makes the noise.
+/// One scan at one instant, with a column every `column_step_deg`. `velocity` is that of the sensor over ground, world axes, m/s; `key`
+/// makes the noise.
 pub(crate) fn scan(
     world: &World,
     light: &GroundLight,
     moving: &MovingSolids,
-    world_from_lidar: &Se3,
-    velocity: &Vector3<f64>,
+    (world_from_lidar, velocity): (&Se3, &Vector3<f64>),
+    column_step_deg: f32,
     key: u32,
 ) -> FmcwScan {
-    let pixel = COLUMN_STEP_DEG.to_radians();
+    let pixel = column_step_deg.to_radians();
     let scanner = Scanner::new(
         world,
         light,
@@ -90,7 +93,7 @@ pub(crate) fn scan(
         (RANGE.1, pixel),
     );
     let position = world_from_lidar.translation();
-    let columns = (WIDTH_DEG / COLUMN_STEP_DEG).round() as usize;
+    let columns = (WIDTH_DEG / column_step_deg).round() as usize;
     let lines: Vec<Vec<Point>> = (0..LINES)
         .into_par_iter()
         .map(|line| {
@@ -98,7 +101,7 @@ pub(crate) fn scan(
             let (sin, cos) = elevation.sin_cos();
             let mut points = Vec::with_capacity(columns);
             for column in 0..columns {
-                let azimuth = 0.5 * WIDTH_DEG - COLUMN_STEP_DEG * (column as f32 + 0.5);
+                let azimuth = 0.5 * WIDTH_DEG - column_step_deg * (column as f32 + 0.5);
                 let azimuth = azimuth.to_radians();
                 let local = V3::new(cos * azimuth.cos(), cos * azimuth.sin(), sin);
                 let Some(echo) = scanner.cast(&local).filter(|echo| echo.range <= RANGE.1) else {

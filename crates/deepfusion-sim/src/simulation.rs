@@ -257,6 +257,11 @@ impl Simulation {
     /// with each point's ground truth.
     #[must_use]
     pub fn fmcw(&self, time_s: f64) -> FmcwScan {
+        self.fmcw_with_columns(time_s, fmcw::COLUMN_STEP_DEG)
+    }
+
+    /// As [`Self::fmcw`], with a column every `column_step_deg`.
+    pub(crate) fn fmcw_with_columns(&self, time_s: f64, column_step_deg: f32) -> FmcwScan {
         let solids = |time_s| self.moving_solids(time_s);
         let velo_from_imu = self.rig.velo_from_imu;
         let motion = BodyMotion::at(|t| self.imu_at(t) * velo_from_imu.inverse(), time_s);
@@ -275,8 +280,8 @@ impl Simulation {
             &self.world,
             &self.light,
             &moving,
-            &motion.pose,
-            &motion.velocity,
+            (&motion.pose, &motion.velocity),
+            column_step_deg,
             key,
         )
     }

@@ -1,5 +1,6 @@
 //! Writes a drive as a bag with UMAD's sensors.
 
+use crate::fmcw;
 use crate::kitti::{encode_depth, encode_rgb};
 use crate::rig::Rig;
 use crate::{Error, Result, Simulation};
@@ -59,6 +60,8 @@ pub struct BagSettings {
     pub clock_offset_s: f64,
     /// Whether the exact depth of every frame is written too.
     pub true_depth: bool,
+    /// Angle between two columns of the LiDAR, degrees: 0.05 to 5. Fewer columns make a bag smaller and its writing quicker.
+    pub lidar_step_deg: f64,
 }
 
 impl Default for BagSettings {
@@ -67,6 +70,7 @@ impl Default for BagSettings {
             compression: Compression::Lz4,
             clock_offset_s: 0.0,
             true_depth: true,
+            lidar_step_deg: f64::from(fmcw::COLUMN_STEP_DEG),
         }
     }
 }
@@ -77,7 +81,8 @@ impl Default for BagSettings {
 /// The camera's stamps and those of the LiDAR carry the clock's offset; IMU, speed, steering and truth do not.
 ///
 /// # Errors
-/// [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Io`], [`Error::Encode`], [`Error::Bag`].
+/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Io`],
+/// [`Error::Encode`], [`Error::Bag`].
 pub fn write_bag(
     simulation: &Simulation,
     out: &Path,
@@ -90,6 +95,13 @@ pub fn write_bag(
             field: "stereo_baseline_m",
             value: config.stereo_baseline_m.to_string(),
             expected: "0 for a bag, which has one camera",
+        });
+    }
+    if !(0.05..=5.0).contains(&settings.lidar_step_deg) {
+        return Err(Error::Config {
+            field: "lidar_step_deg",
+            value: settings.lidar_step_deg.to_string(),
+            expected: "0.05 to 5 degrees",
         });
     }
     let existed = crate::kitti::prepare(out)?;
@@ -311,7 +323,7 @@ fn write_scan(
     (time_s, index): (f64, u32),
     settings: &BagSettings,
 ) -> Result<()> {
-    let scan = simulation.fmcw(time_s);
+    let scan = simulation.fmcw_with_columns(time_s, settings.lidar_step_deg as f32);
     let moving = |i: &usize| scan.ground_radial_mps[*i].abs() > DYNAMIC_MPS;
     let all: Vec<usize> = (0..scan.cloud.len()).collect();
     let dynamic: Vec<usize> = all.iter().copied().filter(moving).collect();

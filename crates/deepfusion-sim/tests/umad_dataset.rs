@@ -227,6 +227,7 @@ fn a_clock_that_is_ahead_is_set_back() {
     let folder = tempfile::tempdir().unwrap();
     let settings = BagSettings {
         clock_offset_s: 0.3,
+        lidar_step_deg: 5.0,
         ..BagSettings::default()
     };
     let path = bag(&simulation, folder.path(), &settings);

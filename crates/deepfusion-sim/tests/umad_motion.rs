@@ -4,7 +4,7 @@ use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_geometry::Se3;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag};
 
-/// Ten seconds; the pictures do not matter here.
+/// Ten seconds; pictures and scans do not matter here.
 fn drive(scene: Scene, seed: u64) -> (tempfile::TempDir, Dataset) {
     let config = SimConfig {
         frames: 250,
@@ -20,6 +20,7 @@ fn drive(scene: Scene, seed: u64) -> (tempfile::TempDir, Dataset) {
     let simulation = Simulation::new(&config).unwrap();
     let settings = BagSettings {
         true_depth: false,
+        lidar_step_deg: 5.0,
         ..BagSettings::default()
     };
     let folder = tempfile::tempdir().unwrap();
