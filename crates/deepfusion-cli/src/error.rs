@@ -182,7 +182,7 @@ pub(crate) enum CliError {
         path: PathBuf,
     },
     /// A run that was stopped.
-    #[error("stopped: {done} of {total} images are done")]
+    #[error("stopped: {done} of {} {} done", count_of(*total, "image"), if *done == 1 || *total == 1 { "is" } else { "are" })]
     Interrupted {
         /// Images done.
         done: usize,
@@ -192,7 +192,7 @@ pub(crate) enum CliError {
         resumes: bool,
     },
     /// Training that was stopped, and saved.
-    #[error("stopped after {step} of {steps} steps; the run is saved")]
+    #[error("stopped after {step} of {}; the run is saved", count_of(*steps, "step"))]
     Stopped {
         /// Steps done.
         step: usize,
@@ -378,11 +378,33 @@ fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
     }
     text
 }
+
 /// How a bulk run is gone on with.
 fn again(resumes: bool) -> &'static str {
     if resumes {
         "run the same again: finished images are kept"
     } else {
         "run it anew with --overwrite: targets are followed from the first image on"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::CliError;
+
+    #[test]
+    fn one_image_is_no_plural() {
+        let said = |done, total| {
+            let resumes = true;
+            let stopped = CliError::Interrupted {
+                done,
+                total,
+                resumes,
+            };
+            stopped.to_string()
+        };
+        assert_eq!(said(0, 1), "stopped: 0 of 1 image is done");
+        assert_eq!(said(1, 5), "stopped: 1 of 5 images is done");
+        assert_eq!(said(2, 5), "stopped: 2 of 5 images are done");
     }
 }

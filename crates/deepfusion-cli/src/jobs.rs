@@ -35,6 +35,7 @@ impl Reportable for Error {
                 setting,
                 asked,
                 run,
+                ..
             }) => format!(
                 "`{}`: {} contradicts the run, which {run}",
                 option_of(setting),
@@ -209,11 +210,9 @@ mod tests {
             error.to_string(),
             "setting `--val-split`: expected none beside [[data.sets]] in the config file: each set has its own, found both"
         );
-        let error = Failure::from(Error::Contradiction(Contradiction {
-            setting: Setting::LearnedCamera,
-            asked: Asked::Learned,
-            run: deepfusion_jobs::training::resume::RunHas::Off,
-        }));
+        let off = deepfusion_jobs::training::resume::RunHas::Off;
+        let contradiction = Contradiction::new(Setting::LearnedCamera, Asked::Learned, off);
+        let error = Failure::from(Error::Contradiction(contradiction));
         assert_eq!(
             error.to_string(),
             "`--intrinsics`: learn contradicts the run, which has it off"

@@ -11,19 +11,31 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What each crate of the workspace uses of the others, tests and benches apart.
+/// What a manifest names of the workspace's crates, tests and benches apart.
+fn uses(manifest: &Path) -> BTreeSet<String> {
+    let manifest: toml::Table = fs::read_to_string(manifest).unwrap().parse().unwrap();
+    let uses = manifest.get("dependencies").and_then(toml::Value::as_table);
+    let uses = uses.into_iter().flat_map(toml::Table::keys);
+    uses.filter(|used| used.starts_with("deepfusion"))
+        .cloned()
+        .collect()
+}
+
+/// What each crate of the workspace uses of the others.
 fn arrows() -> Arrows {
     let mut arrows = Arrows::new();
     for entry in fs::read_dir(root().join("crates")).unwrap() {
         let folder = entry.unwrap().path();
-        let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
-        let manifest: toml::Table = text.parse().unwrap();
         let name = folder.file_name().unwrap().to_str().unwrap().to_owned();
-        let uses = manifest.get("dependencies").and_then(toml::Value::as_table);
-        let uses = uses.into_iter().flat_map(toml::Table::keys);
-        let ours = uses.filter(|used| used.starts_with("deepfusion")).cloned();
-        arrows.insert(name, ours.collect());
+        arrows.insert(name, uses(&folder.join("Cargo.toml")));
     }
+    arrows
+}
+
+/// The same, with the Python package, which lies beside the crates.
+fn arrows_with_python() -> Arrows {
+    let mut arrows = arrows();
+    arrows.insert("python".to_owned(), uses(&root().join("python/Cargo.toml")));
     arrows
 }
 
@@ -61,7 +73,7 @@ fn the_drawing_is_of_todays_crates() {
     let expected = format!(
         "# The crates\n\nWhat each crate uses, without the arrows that follow from others. Drawn from the crates' manifests by\n\n\
          ```\nUPDATE_REFERENCE=1 cargo test --workspace --test cli architecture\n```\n\n```mermaid\n{}```\n",
-        drawing(&arrows())
+        drawing(&arrows_with_python())
     );
     if std::env::var_os("UPDATE_REFERENCE").is_some() {
         fs::write(&page, &expected).unwrap();
@@ -76,16 +88,22 @@ fn every_crate_is_described_above_what_it_uses() {
     let rows: Vec<&str> = text
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split('`').next())
+        .map(|row| row.trim_end_matches('/'))
         .collect();
     let row_of = |name: &str| {
         let row = rows.iter().position(|row| *row == name);
         row.unwrap_or_else(|| panic!("{name} has no row in ARCHITECTURE.md"))
     };
-    for (name, uses) in &arrows() {
+    for (name, uses) in &arrows_with_python() {
         for used in uses {
             assert!(row_of(name) < row_of(used), "{name} uses {used}");
         }
-        let readme = root().join("crates").join(name).join("README.md");
+        let above = if name == "python" {
+            root()
+        } else {
+            root().join("crates")
+        };
+        let readme = above.join(name).join("README.md");
         assert!(readme.exists(), "{}", readme.display());
     }
 }

@@ -1,6 +1,6 @@
 //! What can go wrong with a recording.
 
-use crate::{CalibrationSource, DatasetKind, FoundInstead, GtKind, NamedTopic};
+use crate::{CalibrationSource, DatasetKind, GtKind, NamedTopic};
 use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,12 @@ mod camera;
 mod can;
 mod columns;
 mod config;
+mod found_instead;
 mod frames;
 mod hint;
 mod kitti;
 mod line;
+mod missing;
 mod picture;
 mod pose;
 mod table;
@@ -29,9 +31,11 @@ pub use self::can::CanProblem;
 pub(crate) use self::can::{HIGHEST_EXTENDED, HIGHEST_STANDARD};
 pub use self::columns::{ColumnsProblem, Quantity};
 pub use self::config::{ConfigProblem, ExpectedValue};
+pub use self::found_instead::{FileKind, FoundInstead};
 pub use self::frames::FramesProblem;
 pub use self::kitti::{CalibrationProblem, OxtsField, OxtsProblem};
 pub use self::line::{SplitProblem, TimeStampProblem};
+pub use self::missing::MissingPart;
 pub use self::picture::ImageProblem;
 pub use self::pose::{PoseField, PoseFileProblem, PoseProblem};
 pub use self::table::{ExpectedCell, JsonProblem, TableProblem};
@@ -78,14 +82,12 @@ pub enum Error {
         such_as: PathBuf,
     },
     /// A part of the recording that is needed is not there.
-    #[error("{}: missing, it holds {what}", path.display())]
+    #[error("{}: missing, it holds {part}", path.display())]
     Missing {
         /// Where it should be.
         path: PathBuf,
         /// What it would hold.
-        what: &'static str,
-        /// How to get it.
-        remedy: &'static str,
+        part: MissingPart,
     },
     /// No drive has an image of the camera.
     #[error("{}: no image of camera {camera} (<number>.png or .jpg)", path.display())]
@@ -383,8 +385,8 @@ pub enum Error {
     },
     /// A frame has no line in the time stamp file.
     #[error(
-        "{}: has {lines} time stamps (frames 0 to {}), but there is a frame {frame}",
-        path.display(), lines.saturating_sub(1)
+        "{}: has {} (frames 0 to {}), but there is a frame {frame}",
+        path.display(), count_of(*lines, "time stamp"), lines.saturating_sub(1)
     )]
     NoTimeStamp {
         /// The file.
@@ -429,8 +431,8 @@ pub enum Error {
     },
     /// A split selects no frame of the recording.
     #[error(
-        "{}: none of its {entries} frames is in {} (it begins with {first})",
-        split.display(), path.display()
+        "{}: {} in {} (it begins with {first})",
+        split.display(), none_is(*entries), path.display()
     )]
     SplitSelectsNothing {
         /// The split file.
@@ -458,8 +460,9 @@ pub enum Error {
     },
     /// The car never moves.
     #[error(
-        "{drive}: the car stands: {pairs} pairs, the fastest at {fastest_mps:.2} m/s, \
-         none reaches {min_speed_mps} m/s"
+        "{drive}: the car stands: {}, the fastest at {fastest_mps:.2} m/s, \
+         none reaches {min_speed_mps} m/s",
+        count_of(*pairs, "pair")
     )]
     Standing {
         /// The drive.
@@ -568,6 +571,14 @@ impl Error {
     }
 }
 
+/// That none of a split's frames is there.
+fn none_is(entries: usize) -> String {
+    match entries {
+        1 => "its only frame is not".to_owned(),
+        _ => format!("none of its {entries} frames is"),
+    }
+}
+
 /// How far apart the frames of a step were to be, if they were.
 fn a_step(frame_distance_m: f64) -> String {
     if frame_distance_m > 0.0 {
@@ -592,6 +603,24 @@ mod tests {
         out.write_all(b"x").unwrap();
         let error = Error::file(Path::new("depth.npz"), out.flush().unwrap_err());
         assert!(error.hint().unwrap().contains("full"), "{error}");
+    }
+
+    #[test]
+    fn one_frame_is_no_plural() {
+        let of = |entries| Error::SplitSelectsNothing {
+            split: "split.txt".into(),
+            path: "drive".into(),
+            entries,
+            first: "a 1 l".into(),
+        };
+        assert_eq!(
+            of(1).to_string(),
+            "split.txt: its only frame is not in drive (it begins with a 1 l)"
+        );
+        assert_eq!(
+            of(2).to_string(),
+            "split.txt: none of its 2 frames is in drive (it begins with a 1 l)"
+        );
     }
 
     #[test]

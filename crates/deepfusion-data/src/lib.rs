@@ -35,15 +35,15 @@ pub use dataset::{
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use error::{
     ArrayProblem, CalibrationFileProblem, CalibrationProblem, CameraInfoProblem, CameraProblem,
-    CanProblem, ColumnsProblem, ConfigProblem, Error, ExpectedCell, ExpectedValue, FramesProblem,
-    ImageProblem, JsonProblem, NoFramesReason, NoLens, NoTrackReason, OxtsField, OxtsProblem,
-    PoseField, PoseFileProblem, PoseProblem, Quantity, Result, SegmentProblem, SplitProblem,
-    TableProblem, TimeStampProblem, TopicProblem, TrackletPart, TrackletPlace, TrackletsProblem,
+    CanProblem, ColumnsProblem, ConfigProblem, Error, ExpectedCell, ExpectedValue, FileKind,
+    FoundInstead, FramesProblem, ImageProblem, JsonProblem, MissingPart, NoFramesReason, NoLens,
+    NoTrackReason, OxtsField, OxtsProblem, PoseField, PoseFileProblem, PoseProblem, Quantity,
+    Result, SegmentProblem, SplitProblem, TableProblem, TimeStampProblem, TopicProblem,
+    TrackletPart, TrackletPlace, TrackletsProblem,
 };
 pub use formats::kitti;
 pub use formats::{
-    DopplerEgo, FileKind, FoundInstead, ego_velocity, ground_radial, inspect, inspect_with,
-    write_bag_config,
+    DopplerEgo, ego_velocity, ground_radial, inspect, inspect_with, write_bag_config,
 };
 pub use image::RgbImage;
 pub use pictures::{

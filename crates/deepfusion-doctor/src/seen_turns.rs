@@ -17,8 +17,8 @@ use rayon::prelude::*;
 const AT_ONCE: usize = 64;
 /// Turn to the side above which a pair shows no roll and pitch, radians: the movement of points is linear in small turns alone.
 const MOST_YAW: f64 = 0.08;
-/// Looks at a pair whose yaw nobody measured: the way that it went depends on it.
-const LOOKS: usize = 3;
+/// Passes over a pair whose yaw nobody measured: the way that it went depends on it.
+const PASSES: usize = 3;
 
 /// How the vehicle turned from each image to the next, in their order, where enough points show it and the way between them is known.
 /// Reads all images.
@@ -74,9 +74,9 @@ fn turn(ego: &Ego<'_>, (from_s, to_s): (f64, f64), (a, b): (&Small, &Small)) -> 
     let mut vehicle = ego.vehicle_motion(from_s, to_s)?;
     let points = flow(&a.image, &b.image);
     let vehicle_from_cam = ego.cam_from_vehicle.inverse();
-    let looks = if ego.yaw_known() { 1 } else { LOOKS };
+    let passes = if ego.yaw_known() { 1 } else { PASSES };
     let mut seen = None;
-    for _ in 0..looks {
+    for _ in 0..passes {
         let said = vehicle.camera0_from_camera1(&ego.cam_from_vehicle);
         let pair = EpipolarPair::new(&points, &a.intrinsics, said, (from_s, to_s))?;
         let turn = vehicle_from_cam.rotate(&pair.turn_of_a_pitching_body(&pair.direction()?)?);

@@ -14,7 +14,7 @@ impl fmt::Display for Report {
         };
         let gt = self.protocol.gt.meaning();
         let images = match (self.expected, self.n) {
-            (Some(expected), n) => format!("{n} of the split's {expected} images"),
+            (Some(expected), n) => format!("{n} of the split's {}", count_of(expected, "image")),
             (None, n) => count_of(n, "image"),
         };
         let (min, cap) = (self.protocol.min_m, self.protocol.cap_m);

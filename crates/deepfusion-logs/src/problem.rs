@@ -137,11 +137,19 @@ pub enum SpeedProblem {
     #[error("a video without a track of GoPro's metadata (gpmd)")]
     NoTrack,
     /// No frame of a CAN trace has the signal.
-    #[error("none of its {frames} frames carries {signal}")]
+    #[error("{} {signal}", none_carries(*frames))]
     NoFrame {
         /// How many frames it has.
         frames: usize,
         /// The signal's name.
         signal: String,
     },
+}
+
+/// That no frame of a trace carries something.
+fn none_carries(frames: usize) -> String {
+    match frames {
+        1 => "its only frame does not carry".to_owned(),
+        _ => format!("none of its {frames} frames carries"),
+    }
 }

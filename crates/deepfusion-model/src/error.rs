@@ -188,6 +188,7 @@ impl Hint for Error {
 
 /// What the parser of TOML says of a text or a table, without the line break that ends it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 #[error("{}", .0.to_string().trim_end())]
 pub struct TomlProblem(pub Box<toml::de::Error>);
 

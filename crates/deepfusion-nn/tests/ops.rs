@@ -346,7 +346,7 @@ fn end_of_a_residual_block() {
     assert_close("sum", a.0, b.0);
     assert_close("of the first", a.1, b.1);
     assert_close("of the second", a.2, b.2);
-    // What is no number must be seen.
+    // NaN must come through.
     let none = x.clone().mul_scalar(f32::NAN);
     for sum in [
         ops::add_relu(none.clone(), y.clone()),

@@ -157,6 +157,7 @@ pub enum ModelProblem {
 
 /// Versions of a file's layout and of its operators.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct FormatVersion {
     /// Of the layout.
     pub layout: i64,
@@ -166,6 +167,7 @@ pub struct FormatVersion {
 
 /// A set of operators.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct OperatorSet {
     /// Whose; empty for ONNX's own.
     pub domain: String,

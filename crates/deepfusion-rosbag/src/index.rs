@@ -66,7 +66,7 @@ impl Index {
         let mut at = usize::try_from(header.index_pos).unwrap_or(usize::MAX);
         if at < header.end || at > bytes.len() {
             let bytes = bytes.len();
-            return Err(Fault::new(bytes, IndexProblem::Place { at, bytes }));
+            return Err(Fault::new(bytes, IndexProblem::OutsideFile { at, bytes }));
         }
         for _ in 0..header.connections {
             let record = Record::read(bytes, at)?;

@@ -329,7 +329,7 @@ impl DepthEstimator {
 
     /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Of several views the mean of
     /// the disparities is taken, at the size of the largest; of ln b as well, where it predicts that, so that it says how sure a single
-    /// look is, not how sure their mean.
+    /// prediction is, not how sure their mean.
     ///
     /// # Errors
     /// As [`DepthRunner::run`].
@@ -343,14 +343,14 @@ impl DepthEstimator {
                 found: 0,
             });
         };
-        let mut looks = Vec::with_capacity(image.views.len());
+        let mut predictions = Vec::with_capacity(image.views.len());
         for view in &image.views {
-            looks.push((view.size, self.look(view, image.flip)?));
+            predictions.push((view.size, self.infer_view(view, image.flip)?));
         }
         let NetworkOutput {
             disparity,
             log_scale,
-        } = mean_of(looks, size);
+        } = mean_of(predictions, size);
         Ok(Prediction {
             disparity,
             log_scale,
@@ -362,8 +362,8 @@ impl DepthEstimator {
         })
     }
 
-    /// What the network says of one view, with metres corrected; blended with its mirror image's where `flip` says so.
-    fn look(&mut self, view: &View, flip: bool) -> Result<NetworkOutput, Error> {
+    /// What the network predicts of one view, with metres corrected; blended with its mirror image's where `flip` says so.
+    fn infer_view(&mut self, view: &View, flip: bool) -> Result<NetworkOutput, Error> {
         let (width, factor) = (view.size.width, view.focal_factor);
         let mut own = self.run(&view.input, view.size, factor)?;
         if flip {
@@ -400,26 +400,26 @@ impl DepthEstimator {
     }
 }
 
-/// The mean of what a network said at several sizes, at one of them.
-fn mean_of(mut looks: Vec<(InputSize, NetworkOutput)>, size: InputSize) -> NetworkOutput {
-    if looks.len() == 1
-        && let Some((_, only)) = looks.pop()
+/// The mean of a network's predictions at several sizes, at one of them.
+fn mean_of(mut predictions: Vec<(InputSize, NetworkOutput)>, size: InputSize) -> NetworkOutput {
+    if predictions.len() == 1
+        && let Some((_, only)) = predictions.pop()
     {
         return only;
     }
-    let share = 1.0 / looks.len() as f32;
+    let share = 1.0 / predictions.len() as f32;
     let mean = |of: &dyn Fn(&NetworkOutput) -> Option<&Vec<f32>>| {
         let mut sum = vec![0.0; size.width * size.height];
-        for (from, look) in &looks {
+        for (from, prediction) in &predictions {
             let resample = Resample::new((from.width, from.height), (size.width, size.height));
-            for (sum, value) in sum.iter_mut().zip(resample.map(of(look)?)) {
+            for (sum, value) in sum.iter_mut().zip(resample.map(of(prediction)?)) {
                 *sum += share * value;
             }
         }
         Some(sum)
     };
     NetworkOutput {
-        disparity: mean(&|look| Some(&look.disparity)).unwrap_or_default(),
-        log_scale: mean(&|look| look.log_scale.as_ref()),
+        disparity: mean(&|prediction| Some(&prediction.disparity)).unwrap_or_default(),
+        log_scale: mean(&|prediction| prediction.log_scale.as_ref()),
     }
 }

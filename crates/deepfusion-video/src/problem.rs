@@ -7,7 +7,7 @@ pub(crate) use self::live::quoted;
 pub use self::live::{FrameProblem, LiveProblem, SourceKind};
 pub use self::packet::PacketProblem;
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::fmt;
 
 /// What a program was to do.
@@ -57,7 +57,7 @@ pub enum ProgramProblem {
         said: String,
     },
     /// It found another number of frames than ffprobe.
-    #[error("decoded {decoded} frames, ffprobe counts {counted}")]
+    #[error("decoded {}, ffprobe counts {counted}", count_of(*decoded, "frame"))]
     Frames {
         /// How many it decoded.
         decoded: usize,
@@ -66,7 +66,7 @@ pub enum ProgramProblem {
     },
     /// It stopped early, and calls that a success.
     #[error("made only a part of it: {said}")]
-    Part {
+    StoppedEarly {
         /// What it said.
         said: String,
     },
@@ -125,7 +125,9 @@ impl ProgramProblem {
             Self::Frames { .. } => {
                 "part of the video is damaged: write it anew, such as ffmpeg -i OLD -c:v libx264 -crf 12 NEW.mp4"
             }
-            Self::Part { .. } => "see whether the disk is full and the pictures can be opened",
+            Self::StoppedEarly { .. } => {
+                "see whether the disk is full and the pictures can be opened"
+            }
             Self::Answer(_) => "is it a video, and whole?",
             Self::Live(problem) => problem.remedy(),
         }

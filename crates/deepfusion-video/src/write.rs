@@ -155,7 +155,7 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
         Err(Error::Program {
             path: video.to_owned(),
             program: "ffmpeg",
-            problem: ProgramProblem::Part {
+            problem: ProgramProblem::StoppedEarly {
                 said: done.complaint,
             },
         })

@@ -31,25 +31,26 @@
 #![cfg_attr(feature = "train", doc = "```")]
 #![cfg_attr(not(feature = "train"), doc = "```ignore")]
 //! use deepfusion::data::{Dataset, OpenOptions};
-//! use deepfusion::model::{Preset, RunFolder};
+//! use deepfusion::model::{Preset, RunFolder, TrainConfig};
 //! use deepfusion::train::{Control, Device, SampleSet, Trainer};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let (drive, run) = ("drives/monday", "runs/monday");
+//! let config = TrainConfig { steps: Some(2), ..Preset::Tiny.config() }; // thousands, to learn something
 //! # use deepfusion::sim::{SimConfig, Simulation, write_kitti};
-//! # let folder = tempfile::tempdir()?;
+//! # let temporary = tempfile::tempdir()?;
 //! # let small = SimConfig { frames: 12, width: 320, height: 96, ..Default::default() };
-//! # let drive = write_kitti(&Simulation::new(&small)?, folder.path(), &mut |_, _| ())?;
-//! # let run = folder.path().join("run");
-//! let mut config = Preset::Tiny.config();
-//! config.steps = Some(2); // thousands, to learn something
+//! # let drive = write_kitti(&Simulation::new(&small)?, temporary.path(), &mut |_, _| ())?;
+//! # let run = temporary.path().join("run");
+//! # let mut config = config;
 //! # (config.batch, config.size.width, config.validation_share) = (2, 64, 0.2);
 //! # config.size.height = 64;
-//! let drives = Dataset::open(&drive, &OpenOptions::default())?;
+//! let drives = Dataset::open(drive.as_ref(), &OpenOptions::default())?;
 //! let (samples, held_out, _skipped) = SampleSet::split(&config, drives, None)?;
-//! let run = RunFolder::create(&run)?;
+//! let run = RunFolder::create(run.as_ref())?;
 //! let mut trainer = Trainer::create(config, run, (samples, held_out), &Device::flex(), Ok)?;
 //! let summary = trainer.run(&mut |_event| Control::Continue)?;
-//! assert_eq!(summary.step, 2);
+//! # assert_eq!(summary.step, 2);
 //! # Ok(())
 //! # }
 //! ```
@@ -60,12 +61,13 @@
 //! use deepfusion::bags::{Bag, Selection};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let path = "drives/monday.bag";
 //! # use deepfusion::sim::{BagSettings, SimConfig, Simulation, write_bag};
-//! # let folder = tempfile::tempdir()?;
+//! # let temporary = tempfile::tempdir()?;
 //! # let small = SimConfig { frames: 4, width: 160, height: 96, ..Default::default() };
 //! # let street = Simulation::new(&small)?;
-//! # let path = write_bag(&street, folder.path(), &BagSettings::default(), &mut |_, _| ())?;
-//! let bag = Bag::open(&path)?;
+//! # let path = write_bag(&street, temporary.path(), &BagSettings::default(), &mut |_, _| ())?;
+//! let bag = Bag::open(path)?;
 //! for topic in bag.topics()? {
 //!     println!("{}  {}  {} messages", topic.name, topic.type_name, topic.count);
 //! }

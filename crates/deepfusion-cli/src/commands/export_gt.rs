@@ -64,7 +64,10 @@ pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
         });
     }
     say(&match expected {
-        Some(expected) => format!("{written} of the split's {expected} frames with ground truth"),
+        Some(expected) => format!(
+            "{written} of the split's {} with ground truth",
+            count_of(expected, "frame")
+        ),
         None => format!("{} with ground truth", count_of(written, "frame")),
     });
     output::print(&format!("{}\n", args.out.display()))

@@ -188,9 +188,9 @@ fn how_long(estimate: &TimeEstimate) -> String {
         s => format!("{s:.0} s"),
     };
     let mut line = format!(
-        "about {} from here: {} steps of {pace}",
+        "about {} from here: {} of {pace}",
         clock(estimate.total_s()),
-        estimate.steps
+        count_of(estimate.steps, "step")
     );
     let choices = estimate.choices.iter().map(|(choice, total_s)| {
         let option = match choice {

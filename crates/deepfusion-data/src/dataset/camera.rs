@@ -53,6 +53,7 @@ impl Cameras {
 
 /// A text that names no camera.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 #[error("'{text}' is no camera: 2, 3 or both")]
 pub struct NoSuchCamera {
     /// The text.

@@ -5,7 +5,7 @@ use super::frame::Frame;
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
-use crate::{CalibrationSource, Error, Result};
+use crate::{CalibrationSource, Error, MissingPart, Result};
 use deepfusion_geometry::{DepthMap, Se3};
 use image::RgbImage;
 use std::fmt;
@@ -50,8 +50,7 @@ pub trait Recording: fmt::Debug + Send + Sync {
     fn no_motion(&self) -> Error {
         Error::Missing {
             path: self.folder().to_owned(),
-            what: "times and speeds of the frames",
-            remedy: "give each frame its time and speed",
+            part: MissingPart::Motion,
         }
     }
 

@@ -15,7 +15,7 @@ pub enum NoFramesReason {
     #[error("no frame-<number>.color.png or .jpg")]
     NoColour,
     /// None of the files that the tables name is there.
-    #[error("not there, and no other image of {camera} that {table} names in {scenes} scenes")]
+    #[error("not there, and no other image of {camera} that {table} names in {}", count_of(*scenes, "scene"))]
     NotUnpacked {
         /// The camera.
         camera: &'static str,

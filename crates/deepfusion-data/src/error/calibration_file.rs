@@ -6,7 +6,7 @@ use deepfusion_geometry::NoDistortion;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationFileProblem {
-    /// A word is no number.
+    /// A word is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
         /// The word, or its beginning.

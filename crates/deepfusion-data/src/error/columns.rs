@@ -2,6 +2,7 @@
 
 use super::array::SegmentProblem;
 use super::pose::PoseFileProblem;
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// What is measured, where its unit is in question.
@@ -72,7 +73,7 @@ pub enum ColumnsProblem {
     #[error("nothing says the unit of the depth images")]
     NoDepthUnit,
     /// There are more times than images, or fewer.
-    #[error("{times} times, but there are {images} images")]
+    #[error("{}, but there {} {}", count_of(*times, "time"), is_or_are(*images), count_of(*images, "image"))]
     TimesOfImages {
         /// How many times there are.
         times: usize,
@@ -85,6 +86,11 @@ pub enum ColumnsProblem {
     /// A file of a pose does not hold one.
     #[error(transparent)]
     Pose(#[from] PoseFileProblem),
+}
+
+/// The verb of a count.
+fn is_or_are(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
 }
 
 impl ColumnsProblem {

@@ -1,7 +1,7 @@
 //! What to do about each error.
 
-use super::Error;
-use crate::{DatasetKind, FoundInstead, ImageProblem};
+use super::{Error, FoundInstead};
+use crate::{DatasetKind, ImageProblem};
 use deepfusion_hint::Hint;
 
 impl Hint for Error {
@@ -82,7 +82,7 @@ impl Hint for Error {
                 "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
             }
             Self::DepthKind { .. } => "camera z (kind z) is what every recording with depth has",
-            Self::Missing { remedy, .. } => remedy,
+            Self::Missing { part, .. } => part.remedy(),
             Self::NoImages { .. } => {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
             }

@@ -10,7 +10,7 @@ pub enum CalibrationProblem {
     /// It is not there.
     #[error("the file has no such line")]
     NoLine,
-    /// A word of it is no number.
+    /// A word of it is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
         /// The word.
@@ -75,7 +75,7 @@ impl fmt::Display for OxtsField {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OxtsProblem {
-    /// A value is no number.
+    /// A value is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
         /// What it is.

@@ -10,7 +10,7 @@ pub enum TimeStampProblem {
         /// The line.
         text: String,
     },
-    /// It is no number of seconds.
+    /// It is not a number of seconds.
     #[error("'{text}' is not a time in seconds")]
     NotSeconds {
         /// The line.
@@ -40,7 +40,7 @@ pub enum SplitProblem {
         /// How many.
         found: usize,
     },
-    /// Its second word is no number.
+    /// Its second word is not a number.
     #[error("index '{text}' is not a frame number")]
     Index {
         /// The word.

@@ -33,7 +33,7 @@ impl fmt::Display for PoseField {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseProblem {
-    /// A word is no number, or NaN, or infinite.
+    /// A word is not a number, or it is NaN or infinite.
     #[error("'{text}' is not a finite number")]
     NotANumber {
         /// The word, or its beginning.
@@ -65,7 +65,7 @@ pub enum PoseProblem {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseFileProblem {
-    /// A word is no number.
+    /// A word is not a number.
     #[error("a word is not a number")]
     NotANumber,
     /// Its matrix is not whole.

@@ -98,7 +98,7 @@ pub enum TrackletsProblem {
         /// The text, or its beginning.
         text: String,
     },
-    /// A text is no number, or NaN, or infinite.
+    /// A text is not a number, or it is NaN or infinite.
     #[error("'{text}' is not a finite number")]
     NotANumber {
         /// The text, or its beginning.

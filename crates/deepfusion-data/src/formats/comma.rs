@@ -11,8 +11,8 @@ use crate::logs::samples::Samples;
 use crate::logs::speed_log::SpeedLog;
 use crate::logs::vehicle_log::VehicleLog;
 use crate::{
-    Camera, Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result,
-    SegmentProblem, SpeedRange, Stream,
+    Camera, Dataset, DatasetKind, DriveInspection, Error, Inspection, MissingPart, OpenOptions,
+    Result, SegmentProblem, SpeedRange, Stream,
 };
 use deepfusion_hint::count_of;
 use deepfusion_motion::{ImuMount, comma};
@@ -171,8 +171,7 @@ fn frame_times(folder: &Path) -> Result<Vec<i64>> {
         path if path.is_file() => nanoseconds(&path),
         path => Err(Error::Missing {
             path,
-            what: "the times of the frames",
-            remedy: "fetch global_pose of the segment",
+            part: MissingPart::SegmentTimes,
         }),
     }
 }

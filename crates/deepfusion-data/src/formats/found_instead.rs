@@ -1,179 +1,65 @@
-//! What lies at a path where no recording of a known layout is.
+//! Finds out what lies at a path where no recording of a known layout is.
 
 use super::files::folders;
-use crate::{Error, Result};
-use deepfusion_hint::count_of;
+use crate::{Error, FileKind, FoundInstead, Result};
 use std::collections::BTreeMap;
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// What lies at a path that is no recording of a known layout.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum FoundInstead {
-    /// A part of a drive.
-    PartOf {
-        /// The drive's folder.
-        drive: PathBuf,
-    },
-    /// A ROS 2 bag, which this build does not read.
-    Ros2Bag,
-    /// A single image.
-    Image,
-    /// An archive.
-    Archive,
-    /// A file of another kind.
-    File,
-    /// A folder without files.
-    Empty,
-    /// Files of known kinds, without what says how to read them.
-    Files {
-        /// How many there are of each kind.
-        kinds: BTreeMap<FileKind, usize>,
-    },
-    /// A folder with nothing in it that is known.
-    Others {
-        /// Files in it and in its folders.
-        files: usize,
-        /// Folders in it.
-        folders: usize,
-        /// One of them, within the folder.
-        such_as: PathBuf,
-    },
-}
-
-/// Kinds of files that recordings are made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[non_exhaustive]
-pub enum FileKind {
-    /// `.bin`: scans, as a rule.
-    Bin,
-    /// Bags of ROS 2.
-    Ros2Bags,
-    /// Bags of ROS.
-    RosBags,
-    /// PNG or JPEG.
-    Images,
-    /// Packed archives.
-    Archives,
-    /// Videos.
-    Videos,
-}
-
-impl FileKind {
-    fn of(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?;
-        Some(match extension.to_ascii_lowercase().as_str() {
-            "png" | "jpg" | "jpeg" => Self::Images,
-            "mcap" | "db3" => Self::Ros2Bags,
-            "bag" => Self::RosBags,
-            "mp4" | "mkv" | "avi" | "mov" | "hevc" => Self::Videos,
-            "zip" | "tar" | "gz" | "tgz" => Self::Archives,
-            "bin" => Self::Bin,
-            _ => return None,
-        })
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Bin => ".bin file",
-            Self::Ros2Bags => "ROS 2 bag",
-            Self::RosBags => "ROS bag",
-            Self::Images => "image",
-            Self::Archives => "packed archive",
-            Self::Videos => "video",
-        }
+/// A file that is no recording.
+pub(super) fn file(path: &Path) -> FoundInstead {
+    match kind_of(path) {
+        Some(FileKind::Ros2Bags) => FoundInstead::Ros2Bag,
+        Some(FileKind::Images) => FoundInstead::Image,
+        Some(FileKind::Archives) => FoundInstead::Archive,
+        _ => FoundInstead::File,
     }
 }
 
-impl FoundInstead {
-    /// A file that is no recording.
-    pub(super) fn file(path: &Path) -> Self {
-        match FileKind::of(path) {
-            Some(FileKind::Ros2Bags) => Self::Ros2Bag,
-            Some(FileKind::Images) => Self::Image,
-            Some(FileKind::Archives) => Self::Archive,
-            _ => Self::File,
-        }
-    }
-
-    /// A folder without a recording; it is read, and those in it.
-    ///
-    /// # Errors
-    /// [`Error::File`], [`Error::NoSuchPath`].
-    pub(super) fn folder(folder: &Path) -> Result<Self> {
-        let mut kinds = BTreeMap::new();
-        let (mut files, mut first) = (0_usize, None);
-        let inner = folders(folder)?;
-        for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
-            for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
-                let path = entry.map_err(|e| Error::file(&place, e))?.path();
-                if path.is_dir() {
-                    continue;
-                }
-                files += 1;
-                if let Some(kind) = FileKind::of(&path) {
-                    *kinds.entry(kind).or_default() += 1;
-                }
-                first.get_or_insert(path);
+/// A folder without a recording; it is read, and those in it.
+///
+/// # Errors
+/// [`Error::File`], [`Error::NoSuchPath`].
+pub(super) fn folder(folder: &Path) -> Result<FoundInstead> {
+    let mut kinds = BTreeMap::new();
+    let (mut files, mut first) = (0_usize, None);
+    let inner = folders(folder)?;
+    for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
+        for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
+            let path = entry.map_err(|e| Error::file(&place, e))?.path();
+            if path.is_dir() {
+                continue;
             }
-        }
-        if files == 0 && inner.is_empty() {
-            return Ok(Self::Empty);
-        }
-        if !kinds.is_empty() {
-            return Ok(Self::Files { kinds });
-        }
-        let such_as = first.or_else(|| inner.first().cloned()).unwrap_or_default();
-        Ok(Self::Others {
-            files,
-            folders: inner.len(),
-            such_as: such_as.strip_prefix(folder).unwrap_or(&such_as).to_owned(),
-        })
-    }
-
-    /// Whether bags of ROS 2 are there.
-    #[must_use]
-    pub fn has_ros2_bags(&self) -> bool {
-        match self {
-            Self::Ros2Bag => true,
-            Self::Files { kinds } => kinds.contains_key(&FileKind::Ros2Bags),
-            _ => false,
+            files += 1;
+            if let Some(kind) = kind_of(&path) {
+                *kinds.entry(kind).or_default() += 1;
+            }
+            first.get_or_insert(path);
         }
     }
+    if files == 0 && inner.is_empty() {
+        return Ok(FoundInstead::Empty);
+    }
+    if !kinds.is_empty() {
+        return Ok(FoundInstead::Files { kinds });
+    }
+    let such_as = first.or_else(|| inner.first().cloned()).unwrap_or_default();
+    Ok(FoundInstead::Others {
+        files,
+        folders: inner.len(),
+        such_as: such_as.strip_prefix(folder).unwrap_or(&such_as).to_owned(),
+    })
 }
 
-impl fmt::Display for FoundInstead {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PartOf { drive } => write!(f, "it lies within the drive {}", drive.display()),
-            Self::Ros2Bag => f.write_str("it is a ROS 2 bag"),
-            Self::Image => f.write_str("it is a single image"),
-            Self::Archive => f.write_str("it is an archive that is still packed"),
-            Self::File => f.write_str("it is a file"),
-            Self::Empty => f.write_str("it is empty"),
-            Self::Files { kinds } => {
-                let list = kinds.iter().map(|(kind, n)| count_of(*n, kind.name()));
-                let list = list.collect::<Vec<_>>().join(", ");
-                write!(f, "it holds {list} and nothing that says how to read them")
-            }
-            Self::Others {
-                files,
-                folders,
-                such_as,
-            } => write!(
-                f,
-                "it holds {} and {} (such as {})",
-                count_of(*files, "file"),
-                count_of(*folders, "folder"),
-                such_as.display()
-            ),
-        }?;
-        if cfg!(not(feature = "ros2")) && self.has_ros2_bags() {
-            f.write_str(
-                ", and this program was built without the feature `ros2` (`ros2-sqlite` for .db3)",
-            )?;
-        }
-        Ok(())
-    }
+/// The kind of a file, by its ending.
+fn kind_of(path: &Path) -> Option<FileKind> {
+    let extension = path.extension()?.to_str()?;
+    Some(match extension.to_ascii_lowercase().as_str() {
+        "png" | "jpg" | "jpeg" => FileKind::Images,
+        "mcap" | "db3" => FileKind::Ros2Bags,
+        "bag" => FileKind::RosBags,
+        "mp4" | "mkv" | "avi" | "mov" | "hevc" => FileKind::Videos,
+        "zip" | "tar" | "gz" | "tgz" => FileKind::Archives,
+        "bin" => FileKind::Bin,
+        _ => return None,
+    })
 }

@@ -12,8 +12,8 @@ use super::poses::read_poses;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::measured::{MeasuredDepth, velodyne};
 use crate::{
-    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, PoseField, PoseProblem,
-    Result, image_size,
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, MissingPart, OpenOptions, PoseField,
+    PoseProblem, Result, image_size,
 };
 use deepfusion_geometry::{Distortion, Se3};
 use nalgebra::{Matrix3x4, Vector3};
@@ -30,8 +30,6 @@ const CALIBRATION: &str = "calibration";
 const PERSPECTIVE: &str = "perspective.txt";
 const CAM_TO_POSE: &str = "calib_cam_to_pose.txt";
 const CAM_TO_VELO: &str = "calib_cam_to_velo.txt";
-const CALIBRATION_REMEDY: &str =
-    "put KITTI-360's calibration files (calibration.zip) beside data_2d_raw";
 
 /// A drive and the root around its parts.
 #[derive(Debug)]
@@ -229,16 +227,12 @@ impl Rig {
     /// # Errors
     /// [`Error::Missing`], [`Error::Calibration`].
     fn read(folder: &Path, camera: Camera) -> Result<Self> {
-        let fields = |name: &str, what| {
+        let fields = |name: &str, part| {
             let path = folder.join(name);
-            Fields::read(&path)?.ok_or(Error::Missing {
-                path,
-                what,
-                remedy: CALIBRATION_REMEDY,
-            })
+            Fields::read(&path)?.ok_or(Error::Missing { path, part })
         };
-        let cameras = fields(PERSPECTIVE, "the cameras' intrinsics")?;
-        let mounts = fields(CAM_TO_POSE, "where the cameras are")?;
+        let cameras = fields(PERSPECTIVE, MissingPart::Kitti360Intrinsics)?;
+        let mounts = fields(CAM_TO_POSE, MissingPart::Kitti360Cameras)?;
         // Unrectified camera axes to the unit's; the rectification turns a camera on its place.
         let cam_from_pose = |camera: Camera| -> Result<Se3> {
             let rect = format!("R_rect_0{}", camera.number() - 2);
@@ -279,8 +273,7 @@ impl Rig {
         if !path.is_file() {
             return Err(Error::Missing {
                 path,
-                what: "where the velodyne is",
-                remedy: CALIBRATION_REMEDY,
+                part: MissingPart::Kitti360Velodyne,
             });
         }
         let velo_from_raw0 = read_poses(&path, false, 12)?.into_iter().next();

@@ -14,8 +14,8 @@ use crate::logs::clock::TimeUnit;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::measured::{MeasuredDepth, velodyne};
 use crate::{
-    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, TimeStampProblem,
-    image_size,
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, MissingPart, OpenOptions, Result,
+    TimeStampProblem, image_size,
 };
 use deepfusion_geometry::{Distortion, Intrinsics, Se3};
 use nalgebra::Matrix3x4;
@@ -126,8 +126,7 @@ impl<'a> Sequence<'a> {
         let path = self.folder.join(CALIBRATION);
         let fields = Fields::read(&path)?.ok_or_else(|| Error::Missing {
             path: path.clone(),
-            what: "the cameras' projections P0 to P3",
-            remedy: "put the sequence's calibration there (data_odometry_calib.zip)",
+            part: MissingPart::SequenceProjections,
         })?;
         let field = format!("P{}", self.number);
         let projection = Matrix3x4::from_row_slice(&fields.numbers::<12>(&field)?);
@@ -235,8 +234,7 @@ fn read_times(path: &Path) -> Result<Vec<i64>> {
     let bytes = std::fs::read(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::Missing {
             path: path.to_owned(),
-            what: "the time of every frame",
-            remedy: "put the sequence's times there (data_odometry_calib.zip)",
+            part: MissingPart::SequenceTimes,
         },
         _ => Error::file(path, e),
     })?;

@@ -1,12 +1,11 @@
 //! Telling layouts apart.
 
 use super::files::folders;
-use super::found_instead::FoundInstead;
 use super::kitti::{self, Drive, drive_around, find_drives};
-use super::neighbours::{Look, unread};
-use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
+use super::neighbours::{Wanted, unread};
+use super::{bag, comma, folder, found_instead, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
-use crate::{ConfigProblem, Dataset, DatasetKind, Error, OpenOptions, Result};
+use crate::{ConfigProblem, Dataset, DatasetKind, Error, FoundInstead, OpenOptions, Result};
 use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -91,7 +90,7 @@ impl Layout {
                 path,
             },
             None => Error::UnknownLayout {
-                found: FoundInstead::folder(&path)?,
+                found: found_instead::folder(&path)?,
                 path,
             },
         })
@@ -133,7 +132,7 @@ impl Layout {
             return if video::is_video(&real) {
                 Ok(Some(Self::Video(real)))
             } else {
-                Err(unknown(FoundInstead::file(&real)))
+                Err(unknown(found_instead::file(&real)))
             };
         }
         if let Some(drive) = drive_around(&real) {
@@ -209,7 +208,7 @@ impl Layout {
             return None;
         }
         let used = self.used(&folder);
-        let look = Look {
+        let wanted = Wanted {
             used: &used,
             // A folder's own, or left out by its `dataset.toml`.
             videos: !matches!(self, Self::Comma(_) | Self::Folder(_) | Self::Video(_)),
@@ -219,7 +218,7 @@ impl Layout {
                 _ => false,
             },
         };
-        let names = unread(&folder, look);
+        let names = unread(&folder, wanted);
         let said = names.get(..MOST).unwrap_or(&names).join(", ");
         let more = match names.len().checked_sub(MOST) {
             None | Some(0) => String::new(),

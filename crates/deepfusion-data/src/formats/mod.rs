@@ -23,5 +23,4 @@ mod video;
 
 pub(crate) use bag::Change;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial, write_bag_config};
-pub use found_instead::{FileKind, FoundInstead};
 pub use inspect::{inspect, inspect_with};

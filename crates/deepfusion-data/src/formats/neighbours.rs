@@ -25,7 +25,7 @@ const OUTPUT_FILM: &str = "_video.mp4";
 
 /// What is looked for in a recording's folder.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Look<'a> {
+pub(crate) struct Wanted<'a> {
     /// Files and folders that are read.
     pub(crate) used: &'a [PathBuf],
     /// Whether a video is another recording.
@@ -36,20 +36,20 @@ pub(crate) struct Look<'a> {
 
 /// The names of what looks like recordings in a folder, in their order. It is judged by names alone: among them there may be a hundred
 /// thousand images.
-pub(crate) fn unread(folder: &Path, look: Look) -> Vec<String> {
+pub(crate) fn unread(folder: &Path, wanted: Wanted) -> Vec<String> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
-        if is_hidden(&path) || look.used.iter().any(|used| used.starts_with(&path)) {
+        if is_hidden(&path) || wanted.used.iter().any(|used| used.starts_with(&path)) {
             continue;
         }
         let is_folder = entry
             .file_type()
             .is_ok_and(|kind| kind.is_dir() || kind.is_symlink() && path.is_dir());
         let is_recording = if is_folder {
-            look.folders && holds_a_recording(&path)
+            wanted.folders && holds_a_recording(&path)
         } else {
-            is_bag(&path) || look.videos && is_film(&path)
+            is_bag(&path) || wanted.videos && is_film(&path)
         };
         if is_recording {
             found.push(entry.file_name().to_string_lossy().into_owned());

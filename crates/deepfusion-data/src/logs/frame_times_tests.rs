@@ -72,7 +72,7 @@ fn lists_and_tables_are_read() {
 #[test]
 fn what_is_wrong_is_named() {
     for (file, text, problem) in [
-        ("timestamps.txt", "0.5\n", "1 times, but there are 2 images"),
+        ("timestamps.txt", "0.5\n", "1 time, but there are 2 images"),
         (
             "timestamps.txt",
             "0.5\nx\n",

@@ -32,6 +32,7 @@ impl GtKind {
 
 /// A text that names no kind of ground-truth depth.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 #[error("'{text}' is no ground-truth depth: z, velodyne or annotated")]
 pub struct NoSuchDepth {
     /// The text.

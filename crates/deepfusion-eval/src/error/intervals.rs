@@ -19,7 +19,7 @@ pub enum IntervalsProblem {
     /// They are for other ranges of depths.
     #[error("ranges other than those ending at {:?} m", ENDS_M)]
     Ranges,
-    /// One that is negative, or no number.
+    /// One that is negative or NaN.
     #[error("a factor of {factor}")]
     Factor {
         /// The factor.

@@ -124,7 +124,7 @@ pub enum PoseLineProblem {
         /// How many the lines before have.
         before: usize,
     },
-    /// A word that is no number.
+    /// A word that is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
         /// Its first 40 letters.

@@ -81,6 +81,7 @@ impl fmt::Display for Setting {
 
 /// Something that is asked of a run and is not what it has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 #[error("{setting}: {asked} contradicts the run, which {run}")]
 pub struct Contradiction {
     /// What was to be set.
@@ -89,6 +90,18 @@ pub struct Contradiction {
     pub asked: Asked,
     /// What the run has.
     pub run: RunHas,
+}
+
+impl Contradiction {
+    /// What is asked of a run, and what it has.
+    #[must_use]
+    pub fn new(setting: Setting, asked: impl Into<Asked>, run: RunHas) -> Self {
+        Self {
+            setting,
+            asked: asked.into(),
+            run,
+        }
+    }
 }
 
 /// What is asked for.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Error as DataError, image_size};
+use deepfusion_data::{Error as DataError, MissingPart, image_size};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::Label;
@@ -56,8 +56,7 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         .find(|path| path.exists())
         .ok_or_else(|| DataError::Missing {
             path: folder.join(format!("image_2/{name}.png")),
-            what: "the image of a labelled frame",
-            remedy: "fetch the images, or leave its label file out",
+            part: MissingPart::LabelledImage,
         })?;
     let calib = Calib::read(&folder.join(format!("calib/{name}.txt")))?;
     let (width, height) = image_size(&image)?;

@@ -1,7 +1,7 @@
 //! The boxes of a drive's `tracklet_labels.xml`, as the camera of each frame sees them.
 
 use deepfusion_data::kitti::{Calibration, Tracklet};
-use deepfusion_data::{Dataset, Error};
+use deepfusion_data::{Dataset, Error, MissingPart};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_perception::Label;
 use nalgebra::Vector3;
@@ -34,8 +34,7 @@ impl Labels {
         let calibration = Calibration::read(date, dataset.camera())?;
         let cam_from_velo = calibration.cam_from_velo.ok_or_else(|| Error::Missing {
             path: date.join(Calibration::VELO_TO_CAM),
-            what: "the velodyne's place, in whose axes the boxes are",
-            remedy: "fetch the date's calibration files",
+            part: MissingPart::AxesOfBoxes,
         })?;
         Ok(Self {
             tracklets,

@@ -177,7 +177,7 @@ fn is_kittis_own(drive: &Drive) -> bool {
     DAYS.iter().any(|day| drive.name.starts_with(day))
 }
 
-/// Whether a drive has what `simulate` writes beside its images and nobody can record: exact poses, and exact masks of what moves.
+/// Whether a drive has what `simulate` writes beside its images and nobody can record: exact poses, and exact masks of dynamic objects.
 fn is_simulators(drive: &Drive) -> bool {
     let has = |part: &str| drive.folder.join(part).exists();
     has("poses.txt") && has("moving_02")

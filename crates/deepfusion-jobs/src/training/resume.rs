@@ -351,11 +351,8 @@ fn same(setting: Setting, asked: String, found: String) -> Result<()> {
 }
 
 fn contradicts<T>(setting: Setting, asked: impl Into<Asked>, run: RunHas) -> Result<T> {
-    Err(Error::Contradiction(Contradiction {
-        setting,
-        asked: asked.into(),
-        run,
-    }))
+    let contradiction = Contradiction::new(setting, asked, run);
+    Err(Error::Contradiction(contradiction))
 }
 
 fn list(paths: &[PathBuf]) -> String {

@@ -38,7 +38,7 @@ pub enum FrameProblem {
     /// Its time is none.
     #[error("'{0}' is not a time in seconds")]
     Time(String),
-    /// Its identifier is no number.
+    /// Its identifier is not a number.
     #[error("'{0}' is not an identifier")]
     Identifier(String),
     /// Its identifier is too large for a standard frame's.

@@ -51,7 +51,7 @@ pub enum GpmfProblem {
         /// How many bytes there are.
         left: usize,
     },
-    /// Its values are of a kind that is no number.
+    /// Its values are of a kind that is not a number.
     #[error("{key}: values of kind '{kind}' are not numbers")]
     NoNumbers {
         /// Its key.

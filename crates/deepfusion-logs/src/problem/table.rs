@@ -15,7 +15,7 @@ pub enum TableProblem {
         /// How many the header names.
         named: usize,
     },
-    /// A value is no number.
+    /// A value is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
         /// The value, shortened.

@@ -58,7 +58,7 @@ pub(crate) struct View<'a> {
 }
 
 impl Parking {
-    /// Forgets all cars.
+    /// Drops all cars.
     pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }

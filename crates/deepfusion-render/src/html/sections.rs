@@ -1,6 +1,7 @@
 //! Whole sections of a run's report.
 
 use deepfusion_eval::{DrawnPoint, ImageScore, PointErrors, Points, Report};
+use deepfusion_hint::count_of;
 
 use super::HtmlReport;
 use crate::learning::smoothed;
@@ -134,11 +135,12 @@ impl HtmlReport {
             "distance along z, for the camera is not known,"
         };
         self = self.table(&header, &rows).note(&format!(
-            "{} points drawn uniformly over all compared pixels (seed {}): {distance}. The LiDAR's point is taken at its \
+            "{} drawn uniformly over all compared pixels (seed {}): {distance}. The LiDAR's point is taken at its \
              depth on the ray through the centre of the pixel it fell on, so both lie on one ray. Standard error: std / √n, \
              as if points were independent; by image: with images as the independent units, since the points of an image err \
              together.",
-            points.unscaled.n, points.seed
+            count_of(points.unscaled.n, "point"),
+            points.seed
         ));
         if points.in_space {
             for (axis, name) in ["X, right", "Y, down", "Z, forward"].iter().enumerate() {

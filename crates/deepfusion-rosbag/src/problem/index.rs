@@ -9,7 +9,7 @@ use std::fmt;
 pub enum IndexProblem {
     /// It should begin where the bag cannot have one.
     #[error("the index should be at byte {at}, the file has {bytes}")]
-    Place {
+    OutsideFile {
         /// Where it should begin.
         at: usize,
         /// The file's length.

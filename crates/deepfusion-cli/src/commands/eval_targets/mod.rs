@@ -78,8 +78,8 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
     if args.json {
         output::print_json(&report)
     } else {
-        let looks = report.post_process.map(|how| format!(" ({how})"));
-        let depth = format!("{}{}", report.depth, looks.unwrap_or_default());
+        let post_process = report.post_process.map(|how| format!(" ({how})"));
+        let depth = format!("{}{}", report.depth, post_process.unwrap_or_default());
         output::print(&table::text(&depth, &report.score))
     }
 }

@@ -1,7 +1,7 @@
 //! The three calibration files of a date.
 
 use super::fields::{Fields, cam_from_cam0};
-use crate::{Camera, Error, Result};
+use crate::{Camera, Error, MissingPart, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Vector3};
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ impl Calibration {
     /// [`Error::Calibration`] where a field is absent, is not numbers or makes no camera.
     pub fn read(folder: &Path, camera: Camera) -> Result<Self> {
         let cameras = Fields::read(&folder.join(Self::CAM_TO_CAM))?
-            .ok_or_else(|| missing(folder, Self::CAM_TO_CAM, "the cameras' intrinsics"))?;
+            .ok_or_else(|| missing(folder, Self::CAM_TO_CAM, MissingPart::Intrinsics))?;
         let number = camera.number();
         let (size_field, p_field) = (format!("S_rect_0{number}"), format!("P_rect_0{number}"));
         let size = cameras.numbers::<2>(&size_field)?;
@@ -90,9 +90,9 @@ impl Calibration {
     pub fn require_cam_from_imu(&self) -> Result<Se3> {
         self.cam_from_imu.ok_or_else(|| {
             if self.cam_from_velo.is_none() {
-                missing(&self.folder, Self::VELO_TO_CAM, "the velodyne's place")
+                missing(&self.folder, Self::VELO_TO_CAM, MissingPart::VelodynePlace)
             } else {
-                missing(&self.folder, Self::IMU_TO_VELO, "the IMU's place")
+                missing(&self.folder, Self::IMU_TO_VELO, MissingPart::ImuPlace)
             }
         })
     }
@@ -103,15 +103,14 @@ impl Calibration {
     /// [`Error::Missing`].
     pub fn require_pixels_from_velo(&self) -> Result<Matrix3x4<f64>> {
         self.pixels_from_velo
-            .ok_or_else(|| missing(&self.folder, Self::VELO_TO_CAM, "the velodyne's place"))
+            .ok_or_else(|| missing(&self.folder, Self::VELO_TO_CAM, MissingPart::VelodynePlace))
     }
 }
 
-fn missing(folder: &Path, file: &str, what: &'static str) -> Error {
+fn missing(folder: &Path, file: &str, part: MissingPart) -> Error {
     Error::Missing {
         path: folder.join(file),
-        what,
-        remedy: "put the calibration files of that date (KITTI offers them as <date>_calib.zip) into the date folder",
+        part,
     }
 }
 

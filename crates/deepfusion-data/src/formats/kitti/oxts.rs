@@ -1,7 +1,7 @@
 //! OXTS: one file a packet of the car's GPS / IMU, thirty numbers.
 
 use super::timestamps::TimeStamps;
-use crate::{Error, OxtsField, OxtsProblem, Result, VehicleTrack};
+use crate::{Error, MissingPart, OxtsField, OxtsProblem, Result, VehicleTrack};
 use std::path::Path;
 
 /// The fields' names, in their order (KITTI's `oxts/dataformat.txt`).
@@ -98,12 +98,10 @@ pub fn read_oxts(folder: &Path, origin_ns: i64) -> Result<VehicleTrack> {
 /// # Errors
 /// As [`read_oxts`].
 pub(crate) fn read_packets(folder: &Path, origin_ns: i64) -> Result<Vec<(f64, OxtsPacket)>> {
-    const REMEDY: &str = "fetch the drive's oxts folder: its speeds are what makes depth metric";
     let data = folder.join("data");
     let missing = || Error::Missing {
         path: data.clone(),
-        what: "the car's speed and yaw rate",
-        remedy: REMEDY,
+        part: MissingPart::Oxts,
     };
     if !data.is_dir() {
         return Err(missing());

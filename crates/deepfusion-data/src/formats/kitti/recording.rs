@@ -12,8 +12,8 @@ use crate::dataset::selection::Selection;
 use crate::logs::clock::on_the_vehicles_clock;
 use crate::{
     CalibrationPlace, Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
-    FrameImage, GtKind, MovingLabels, OpenOptions, Recording, Result, Stream, load_rgb,
-    read_depth_png,
+    FrameImage, GtKind, MissingPart, MovingLabels, OpenOptions, Recording, Result, Stream,
+    load_rgb, read_depth_png,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -220,8 +220,7 @@ impl Recording for KittiRecording {
         let again = again.and_then(|()| self.calibration.require_cam_from_imu().map(|_| ()));
         again.err().unwrap_or(Error::Missing {
             path: folder.join("oxts"),
-            what: "the car's speed and yaw rate",
-            remedy: "open the recording again: it changed meanwhile",
+            part: MissingPart::OxtsGone,
         })
     }
 

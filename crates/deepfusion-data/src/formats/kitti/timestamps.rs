@@ -1,7 +1,7 @@
 //! `timestamps.txt`: one line a frame of the whole drive, whether or not the frame is there.
 
 use crate::logs::date_time::parse;
-use crate::{Error, Result};
+use crate::{Error, MissingPart, Result};
 use std::path::{Path, PathBuf};
 
 /// Time stamps of a sensor, by frame number.
@@ -24,8 +24,7 @@ impl TimeStamps {
         let bytes = std::fs::read(path).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => Error::Missing {
                 path: path.to_owned(),
-                what: "the time of every frame",
-                remedy: "fetch the drive's time stamps: ego-motion uses real time, not a nominal frame rate",
+                part: MissingPart::TimeStamps,
             },
             _ => Error::file(path, e),
         })?;

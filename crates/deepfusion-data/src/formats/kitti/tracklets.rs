@@ -1,6 +1,6 @@
 //! `tracklet_labels.xml`: boxes around traffic, followed over a drive's frames.
 
-use crate::{Error, TrackletPart, TrackletPlace, TrackletsProblem};
+use crate::{Error, MissingPart, TrackletPart, TrackletPlace, TrackletsProblem};
 use nalgebra::Vector3;
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -49,8 +49,7 @@ impl Tracklet {
         let file = std::fs::File::open(path).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => Error::Missing {
                 path: path.to_owned(),
-                what: "the labelled boxes of traffic",
-                remedy: "fetch the drive's tracklets, or evaluate without them",
+                part: MissingPart::Tracklets,
             },
             _ => Error::file(path, e),
         })?;

@@ -1,6 +1,6 @@
 //! Tables of JSON: an array of objects, read one at a time, since a table may be larger than the memory.
 
-use crate::{Error, JsonProblem, Result};
+use crate::{Error, JsonProblem, MissingPart, Result};
 use memchr::memchr_iter;
 use serde::Deserialize;
 use std::fs::File;
@@ -64,8 +64,7 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
     let file = File::open(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::Missing {
             path: path.to_owned(),
-            what: "a table of the data set",
-            remedy: "unpack the data set's metadata (v1.0-*_meta.tgz) again",
+            part: MissingPart::NuScenesTable,
         },
         _ => Error::file(path, e),
     })?;

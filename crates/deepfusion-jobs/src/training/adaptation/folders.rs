@@ -143,14 +143,14 @@ pub fn undo(out: &Path) -> Result<()> {
     for kind in [CheckpointKind::Best, CheckpointKind::Last] {
         let path = folder.checkpoint_path(kind);
         if path.is_file() {
-            rename(&path, &aside(&path))?;
+            publish(&path, &aside(&path))?;
         }
     }
     if config.is_file() {
         copy(&folder.config_path(), &aside(&folder.config_path()))?;
-        rename(&config, &folder.config_path())?;
+        publish(&config, &folder.config_path())?;
     }
-    rename(&weights, &folder.checkpoint_path(CheckpointKind::Best))
+    publish(&weights, &folder.checkpoint_path(CheckpointKind::Best))
 }
 
 /// `out` with an ending.
@@ -162,6 +162,11 @@ fn beside(out: &Path, end: &str) -> PathBuf {
 
 fn rename(from: &Path, to: &Path) -> Result<()> {
     Ok(fs::rename(from, to).map_err(|e| DataError::file(from, e))?)
+}
+
+/// Renames a file; its content and its new name are on the disk once this returns.
+fn publish(from: &Path, to: &Path) -> Result<()> {
+    Ok(deepfusion_fs::publish(from, to).map_err(|e| DataError::file(from, e))?)
 }
 
 fn copy(from: &Path, to: &Path) -> Result<()> {
