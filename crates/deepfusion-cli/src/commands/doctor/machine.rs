@@ -151,8 +151,8 @@ fn cpu_flags() -> String {
 
 /// What `--device` takes in this build.
 fn devices() -> Vec<&'static str> {
-    let built = Backend::ALL.into_iter().filter(|(.., built)| *built);
-    built.map(|(_, name, ..)| name).collect()
+    let built = Backend::ALL.into_iter().filter(|one| one.is_built());
+    built.map(Backend::name).collect()
 }
 
 /// Whole and available memory, MB, as Linux reports it.
