@@ -2,7 +2,7 @@
 # Builds the package into a fresh virtual environment, as `pip install .` does for a user, and runs its tests there.
 #
 #   python/test.sh [FOLDER]     default: a temporary one
-#   EXTRAS=test,test-ray python/test.sh     the tests of deepfusion.ray too, which are skipped without Ray
+#   EXTRAS=test,test-ray,test-torch,notebook python/test.sh     the tests of deepfusion.ray, those with torch, and the notebook, too
 set -euo pipefail
 # From where the caller stands.
 if [ -n "${DEEPFUSION:-}" ]; then

@@ -42,6 +42,7 @@ __all__ = [
     "Target",
     "TrainEvent",
     "adapt",
+    "devices",
     "doctor",
     "evaluate",
     "load",
@@ -54,20 +55,31 @@ __all__ = [
 
 
 def load(
-    model: str | PathLike[str] = "street", *, precision: str = "f32", data_set: str | None = None
+    model: str | PathLike[str] = "street", *, precision: str = "f32", data_set: str | None = None, device: str = "cpu"
 ) -> Model:
     """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
 
     `precision` is "f32", "bf16" on processors with AMX or AVX512-BF16, or "int8" on those with AVX512-VNNI, for networks that
     `deepfusion weights calibrate` has seen. `data_set` names one of the data sets that a run
     learned from, where it learned several: its metres are meant (`--data-set` on the command line).
+
+    `device` is "cpu", a GPU by its backend ("cuda", "vulkan", "wgpu", "metal"; "cuda:1" is the second one), or "auto": a GPU where package
+    and machine have one, else the processor. A GPU computes in f32. `devices()` are the backends that the package was built with.
     """
-    return _native.load(model, precision, data_set)
+    return _native.load(model, precision, data_set, device)
 
 
 def networks() -> list[str]:
     """The names of the networks inside the package."""
     return _native.networks()
+
+
+def devices() -> list[str]:
+    """The backends that this package was built with, as `device` names them: "cpu", and those of GPUs that were asked for.
+
+    `pip install ./python --config-settings=build-args="--features cuda"` in a checkout builds it with CUDA.
+    """
+    return _native.devices()
 
 
 def evaluate(

@@ -63,6 +63,7 @@ def adapt(
     speed_error: float = 0.03,
     seed: int = 0,
     config: Mapping[str, Any] | None = None,
+    device: str = "cpu",
 ) -> Adaptation:
     """Learns on drives with a speed from a network that is there, and keeps the result only if it is no worse.
 
@@ -73,7 +74,7 @@ def adapt(
     `batch` samples of the drives and `simulated` ones of simulated depth, which keep what the network knows: seen by the drives' own cameras,
     at their height above the road in the images (`simulated_camera="own"`), or by any (`"any"`). `clock_offset_ms` is how far the camera's clock
     is ahead of the vehicle's, where the recordings do not say. `speed_error` is one standard error of the speed, as a share of it. `config`
-    changes any key of the configuration, as in `train`.
+    changes any key of the configuration, as in `train`. `device` is where it learns and is judged, as in `load`.
 
     The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, as in `train`; where it returns False or raises, or at Ctrl-C, what
     was learned is saved, and the same call goes on.
@@ -93,6 +94,7 @@ def adapt(
         "held_out": held_out,
         "speed_error": speed_error,
         "seed": seed,
+        "device": device,
         "settings": list(_settings(config or {})),
     }
     outcome = json.loads(_native.adapt(asked, callback))

@@ -1,21 +1,44 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Dataset",
+    "DeepFusionError",
+    "Frame",
+    "Model",
+    "Perception",
+    "Prediction",
+    "Predictions",
+    "__version__",
+    "adapt",
+    "check_device",
+    "command",
+    "devices",
+    "doctor",
+    "evaluate",
+    "load",
+    "networks",
+    "simulate",
+    "train",
+    "undo_adaptation",
+]
+
 __version__: str
 
-Intrinsics = tuple[float, float, float, float]
-PostProcess: TypeAlias = Literal["flip", "multi-scale", "multi-scale-flip"]
+_Intrinsics: TypeAlias = tuple[float, float, float, float]
+_PostProcess: TypeAlias = Literal["flip", "multi-scale", "multi-scale-flip"]
 
 class DeepFusionError(Exception):
     """What went wrong, with the file, frame or field; `hint` says what to do about it."""
 
     hint: str | None
 
+@final
 class Prediction:
     """The metric depth of an image."""
 
@@ -24,34 +47,35 @@ class Prediction:
         """H x W metres at the image's size; 0 outside of what the network looked at. One array, made once."""
     @property
     def sigma(self) -> NDArray[np.float32] | None:
-        """Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated."""
+        """Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated. One array, made once."""
     @property
     def confidence(self) -> NDArray[np.float32] | None:
         """How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
-        None of a network that does not say. Not calibrated."""
+        None of a network that does not say. Not calibrated. One array, made once."""
     @property
     def disparity(self) -> NDArray[np.float32]:
-        """1/m, at the network's size."""
+        """1/m, at the network's size. One array, made once."""
     @property
-    def intrinsics(self) -> Intrinsics | None:
+    def intrinsics(self) -> _Intrinsics | None:
         """fx, fy, cx, cy of the image, where they are known."""
     def __dlpack__(self, **options: Any) -> Any:
         """`depth`'s: `torch.from_dlpack(prediction)` shares its memory."""
     def __dlpack_device__(self) -> tuple[int, int]: ...
     def cloud(self, max_depth: float = 80.0) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3; needs `intrinsics`."""
+        """Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3, of `depth` as it stands there; needs `intrinsics`."""
 
+@final
 class Model:
     """A trained network. Calls on several threads wait for each other; `another()` is for a second thread."""
 
     def predict(
         self,
         image: NDArray[np.uint8] | str | PathLike[str] | Any,
-        intrinsics: Intrinsics | None = None,
+        intrinsics: _Intrinsics | None = None,
         *,
         focal_correction: bool = True,
         stretch: bool = False,
-        post_process: PostProcess | None = None,
+        post_process: _PostProcess | None = None,
     ) -> Prediction:
         """Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
         `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
@@ -63,11 +87,11 @@ class Model:
     def predict_many(
         self,
         images: Iterable[NDArray[np.uint8] | str | PathLike[str] | Any],
-        intrinsics: Intrinsics | None = None,
+        intrinsics: _Intrinsics | None = None,
         *,
         focal_correction: bool = True,
         stretch: bool = False,
-        post_process: PostProcess | None = None,
+        post_process: _PostProcess | None = None,
     ) -> Predictions:
         """The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
         are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
@@ -82,14 +106,19 @@ class Model:
         """Steps it was trained for."""
     @property
     def engine(self) -> str:
-        """What runs it: "fused"."""
+        """What runs it: "fused" on a processor ("fused-bf16", "fused-int8"), "burn" on a GPU."""
+    @property
+    def device(self) -> str:
+        """Where it runs: "cpu", "cuda:1"."""
 
+@final
 class Predictions(Iterator[Prediction]):
     """Of `Model.predict_many`."""
 
     def __iter__(self) -> Predictions: ...
     def __next__(self) -> Prediction: ...
 
+@final
 class Frame:
     """One frame of a recording."""
 
@@ -106,19 +135,20 @@ class Frame:
     def speed_mps(self) -> float | None:
         """The vehicle's."""
     @property
-    def intrinsics(self) -> Intrinsics:
+    def intrinsics(self) -> _Intrinsics:
         """fx, fy, cx, cy in pixels of `image`."""
     def ground_truth(self, kind: str = "z") -> NDArray[np.float32] | None:
         """H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z", "velodyne" or
         "annotated" (KITTI's `proj_depth`)."""
 
+@final
 class Dataset:
     """A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known of the frame."""
 
-    def __init__(self, path: str | PathLike[str], *, camera: str = "2", drive: int = 0) -> None:
+    def __new__(cls, path: str | PathLike[str], *, camera: str = "2", drive: int = 0) -> Dataset:
         """`camera` is "2" (left) or "3" (right) where there are two; `drive` says which of several below `path`, from 0."""
     def __len__(self) -> int: ...
-    def __getitem__(self, index: int) -> Frame: ...
+    def __getitem__(self, index: int, /) -> Frame: ...
     def __iter__(self) -> Iterator[Frame]: ...
     @property
     def name(self) -> str:
@@ -130,8 +160,10 @@ class Dataset:
         """4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
         the vehicle's motion is not known."""
 
-def load(model: Any, precision: str, data_set: str | None) -> Model: ...
+def load(model: Any, precision: str, data_set: str | None, device: str) -> Model: ...
 def networks() -> list[str]: ...
+def devices() -> list[str]: ...
+def check_device(device: str) -> None: ...
 def evaluate(pairs: Any, kind: str, crop: str, cap: float, min_depth: float) -> str: ...
 def simulate(
     out: Any, frames: int, seed: int, scene: str, moving_cars: int, width: int, height: int, scan_every: int
@@ -142,13 +174,14 @@ def adapt(asked: dict[str, Any], callback: Callable[[dict[str, Any]], bool | Non
 def undo_adaptation(out: Any) -> None: ...
 def command(arguments: Sequence[str]) -> int: ...
 
+@final
 class Perception:
-    def __init__(self, settings: str, exact: bool) -> None: ...
+    def __new__(cls, settings: str, exact: bool) -> Perception: ...
     def reset(self) -> None: ...
     def detect(
         self,
         depth: NDArray[np.float32],
-        intrinsics: Intrinsics,
+        intrinsics: _Intrinsics,
         sigma: NDArray[np.float32] | None,
         time_s: float | None,
         world_from_cam: NDArray[np.float64] | None,

@@ -108,8 +108,9 @@ def train(
     camera: str | None = None,
     resume: bool = False,
     workers: Workers | None = None,
+    device: str = "cpu",
 ) -> Run:
-    """Learns metric depth from recordings, without depth labels, on this machine's processor.
+    """Learns metric depth from recordings, without depth labels.
 
     `config` is a preset ("tiny", "light", "resnet50", "paper", "monodepth2", "monodepth2-50", "lite-mono", "lite-mono-small", "lite-mono-tiny",
     "lite-mono-8m", "r-msfm3", "r-msfm6", "sfmlearner"), the path of a TOML file, or a dict over a preset:
@@ -124,6 +125,9 @@ def train(
     `workers` are several processes that learn one network together, as `deepfusion.distributed` connects them: each calls `train` with
     the same arguments, `batch` and `accumulate` are each one's own, and worker 0 validates and writes the run. K workers learn what one
     learns with `accumulate` K times as large.
+
+    `device` is where it learns, as in `load`: "cpu", "auto", "cuda:1". On a GPU a preset has larger sizes, and `"precision": "bf16"` is for
+    those with tensor cores.
 
     `callback` gets each `TrainEvent`; where it returns False, training stops after the step and the run is saved. What it raises
     stops it as well, and is raised here. Ctrl-C saves the run and raises KeyboardInterrupt.
@@ -155,6 +159,7 @@ def train(
         "init": init,
         "resume": resume,
         "workers": workers,
+        "device": device,
     }
     figures = _native.train(asked, callback)
     return Run(**figures)

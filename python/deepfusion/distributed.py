@@ -54,7 +54,8 @@ class Mpi:
 class Torch:
     """A process group of `torch.distributed` (gloo, NCCL), as Ray Train, torchrun or Slurm set it up.
 
-    `group` is by default the one that `torch.distributed.init_process_group` made.
+    `group` is by default the one that `torch.distributed.init_process_group` made. With NCCL gradients are added on torch's current GPU:
+    `torch.cuda.set_device` says which, before this is made. What they are learned on is `train`'s `device`.
     """
 
     def __init__(self, group: Any = None) -> None:
@@ -64,13 +65,14 @@ class Torch:
         self._torch, self._distributed, self._group = torch, distributed, group
         self.rank: int = distributed.get_rank(group)
         self.count: int = distributed.get_world_size(group)
-        self._on_gpu = distributed.get_backend(group) == "nccl"
+        # Torch's current GPU is a thread's own, and `sum` is called on another one.
+        self._gpu = torch.cuda.current_device() if distributed.get_backend(group) == "nccl" else None
 
     def sum(self, values: np.ndarray) -> None:
         # By the buffer, not by NumPy: torch need not be built for the NumPy that is there.
         shared = self._torch.frombuffer(values, dtype=self._torch.float32)
-        if self._on_gpu:
-            moved = shared.cuda()
+        if self._gpu is not None:
+            moved = shared.cuda(self._gpu)
             self._distributed.all_reduce(moved, group=self._group)
             shared.copy_(moved)
         else:

@@ -2,12 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use deepfusion::jobs::devices::ComputeDevice;
+use deepfusion::jobs::engine::EngineSettings;
 use deepfusion::jobs::training::adaptation::{AdaptSettings, Adaptation, undo};
-use deepfusion::runtime::{DepthEstimator, ModelSource, Precision};
-use deepfusion::train::Device;
+use deepfusion::model::Compute;
+use deepfusion::runtime::{DepthEstimator, ModelSource};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::device;
 use crate::error::{Failure, raise};
 use crate::interrupt::interruptible;
 use crate::train::{Listener, Warnings};
@@ -30,12 +33,13 @@ struct AdaptRequest {
     held_out: f64,
     speed_error: f64,
     seed: u64,
+    device: String,
     /// `key=value` over the configuration.
     settings: Vec<String>,
 }
 
 impl AdaptRequest {
-    fn settings(&self) -> Result<AdaptSettings, Failure> {
+    fn settings(&self, compute: Compute) -> Result<AdaptSettings, Failure> {
         let camera = self.camera.parse().map_err(|_| Failure {
             message: format!("camera: `{}`", self.camera),
             hint: Some("\"2\", \"3\" or \"both\"".into()),
@@ -62,6 +66,7 @@ impl AdaptRequest {
             speed_sd: self.speed_error,
             seed: self.seed,
             set: self.settings.clone(),
+            compute,
             ..AdaptSettings::new(self.data.clone(), self.out.clone())
         })
     }
@@ -79,13 +84,14 @@ pub fn adapt(
     deepfusion_cli::keep_memory();
     let outcome = interruptible(py, |stop| -> Result<_, Failure> {
         let judging = &mut |_, _| stop.unwind_if_asked();
+        let place = device::named(&asked.device)?;
+        let device = device::open(place)?;
         let given = ModelSource::named(&asked.model)?;
-        let mut estimator = fused(&given, asked.data_set.as_deref())?;
-        let device = Device::flex();
+        let mut estimator = loaded(&given, asked.data_set.as_deref(), place)?;
         let mut quiet = |_: &_, _: &[_]| ();
         let adaptation = Adaptation::begin(
             given,
-            asked.settings()?,
+            asked.settings(place.compute())?,
             &mut estimator,
             &device,
             &mut quiet,
@@ -115,7 +121,7 @@ pub fn adapt(
                 hint: Some("the same call goes on".into()),
             });
         }
-        let mut learned = fused(&ModelSource::named(adaptation.work())?, None)?;
+        let mut learned = loaded(&ModelSource::named(adaptation.work())?, None, place)?;
         let outcome = adaptation.end(summary.steps, &mut learned, judging)?;
         serde_json::to_string(&outcome).map_err(|error| Failure {
             message: format!("the outcome cannot be written as JSON: {error}"),
@@ -129,8 +135,14 @@ pub fn adapt(
     Ok(outcome??)
 }
 
-fn fused(network: &ModelSource, set: Option<&str>) -> Result<DepthEstimator, Failure> {
-    Ok(DepthEstimator::fused(network.load(set)?, Precision::F32)?)
+/// The network on this device, in f32.
+fn loaded(
+    network: &ModelSource,
+    set: Option<&str>,
+    place: ComputeDevice,
+) -> Result<DepthEstimator, Failure> {
+    let engine = EngineSettings::on(place);
+    engine.load(network.load(set)?).map_err(device::failure)
 }
 
 /// Makes an adapted network predict as the one that it began from.

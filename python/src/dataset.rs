@@ -10,6 +10,7 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::error::{raise, with_hint};
+use crate::interrupt::abandonable;
 use crate::model::image_array;
 
 /// A recording of any known layout: one drive, one camera.
@@ -30,9 +31,10 @@ impl Dataset {
             camera,
             ..OpenOptions::default()
         };
-        let mut all = py
-            .detach(|| data::Dataset::open(&path, &options))
-            .map_err(raise)?;
+        // A large recording takes long to look through.
+        let given = path.clone();
+        let open = move || data::Dataset::open(&given, &options);
+        let mut all = abandonable(py, open)?.map_err(raise)?;
         if drive >= all.len() {
             let message = format!("{}: drive {drive} of {}", path.display(), all.len());
             let hint = "drives are counted from 0; give the folder of one drive".to_owned();
@@ -61,6 +63,13 @@ impl Dataset {
             dataset: Arc::clone(&self.inner),
             index: *found,
         })
+    }
+
+    fn __iter__(&self) -> Frames {
+        Frames {
+            dataset: Arc::clone(&self.inner),
+            next: 0,
+        }
     }
 
     /// The drive's.
@@ -100,6 +109,29 @@ impl Dataset {
         let (name, frames) = (self.inner.name(), self.__len__());
         let s = if frames == 1 { "" } else { "s" };
         format!("Dataset({name:?}, {frames} frame{s}, {})", self.layout())
+    }
+}
+
+/// The frames of a recording, one after another.
+#[pyclass(module = "deepfusion._native")]
+struct Frames {
+    dataset: Arc<data::Dataset>,
+    next: usize,
+}
+
+#[pymethods]
+impl Frames {
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    fn __next__(&mut self) -> Option<Frame> {
+        let index = *self.dataset.selected().get(self.next)?;
+        self.next += 1;
+        Some(Frame {
+            dataset: Arc::clone(&self.dataset),
+            index,
+        })
     }
 }
 

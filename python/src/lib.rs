@@ -4,6 +4,7 @@ mod adapt;
 mod bulk;
 mod command;
 mod dataset;
+mod device;
 mod error;
 mod interrupt;
 mod measure;
@@ -23,6 +24,8 @@ mod _native {
     use super::command::command;
     #[pymodule_export]
     use super::dataset::{Dataset, Frame};
+    #[pymodule_export]
+    use super::device::{built, check_device};
     #[pymodule_export]
     use super::error::DeepFusionError;
     #[pymodule_export]

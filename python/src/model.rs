@@ -7,17 +7,22 @@ use deepfusion::data::{RgbImage, load_photo};
 use deepfusion::eval::PostProcess;
 use deepfusion::geometry::cloud::PointCloud;
 use deepfusion::geometry::{DepthMap, Intrinsics};
+use deepfusion::jobs::devices::ComputeDevice;
+use deepfusion::jobs::engine::EngineSettings;
 use deepfusion::jobs::evaluation::augmentation;
 use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
 use crate::bulk::{BulkRequest, Predictions};
+use crate::device;
 use crate::error::{Failure, raise, with_hint};
+use crate::interrupt::abandonable;
+use crate::perceive::depth_map;
 
 /// The names of the networks inside the package.
 #[pyfunction]
@@ -32,6 +37,7 @@ pub fn load(
     model: PathBuf,
     precision: &str,
     data_set: Option<String>,
+    device: String,
 ) -> PyResult<Model> {
     let precision = match precision {
         "f32" => Precision::F32,
@@ -43,23 +49,32 @@ pub fn load(
             return Err(PyValueError::new_err(message));
         }
     };
-    let open = || {
+    let open = move || -> Result<_, Failure> {
+        let place = device::named(&device)?;
         let network = ModelSource::named(&model)?.load(data_set.as_deref())?;
-        DepthEstimator::fused(network, precision)
+        let engine = EngineSettings {
+            precision,
+            ..EngineSettings::on(place)
+        };
+        let estimator = engine.load(network).map_err(device::failure)?;
+        Ok(Model::new(estimator, place))
     };
-    py.detach(open).map(Model::new).map_err(raise)
+    // Large weights are read, and packed or moved to a GPU: that can take a while.
+    Ok(abandonable(py, open)??)
 }
 
 /// A trained network.
 #[pyclass(frozen, module = "deepfusion")]
 pub struct Model {
     estimator: Mutex<DepthEstimator>,
+    device: ComputeDevice,
 }
 
 impl Model {
-    fn new(estimator: DepthEstimator) -> Self {
+    fn new(estimator: DepthEstimator, device: ComputeDevice) -> Self {
         Self {
             estimator: Mutex::new(estimator),
+            device,
         }
     }
 
@@ -141,7 +156,8 @@ impl Model {
     /// The same network for another thread: it shares the weights.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
         let another = py.detach(|| self.with(|estimator| estimator.another()));
-        another.map(Self::new).map_err(raise)
+        let another = another.map_err(raise)?;
+        Ok(Self::new(another, self.device))
     }
 
     /// Width and height trained with.
@@ -157,10 +173,16 @@ impl Model {
         py.detach(|| self.with(|estimator| estimator.step))
     }
 
-    /// What runs it: "fused".
+    /// What runs it: "fused" on a processor ("fused-bf16", "fused-int8"), "burn" on a GPU.
     #[getter]
     fn engine(&self, py: Python<'_>) -> &'static str {
         py.detach(|| self.with(|estimator| estimator.engine()))
+    }
+
+    /// Where it runs: "cpu", "cuda:1".
+    #[getter]
+    fn device(&self) -> String {
+        self.device.to_string()
     }
 }
 
@@ -273,9 +295,15 @@ pub struct Prediction {
     prediction: deepfusion::Prediction,
     image: RgbImage,
     camera: Option<Intrinsics>,
-    /// Made once: whoever asks again gets the same array.
-    depth: PyOnceLock<Py<PyArray2<f32>>>,
+    /// Each made once: whoever asks again gets the same array.
+    depth: PyOnceLock<Plane>,
+    sigma: PyOnceLock<Option<Plane>>,
+    confidence: PyOnceLock<Option<Plane>>,
+    disparity: PyOnceLock<Plane>,
 }
+
+/// An array of H x W.
+type Plane = Py<PyArray2<f32>>;
 
 impl Prediction {
     pub fn new(
@@ -289,6 +317,9 @@ impl Prediction {
             image,
             camera,
             depth: PyOnceLock::new(),
+            sigma: PyOnceLock::new(),
+            confidence: PyOnceLock::new(),
+            disparity: PyOnceLock::new(),
         }
     }
 
@@ -303,7 +334,7 @@ impl Prediction {
 impl Prediction {
     /// H x W metres at the image's size; 0 outside of what the network looked at. One array, made once.
     #[getter]
-    fn depth(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
+    fn depth(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.depth.get_or_try_init(py, || {
             let made = self
                 .made
@@ -316,30 +347,27 @@ impl Prediction {
         Ok(array.clone_ref(py))
     }
 
-    /// Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated.
+    /// Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated. One array, made once.
     #[getter]
-    fn sigma(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
-        let sigma = py.detach(|| self.prediction.sigma());
-        sigma
-            .map(|sigma| image_array(py, sigma.height, sigma.width, sigma.data))
-            .transpose()
+    fn sigma(&self, py: Python<'_>) -> PyResult<Option<Plane>> {
+        once(py, &self.sigma, || self.prediction.sigma())
     }
 
     /// How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
-    /// None of a network that does not say. Not calibrated.
+    /// None of a network that does not say. Not calibrated. One array, made once.
     #[getter]
-    fn confidence(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
-        let confidence = py.detach(|| self.prediction.confidence());
-        confidence
-            .map(|map| image_array(py, map.height, map.width, map.data))
-            .transpose()
+    fn confidence(&self, py: Python<'_>) -> PyResult<Option<Plane>> {
+        once(py, &self.confidence, || self.prediction.confidence())
     }
 
-    /// 1/m, at the network's size.
+    /// 1/m, at the network's size. One array, made once.
     #[getter]
-    fn disparity(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
-        let p = &self.prediction;
-        image_array(py, p.height, p.width, p.disparity.clone())
+    fn disparity(&self, py: Python<'_>) -> PyResult<Plane> {
+        let array = self.disparity.get_or_try_init(py, || {
+            let p = &self.prediction;
+            image_array(py, p.height, p.width, p.disparity.clone())
+        })?;
+        Ok(array.clone_ref(py))
     }
 
     /// fx, fy, cx, cy of the image, where they are known.
@@ -364,7 +392,7 @@ impl Prediction {
         self.depth(py)?.bind(py).call_method0("__dlpack_device__")
     }
 
-    /// Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3; needs `intrinsics`.
+    /// Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3, of `depth` as it stands there; needs `intrinsics`.
     #[pyo3(signature = (max_depth=80.0))]
     fn cloud<'py>(&self, py: Python<'py>, max_depth: f32) -> PyResult<Points<'py>> {
         let Some(camera) = self.camera else {
@@ -373,10 +401,8 @@ impl Prediction {
                 Some("predict(image, intrinsics=(fx, fy, cx, cy))".into()),
             ));
         };
-        let make = || {
-            let depth = self.prediction.depth();
-            PointCloud::from_depth(&depth, &camera, Some(&self.image), max_depth)
-        };
+        let depth = depth_map(&self.depth(py)?.bind(py).try_readonly()?);
+        let make = || PointCloud::from_depth(&depth, &camera, Some(&self.image), max_depth);
         let cloud = py.detach(make).map_err(raise)?;
         let points = cloud.xyz.len();
         let rgb = cloud.rgb.unwrap_or_default();
@@ -385,6 +411,20 @@ impl Prediction {
             columns(py, rgb.len(), rgb.into_flattened())?,
         ))
     }
+}
+
+/// The array of a map, made when it is first asked for.
+fn once(
+    py: Python<'_>,
+    place: &PyOnceLock<Option<Plane>>,
+    make: impl FnOnce() -> Option<DepthMap> + Send,
+) -> PyResult<Option<Plane>> {
+    let array = place.get_or_try_init(py, || {
+        let map = py.detach(make);
+        map.map(|map| image_array(py, map.height, map.width, map.data))
+            .transpose()
+    })?;
+    Ok(array.as_ref().map(|array| array.clone_ref(py)))
 }
 
 /// N×3, without a copy.

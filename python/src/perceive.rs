@@ -86,8 +86,8 @@ impl Perception {
         speed_mps: Option<f64>,
         yaw_rate_radps: f64,
     ) -> PyResult<String> {
-        let depth = map(&depth);
-        let sigma = sigma.map(|sigma| map(&sigma));
+        let depth = depth_map(&depth);
+        let sigma = sigma.map(|sigma| depth_map(&sigma));
         let size = |n: usize| u32::try_from(n).map_err(|e| PyValueError::new_err(e.to_string()));
         let camera = checked(intrinsics, (size(depth.width)?, size(depth.height)?))?;
         let pose = world_from_cam.map(|pose| transform(&pose)).transpose()?;
@@ -151,7 +151,8 @@ fn over(base: &PerceptionConfig, settings: &str) -> PyResult<PerceptionConfig> {
     serde_json::from_value(all).map_err(wrong)
 }
 
-fn map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
+/// The values of an array of H x W metres.
+pub fn depth_map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
     DepthMap {
         width: array.shape()[1],
         height: array.shape()[0],

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
 use deepfusion::jobs::training::{RunLog, Start};
 use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
-use deepfusion::train::{Control, Device, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
+use deepfusion::train::{Control, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::device;
 use crate::error::{Failure, raise};
 use crate::interrupt::{Stop, interruptible};
 
@@ -32,6 +33,7 @@ struct TrainRequest {
     init: Option<PathBuf>,
     resume: bool,
     workers: Option<PythonWorkers>,
+    device: String,
 }
 
 /// The other workers, as an object of Python's connects them: `rank`, `count` and `sum(array)`.
@@ -134,7 +136,8 @@ impl Warnings {
 
 /// The trainer that is asked for.
 fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Failure> {
-    let device = Device::flex();
+    let place = device::named(&asked.device)?;
+    let device = device::open(place)?;
     let workers: Box<dyn Workers> = match &asked.workers {
         Some(others) => others.another(),
         None => Box::new(SingleWorker),
@@ -157,7 +160,7 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
             workers, config, folder, sets, &device,
         )?);
     }
-    let (mut config, is_preset) = configuration(asked)?;
+    let (mut config, is_preset) = configuration(asked, place.compute())?;
     let start = Start::of(asked.init.as_deref(), &config, is_preset)?;
     start.record_in(&mut config)?;
     config.validate()?;
@@ -177,13 +180,14 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
     )?)
 }
 
-/// The configuration that is asked for, and whether it is a preset's: no file then says what the run starts from.
-fn configuration(asked: &TrainRequest) -> Result<(TrainConfig, bool), Failure> {
+/// The configuration that is asked for, and whether it is a preset's: no file then says what the run starts from. A preset's sizes follow
+/// what it is trained on.
+fn configuration(asked: &TrainRequest, compute: Compute) -> Result<(TrainConfig, bool), Failure> {
     let preset = Preset::ALL
         .into_iter()
         .find(|preset| Path::new(preset.name()) == asked.config);
     let mut config = match preset {
-        Some(preset) => preset.config_on(Compute::Processor),
+        Some(preset) => preset.config_on(compute),
         None if asked.config.extension().is_none() && !asked.config.exists() => {
             let names: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
             return Err(Failure {
@@ -194,7 +198,7 @@ fn configuration(asked: &TrainRequest) -> Result<(TrainConfig, bool), Failure> {
                 )),
             });
         }
-        None => TrainConfig::read_over_preset(&asked.config, Compute::Processor)?,
+        None => TrainConfig::read_over_preset(&asked.config, compute)?,
     };
     for assignment in &asked.settings {
         config.set(assignment)?;

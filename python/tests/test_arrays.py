@@ -124,7 +124,7 @@ def test_targets_are_the_commands(drive, model, tmp_path):
     subprocess.run([sys.executable, "-m", "deepfusion", *arguments], check=True)
     lines = (out / "targets.jsonl").read_text().splitlines()
     recording, perception, pose = deepfusion.Dataset(drive), deepfusion.Perception(), np.eye(4)
-    told = 0
+    compared = 0
     for i, (frame, line) in enumerate(zip(recording, lines, strict=True)):
         theirs = json.loads(line)
         if i > 0:
@@ -138,10 +138,10 @@ def test_targets_are_the_commands(drive, model, tmp_path):
             assert np.allclose(mine.center_m, other["center_m"], atol=1e-6)
             assert np.allclose(mine.size_m, other["size_m"], atol=1e-6)
             assert mine.pixels == other["pixels"] and mine.moving == other["moving"]
-            told += 1
+            compared += 1
         if ours.ground is not None:
             assert np.allclose(ours.ground.normal, theirs["ground"]["normal"], atol=1e-6)
-    assert told > 0
+    assert compared > 0
 
 
 def test_perception_says_what_is_wrong():

@@ -58,8 +58,8 @@ def alone(street, tmp_path_factory):
 def launched(command, street, out, connect, resume="new", dies_at=0):
     words = ["-c", textwrap.dedent(WORKER), street, out, connect, resume, dies_at, json.dumps(SMALL)]
     done = subprocess.run([*command, sys.executable, *map(str, words)], capture_output=True, text=True, timeout=300)
-    told = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
-    return done, sorted(told, key=lambda t: t["rank"])
+    printed = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    return done, sorted(printed, key=lambda t: t["rank"])
 
 
 def mpiexec():
@@ -72,10 +72,10 @@ def mpiexec():
 
 
 def test_two_processes_learn_what_one_learns_with_twice_the_batches(street, alone, tmp_path):
-    done, told = launched(mpiexec(), street, tmp_path / "run", "mpi")
+    done, printed = launched(mpiexec(), street, tmp_path / "run", "mpi")
     assert done.returncode == 0, done.stderr
-    assert [t["rank"] for t in told] == [0, 1] and told[0]["losses"] == told[1]["losses"]
-    assert told[0]["losses"] == pytest.approx(alone, rel=1e-4)
+    assert [t["rank"] for t in printed] == [0, 1] and printed[0]["losses"] == printed[1]["losses"]
+    assert printed[0]["losses"] == pytest.approx(alone, rel=1e-4)
     assert deepfusion.load(tmp_path / "run").step in (2, 4)
     assert len([line for line in (tmp_path / "run" / "log.csv").read_text().splitlines() if ",train," in line]) == 4
 
@@ -83,14 +83,14 @@ def test_two_processes_learn_what_one_learns_with_twice_the_batches(street, alon
 def test_a_worker_that_dies_ends_the_run_and_it_is_gone_on_with(street, alone, tmp_path):
     command = mpiexec()
     out = tmp_path / "run"
-    done, told = launched(command, street, out, "mpi", dies_at=3)
-    assert done.returncode != 0 and told == []
+    done, printed = launched(command, street, out, "mpi", dies_at=3)
+    assert done.returncode != 0 and printed == []
     # The checkpoint of step 2 is whole.
     assert deepfusion.load(out / "last.safetensors").step == 2
-    done, told = launched(command, street, out, "mpi", "resume")
+    done, printed = launched(command, street, out, "mpi", "resume")
     assert done.returncode == 0, done.stderr
-    assert told[0]["step"] == 4
-    assert told[0]["losses"] == pytest.approx(alone[2:], rel=1e-4)
+    assert printed[0]["step"] == 4
+    assert printed[0]["losses"] == pytest.approx(alone[2:], rel=1e-4)
 
 
 def test_torch_connects_them_too(street, alone, tmp_path):
@@ -105,9 +105,9 @@ def test_torch_connects_them_too(street, alone, tmp_path):
         subprocess.Popen(list(map(str, words)), env={**os.environ, **group, "RANK": str(rank)}, stdout=subprocess.PIPE, text=True)
         for rank in range(2)
     ]
-    told = [json.loads(process.communicate(timeout=300)[0].splitlines()[-1]) for process in both]
+    printed = [json.loads(process.communicate(timeout=300)[0].splitlines()[-1]) for process in both]
     assert [process.returncode for process in both] == [0, 0]
-    assert told[0]["losses"] == told[1]["losses"] == pytest.approx(alone, rel=1e-4)
+    assert printed[0]["losses"] == printed[1]["losses"] == pytest.approx(alone, rel=1e-4)
 
 
 def test_workers_need_a_folder(street):

@@ -2,11 +2,14 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import deepfusion
 import numpy as np
@@ -264,3 +267,89 @@ def test_a_network_is_learned_by_two_workers_though_one_is_killed(tmp_path):
     steps = [int(line[0]) for line in lines if line[1] == "train"]
     assert steps[-1] == 40
     assert run.losses["total"] == pytest.approx(alone.losses["total"], rel=1e-3)
+
+
+def test_what_computes_is_checked_before_anything_starts(street, tmp_path):
+    def refused(error, **options):
+        with pytest.raises(error) as caught:
+            cluster.predict(street, "tiny", tmp_path / "out", **options)
+        return f"{caught.value} {getattr(caught.value, 'hint', '')}"
+
+    assert "0 or more" in refused(ValueError, gpus_per_worker=-1)
+    assert "idle" in refused(ValueError, gpus_per_worker=1, device="cpu")
+    assert "cpu, " in refused(deepfusion.DeepFusionError, device="gpu")
+    lacking = next((name for name in ("metal", "cuda", "wgpu", "vulkan") if name not in deepfusion.devices()), None)
+    if lacking is not None:
+        assert f"--features {lacking}" in refused(deepfusion.DeepFusionError, device=lacking)
+    if deepfusion.devices() == ["cpu"]:
+        assert "no `cuda` backend" in refused(deepfusion.DeepFusionError, gpus_per_worker=1)
+    assert not (tmp_path / "out").exists()
+
+    for options, expected in [
+        ({"backend": "mpi"}, "gloo"),
+        ({"backend": "nccl"}, "use_gpu"),
+        ({"device": "auto"}, "use_gpu"),
+        ({"device": "cpu", "use_gpu": True}, "idle"),
+    ]:
+        with pytest.raises(ValueError, match=expected):
+            cluster.train(SMALL, street, out=tmp_path / "run", **options)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_processor_by_name_is_the_default(street, tmp_path):
+    """The same outputs, so that a job of before goes on."""
+    job = dict(intrinsics=CAMERA, workers=1)
+    assert cluster.predict(street / "left", "tiny", tmp_path / "out", **job).done == 3
+    assert cluster.predict(street / "left", "tiny", tmp_path / "out", **job, device="cpu", gpus_per_worker=0).kept == 3
+
+
+def test_each_worker_takes_a_gpu_of_its_own():
+    from deepfusion.ray._devices import numbered
+
+    assert [numbered("cuda", index) for index in range(2)] == ["cuda:0", "cuda:1"]
+    assert numbered("auto", 1) in {"cpu", "cuda:1", "metal:1", "vulkan:1", "wgpu:1"}
+
+
+GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "on-a-cluster.md"
+
+# Nothing is learned for long here.
+SHORTER = [
+    ("frames=40", "frames=10, size=(192, 64)"),
+    ('"steps": 20', '"steps": 2, "size": {"width": 64, "height": 64}, "validation_share": 0.3'),
+    ("seeds=[1, 2, 3]", "seeds=[1]"),
+    ("trials=2", "trials=1"),
+]
+
+
+def test_what_the_guide_shows_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(), re.DOTALL)
+    assert len(blocks) >= 5
+    names: dict = {}
+    skipped = set()
+    for shown in blocks:
+        for long, short in SHORTER:
+            shown = shown.replace(long, short)
+        if "deepfusion.ray.train(" in shown and not _has("torch"):
+            skipped.add("torch")
+        elif shown.startswith("# mpiexec"):
+            launcher = shutil.which("mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+            if launcher is None or not _has("mpi4py"):
+                skipped.add("MPI")
+                continue
+            # Another run than the block before made.
+            (tmp_path / "learn.py").write_text(shown.replace('out="shared"', 'out="by-mpi"'))
+            words = [launcher, "-n", "2", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", sys.executable, "learn.py"]
+            subprocess.run(words, check=True, timeout=300)
+            assert (tmp_path / "by-mpi" / "last.safetensors").exists()
+        else:
+            exec(compile(shown, str(GUIDE), "exec"), names)
+    assert (names["summary"].done, names["summary"].failed) == (10, []) and "bad" in names
+    assert all(trial.error is None for trial in names["trials"]) and list(names["rows"]) == ["all", "no smoothness"]
+    assert "torch" in skipped or names["run"].step == 2
+
+
+def _has(package):
+    from importlib.util import find_spec
+
+    return find_spec(package) is not None

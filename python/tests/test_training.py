@@ -1,6 +1,7 @@
 """Learning from a simulated street, seen from Python."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -196,3 +197,39 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
     """
     code, rest, seconds = interrupted(code, "begun", street)
     assert code == 0 and "interrupted" in rest and seconds < 20
+
+
+@pytest.mark.skipif(os.name != "posix", reason="makes a pipe, sends SIGINT")
+@pytest.mark.parametrize("call", ["Dataset", "load"])
+def test_ctrl_c_ends_what_reads_for_long(run, street, tmp_path, call):
+    """A file that never comes stands for a large recording, or weights on a slow disk."""
+    if call == "Dataset":
+        date = tmp_path / street.parent.name
+        given = date / street.name
+        shutil.copytree(street, given)
+        for calibration in street.parent.glob("*.txt"):
+            shutil.copy(calibration, date)
+        slow = given / "image_02" / "timestamps.txt"
+        slow.unlink()
+    else:
+        given = tmp_path
+        shutil.copy(run[0].path / "config.toml", given)
+        slow = given / "last.safetensors"
+    os.mkfifo(slow)
+    code = f"""
+        import os, signal, sys, threading
+        import deepfusion
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            deepfusion.{call}(sys.argv[1])
+        except KeyboardInterrupt:
+            print("interrupted")
+    """
+    ended = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code), str(given)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (ended.returncode, ended.stdout) == (0, "interrupted\n"), ended.stderr

@@ -17,22 +17,6 @@ pub(crate) enum CliError {
         /// The option that allows it, or what else to do.
         remedy: &'static str,
     },
-    /// A device whose backend was not compiled in.
-    #[error("this build has no `{device}` backend")]
-    NoBackend {
-        /// The device's name.
-        device: &'static str,
-    },
-    /// A device that this machine does not have.
-    #[error("no device `{device}`: this machine has {count} of the `{backend}` backend")]
-    NoSuchDevice {
-        /// As it was given.
-        device: String,
-        /// Its backend.
-        backend: &'static str,
-        /// How many devices that has here.
-        count: usize,
-    },
     /// A device that computes something else than the processor.
     #[cfg(feature = "train")]
     #[error("{wrong} of {of} operations on `{device}` are not what the processor computes")]
@@ -126,15 +110,6 @@ pub(crate) enum CliError {
         /// The output's name.
         path: PathBuf,
     },
-    /// An engine for processors on another device.
-    #[error("only `--engine burn` computes on other devices than the processor")]
-    OnlyOnCpu,
-    /// A library for another engine.
-    #[error("`--ort-lib` needs `--engine ort`")]
-    OnlyOrt,
-    /// A precision that an engine does not have.
-    #[error("`--precision bf16` is the fused engine's")]
-    OnlyFused,
     /// Several recordings, of which some cannot be read, or all for different reasons.
     #[error("{}: {unreadable} of {} cannot be read", path.display(), count_of(*recordings, "recording"))]
     Unreadable {
@@ -279,17 +254,8 @@ impl Reportable for CliError {
     fn remedy(&self) -> Option<String> {
         match self {
             Self::Exists { remedy, .. } => Some((*remedy).to_owned()),
-            Self::NoBackend { device } => Some(format!(
-                "build it with `cargo build --release --features {device}`, or use --device cpu"
-            )),
-            Self::NoSuchDevice { backend, count: 1.., .. } => Some(format!(
-                "they are counted from 0: `--device {backend}` takes the one that the backend prefers"
-            )),
             #[cfg(feature = "train")]
             Self::DeviceDiffers { remedy, .. } => Some(remedy.clone()),
-            Self::NoSuchDevice { .. } => Some(
-                "is the GPU's driver installed, and may this user open it? `--device cpu` computes on the processor".into(),
-            ),
             #[cfg(not(feature = "rerun"))]
             Self::NoRerun => Some(
                 "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
@@ -309,9 +275,6 @@ impl Reportable for CliError {
             Self::NoRos2Writer { .. } => {
                 Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
             }
-            Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
-            Self::OnlyOrt => Some("add --engine ort, or leave out --ort-lib".into()),
-            Self::OnlyFused => Some("give --engine fused --device cpu, or leave out --precision".into()),
             Self::SomeFailed { hint, resumes, .. } => Some(match hint {
                 Some(hint) => format!("{hint}; then {}", again(*resumes)),
                 None => format!("mend them, then {}", again(*resumes)),

@@ -46,6 +46,16 @@ impl Reportable for Error {
                 "setting `{}`: expected none beside [[data.sets]] in the config file: each set has its own, found both",
                 option_of(setting)
             ),
+            Self::OnlyOnCpu => {
+                "only `--engine burn` computes on other devices than the processor".into()
+            }
+            Self::OnlyFused { precision } => {
+                format!("`--precision {}` is the fused engine's", precision.name())
+            }
+            Self::OnlyOrt => "`--ort-lib` needs `--engine ort`".into(),
+            Self::NoFramework => {
+                "--engine burn, or another device than the processor, needs the training framework, which this build leaves out".into()
+            }
             other => wrapped(other).map_or_else(|| other.to_string(), Reportable::message),
         }
     }
@@ -91,6 +101,25 @@ impl Reportable for Error {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
             }
             Self::SawReal { .. } => Some("leave --simulated-only out".into()),
+            Self::NoBackend { device } => Some(format!(
+                "build it with `cargo build --release --features {device}`, or use --device cpu"
+            )),
+            Self::NoSuchDevice {
+                backend, count: 1.., ..
+            } => Some(format!(
+                "they are counted from 0: `--device {backend}` takes the one that the backend prefers"
+            )),
+            Self::NoSuchDevice { .. } => Some(
+                "is the GPU's driver installed, and may this user open it? `--device cpu` computes on the processor".into(),
+            ),
+            Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
+            Self::OnlyFused { .. } => {
+                Some("give --engine fused --device cpu, or leave out --precision".into())
+            }
+            Self::OnlyOrt => Some("add --engine ort, or leave out --ort-lib".into()),
+            Self::NoFramework => {
+                Some("use a program built with the feature `train`, which is on by default".into())
+            }
             #[cfg(feature = "train")]
             Self::NotJudged { .. } => Some(
                 "give longer drives with a speed, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
@@ -217,6 +246,30 @@ mod tests {
             error.to_string(),
             "`--intrinsics`: learn contradicts the run, which has it off"
         );
+    }
+
+    #[test]
+    fn engines_and_devices_are_options() {
+        let precision = deepfusion_infer::Precision::Bf16;
+        let error = Failure::from(Error::OnlyFused { precision });
+        assert_eq!(
+            error.to_string(),
+            "`--precision bf16` is the fused engine's"
+        );
+        for error in [
+            Error::OnlyOnCpu,
+            Error::OnlyFused { precision },
+            Error::OnlyOrt,
+            Error::NoBackend { device: "cuda" },
+            Error::NoSuchDevice {
+                device: "cuda:1".into(),
+                backend: "cuda",
+                count: 1,
+            },
+        ] {
+            let error = Failure::from(error);
+            assert!(error.hint().is_some_and(|hint| hint.contains("--")));
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use deepfusion_data::{DatasetKind, NoNamedTopic};
 use deepfusion_hint::Hint;
 use deepfusion_records::Difference;
+use deepfusion_runtime::Precision;
 
 use crate::bulk::Shard;
 
@@ -216,6 +217,37 @@ pub enum Error {
         /// Why not.
         source: toml::ser::Error,
     },
+    /// A device whose backend was not compiled in.
+    #[error("this build has no `{device}` backend")]
+    NoBackend {
+        /// The backend's name, which is that of its feature.
+        device: &'static str,
+    },
+    /// A device that this machine does not have.
+    #[error("no device `{device}`: this machine has {count} of the `{backend}` backend")]
+    NoSuchDevice {
+        /// As it was given.
+        device: String,
+        /// Its backend.
+        backend: &'static str,
+        /// How many devices that has here.
+        count: usize,
+    },
+    /// An engine for processors on another device.
+    #[error("only Burn computes on other devices than the processor")]
+    OnlyOnCpu,
+    /// A precision that an engine does not have.
+    #[error("only the fused engine, on the processor, computes in {}", precision.name())]
+    OnlyFused {
+        /// What was asked for.
+        precision: Precision,
+    },
+    /// A library for another engine.
+    #[error("a library of ONNX Runtime is given, and another engine runs the network")]
+    OnlyOrt,
+    /// Burn, in a build without it.
+    #[error("Burn, and with it any device but the processor, is left out of this build")]
+    NoFramework,
     /// An embedded network that is not the one a configuration began from.
     #[cfg(feature = "train")]
     #[error(
@@ -542,6 +574,25 @@ impl Hint for Error {
             Self::OtherStart { .. } => Some(
                 "take the version of the program that made the run, or remove init_sha256 from the file to begin from this one".into(),
             ),
+            Self::NoBackend { device } => Some(format!(
+                "build it with the feature `{device}`, or compute on the processor"
+            )),
+            Self::NoSuchDevice { count: 1.., .. } => Some(
+                "they are counted from 0; without a number the backend takes the one that it prefers".into(),
+            ),
+            Self::NoSuchDevice { .. } => Some(
+                "is the GPU's driver installed, and may this user open it? The processor computes the same".into(),
+            ),
+            Self::OnlyOnCpu => {
+                Some("leave the engine to be chosen, or compute on the processor".into())
+            }
+            Self::OnlyFused { .. } => {
+                Some("compute on the processor in the fused engine, or in f32".into())
+            }
+            Self::OnlyOrt => {
+                Some("choose ONNX Runtime as the engine, or leave its library out".into())
+            }
+            Self::NoFramework => Some("build it with the feature `train`".into()),
             #[cfg(feature = "train")]
             Self::AdaptedBefore { .. } => {
                 Some("choose another folder: what was adapted before stays".into())

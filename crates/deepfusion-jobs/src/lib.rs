@@ -15,6 +15,7 @@
 //! | [`int8`] | the ranges of what a network's convolutions read, for int8 |
 //! | [`averaging`] | the mean of several runs' weights |
 //! | [`packing`] | a run's network as a file of its own, with its card |
+//! | [`devices`], [`engine`] | where a network computes, and what runs it there |
 //! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
 //! | [`machine`] | what this machine has: vector instructions, memory, disk |
 //! | [`RunHistory`] | how a run learned, by what its folder keeps |
@@ -43,6 +44,8 @@ pub mod bench;
 pub mod board;
 pub mod bulk;
 pub mod dates;
+pub mod devices;
+pub mod engine;
 mod error;
 pub mod evaluation;
 #[cfg(feature = "train")]

@@ -97,7 +97,7 @@ def _inspect(path: str) -> Row:
     }
 
 
-_EMPTY = {
+_EMPTY: dict[Callable[[str], Row], Row] = {
     _doctor: {"drives": None, "frames": None, "errors": None, "warnings": None, "findings": [], "report": None},
     _inspect: dict.fromkeys(["layout", "drives", "frames", "usable_pairs", "distance_m", "duration_s", "report"]),
 }

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ray
@@ -22,7 +22,11 @@ from ray.util import metrics
 
 import deepfusion
 
+from ._devices import of_workers
 from ._storage import Folder, Sources, images, urls, weights_mark
+
+if TYPE_CHECKING:
+    from deepfusion._native import _PostProcess as PostProcess
 
 _LOG = logging.getLogger(__name__)
 
@@ -68,13 +72,14 @@ class _Job:
     intrinsics: tuple[float, float, float, float] | None
     focal_correction: bool
     stretch: bool
-    post_process: str | None
+    post_process: PostProcess | None
     output: str
     save: tuple[str, ...]
     overwrite: bool
     threads: int
     options: dict[str, Any]
     weights: str | None
+    device: str
 
     def made_with(self) -> dict[str, Any]:
         """What the outputs depend on beside the image."""
@@ -89,6 +94,9 @@ class _Job:
         # Absent where there is one prediction, as in what was made before there could be more.
         if self.post_process is not None:
             made["post_process"] = self.post_process
+        # A GPU's last digits are its own.
+        if self.device != "cpu":
+            made["device"] = self.device.partition(":")[0]
         return made
 
 
@@ -106,7 +114,7 @@ class _Worker:
             model = job.model
             if "://" in model:
                 model = stack.enter_context(self.sources.local_tree(model))
-            self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set)
+            self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set, device=job.device)
         self.counted = metrics.Counter("deepfusion_images", "Images by outcome", ("outcome",))
         self.took = metrics.Histogram("deepfusion_image_seconds", "Wall time of an image", [0.01, 0.03, 0.1, 0.3, 1, 3, 10])
 
@@ -173,7 +181,7 @@ class _Worker:
         if when != mark:
             return "failed", "the image has changed since its depth was made; overwrite=True makes it anew"
         if made_with != self.made_with:
-            differs = [key for key in self.made_with if made_with.get(key) != self.made_with[key]]
+            differs = [key for key in {**self.made_with, **made_with} if made_with.get(key) != self.made_with.get(key)]
             return "failed", f"its depth was made with another {', '.join(differs)}; overwrite=True makes it anew"
         parent = name.rpartition("/")[0]
         for file, size, crc32 in files:
@@ -247,11 +255,13 @@ def predict(
     save: Sequence[str] = ("depth-png",),
     workers: int | None = None,
     cpus_per_worker: int = 1,
+    gpus_per_worker: float = 0,
+    device: str | None = None,
     precision: str = "f32",
     data_set: str | None = None,
     focal_correction: bool = True,
     stretch: bool = False,
-    post_process: str | None = None,
+    post_process: PostProcess | None = None,
     overwrite: bool = False,
     storage_options: Mapping[str, Any] | None = None,
 ) -> PredictSummary:
@@ -264,8 +274,12 @@ def predict(
     (`NAME_depth.npy`, f32 metres), "sigma" and "confidence" (`NAME_sigma.npy`, `NAME_confidence.npy`, of a network that says how sure it
     is). `post_process` is that of `Model.predict`.
 
-    Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads. An
-    image's `NAME.json` is written last and marks it as done: what is there whole, of the same image, network and options, is kept.
+    Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads, and with
+    `gpus_per_worker` a GPU, or a share of one (0.5: two processes on each). It then computes there: `device` is "auto" by default, or the
+    backend (as in `deepfusion.load`). By CUDA each process sees the GPU that Ray gave it and no other; by another backend all processes of a
+    machine take the one that this prefers.
+
+    An image's `NAME.json` is written last and marks it as done: what is there whole, of the same image, network and options, is kept.
     So a job goes on where it was stopped, by the same call. A worker that dies is replaced, and what it had not finished is done
     again. An image that cannot be read, or whose outputs are of something else, is in the summary's `failed`; the others are done.
     """
@@ -275,12 +289,17 @@ def predict(
     for name, number in [("workers", workers), ("cpus_per_worker", cpus_per_worker)]:
         if number is not None and number < 1:
             raise ValueError(f"{name}: expected at least 1, found {number}")
+    if gpus_per_worker < 0:
+        raise ValueError(f"gpus_per_worker: expected 0 or more, found {gpus_per_worker}")
+    device = of_workers(device, gpus_per_worker)
+    if device != "cpu" and precision != "f32":
+        raise ValueError(f"precision: a GPU computes in f32, found {precision}")
     options = dict(storage_options or {})
     model = os.fspath(model)
     if "://" not in model and os.path.exists(model):
         model = os.path.abspath(model)
     if "://" not in model:
-        # Here rather than in each worker: a wrong name or a run without weights is one error, at once.
+        # Here rather than in each worker: a wrong name or a run without weights is one error, at once. This machine may have no GPU.
         network = deepfusion.load(model, precision=precision, data_set=data_set)
         grey = np.full((64, 64, 3), 128, np.uint8)
         unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
@@ -289,12 +308,16 @@ def predict(
             network.predict(grey, post_process=post_process)
         if unsaid and network.predict(grey).sigma is None:
             raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
+    camera = None
+    if intrinsics is not None:
+        fx, fy, cx, cy = map(float, intrinsics)
+        camera = (fx, fy, cx, cy)
     job = _Job(
         id=uuid.uuid4().hex,
         model=model,
         precision=precision,
         data_set=data_set,
-        intrinsics=None if intrinsics is None else tuple(map(float, intrinsics)),
+        intrinsics=camera,
         focal_correction=focal_correction,
         stretch=stretch,
         post_process=post_process,
@@ -304,12 +327,17 @@ def predict(
         threads=cpus_per_worker,
         options=options,
         weights=weights_mark(model, options),
+        device=device,
     )
     named = images(urls(paths), options)
     if not ray.is_initialized():
         ray.init()
     if workers is None:
-        workers = max(1, int(ray.cluster_resources().get("CPU", 1)) // cpus_per_worker)
+        there = ray.cluster_resources()
+        room = int(there.get("CPU", 1)) // cpus_per_worker
+        if gpus_per_worker:
+            room = min(room, int(there.get("GPU", 0) / gpus_per_worker))
+        workers = max(1, room)
     blocks = min(-(-len(named) // _BATCH), _MOST_BLOCKS)
     begun = time.monotonic()
     rows = ray.data.from_items([{"image": url, "name": name} for url, name in named], override_num_blocks=blocks)
@@ -319,6 +347,7 @@ def predict(
         batch_size=_BATCH,
         compute=ray.data.ActorPoolStrategy(min_size=1, max_size=min(workers, blocks)),
         num_cpus=cpus_per_worker,
+        num_gpus=gpus_per_worker or None,
     )
     counts = {"done": 0, "kept": 0, "failed": 0}
     failed = []

@@ -12,8 +12,8 @@ from typing import Any
 
 import deepfusion
 
+from ._devices import numbered, of_workers
 from ._storage import urls
-
 
 _FIGURES = "ray-train.json"
 """What the run came to, in its folder."""
@@ -26,6 +26,9 @@ def train(
     out: str | PathLike[str],
     workers: int = 2,
     cpus_per_worker: int = 1,
+    use_gpu: bool = False,
+    device: str | None = None,
+    backend: str = "gloo",
     restarts: int = 3,
     init: str | PathLike[str] | None = None,
     validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
@@ -33,11 +36,22 @@ def train(
 ) -> deepfusion.Run:
     """Learns one network with several workers, each with `config`'s own `batch` and `accumulate`, as `deepfusion.distributed` has it.
 
-    Needs torch, whose process group (gloo) adds the gradients. `out` is a folder that all machines see; a run that is there goes on
-    with its own configuration. Where a worker dies Ray starts all of them again, at most `restarts` times, and they go on from the last
-    checkpoint (`checkpoint_minutes`, `validate_every`). The package trains on
-    processors: no GPU is asked for.
+    Needs torch, whose process group adds the gradients: `backend` is "gloo", or "nccl" between GPUs, with a torch that has CUDA. `out` is
+    a folder that all machines see; a run that is there goes on with its own configuration. Where a worker dies Ray starts all of them
+    again, at most `restarts` times, and they go on from the last checkpoint (`checkpoint_minutes`, `validate_every`).
+
+    With `use_gpu` each worker is given a GPU and learns on it: `device` is "auto" by default, or the backend ("cuda", "vulkan"), without a
+    number: Ray says which of a machine's GPUs is whose.
     """
+    if backend not in ("gloo", "nccl"):
+        raise ValueError(f'backend: expected "gloo" or "nccl", found {backend!r}')
+    if backend == "nccl" and not use_gpu:
+        raise ValueError("backend: nccl adds on GPUs alone: use_gpu=True, or gloo")
+    device = of_workers(device, int(use_gpu))
+    if ":" in device:
+        raise ValueError(f"device: Ray says which GPU is whose: {device.partition(':')[0]!r}, found {device!r}")
+    if device != "cpu" and not use_gpu:
+        raise ValueError(f"device: {device!r} needs use_gpu=True, which gives each worker a GPU")
     from ray.train import FailureConfig, RunConfig, ScalingConfig
     from ray.train.torch import TorchConfig, TorchTrainer
 
@@ -51,12 +65,14 @@ def train(
         "validation": None if validation is None else urls(validation),
         "camera": camera,
         "threads": cpus_per_worker,
+        "device": device,
+        "backend": backend,
     }
     trainer = TorchTrainer(
         _learn,
         train_loop_config=arguments,
-        torch_config=TorchConfig(backend="gloo"),
-        scaling_config=ScalingConfig(num_workers=workers, resources_per_worker={"CPU": cpus_per_worker}),
+        torch_config=TorchConfig(backend=backend),
+        scaling_config=ScalingConfig(num_workers=workers, use_gpu=use_gpu, resources_per_worker={"CPU": cpus_per_worker}),
         run_config=RunConfig(
             name=f"{folder.name}.ray", storage_path=str(folder.parent), failure_config=FailureConfig(max_failures=restarts)
         ),
@@ -75,19 +91,41 @@ def _learn(arguments: dict[str, Any]) -> None:
     os.environ["RAYON_NUM_THREADS"] = str(arguments.pop("threads"))
     from deepfusion.distributed import Torch
 
+    device = arguments.pop("device")
+    if device != "cpu":
+        gpu = _own_gpu()
+        device = numbered(device, gpu)
+        if arguments["backend"] == "nccl":
+            import torch
+
+            # Where `Torch` adds: each worker on a GPU of its own.
+            torch.cuda.set_device(gpu)
+    del arguments["backend"]
     out = Path(arguments.pop("out"))
     leads = ray_train.get_context().get_world_rank() == 0
     if (out / "last.safetensors").exists():
-        run = deepfusion.train({}, out=out, resume=True, workers=Torch())
+        run = deepfusion.train({}, out=out, resume=True, workers=Torch(), device=device)
     else:
         config, data = arguments.pop("config"), arguments.pop("data")
         # Of a run that died before its first checkpoint nothing is lost.
         if leads and (out / "config.toml").exists():
             (out / "config.toml").unlink()
             (out / "log.csv").unlink(missing_ok=True)
-        run = deepfusion.train(config, data, out=out, workers=Torch(), **arguments)
+        run = deepfusion.train(config, data, out=out, workers=Torch(), device=device, **arguments)
     if leads:
         # Ray keeps metrics only beside checkpoints of its own.
         part = out / f"{_FIGURES}.part"
         part.write_text(json.dumps(dataclasses.asdict(run) | {"path": str(run.path)}))
         part.replace(out / _FIGURES)
+
+
+def _own_gpu() -> int:
+    """The number of this worker's GPU among those that it sees: Ray shows each worker the GPUs of all workers of its machine."""
+    from ray import train as ray_train
+    from ray.train.torch import get_device
+
+    own = get_device()
+    if own.type == "cuda":
+        return own.index or 0
+    # A torch without CUDA does not know; the workers of a machine are counted.
+    return ray_train.get_context().get_local_rank()

@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use crate::devices::{Backend, ComputeDevice, NoDevice, fastest};
+use crate::devices::{Backend, ComputeDevice, NoDevice};
 
 /// Reads `--device`: the names of [`Backend::ALL`], with an index, and `auto`.
 pub(super) fn device() -> impl TypedValueParser<Value = ComputeDevice> {
@@ -23,10 +23,7 @@ impl TypedValueParser for Parser {
         value: &std::ffi::OsStr,
     ) -> Result<ComputeDevice, clap::Error> {
         let given = value.to_string_lossy();
-        if given == "auto" {
-            return Ok(fastest());
-        }
-        given.parse().map_err(|why| {
+        ComputeDevice::chosen(&given).map_err(|why| {
             let mut error = clap::Error::new(ErrorKind::InvalidValue).with_cmd(command);
             if let Some(arg) = arg {
                 let named = ContextValue::String(arg.to_string());
@@ -36,7 +33,7 @@ impl TypedValueParser for Parser {
             error.insert(ContextKind::InvalidValue, given);
             let valid = match why {
                 NoDevice::Index => vec!["cuda:1".into(), "vulkan:0".into()],
-                NoDevice::Name => self
+                _ => self
                     .possible_values()
                     .into_iter()
                     .flatten()
@@ -52,9 +49,10 @@ impl TypedValueParser for Parser {
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let auto = PossibleValue::new("auto")
             .help("A GPU where this build and this machine have one, else the processor");
-        let named = Backend::ALL
-            .iter()
-            .map(|(_, name, meaning, built)| PossibleValue::new(*name).help(*meaning).hide(!built));
+        let named = Backend::ALL.iter().map(|one| {
+            let named = PossibleValue::new(one.name());
+            named.help(one.meaning()).hide(!one.is_built())
+        });
         Some(Box::new(named.chain([auto])))
     }
 }

@@ -1,7 +1,8 @@
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use deepfusion_infer::Precision;
+use deepfusion_jobs::engine::{Engine, EngineSettings};
 
 use super::device::device;
 use super::names;
@@ -11,7 +12,7 @@ use crate::devices::ComputeDevice;
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EngineArgs {
     /// What runs the network.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = names::engine(), default_value_t)]
     pub engine: Engine,
     /// In which numbers the fused engine computes.
     #[arg(long, value_parser = names::precision(), default_value = "f32")]
@@ -38,18 +39,14 @@ impl EngineArgs {
             set: None,
         }
     }
-}
 
-/// What runs the network.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(crate) enum Engine {
-    /// `fused` on the processor, `burn` on any other device.
-    #[default]
-    Auto,
-    /// The network as it is trained.
-    Burn,
-    /// This program's own engine for processors.
-    Fused,
-    /// ONNX Runtime, a library of your own.
-    Ort,
+    /// The same as the library takes it; which data set is meant is the network's matter.
+    pub(crate) fn settings(&self) -> EngineSettings {
+        EngineSettings {
+            engine: self.engine,
+            precision: self.precision,
+            ort_library: self.ort_lib.clone(),
+            device: self.device,
+        }
+    }
 }

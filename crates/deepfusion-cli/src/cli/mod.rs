@@ -42,7 +42,7 @@ pub(crate) use completions::{CompletionsArgs, CompletionsKind};
 pub(crate) use config::{ConfigCommand, ShowArgs};
 pub(crate) use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
 pub(crate) use doctor::DoctorArgs;
-pub(crate) use engine::{Engine, EngineArgs};
+pub(crate) use engine::EngineArgs;
 pub(crate) use eval::{EvalArgs, PredKind};
 pub(crate) use eval_odometry::EvalOdometryArgs;
 pub(crate) use eval_targets::{EvalTargetsArgs, TargetDepth};

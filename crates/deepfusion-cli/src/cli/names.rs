@@ -4,6 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use deepfusion_data::GtKind;
 use deepfusion_eval::{Crop, PostProcess};
 use deepfusion_infer::Precision;
+use deepfusion_jobs::engine::Engine;
 use deepfusion_jobs::outputs::{DepthOutput, TargetOutput};
 use deepfusion_model::{CheckpointKind, Learn, Preset, ViewMotion};
 use deepfusion_rosbag::Compression;
@@ -122,6 +123,22 @@ pub(super) fn checkpoint() -> impl TypedValueParser<Value = CheckpointKind> {
         &[
             (CheckpointKind::Best, "At the lowest held-out loss"),
             (CheckpointKind::Last, "Where training ended"),
+        ],
+    )
+}
+
+/// What runs a network.
+pub(super) fn engine() -> impl TypedValueParser<Value = Engine> {
+    one_of(
+        Engine::name,
+        &[
+            (
+                Engine::Auto,
+                "`fused` on the processor, `burn` on any other device",
+            ),
+            (Engine::Burn, "The network as it is trained"),
+            (Engine::Fused, "This program's own engine for processors"),
+            (Engine::Ort, "ONNX Runtime, a library of your own"),
         ],
     )
 }

@@ -254,7 +254,7 @@ mod tests {
         let view = deepfusion_view::Error::Stopped { path, done, total };
         let view = Failure::from(view).context("view");
         assert_eq!(view.error.exit(), Exit::Stopped);
-        assert_eq!(CliError::OnlyOnCpu.exit(), Exit::Failed);
+        assert_eq!(CliError::NoMedia.exit(), Exit::Failed);
         assert_eq!(CliError::NoModelGiven.exit(), Exit::WrongArguments);
     }
 }

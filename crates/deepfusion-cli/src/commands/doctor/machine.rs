@@ -133,8 +133,8 @@ impl Machine {
 
 /// What `--device` takes in this build.
 fn devices() -> Vec<&'static str> {
-    let built = Backend::ALL.into_iter().filter(|(.., built)| *built);
-    built.map(|(_, name, ..)| name).collect()
+    let built = Backend::ALL.into_iter().filter(|one| one.is_built());
+    built.map(Backend::name).collect()
 }
 
 /// The library as `--engine ort` finds it.

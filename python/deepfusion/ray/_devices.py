@@ -1,0 +1,30 @@
+"""What the workers of a cluster compute on."""
+
+from __future__ import annotations
+
+import deepfusion
+from deepfusion import _native
+
+
+def of_workers(device: str | None, gpus: float) -> str:
+    """The device that each worker opens, given `gpus` GPUs: by default one of those, else the processor.
+
+    A wrong word, or a backend that the package lacks, is an error here rather than in each worker.
+    """
+    if device is None:
+        device = "auto" if gpus else "cpu"
+    _native.check_device(device)
+    if gpus and device == "cpu":
+        raise ValueError('device: "cpu" leaves the GPU idle that each worker is given')
+    if gpus and device == "auto" and deepfusion.devices() == ["cpu"]:
+        # Raises: the GPUs that Ray counts are mostly NVIDIA's.
+        _native.check_device("cuda")
+    return device
+
+
+def numbered(device: str, index: int) -> str:
+    """The GPU of this index, by the backend that is asked for, or by the first that the package has."""
+    if device == "auto":
+        built = deepfusion.devices()
+        device = next((one for one in ("cuda", "metal", "vulkan", "wgpu") if one in built), "cpu")
+    return device if device == "cpu" else f"{device}:{index}"

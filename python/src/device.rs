@@ -1,0 +1,67 @@
+//! Where to compute: `device="cuda:1"`.
+
+use deepfusion::Hint;
+use deepfusion::jobs::Error;
+use deepfusion::jobs::devices::{self, Backend, ComputeDevice};
+use deepfusion::train::Device;
+use pyo3::prelude::*;
+
+use crate::error::Failure;
+
+/// The names of the backends that this package was built with.
+#[pyfunction]
+#[pyo3(name = "devices")]
+pub fn built() -> Vec<&'static str> {
+    let built = Backend::ALL.into_iter().filter(|one| one.is_built());
+    built.map(Backend::name).collect()
+}
+
+/// Raises where a word is no device of this package; whether the machine has it is not asked.
+#[pyfunction]
+pub fn check_device(device: &str) -> PyResult<()> {
+    // Which one that is, whoever computes finds out.
+    if device == "auto" {
+        return Ok(());
+    }
+    let backend = named(device)?.backend;
+    if backend.is_built() {
+        return Ok(());
+    }
+    let device = backend.name();
+    Err(failure(Error::NoBackend { device }).into())
+}
+
+/// The device that a word means.
+pub fn named(word: &str) -> Result<ComputeDevice, Failure> {
+    ComputeDevice::chosen(word).map_err(|why| Failure {
+        message: format!("device: {word:?}: {why}"),
+        hint: why.hint(),
+    })
+}
+
+/// Opens it.
+pub fn open(device: ComputeDevice) -> Result<Device, Failure> {
+    devices::open(device).map_err(failure)
+}
+
+/// An error of the library, with what helps in Python.
+pub fn failure(error: Error) -> Failure {
+    let hint = match &error {
+        Error::NoBackend { device } => Some(format!(
+            "build the package with it, in a checkout: pip install ./python --config-settings=build-args=\"--features {device}\"; or device=\"cpu\""
+        )),
+        Error::NoSuchDevice {
+            backend,
+            count: 1..,
+            ..
+        } => Some(format!(
+            "they are counted from 0; device=\"{backend}\" is the one that the backend prefers"
+        )),
+        Error::OnlyFused { .. } => Some("precision=\"f32\", or device=\"cpu\"".into()),
+        other => other.hint(),
+    };
+    Failure {
+        message: error.to_string(),
+        hint,
+    }
+}
