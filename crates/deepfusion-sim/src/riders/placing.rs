@@ -244,7 +244,8 @@ fn draw(
             }
         }
         Does::Walk => {
-            let lateral = pavement(rng, sample, usize::from(rng.random_bool(0.5)))?;
+            let side = usize::from(rng.random_bool(0.5));
+            let lateral = pavement(rng, sample, side)?;
             let rate = pace(rng);
             Way {
                 s: s - rate * time_s,

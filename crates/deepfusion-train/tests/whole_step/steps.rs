@@ -56,7 +56,7 @@ struct Training {
 
 impl Training {
     fn of(preset: Preset) -> Self {
-        // Where the preset decays, a decay that twenty steps show (a thousandth each); clipping at the preset's norm where it is exceeded.
+        // Where the preset decays, a decay that a few steps show (a thousandth each); clipping at the preset's norm where it is exceeded.
         let (learning_rate, clip_norm, weight_decay) = match preset {
             Preset::LiteMono => (5e-7, 0.0, 2000.0),
             Preset::RMsfm3 | Preset::RMsfm6 => (5e-7, 1.0, 2000.0),
