@@ -4,9 +4,10 @@
     benches/bulk/throughput.py DEEPFUSION OUT [--images 300] [--times 1 2 4] [--repeats 3] [--precision f32]
 
 simulates a drive of `--images` images of 640x192, links them 1, 2 and 4 times over, and predicts them with the embedded network: as NumPy files by
-`deepfusion predict --save npy`, and by the package's `Model.predict_many` with `numpy.save` (where the package is installed), in turns. Prints, for each
-number of images, the median of the images a second, what an image takes on disk, and the ratio of the two. `--shards` also runs the command as two
-processes of one thread each.
+`deepfusion predict --save npy`, and by the package's `Model.predict_many` and `Model.predict` (one by one) with `numpy.save` (where the package is
+installed), in turns. Prints, for each number of images, the median of the images a second, their ratio to the command's, and what an image takes on
+disk. `--shards` also runs the command as two processes of one thread each, `--ray` `deepfusion.ray.predict` with one worker of two cores and with two
+of one (Ray is started beforehand).
 """
 
 import argparse
@@ -67,12 +68,24 @@ def by_command(program, inputs, calibration, out, precision, shards=1):
     return time.perf_counter() - begin
 
 
-def by_python(files, intrinsics, out, precision):
+def by_python(files, intrinsics, out, precision, many=True):
     begin = time.perf_counter()
     out.mkdir()
     model = deepfusion.load("street", precision=precision)
-    for file, seen in zip(files, model.predict_many(files, intrinsics)):
+    each = model.predict_many(files, intrinsics) if many else (model.predict(file, intrinsics) for file in files)
+    for file, seen in zip(files, each):
         numpy.save(out / f"{file.stem}.npy", seen.depth)
+    return time.perf_counter() - begin
+
+
+def by_ray(files, intrinsics, out, precision, workers):
+    import deepfusion.ray
+
+    begin = time.perf_counter()
+    cores = {"cpus_per_worker": 2 // workers}
+    summary = deepfusion.ray.predict(files[0].parent, "street", out, intrinsics=intrinsics, save=["npy"], precision=precision, workers=workers, **cores)
+    if summary.failed:
+        sys.exit(f"{summary.failed[0]}")
     return time.perf_counter() - begin
 
 
@@ -85,6 +98,7 @@ def main():
     words.add_argument("--repeats", type=int, default=3)
     words.add_argument("--precision", default="f32")
     words.add_argument("--shards", action="store_true")
+    words.add_argument("--ray", action="store_true")
     asked = words.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     images, calibration = simulated(asked.program, asked.out / "drive", asked.images)
@@ -96,6 +110,13 @@ def main():
         ways["2 processes"] = lambda files, out: by_command(asked.program, files[0].parent, calibration, out, asked.precision, 2)
     if deepfusion is not None:
         ways["Python"] = lambda files, out: by_python(files, intrinsics, out, asked.precision)
+        ways["one by one"] = lambda files, out: by_python(files, intrinsics, out, asked.precision, many=False)
+    if asked.ray:
+        import ray
+
+        ray.init(num_cpus=2, include_dashboard=False)
+        ways["Ray, 1 worker"] = lambda files, out: by_ray(files, intrinsics, out, asked.precision, 1)
+        ways["Ray, 2 workers"] = lambda files, out: by_ray(files, intrinsics, out, asked.precision, 2)
     print("| images | " + " | ".join(f"{way}, images/s" for way in ways) + " | over the command | kB an image |")
     print("|---|" + "---|" * len(ways) + "---|---|")
     for times in asked.times:
