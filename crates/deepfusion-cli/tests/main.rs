@@ -16,6 +16,7 @@ mod bulk;
 mod calibrate;
 mod clocks;
 mod compare;
+mod demo;
 mod doctor;
 mod drive;
 mod evaluation;

@@ -1,4 +1,5 @@
-//! The recipes for KITTI's tables start: two steps each, on a simulated drive, smaller than they say.
+//! The recipes for KITTI's tables start: two steps each, on a simulated drive, smaller than they say. That of the embedded networks runs to its
+//! end, at one step a stage.
 
 use std::path::Path;
 
@@ -34,4 +35,148 @@ fn each_row_of_kittis_tables_starts() {
         started += 1;
     }
     assert_eq!(started, 11);
+}
+
+/// `deepfusion` for `recipes/street.sh`: few frames and views, narrow networks, one step. What it is asked for it adds to `log`. Where there is
+/// a file `stop`, it ends as after Ctrl-C once the second stage has made its step.
+#[cfg(unix)]
+const SMALLER: &str = r#"#!/usr/bin/env bash
+set -euo pipefail
+asked="$*"
+printf '%s\n' "$asked" >>log
+views='views = 4000, validation_views = 64, views_per_world = 24'
+arguments=()
+while [ $# -gt 0 ]; do
+    case $1 in
+        --config)
+            name=$(basename "$2")
+            sed "s/$views/views = 4, validation_views = 0, views_per_world = 4/" "$2" >"$name"
+            grep -q 'views = 4,' "$name"
+            arguments+=(--config "$name" --steps 1 --size 96x64 --batch 1)
+            arguments+=(--set 'augmentation.sizes=[]' --set validation_share=0)
+            arguments+=(--set depth_net.encoder.base_width=16 --set 'depth_net.decoder.widths=[16, 16, 16, 16, 16]')
+            arguments+=(--set pose_net.encoder.base_width=8)
+            shift
+            ;;
+        --frames)
+            arguments+=(--frames 5 --size 192x64)
+            shift
+            ;;
+        --images)
+            arguments+=(--images 2)
+            shift
+            ;;
+        *) arguments+=("$1") ;;
+    esac
+    shift
+done
+"$PROGRAM" "${arguments[@]}"
+if [ -e stop ] && [[ $asked == *street-more.toml* ]]; then
+    exit 130
+fi
+"#;
+
+/// Drives where `KITTI` has those that the cards have figures of: the first with frames 0 and 20.
+#[cfg(unix)]
+fn write_kitti(at: &Path) {
+    ok(
+        at,
+        "simulate --out kitti --frames 21 --seed 5 --scan-every 20 --size 192x64",
+    );
+    ok(
+        at,
+        "simulate --out other --frames 3 --seed 9 --scan-every 4 --size 192x64",
+    );
+    let simulated = |number: u32| format!("2026_01_01/2026_01_01_drive_000{number}_sync");
+    let named = |number: u32| format!("kitti/2026_01_01/2011_09_26_drive_000{number}_sync");
+    for (from, number) in [("kitti", 5), ("other", 9)] {
+        let from = at.join(from).join(simulated(number));
+        std::fs::rename(from, at.join(named(number))).unwrap();
+    }
+    std::fs::rename(at.join("kitti/2026_01_01"), at.join("kitti/2011_09_26")).unwrap();
+}
+
+/// The chain of the embedded networks: stopped and gone on with, it makes both cards with all that they have; done, the same bytes again.
+#[test]
+#[cfg(unix)]
+fn the_embedded_networks_are_made_and_packed_again_alike() {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use std::process::Command;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let program = at.join("smaller");
+    fs::write(&program, SMALLER).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    write_kitti(at);
+    crate::rgbd::write_folder(&at.join("rooms"));
+    let has_int8 = deepfusion_infer::Engine::has_int8();
+    let recipe = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes/street.sh");
+    let run = || {
+        let mut command = Command::new("bash");
+        command.arg(&recipe).arg("out").current_dir(at);
+        command.env("DEEPFUSION", &program);
+        command.env("PROGRAM", env!("CARGO_BIN_EXE_deepfusion"));
+        command.env("PRECISION", "f32");
+        command.env("INT8", if has_int8 { "" } else { "none" });
+        command.env("KITTI", "kitti").env("ROOMS", "rooms");
+        let output = command.output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        (output.status.code().unwrap(), said)
+    };
+    let asked = |what: &str| {
+        let log = fs::read_to_string(at.join("log")).unwrap();
+        log.lines().filter(|line| line.starts_with(what)).count()
+    };
+
+    fs::write(at.join("stop"), "").unwrap();
+    let (code, said) = run();
+    assert_eq!(code, 130, "{said}");
+    assert_eq!(asked("train --config"), 2);
+    fs::remove_file(at.join("stop")).unwrap();
+    let (code, said) = run();
+    assert_eq!(code, 0, "{said}");
+    // What was begun is gone on with, and what was done is not done again.
+    assert_eq!(asked("train --out out/street-more --resume"), 1);
+    assert_eq!(asked("train --config"), 7);
+
+    let names = ["street", "tiny"];
+    let files = names.map(|name| ["safetensors", "toml"].map(|ending| format!("{name}.{ending}")));
+    let packed = || {
+        let read = |file: &String| fs::read(at.join("out/packed").join(file)).unwrap();
+        files.as_flattened().iter().map(read).collect::<Vec<_>>()
+    };
+    let first = packed();
+    for name in names {
+        let card = fs::read_to_string(at.join(format!("out/packed/{name}.toml"))).unwrap();
+        let card: toml::Table = card.parse().unwrap();
+        let figures = card["figures"].as_array().unwrap().iter();
+        let mut of: Vec<&str> = figures.map(|f| f["data"].as_str().unwrap()).collect();
+        of.sort_unstable();
+        let mut expected = vec![
+            "2011_09_26_drive_0005_sync",
+            "2011_09_26_drive_0009_sync",
+            "301, 302, 303, 304, 305, 306",
+            "41, 42, 43",
+            "rooms",
+        ];
+        // The small one does not say how sure it is: there is nothing to calibrate.
+        if name == "tiny" {
+            expected.remove(2);
+        }
+        assert_eq!(of, expected, "{name}");
+        assert_eq!(card.contains_key("uncertainty"), name == "street", "{name}");
+        let images = card.get("int8").map(|ranges| &ranges["images"]);
+        let looked_at = images.and_then(toml::Value::as_integer);
+        assert_eq!(looked_at, has_int8.then_some(2), "{name}");
+        assert_eq!(card["simulated_only"].as_bool(), Some(true), "{name}");
+        assert!(card.contains_key("note"), "{name}");
+    }
+
+    fs::remove_file(at.join("log")).unwrap();
+    let (code, said) = run();
+    assert_eq!(code, 0, "{said}");
+    assert_eq!(asked("train") + asked("simulate") + asked("eval"), 0);
+    assert!(packed() == first, "the same runs give the same bytes");
 }

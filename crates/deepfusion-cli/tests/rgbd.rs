@@ -7,7 +7,7 @@ use image::{ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::Value;
 
 /// Three frames as 7-Scenes has them, 96x64, and the camera they share.
-fn write_folder(folder: &Path) {
+pub(crate) fn write_folder(folder: &Path) {
     std::fs::create_dir_all(folder).unwrap();
     for n in 0..3_u32 {
         let at = |ending: &str| folder.join(format!("frame-{n:06}.{ending}"));

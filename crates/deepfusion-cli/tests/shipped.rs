@@ -353,5 +353,13 @@ fn what_is_embedded_is_listed_and_used() {
         );
         ok(at, "eval --data sim --crop none");
         ok(at, "export --out unasked.onnx");
+        let lines = ok(at, "perceive sim --out targets --json").stdout;
+        assert_eq!(lines.lines().count(), 6, "{lines}");
+        for line in lines.lines() {
+            let frame: Value = serde_json::from_str(line).unwrap();
+            assert!(frame["targets"].is_array(), "{frame}");
+        }
+        let bench = json(at, "bench --repeats 1 --json");
+        assert_eq!(bench["network"], deepfusion_weights::DEFAULT);
     }
 }

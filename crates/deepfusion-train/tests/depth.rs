@@ -286,21 +286,40 @@ fn a_drive_is_learned_from_as_its_set_says() {
     assert!(error.hint().unwrap().contains("learn = \"self\""));
 }
 
-/// Simulated depth and a real drive's motion in one step: both gradients arrive, and each is logged.
+/// Simulated depth and a real drive's motion in one step: both gradients arrive, and each is logged. Stopped after the first step, the run
+/// goes on to the same weights, to the last bit.
 #[test]
-fn depth_and_motion_are_learned_in_one_step() {
+fn depth_and_motion_are_learned_in_one_step_and_resume_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = streets(3);
     config.depth_batch = 1;
     let drive = drive(&folder.path().join("street"), 8);
     with_recording(&mut config, vec![drive], Learn::OwnMotion);
-    let mut trainer = trainer(&config, &folder.path().join("run"));
-    let (steps, _) = run(&mut trainer, None);
+    let mut whole = trainer(&config, &folder.path().join("whole"));
+    let (steps, _) = run(&mut whole, None);
     assert_eq!(steps.len(), 3);
-    for losses in steps {
+    for losses in &steps {
         assert!(losses.depth > 0.0 && losses.reprojection > 0.0 && losses.speed > 0.0);
         assert!(losses.total > losses.depth);
     }
+
+    let parts = folder.path().join("parts");
+    let (mut begun, _) = run(&mut trainer(&config, &parts), Some(1));
+    let (run_folder, _) = RunFolder::open(&parts).unwrap();
+    let stored = run_folder.read_config().unwrap();
+    let sets = samples(&stored).unwrap();
+    let mut resumed = Trainer::resume(stored, run_folder, sets, &Device::flex()).unwrap();
+    begun.extend(run(&mut resumed, None).0);
+    assert_eq!(begun, steps);
+    let learned = |trainer: &Trainer| {
+        let model = trainer.model();
+        let networks = [
+            weights::collect(&model.depth_net),
+            weights::collect(&model.pose_net),
+        ];
+        networks.map(|network| network.tensors)
+    };
+    assert!(learned(&resumed) == learned(&whole));
 }
 
 /// Weights that stay leave something to learn from each kind of sample that a run has.

@@ -18,6 +18,7 @@ mod losses;
 mod no_yaw_rate;
 mod presets;
 mod recipes;
+mod rgbd;
 mod simulated;
 mod stereo;
 mod support;

@@ -150,6 +150,15 @@ pub(crate) struct DemoArgs {
     /// Where to compute; one of several GPUs by its index, as cuda:1.
     #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
+    /// Frames of each drive; fewer than 12 may leave no scan to measure on. This and the next two make the way short enough to be tested.
+    #[arg(long, hide = true, value_name = "N", value_parser = clap::value_parser!(u16).range(12..))]
+    pub frames: Option<u16>,
+    /// Steps of training.
+    #[arg(long, hide = true, value_name = "N")]
+    pub steps: Option<usize>,
+    /// Size of the pictures, and of what the network learns from.
+    #[arg(long, hide = true, value_name = "WxH")]
+    pub size: Option<Size>,
 }
 
 /// `deepfusion simulate`.

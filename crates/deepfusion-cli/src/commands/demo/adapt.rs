@@ -1,4 +1,4 @@
-//! With the embedded network: what it sees at first sight on a street it has never seen, and what learning there adds.
+//! With the embedded network: what it sees zero-shot, on a street it has never seen, and what learning there adds.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ const FRAMES: usize = 200;
 const SCAN_EVERY: usize = 5;
 /// Cars that drive there.
 const MOVING_CARS: usize = 6;
-/// Frames that it learns from; those after the gap are measured on.
+/// Of these, frames that it learns from; those after the gap are measured on.
 const LEARNED: usize = 120;
 const GAP: usize = 5;
 /// Steps of learning, and samples of a step: about two minutes on two cores.
@@ -49,12 +49,17 @@ struct Typed {
 /// The demo of an embedded network.
 pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     say("1/4 simulating a drive along a street that no network has seen");
+    let usual = SimConfig::default();
+    let (width, height) = demo.size((usual.width, usual.height));
+    let frames = demo.frames(FRAMES);
     let street = SimConfig {
         seed: demo.args.seed.wrapping_add(TEST_SEED),
-        frames: FRAMES,
+        frames,
+        width,
+        height,
         scan_every: SCAN_EVERY,
         moving_cars: MOVING_CARS,
-        ..SimConfig::default()
+        ..usual
     };
     let drive = demo.simulate("street", &street)?;
     let parts = Parts::of(demo, &drive)?;
@@ -68,7 +73,8 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
         network: network.clone(),
     };
     let mut estimator = demo.estimator(&shipped)?;
-    let frame = LEARNED + GAP + (FRAMES - LEARNED - GAP) / 3;
+    let measured = measured_of(frames);
+    let frame = measured.start + measured.len() / 3;
     let before = Instant::now();
     let factors = shipped.interval_factors()?;
     let first = Shown::of(demo, (&mut estimator, &factors), &parts.all, frame)?;
@@ -85,10 +91,10 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     // Before what it says of being interrupted: this is no command that can be repeated.
     interrupt::check(DEMO)?;
     followed?;
-    let at_first_sight = measure(&mut estimator, &parts.learned, &parts.measured)?;
+    let zero_shot = measure(&mut estimator, &parts.learned, &parts.measured)?;
     say(&format!(
         "abs_rel {:.3} unscaled, from one image and nothing learned here",
-        at_first_sight.report.unscaled.abs_rel
+        zero_shot.report.unscaled.abs_rel
     ));
 
     say("3/4 learning on the street's first part from images, speed and yaw rate");
@@ -102,15 +108,16 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     } else {
         Precision::F32
     };
+    let steps = demo.steps(STEPS);
     let mut config = TrainConfig {
         view_motion: ViewMotion::Vehicle,
         precision,
-        size: own.size,
+        size: demo.input_size(own.size),
         batch: BATCH,
-        steps: Some(STEPS),
+        steps: Some(steps),
         learning_rate: LEARNING_RATE,
         seed: demo.args.seed,
-        validate_every: STEPS / 2,
+        validate_every: steps / 2,
         ..own.preset.config_on(demo.args.device.compute())
     };
     // Two pictures of one street say little of how pictures are distributed.
@@ -133,13 +140,24 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     report(
         demo,
         first_ms,
-        (&first, &at_first_sight),
+        (&first, &zero_shot),
         (&second, &learned),
         overlay.as_deref(),
         &html,
     )?;
     say(&format!("targets deepfusion view {}", targets.display()));
     demo.end(&learned, &html)
+}
+
+/// Which of a drive's frames are learned from: as large a part as of the usual drive.
+fn learned_of(frames: usize) -> Range<usize> {
+    0..frames * LEARNED / FRAMES
+}
+
+/// Which are measured on.
+fn measured_of(frames: usize) -> Range<usize> {
+    let gap = (frames * GAP).div_ceil(FRAMES);
+    learned_of(frames).end + gap..frames
 }
 
 /// The drive's first part, to learn from, and its last, to be measured on.
@@ -169,8 +187,9 @@ impl Parts {
             write_split(&all, part, &path)?;
             Ok(path)
         };
-        let learn = list("learned.txt", 0..LEARNED)?;
-        let measure = list("measured.txt", LEARNED + GAP..all.frames().len())?;
+        let frames = all.frames().len();
+        let learn = list("learned.txt", learned_of(frames))?;
+        let measure = list("measured.txt", measured_of(frames))?;
         Ok(Self {
             learned: open(Some(&learn))?,
             measured: open(Some(&measure))?,
@@ -208,35 +227,35 @@ fn overlay_of(targets: &Path, shown: &Shown) -> Result<Option<PathBuf>> {
     Ok(None)
 }
 
-/// The page: what it sees at first sight and after learning.
+/// The page: what it sees zero-shot and after learning.
 fn report(
     demo: &Demo,
     first_ms: f64,
-    (first, at_first_sight): (&Shown, &Evaluated),
+    (first, zero_shot): (&Shown, &Evaluated),
     (second, learned): (&Shown, &Evaluated),
     overlay: Option<&Path>,
     html: &Path,
 ) -> Result<()> {
     let number = |v: f64| format!("{v:.3}");
-    let (before, after) = (&at_first_sight.report, &learned.report);
+    let (before, after) = (&zero_shot.report, &learned.report);
     let mean_depth_baseline = after
         .mean_depth_baseline
         .as_ref()
         .map(|t| t.unscaled.abs_rel);
     let mut page = HtmlReport::new(
         "DeepFusion: metric depth from one camera and a speed signal",
-        "A simulated street that the embedded network has never seen: at first sight, and after learning on its first part from \
-         images, speed and yaw rate, without any depth label",
+        "A simulated street that the embedded network has never seen: zero-shot, and after learning on its first part from images, \
+         speed and yaw rate, without any depth label",
     )
     .facts(&[
-        ("Abs Rel at first sight", &number(before.unscaled.abs_rel)),
+        ("Abs Rel zero-shot", &number(before.unscaled.abs_rel)),
         ("after learning", &number(after.unscaled.abs_rel)),
         ("mean-depth baseline", &mean_depth_baseline.map_or("-".into(), number)),
         ("scale (1 is metric)", &number(after.scale.median)),
         ("first image to depth", &format!("{first_ms:.0} ms")),
         ("time", &clock(demo.start.elapsed().as_secs_f64())),
     ])
-    .section("At first sight");
+    .section("Zero-shot");
     page = first.add_to(page, "its depth in metres")?;
     page = first.add_truth_to(page)?;
     page = first.add_cloud_to(page)?;
@@ -257,4 +276,26 @@ fn report(
         .command(&run_report::command())
         .write(html)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A short drive, too, has a scan among the frames that are measured on, and none of these is learned from.
+    #[test]
+    fn every_drive_has_something_to_measure_on() {
+        assert_eq!(
+            (learned_of(FRAMES), measured_of(FRAMES)),
+            (0..120, 125..200)
+        );
+        for frames in 12..=FRAMES {
+            let (learned, mut measured) = (learned_of(frames), measured_of(frames));
+            assert!(learned.end < measured.start, "{frames}");
+            assert!(
+                measured.any(|frame| frame.is_multiple_of(SCAN_EVERY)),
+                "{frames}"
+            );
+        }
+    }
 }

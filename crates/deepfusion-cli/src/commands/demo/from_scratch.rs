@@ -35,11 +35,12 @@ const SIZE: (usize, usize) = (192, 64);
 pub(super) fn run(demo: &Demo) -> Result<()> {
     say("1/4 simulating streets to learn on, and another to be measured on");
     let seed = demo.args.seed;
+    let (width, height) = demo.size(STREET_SIZE);
     let street = |(i, fps): (usize, f64)| SimConfig {
         seed: seed.wrapping_add(i as u64),
-        frames: STREET_FRAMES,
-        width: STREET_SIZE.0,
-        height: STREET_SIZE.1,
+        frames: demo.frames(STREET_FRAMES),
+        width,
+        height,
         scan_every: STREET_SCAN_EVERY,
         fps,
         ..SimConfig::default()
@@ -49,11 +50,15 @@ pub(super) fn run(demo: &Demo) -> Result<()> {
         .enumerate()
         .map(|(i, fps)| demo.simulate(&format!("train-{i}"), &street((i, fps))))
         .collect::<Result<Vec<_>>>()?;
+    let usual = SimConfig::default();
+    let (width, height) = demo.size((usual.width, usual.height));
     let test = SimConfig {
         seed: seed.wrapping_add(TEST_SEED),
-        frames: TEST_FRAMES,
+        frames: demo.frames(TEST_FRAMES),
+        width,
+        height,
         scan_every: TEST_SCAN_EVERY,
-        ..SimConfig::default()
+        ..usual
     };
     let test_drive = demo.simulate("test", &test)?;
 
@@ -64,12 +69,13 @@ pub(super) fn run(demo: &Demo) -> Result<()> {
     preset.loss.compare_at = CompareAt::Own;
     preset.data.paths.clone_from(&train_drives);
     let (width, height) = SIZE;
+    let steps = demo.steps(STEPS);
     let config = TrainConfig {
         view_motion: ViewMotion::Vehicle,
-        size: InputSize { width, height },
-        steps: Some(STEPS),
+        size: demo.input_size(InputSize { width, height }),
+        steps: Some(steps),
         seed,
-        validate_every: STEPS / 5,
+        validate_every: steps / 5,
         ..preset
     };
     let model = demo.learn(config, Ok)?;

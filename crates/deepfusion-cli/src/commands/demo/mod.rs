@@ -1,4 +1,4 @@
-//! The whole way with no data at all. The embedded network sees a simulated street at first sight, learns there from images and
+//! The whole way with no data at all. The embedded network sees a simulated street zero-shot, learns there from images and
 //! motion, and is measured before and after. Or streets are simulated, a small network learns depth on them from scratch,
 //! and is measured on another.
 
@@ -6,6 +6,7 @@ mod adapt;
 mod from_scratch;
 mod page;
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -15,7 +16,7 @@ use deepfusion_eval::{Crop, GroundTruth, Protocol};
 use deepfusion_jobs::evaluation::{
     Evaluated, Truth, baseline_from_datasets, evaluate_datasets, predict,
 };
-use deepfusion_model::{RunFolder, TrainConfig};
+use deepfusion_model::{InputSize, RunFolder, TrainConfig};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
@@ -25,6 +26,7 @@ use deepfusion_weights::DEFAULT;
 use super::recordings::open_samples;
 use super::train;
 use crate::cli::{DemoArgs, EngineArgs};
+use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{Progress, clock, say};
 use crate::{devices, engine, interrupt, output};
@@ -38,7 +40,9 @@ const DEMO: &str = "the demo";
 /// `deepfusion demo`.
 pub(super) fn run(args: &DemoArgs) -> Result<()> {
     // The first notice is the one that stands: what training and `perceive` say of going on does not hold here.
-    interrupt::catch("stopping after the drive, step or image at work; the demo cannot be resumed");
+    interrupt::catch(
+        "stopping after the frames, step or image at work; the demo cannot be resumed",
+    );
     let embedded = if args.from_scratch {
         None
     } else {
@@ -56,6 +60,9 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     }
 }
 
+/// What unwinds out of a simulation that is to end.
+struct Stopped;
+
 /// What both ways have in common.
 struct Demo<'a> {
     args: &'a DemoArgs,
@@ -71,11 +78,44 @@ impl Demo<'_> {
         let simulation = Simulation::new(config)?;
         let mut progress = Progress::new("simulating");
         let out = self.out.join(name);
-        let drive = write_kitti(&simulation, &out, &mut |done, total| {
+        let mut listen = |done, total| {
             progress.set(done, total);
-        })?;
-        interrupt::check(DEMO)?;
-        Ok(drive)
+            // The writer cannot be stopped in another way, and takes away what it has written. No panic: nothing is printed.
+            if interrupt::asked() {
+                resume_unwind(Box::new(Stopped));
+            }
+        };
+        let write = AssertUnwindSafe(|| write_kitti(&simulation, &out, &mut listen));
+        match catch_unwind(write) {
+            Ok(drive) => Ok(drive?),
+            Err(stopped) if stopped.is::<Stopped>() => Err(CliError::Ended { what: DEMO }.into()),
+            Err(panic) => resume_unwind(panic),
+        }
+    }
+
+    /// Frames of a drive.
+    fn frames(&self, usual: usize) -> usize {
+        self.args.frames.map_or(usual, usize::from)
+    }
+
+    /// Steps of training.
+    fn steps(&self, usual: usize) -> usize {
+        self.args.steps.unwrap_or(usual)
+    }
+
+    /// Width and height of pictures.
+    fn size(&self, usual: (u32, u32)) -> (u32, u32) {
+        self.args
+            .size
+            .map_or(usual, |size| (size.width, size.height))
+    }
+
+    /// The size of what the network learns from.
+    fn input_size(&self, usual: InputSize) -> InputSize {
+        self.args.size.map_or(usual, |size| InputSize {
+            width: size.width as usize,
+            height: size.height as usize,
+        })
     }
 
     /// Trains into the folder `model`.
