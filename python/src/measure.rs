@@ -76,6 +76,7 @@ pub fn simulate(
     seed: u64,
     scene: &str,
     moving_cars: usize,
+    riders: usize,
     width: u32,
     height: u32,
     scan_every: usize,
@@ -94,6 +95,7 @@ pub fn simulate(
         width,
         height,
         moving_cars,
+        riders,
         scene,
         scan_every,
         ..SimConfig::default()

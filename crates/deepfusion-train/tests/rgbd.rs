@@ -23,16 +23,16 @@ fn depth_mm(x: u32, y: u32) -> u16 {
     }
 }
 
-/// Six frames as 7-Scenes has them, `step` colour pixels to one of depth. No poses, no times, no speeds.
-fn write_folder(folder: &Path, step: u32) {
+/// Six frames as 7-Scenes has them, so many colour pixels across and down to one of depth. No poses, no times, no speeds.
+fn write_folder(folder: &Path, [across, down]: [u32; 2]) {
     for n in 0..6_u32 {
         let at = |ending: &str| folder.join(format!("frame-{n:06}.{ending}"));
         let colour = |x: u32, y: u32| Rgb([x as u8, (y * 2) as u8, (40 * n) as u8]);
         let image = RgbImage::from_fn(WIDTH, HEIGHT, colour);
         image.save(at("color.png")).unwrap();
         let depth: ImageBuffer<Luma<u16>, _> =
-            ImageBuffer::from_fn(WIDTH / step, HEIGHT / step, |x, y| {
-                Luma([depth_mm(x * step, y * step)])
+            ImageBuffer::from_fn(WIDTH / across, HEIGHT / down, |x, y| {
+                Luma([depth_mm(x * across, y * down)])
             });
         depth.save(at("depth.png")).unwrap();
     }
@@ -60,7 +60,7 @@ fn values(plane: &Tensor<4>) -> Vec<f32> {
 #[test]
 fn depth_images_are_learned_from_in_metres_and_their_holes_are_no_sky() {
     let folder = tempfile::tempdir().unwrap();
-    write_folder(folder.path(), 1);
+    write_folder(folder.path(), [1, 1]);
     let (config, train, validation) = learning(folder.path(), 1);
     assert!(train.samples.is_empty(), "no speed, so no motion");
     assert_eq!((train.depth.len(), validation.depth.len()), (5, 1));
@@ -91,7 +91,7 @@ fn depth_images_are_learned_from_in_metres_and_their_holes_are_no_sky() {
 #[test]
 fn a_network_learns_from_depth_images_without_a_speed() {
     let folder = tempfile::tempdir().unwrap();
-    write_folder(folder.path(), 1);
+    write_folder(folder.path(), [1, 1]);
     let (config, train, validation) = learning(folder.path(), 20);
     let run = RunFolder::create(&folder.path().join("run")).unwrap();
     let sets = (train, validation);
@@ -114,15 +114,40 @@ fn a_network_learns_from_depth_images_without_a_speed() {
     assert!(last < 0.9 * first, "{first} to {last}");
 }
 
-/// Depth images of another size than the colour images are refused with both sizes: nothing says how they lie over each other.
+/// A sensor with fewer pixels, as a telephone's: each of its pixels is four of the colour image.
 #[test]
-fn depth_images_of_another_size_are_refused() {
+fn depth_images_may_have_fewer_pixels_than_the_colour() {
     let folder = tempfile::tempdir().unwrap();
-    write_folder(folder.path(), 2);
+    write_folder(folder.path(), [2, 2]);
+    let (config, train, _) = learning(folder.path(), 1);
+    let loader = DepthLoader::validation(&config, train.depth);
+    let batch = loader.next(&Device::flex()).unwrap().unwrap();
+    let width = config.size.width;
+    let (known, logs) = (values(&batch.truth.known), values(&batch.truth.log_depth));
+    for (i, (known, log)) in known.iter().zip(&logs).enumerate() {
+        let (u, v) = (i % width, i / width % config.size.height);
+        let mm = depth_mm(2 * u as u32, 2 * v as u32);
+        if matches!(mm, 0 | 65_535) {
+            assert_eq!(*known, 0.0, "{u}, {v}");
+        } else {
+            let metres = f32::from(mm) / 1000.0;
+            assert!((log.exp() / metres - 1.0).abs() < 1e-5, "{u}, {v}: {log}");
+        }
+    }
+}
+
+/// Depth images of another shape than the colour images are refused with both sizes: nothing says how they lie over each other.
+#[test]
+fn depth_images_of_another_shape_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_folder(folder.path(), [2, 1]);
     let (config, train, _) = learning(folder.path(), 1);
     let loader = DepthLoader::training(&config, train.depth, 0);
     let error = loader.next(&Device::flex()).unwrap().unwrap_err();
     assert!(matches!(error, Error::Data(_)), "{error}");
     let text = error.to_string();
-    assert!(text.contains("96x64") && text.contains("192x128"), "{text}");
+    assert!(
+        text.contains("96x128") && text.contains("192x128"),
+        "{text}"
+    );
 }

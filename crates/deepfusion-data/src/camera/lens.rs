@@ -104,19 +104,22 @@ impl Lens {
     }
 
     /// The corrected depth map (camera z, which a lens does not change), each pixel from its nearest: a
-    /// mean over an edge would be a depth that is nowhere.
+    /// mean over an edge would be a depth that is nowhere. A map of the images' shape in another size, as of a telephone's depth sensor, is taken
+    /// for what the whole image shows.
     ///
     /// # Errors
-    /// [`Error::Size`] for a map of another size than the camera's images.
+    /// [`Error::Size`] for a map of another shape than the camera's images.
     pub fn correct_depth(&self, depth: DepthMap) -> Result<DepthMap> {
         let (width, height) = (self.pinhole.width as usize, self.pinhole.height as usize);
-        if (depth.width, depth.height) != (width, height) {
+        let depth = if same_shape(&depth, width, height) {
+            resized(depth, width, height)
+        } else {
             return Err(Error::Size {
                 what: "the depth image",
                 found: (depth.width as u32, depth.height as u32),
                 image: (width as u32, height as u32),
             });
-        }
+        };
         let Some(map) = &self.map else {
             return Ok(depth);
         };
@@ -127,6 +130,28 @@ impl Lens {
             height,
             data: map.iter().map(nearest).collect(),
         })
+    }
+}
+
+/// Whether a depth map has an image's aspect ratio to one percent: sizes are whole pixels, and sensors cut some off.
+fn same_shape(depth: &DepthMap, width: usize, height: usize) -> bool {
+    let (across, down) = ((depth.width * height) as f64, (depth.height * width) as f64);
+    across > 0.0 && (across / down - 1.0).abs() <= 0.01
+}
+
+/// The map in another size, each pixel the depth of the one in which its centre lies.
+fn resized(depth: DepthMap, width: usize, height: usize) -> DepthMap {
+    if (depth.width, depth.height) == (width, height) {
+        return depth;
+    }
+    let from = |i: usize, to: usize, of: usize| (2 * i + 1) * of / (2 * to);
+    let columns: Vec<usize> = (0..width).map(|x| from(x, width, depth.width)).collect();
+    let row = |y: usize| &depth.data[from(y, height, depth.height) * depth.width..][..depth.width];
+    let data = (0..height).flat_map(|y| columns.iter().map(move |x| row(y)[*x]));
+    DepthMap {
+        width,
+        height,
+        data: data.collect(),
     }
 }
 
@@ -238,6 +263,30 @@ mod tests {
         let lens = Lens::new(camera(), &bent).unwrap();
         assert!(lens.correct(RgbImage::new(79, 60)).is_err());
         assert!(lens.correct_depth(DepthMap::empty(80, 61)).is_err());
+        assert!(lens.correct_depth(DepthMap::empty(0, 60)).is_err());
+    }
+
+    /// A map of half the size, and one of three quarters, whose pixels are no whole number of the image's.
+    #[test]
+    fn a_depth_map_of_the_same_shape_is_enlarged() {
+        let straight = Lens::new(camera(), &Distortion::from_opencv(&[0.0; 4]).unwrap()).unwrap();
+        let map = |width: usize, height: usize| DepthMap {
+            width,
+            height,
+            data: (0..width * height).map(|i| i as f32).collect(),
+        };
+        let half = straight.correct_depth(map(40, 30)).unwrap();
+        assert_eq!((half.width, half.height), (80, 60));
+        for (i, depth) in half.data.iter().enumerate() {
+            assert_eq!(*depth, (i / 80 / 2 * 40 + i % 80 / 2) as f32);
+        }
+        let most = straight.correct_depth(map(60, 45)).unwrap();
+        // Centres at 0.375, 1.125, 1.875, 2.625 of the map's pixels.
+        assert_eq!(most.data[..8], [0.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 5.0]);
+        assert_eq!(most.data[80 * 59], 44.0 * 60.0);
+        // A larger map is thinned out.
+        let twice = straight.correct_depth(map(160, 120)).unwrap();
+        assert_eq!(twice.data[..3], [161.0, 163.0, 165.0]);
     }
 
     proptest! {
