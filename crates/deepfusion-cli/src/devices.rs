@@ -6,6 +6,7 @@ pub(crate) use deepfusion_jobs::devices::{Backend, ComputeDevice, NoDevice, mega
 
 #[cfg(feature = "train")]
 use crate::failure::Result;
+#[cfg(feature = "train")]
 use crate::progress::say;
 
 /// Opens a device, and says which it is where it is not the processor.
@@ -15,13 +16,9 @@ use crate::progress::say;
 #[cfg(feature = "train")]
 pub(crate) fn open(device: ComputeDevice) -> Result<Device> {
     let opened = deepfusion_jobs::devices::open(device)?;
-    announce(device);
-    Ok(opened)
-}
-
-/// Whoever said `auto` hears what it came to.
-pub(crate) fn announce(device: ComputeDevice) {
+    // Whoever said `auto` hears what it came to.
     if device.backend != Backend::Cpu {
         say(&format!("computes on {device}"));
     }
+    Ok(opened)
 }

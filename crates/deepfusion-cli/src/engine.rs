@@ -5,9 +5,11 @@ use deepfusion_model::weights::Weights;
 use deepfusion_model::{Int8Calibration, TrainConfig};
 use deepfusion_runtime::{DepthEstimator, DepthRunner, ModelSource};
 
+use crate::allocator;
 use crate::cli::EngineArgs;
+#[cfg(feature = "train")]
+use crate::devices;
 use crate::failure::Result;
-use crate::{allocator, devices};
 
 /// Loads a network with the engine asked for.
 pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
@@ -30,12 +32,13 @@ pub(crate) fn runner(
     let engine = settings.chosen()?;
     if engine == Engine::Burn {
         allocator::keep_memory();
+        // Says which device it is before the network is built there.
+        #[cfg(feature = "train")]
+        devices::open(args.device)?;
     }
     let packed = || settings.runner(config, weights, int8);
-    let runner = match engine {
+    Ok(match engine {
         Engine::Fused => allocator::without_hoarding(packed)?,
         _ => packed()?,
-    };
-    devices::announce(args.device);
-    Ok(runner)
+    })
 }

@@ -5,17 +5,20 @@ use std::fs::File;
 use std::hash::{BuildHasher, Hasher};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::sync::{folder_of, publish, sync_files, sync_folder};
 
 /// A temporary file beside its target, on the same file system, until the file is complete. It is removed on drop unless
-/// it was published.
+/// it was published, or is [to stay](Self::keep).
 #[derive(Debug)]
 pub struct Partial {
     temporary: PathBuf,
     target: PathBuf,
     /// Whether readers know the temporary name, and an earlier writer may have left it.
     watched: bool,
+    /// Whether a drop removes what lies under the temporary name: not a file that somebody else made.
+    ours: AtomicBool,
 }
 
 impl Partial {
@@ -32,6 +35,7 @@ impl Partial {
             temporary: target.with_file_name(name),
             target: target.to_owned(),
             watched: false,
+            ours: AtomicBool::new(true),
         }
     }
 
@@ -45,6 +49,7 @@ impl Partial {
             temporary: target.with_file_name(name),
             target: target.to_owned(),
             watched: true,
+            ours: AtomicBool::new(false),
         }
     }
 
@@ -59,11 +64,18 @@ impl Partial {
     /// # Errors
     /// The system's error, for instance if there is no such folder.
     pub fn create(&self) -> io::Result<File> {
-        if self.watched {
-            File::create(&self.temporary)
+        let file = if self.watched {
+            File::create(&self.temporary)?
         } else {
-            File::create_new(&self.temporary)
-        }
+            File::create_new(&self.temporary)?
+        };
+        self.ours.store(true, Ordering::Relaxed);
+        Ok(file)
+    }
+
+    /// From now on the file stays where it is if it is not published: what it holds is worth more than nothing.
+    pub fn keep(&self) {
+        self.ours.store(false, Ordering::Relaxed);
     }
 
     /// Syncs the content, renames the file to its target and syncs the folder.
@@ -71,7 +83,10 @@ impl Partial {
     /// # Errors
     /// The system's error. If syncing the file or renaming failed, the target is unchanged.
     pub fn publish(self) -> io::Result<()> {
-        publish(&self.temporary, &self.target)
+        publish(&self.temporary, &self.target)?;
+        // Under its old name may be the file of whoever writes it next.
+        self.keep();
+        Ok(())
     }
 
     /// Renames the file to its target without waiting for the disk: after a power cut its content may be missing.
@@ -94,8 +109,10 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        // Gone already after the rename; nothing can be done about other failures here.
-        let _ = std::fs::remove_file(&self.temporary);
+        if *self.ours.get_mut() {
+            // Nothing can be done about failures here.
+            let _ = std::fs::remove_file(&self.temporary);
+        }
     }
 }
 
@@ -289,11 +306,19 @@ mod tests {
         assert!(!target.exists());
         partial.publish().unwrap();
         assert_eq!(names(dir.path()), ["a.jsonl"]);
-        // One that is given up is gone; what was there before stays.
+        // One that is given up is gone, unless it is to stay; what was there before stays.
         let partial = Partial::watched(&target);
         drop(partial.create().unwrap());
         drop(partial);
         assert_eq!(names(dir.path()), ["a.jsonl"]);
         assert_eq!(std::fs::read(&target).unwrap(), b"new");
+        let partial = Partial::watched(&target);
+        drop(partial.create().unwrap());
+        partial.keep();
+        drop(partial);
+        assert!(known.exists());
+        // Another's, where nothing was created.
+        drop(Partial::watched(&target));
+        assert!(known.exists());
     }
 }

@@ -145,9 +145,9 @@ impl Riders {
         all.filter(move |(_, person)| person.is_there(time_s))
     }
 
-    /// Their solids at a time.
-    pub(crate) fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
-        self.present(time_s)
+    /// The solids, at a time, of those who are on the street at `present_s`: the same people a moment later.
+    pub(crate) fn solids(&self, world: &World, time_s: f64, present_s: f64) -> Vec<Primitive> {
+        self.present(present_s)
             .flat_map(|(_, person)| {
                 let stance = person.stance(&world.road, time_s);
                 person

@@ -262,19 +262,19 @@ impl Simulation {
 
     /// As [`Self::fmcw`], with a column every `column_step_deg`.
     pub(crate) fn fmcw_with_columns(&self, time_s: f64, column_step_deg: f32) -> FmcwScan {
-        let solids = |time_s| self.moving_solids(time_s);
         let velo_from_imu = self.rig.velo_from_imu;
         let motion = BodyMotion::at(|t| self.imu_at(t) * velo_from_imu.inverse(), time_s);
-        let (now, later) = (solids(time_s), solids(time_s + VELOCITY_STEP_S));
+        let later_s = time_s + VELOCITY_STEP_S;
+        let cars = |time_s| self.traffic.solids(&self.world, time_s);
+        let (mut now, mut later) = (cars(time_s), cars(later_s));
         // A car that leaves the street within the millisecond is taken as gone.
-        let moving = if now.len() == later.len() {
-            MovingSolids { now, later }
-        } else {
-            MovingSolids {
-                now: later.clone(),
-                later,
-            }
-        };
+        if now.len() != later.len() {
+            now.clone_from(&later);
+        }
+        let people = |at_s| self.riders.solids(&self.world, at_s, time_s);
+        now.extend(people(time_s));
+        later.extend(people(later_s));
+        let moving = MovingSolids { now, later };
         let key = hash((time_s * 1e3).round() as i32, 31, self.world.seed);
         fmcw::scan(
             &self.world,
@@ -356,7 +356,7 @@ impl Simulation {
     /// The solids of everything that moves, at a time.
     fn moving_solids(&self, time_s: f64) -> Vec<Primitive> {
         let mut solids = self.traffic.solids(&self.world, time_s);
-        solids.extend(self.riders.solids(&self.world, time_s));
+        solids.extend(self.riders.solids(&self.world, time_s, time_s));
         solids
     }
 

@@ -41,6 +41,9 @@ pub enum StepOutcome {
     Skipped,
 }
 
+/// Values that are read from a device at once: 32 MB, so that neither memory nor the largest buffer of a small GPU is exceeded.
+const AT_ONCE: usize = 8 << 20;
+
 /// A step's gradients by parameter name.
 #[derive(Debug, Default)]
 pub struct NamedGradients(BTreeMap<String, Values>);
@@ -74,17 +77,22 @@ impl NamedGradients {
 
     /// All values one after the other, in the order of the names.
     pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
-        // Those on the device in one transfer.
-        let on_device = self.0.values().filter_map(|values| match values {
-            Values::Host(_) => None,
-            Values::Device(values) => Some(values.clone()),
-        });
-        let on_device: Vec<Tensor<1>> = on_device.collect();
-        let read = if on_device.is_empty() {
-            Vec::new()
-        } else {
-            to_vec(Tensor::cat(on_device, 0))
-        };
+        // Those on the device in few transfers.
+        let mut read = Vec::new();
+        let mut waiting: Vec<Tensor<1>> = Vec::new();
+        for values in self.0.values() {
+            let Values::Device(values) = values else {
+                continue;
+            };
+            let together: usize = waiting.iter().map(|tensor| tensor.dims()[0]).sum();
+            if together > 0 && together + values.dims()[0] > AT_ONCE {
+                read.extend(to_vec(Tensor::cat(std::mem::take(&mut waiting), 0)));
+            }
+            waiting.push(values.clone());
+        }
+        if !waiting.is_empty() {
+            read.extend(to_vec(Tensor::cat(waiting, 0)));
+        }
         let mut rest = read.as_slice();
         for values in self.0.values() {
             match values {

@@ -80,6 +80,7 @@ class _Job:
     options: dict[str, Any]
     weights: str | None
     device: str
+    gpus: float
 
     def made_with(self) -> dict[str, Any]:
         """What the outputs depend on beside the image."""
@@ -94,9 +95,6 @@ class _Job:
         # Absent where there is one prediction, as in what was made before there could be more.
         if self.post_process is not None:
             made["post_process"] = self.post_process
-        # A GPU's last digits are its own.
-        if self.device != "cpu":
-            made["device"] = self.device.partition(":")[0]
         return made
 
 
@@ -115,6 +113,12 @@ class _Worker:
             if "://" in model:
                 model = stack.enter_context(self.sources.local_tree(model))
             self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set, device=job.device)
+        # What "auto" came to on this machine. A GPU's last digits are its own.
+        opened = self.model.device.partition(":")[0]
+        if job.gpus and opened == "cpu":
+            raise RuntimeError("the GPU of this worker is not used: this machine's package has no backend that finds it")
+        if opened != "cpu":
+            self.made_with["device"] = opened
         self.counted = metrics.Counter("deepfusion_images", "Images by outcome", ("outcome",))
         self.took = metrics.Histogram("deepfusion_image_seconds", "Wall time of an image", [0.01, 0.03, 0.1, 0.3, 1, 3, 10])
 
@@ -292,7 +296,9 @@ def predict(
     if gpus_per_worker < 0:
         raise ValueError(f"gpus_per_worker: expected 0 or more, found {gpus_per_worker}")
     device = of_workers(device, gpus_per_worker)
-    if device != "cpu" and precision != "f32":
+    if gpus_per_worker and ":" in device:
+        raise ValueError(f"device: each worker is given a GPU of its own and sees that one alone, found {device}")
+    if precision != "f32" and (gpus_per_worker or device not in ("cpu", "auto")):
         raise ValueError(f"precision: a GPU computes in f32, found {precision}")
     options = dict(storage_options or {})
     model = os.fspath(model)
@@ -328,6 +334,7 @@ def predict(
         options=options,
         weights=weights_mark(model, options),
         device=device,
+        gpus=gpus_per_worker,
     )
     named = images(urls(paths), options)
     if not ray.is_initialized():

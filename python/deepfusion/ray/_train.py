@@ -41,7 +41,8 @@ def train(
     again, at most `restarts` times, and they go on from the last checkpoint (`checkpoint_minutes`, `validate_every`).
 
     With `use_gpu` each worker is given a GPU and learns on it: `device` is "auto" by default, or the backend ("cuda", "vulkan"), without a
-    number: Ray says which of a machine's GPUs is whose.
+    number: Ray says which of a machine's GPUs is whose. CUDA sees those alone that Ray gives; the others count all of a machine's, so that two
+    jobs on one machine would share them.
     """
     if backend not in ("gloo", "nccl"):
         raise ValueError(f'backend: expected "gloo" or "nccl", found {backend!r}')

@@ -133,10 +133,16 @@ impl Lens {
     }
 }
 
-/// Whether a depth map has an image's aspect ratio to one percent: sizes are whole pixels, and sensors cut some off.
+/// Whether a depth map has an image's aspect ratio, as nearly as whole pixels of it can. One that has the image's width or height
+/// alone was cut, and shows another part.
 fn same_shape(depth: &DepthMap, width: usize, height: usize) -> bool {
+    let whole = depth.width > 0 && depth.height > 0;
+    if !whole || (depth.width == width) != (depth.height == height) {
+        return false;
+    }
     let (across, down) = ((depth.width * height) as f64, (depth.height * width) as f64);
-    across > 0.0 && (across / down - 1.0).abs() <= 0.01
+    let off = (across - down).abs();
+    off < width as f64 && off < height as f64
 }
 
 /// The map in another size, each pixel the depth of the one in which its centre lies.
@@ -263,7 +269,14 @@ mod tests {
         let lens = Lens::new(camera(), &bent).unwrap();
         assert!(lens.correct(RgbImage::new(79, 60)).is_err());
         assert!(lens.correct_depth(DepthMap::empty(80, 61)).is_err());
-        assert!(lens.correct_depth(DepthMap::empty(0, 60)).is_err());
+        for (width, height) in [(0, 60), (40, 60), (80, 59), (41, 30)] {
+            let other = DepthMap::empty(width, height);
+            assert!(lens.correct_depth(other).is_err(), "{width}x{height}");
+        }
+        for (width, height) in [(40, 30), (53, 40), (27, 20), (8, 6)] {
+            let same = DepthMap::empty(width, height);
+            assert!(lens.correct_depth(same).is_ok(), "{width}x{height}");
+        }
     }
 
     /// A map of half the size, and one of three quarters, whose pixels are no whole number of the image's.

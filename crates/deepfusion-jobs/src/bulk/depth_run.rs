@@ -46,7 +46,8 @@ pub fn predict<E: From<Error> + Send>(
     let stop = || stop() || progress.stopped();
     let threads = Threads::for_this_machine();
     std::thread::scope(|scope| {
-        scope.spawn(|| commit(progress, mine, &written));
+        // It owns its end of the queue: should it panic, nobody waits for it.
+        scope.spawn(move || commit(progress, mine, &written));
         pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
         // The committer ends with the last image written.
         drop(write);

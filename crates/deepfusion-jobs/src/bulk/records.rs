@@ -43,13 +43,13 @@ pub fn write_record(record: &FrameRecord, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// All frames, a line each, growing beside their final place under a name that readers can watch. Gone again unless it is finished.
+/// All frames, a line each, growing beside their final place under a name that readers can watch. Where it is not finished, its lines stay there;
+/// without a line it is gone.
 pub struct RecordLines {
     path: PathBuf,
     /// Closed before its name changes or goes: it stands above `partial`.
     file: BufWriter<File>,
     partial: Partial,
-    empty: bool,
 }
 
 impl RecordLines {
@@ -66,7 +66,6 @@ impl RecordLines {
             path: path.to_owned(),
             file: BufWriter::new(file),
             partial,
-            empty: true,
         })
     }
 
@@ -79,25 +78,27 @@ impl RecordLines {
         // Line by line: who watches the file sees whole frames.
         self.file.write_all(line.as_bytes()).map_err(failed)?;
         self.file.flush().map_err(failed)?;
-        self.empty = false;
+        self.partial.keep();
         Ok(())
     }
 
-    /// Puts it in its place; where no line came, it is taken away.
+    /// Takes it away, with its lines.
+    pub fn discard(self) {
+        // What cannot be removed is taken over by the next run.
+        let _ = std::fs::remove_file(self.partial.path());
+    }
+
+    /// Puts it in its place.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// Where it cannot be written; its lines are then still under the other name.
     pub fn finish(self) -> Result<()> {
         let Self {
             path,
             file,
             partial,
-            empty,
         } = self;
         drop(file);
-        if empty {
-            return Ok(());
-        }
         let published = partial.publish();
         Ok(published.map_err(|e| DataError::file(&path, e))?)
     }
@@ -125,8 +126,18 @@ mod tests {
     fn without_a_line_nothing_is_left() {
         let folder = tempfile::tempdir().unwrap();
         let path = record_lines_path(folder.path());
-        RecordLines::begin(&path).unwrap().finish().unwrap();
+        RecordLines::begin(&path).unwrap().discard();
         drop(RecordLines::begin(&path).unwrap());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        // Lines are worth keeping whatever ends the run, until it is said that they are of nothing.
+        let begun = || {
+            let mut lines = RecordLines::begin(&path).unwrap();
+            lines.add("{}\n").unwrap();
+            lines
+        };
+        drop(begun());
+        assert!(folder.path().join("targets.jsonl.partial").exists());
+        begun().discard();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

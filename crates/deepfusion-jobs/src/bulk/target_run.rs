@@ -170,9 +170,10 @@ where
     }
 
     fn finish(self) -> Result<TargetSummary<E>> {
-        self.writer.finish()?;
         let summary = self.summary.into_inner();
-        Ok(summary.unwrap_or_else(PoisonError::into_inner))
+        let summary = summary.unwrap_or_else(PoisonError::into_inner);
+        self.writer.finish(summary.done)?;
+        Ok(summary)
     }
 }
 

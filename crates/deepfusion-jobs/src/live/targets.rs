@@ -54,8 +54,8 @@ pub fn perceive<E: From<Error> + Send>(
         Ok(())
     };
     let ending = run(feed, look_at, write, say);
-    writer.finish()?;
     let (frames, targets) = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
+    writer.finish(frames)?;
     Ok(LiveTargets {
         frames,
         targets,

@@ -41,12 +41,17 @@ impl<'a> TargetWriter<'a> {
         Ok(line)
     }
 
-    /// Puts the file of all targets in its place; where there was no frame, it is taken away.
+    /// Puts the file of all targets in its place; where no frame is done, it is taken away, and an earlier one stays.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn finish(self) -> Result<()> {
+    pub fn finish(self, done: usize) -> Result<()> {
         let lines = self.lines.into_inner();
-        lines.unwrap_or_else(PoisonError::into_inner).finish()
+        let lines = lines.unwrap_or_else(PoisonError::into_inner);
+        if done == 0 {
+            lines.discard();
+            return Ok(());
+        }
+        lines.finish()
     }
 }

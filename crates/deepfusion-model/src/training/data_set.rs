@@ -64,8 +64,8 @@ pub struct SimulatedConfig {
     pub plain: f64,
     /// Share of the varied views in the open whose road rises and falls ahead of the camera.
     pub hills: f64,
-    /// Share of the varied views on streets and country roads in which people ride bicycles ahead of the camera and towards it, walk along pavements
-    /// and cross the road.
+    /// Share of the varied views on streets, in parks and on country roads in which people ride bicycles ahead of the camera and towards it, walk
+    /// along pavements and cross the road, where there is room for them.
     pub riders: f64,
     /// Whether a camera's image formation (exposure, noise, blur, JPEG and so on) is applied.
     pub formation: bool,

@@ -15,7 +15,8 @@ use rand_chacha::ChaCha8Rng;
 /// Whether there is room is looked at so often along a drive, seconds.
 const STEP_S: f64 = 0.2;
 
-/// Where the camera sees someone, or would, metres before it along the street. People come and go elsewhere.
+/// Where people neither come nor go, metres before the camera along the street: farther off they are a few pixels high, and behind it only
+/// scans have them.
 const SEEN: (f64, f64) = (-4.0, 120.0);
 
 /// Least and greatest distance at which people are met, metres before the camera along the street.
@@ -66,8 +67,8 @@ impl Does {
 
 impl Riders {
     /// Up to `count` people along a drive of `duration_s` seconds among its traffic, met evenly over it: by turns who rides ahead,
-    /// crosses, rides towards the camera and walks. Fewer where the street has no room for them. Nobody comes or goes in the camera's
-    /// sight, nor gets in its way.
+    /// crosses, rides towards the camera and walks. Fewer where the street has no room for them. Nobody comes or goes within 120 m
+    /// before the camera, nor gets in its way.
     pub(crate) fn along(
         rng: &mut ChaCha8Rng,
         world: &World,

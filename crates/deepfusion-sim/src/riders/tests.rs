@@ -117,3 +117,26 @@ fn people_keep_apart() {
         }
     }
 }
+
+/// A LiDAR sees the same people a moment later, also at the instant in which someone leaves or comes.
+#[test]
+fn whoever_leaves_does_not_stop_the_others() {
+    let (world, riders) = street(1);
+    let ends: Vec<f64> = (riders.people.iter())
+        .flat_map(|person| [person.during.0, person.during.1])
+        .filter(|time_s| time_s.is_finite())
+        .collect();
+    assert!(!ends.is_empty(), "somebody comes or goes");
+    for now_s in ends {
+        let now = riders.solids(&world, now_s, now_s);
+        let later = riders.solids(&world, now_s + 1e-3, now_s);
+        assert!(!now.is_empty() && now.len() == later.len(), "{now_s}");
+        for (a, b) in now.iter().zip(&later) {
+            let moved = (Vector3::from(b.position) - Vector3::from(a.position)).norm();
+            // From the slowest walker to the fastest rider, and what turns about its middle.
+            assert!(moved < 0.02, "{now_s}: {moved}");
+        }
+        let moves = |(a, b): (&Primitive, &Primitive)| a.position != b.position;
+        assert!(now.iter().zip(&later).any(moves), "{now_s}");
+    }
+}

@@ -33,8 +33,8 @@ pub struct EndlessConfig {
     pub plain: f64,
     /// Share of the varied views in the open whose road rises and falls ahead of the camera.
     pub hills: f64,
-    /// Share of the varied views on streets and country roads in which people ride bicycles ahead of the camera and towards it, walk
-    /// along pavements and cross the road.
+    /// Share of the varied views on streets, in parks and on country roads in which people ride bicycles ahead of the camera and towards
+    /// it, walk along pavements and cross the road, where there is room for them.
     pub riders: f64,
     /// The kinds of scene that worlds are of, each as often as the others; none: all, streets most often, `daylight` of them by day.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -143,7 +143,7 @@ impl Endless {
         } else {
             Riders::default()
         };
-        moving.extend(riders.solids(world, 0.0));
+        moving.extend(riders.solids(world, 0.0, 0.0));
         cars.extend(riders.objects(world, 0.0, world.objects.len() + traffic.count()));
 
         let mut rng = generator(config.seed, index, 0x5EA);

@@ -8,8 +8,8 @@ use crate::scene::SceneObject;
 use deepfusion_geometry::Se3;
 use rand::Rng;
 
-/// Who rides and walks before the camera of view `index`, among its `vehicles`: nobody in most views, nor in rooms, in garages, on
-/// motorways and in worlds that are as `simulate` draws them. The views that have some have the same whatever their share is.
+/// Who rides and walks before the camera of view `index`, among its `vehicles`: nobody in rooms, in garages, on motorways and
+/// in worlds that are as `simulate` draws them. The views that have some have the same whatever their share is.
 pub(super) fn of_view(
     config: &EndlessConfig,
     index: u64,

@@ -95,8 +95,8 @@ impl Trainer {
         self.read(learned)
     }
 
-    /// Reads the numbers of the batches that wait for it: a single transfer from the device. Where they are read late it is the step's only
-    /// one, and a single worker's norm of the gradient is in it, too. A step needs it before it changes anything: a loss that is not finite
+    /// Reads the numbers of the batches that wait for it: a single transfer from the device. Where they are read late it is a single worker's
+    /// only one in a step, with the norm of its gradient; several workers read their gradients, too. A step needs it before it changes anything: a loss that is not finite
     /// ends the run, such a gradient skips the step, and Adam counts those that were made.
     fn read(&self, learned: &mut WorkerStep) -> Result<(), Error> {
         let batches = std::mem::take(&mut learned.unread);

@@ -87,7 +87,12 @@ impl Demo<'_> {
         };
         let write = AssertUnwindSafe(|| write_kitti(&simulation, &out, &mut listen));
         match catch_unwind(write) {
-            Ok(drive) => Ok(drive?),
+            Ok(drive) => {
+                let drive = drive?;
+                // Labels and the disk take a while after the last frame.
+                interrupt::check(DEMO)?;
+                Ok(drive)
+            }
             Err(stopped) if stopped.is::<Stopped>() => Err(CliError::Ended { what: DEMO }.into()),
             Err(panic) => resume_unwind(panic),
         }
