@@ -7,7 +7,7 @@ use ndarray::{ArrayD, Axis};
 use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt, ReadNpzError};
 
 use crate::error::first_names;
-use crate::{ArrayName, ArrayProblem, Error, Grid, Result};
+use crate::{ArrayName, ArrayProblem, Error, ExpectedShape, Grid, Result};
 
 /// Before the names of the velocities that `data export-gt` writes beside depths: they are no depths.
 const VELOCITY: &str = "velocity_mps/";
@@ -224,7 +224,12 @@ fn stack(path: &Path, array: ArrayD<f64>) -> Result<ArrayD<f64>> {
     match array.ndim() {
         2 => Ok(array.insert_axis(Axis(0))),
         3 | 4 => Ok(array),
-        _ => Err(wrong_shape(path, ArrayName::Only, array.shape(), "N×H×W")),
+        _ => Err(wrong_shape(
+            path,
+            ArrayName::Only,
+            array.shape(),
+            ExpectedShape::Stack,
+        )),
     }
 }
 
@@ -233,18 +238,18 @@ fn grid(path: &Path, name: ArrayName, mut array: ArrayD<f64>) -> Result<Grid> {
     while array.ndim() > 2 {
         match array.shape().iter().position(|n| *n == 1) {
             Some(axis) => array = array.index_axis_move(Axis(axis), 0),
-            None => return Err(wrong_shape(path, name, &shape, "H×W")),
+            None => return Err(wrong_shape(path, name, &shape, ExpectedShape::Image)),
         }
     }
     let &[height, width] = array.shape() else {
-        return Err(wrong_shape(path, name, &shape, "H×W"));
+        return Err(wrong_shape(path, name, &shape, ExpectedShape::Image));
     };
     // Iterates in logical order, whatever the memory order was (NumPy may write Fortran order).
     Grid::new(width, height, array.iter().copied().collect())
-        .map_err(|_| wrong_shape(path, name, &shape, "H×W, not empty"))
+        .map_err(|_| wrong_shape(path, name, &shape, ExpectedShape::ImageWithPixels))
 }
 
-fn wrong_shape(path: &Path, array: ArrayName, shape: &[usize], expected: &'static str) -> Error {
+fn wrong_shape(path: &Path, array: ArrayName, shape: &[usize], expected: ExpectedShape) -> Error {
     Error::ArrayFile {
         path: path.to_owned(),
         reason: ArrayProblem::Shape {

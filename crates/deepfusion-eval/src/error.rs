@@ -3,10 +3,12 @@ use std::path::PathBuf;
 
 mod arrays;
 mod intervals;
+mod protocol;
 
-pub use self::arrays::{ArrayName, ArrayProblem};
+pub use self::arrays::{ArrayName, ArrayProblem, ExpectedShape};
 pub(crate) use self::intervals::ENDS_M;
 pub use self::intervals::{IntervalsProblem, LEVELS};
+pub use self::protocol::ExpectedProtocolSetting;
 
 /// What can go wrong while arrays are read and compared.
 #[derive(Debug, thiserror::Error)]
@@ -53,7 +55,7 @@ pub enum Error {
         /// Its value.
         value: String,
         /// What it must be.
-        expected: &'static str,
+        expected: ExpectedProtocolSetting,
     },
     /// No image had a single pixel to compare.
     #[error(

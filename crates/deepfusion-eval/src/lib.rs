@@ -33,7 +33,10 @@ mod table;
 pub mod verdict;
 
 pub use array_set::{ArraySet, match_names};
-pub use error::{ArrayName, ArrayProblem, Error, IntervalsProblem, LEVELS, Result};
+pub use error::{
+    ArrayName, ArrayProblem, Error, ExpectedProtocolSetting, ExpectedShape, IntervalsProblem,
+    LEVELS, Result,
+};
 pub use evaluator::{Evaluator, ImageScore, Sample};
 pub use grid::{Grid, Prediction};
 pub use intervals::{

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Result};
+use crate::{Error, ExpectedProtocolSetting as Expected, Result};
 
 /// The part of the image that is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -145,15 +145,15 @@ impl Protocol {
             })
         };
         if !(self.min_m.is_finite() && self.min_m > 0.0) {
-            return fail("the minimum depth", self.min_m, "metres above 0");
+            return fail("the minimum depth", self.min_m, Expected::Metres);
         }
         if !(self.cap_m.is_finite() && self.cap_m > self.min_m) {
-            return fail("the cap", self.cap_m, "metres above the minimum depth");
+            return fail("the cap", self.cap_m, Expected::MetresAboveMinimum);
         }
         if let Scaling::Fixed(factor) = self.scaling
             && !(factor.is_finite() && factor > 0.0)
         {
-            return fail("the fixed scale", factor, "a factor above 0");
+            return fail("the fixed scale", factor, Expected::Factor);
         }
         Ok(())
     }
@@ -197,6 +197,32 @@ mod tests {
             },
         ] {
             assert!(bad.validate().is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn what_a_field_must_be_is_said() {
+        let with = |min_m, cap_m, scaling| Protocol {
+            min_m,
+            cap_m,
+            scaling,
+            ..Protocol::default()
+        };
+        for (protocol, said) in [
+            (
+                with(0.0, 80.0, Scaling::None),
+                "the minimum depth is 0: expected metres above 0",
+            ),
+            (
+                with(0.5, 0.25, Scaling::None),
+                "the cap is 0.25: expected metres above the minimum depth",
+            ),
+            (
+                with(0.5, 80.0, Scaling::Fixed(-1.0)),
+                "the fixed scale is -1: expected a factor above 0",
+            ),
+        ] {
+            assert_eq!(protocol.validate().unwrap_err().to_string(), said);
         }
     }
 }

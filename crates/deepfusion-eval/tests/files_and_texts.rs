@@ -140,7 +140,9 @@ fn broken_files_say_what_is_wrong() {
             .contains("expected float32 or float64")
     );
     write_npy(at("row.npy"), &array![1.0f32, 2.0]).unwrap();
-    assert!(message(ArraySet::open(&at("row.npy")).unwrap_err()).contains("shape [2]"));
+    assert!(
+        message(ArraySet::open(&at("row.npy")).unwrap_err()).contains("shape [2], expected N×H×W")
+    );
 
     npz(&at("whole.npz"), &["a"]);
     let bytes = std::fs::read(at("whole.npz")).unwrap();

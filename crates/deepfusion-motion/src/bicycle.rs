@@ -1,6 +1,6 @@
 //! The kinematic bicycle model: yaw rate from speed and steering angle (Eq. 26–27).
 
-use crate::{Error, Result, Signal};
+use crate::{Error, ExpectedSetting as Expected, Result, Signal};
 use serde::{Deserialize, Serialize};
 
 /// The kinematic bicycle model: one wheel per axle, without slip.
@@ -66,26 +66,35 @@ impl Bicycle {
             (0.3..=20.0).contains(&self.wheelbase_m),
             "wheelbase_m",
             self.wheelbase_m,
-            "0.3 to 20 m",
+            Expected::Metres {
+                from: 0.3,
+                to: 20.0,
+            },
         )?;
         // Some makers count to the right: a negative ratio says so.
         check(
             (0.5..=60.0).contains(&self.steering_ratio.abs()),
             "steering_ratio",
             self.steering_ratio,
-            "0.5 to 60, negative where the signal grows to the right",
+            Expected::SteeringRatio {
+                from: 0.5,
+                to: 60.0,
+            },
         )?;
         check(
             self.steering_offset_rad.abs() < 3.2,
             "steering_offset_rad",
             self.steering_offset_rad,
-            "an angle in radians",
+            Expected::Angle,
         )?;
         check(
             (0.0..=0.02).contains(&self.understeer_s2_per_m2),
             "understeer_s2_per_m2",
             self.understeer_s2_per_m2,
-            "0 to 0.02 s²/m²",
+            Expected::Understeer {
+                from: 0.0,
+                to: 0.02,
+            },
         )
     }
 

@@ -1,9 +1,11 @@
 //! What can go wrong while a vehicle's sensors are read and fused.
 
 mod array;
+mod expected;
 mod signal;
 
 pub use self::array::{ArrayProblem, TimesArray};
+pub use self::expected::{ExpectedLayout, ExpectedSetting};
 pub use self::signal::SignalProblem;
 
 use deepfusion_hint::Hint;
@@ -21,7 +23,7 @@ pub enum Error {
         /// Its value.
         value: f64,
         /// What it must be.
-        expected: &'static str,
+        expected: ExpectedSetting,
     },
     /// A stream has too few usable samples.
     #[error(
@@ -112,7 +114,7 @@ pub enum Error {
         /// Its value.
         value: f64,
         /// What it must be.
-        expected: &'static str,
+        expected: ExpectedLayout,
     },
 }
 

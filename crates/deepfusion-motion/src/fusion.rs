@@ -3,7 +3,9 @@
 use crate::imu::{DrivingBias, bias_at};
 use crate::vehicle_motion::tilt_between;
 use crate::yaw_error::{KNOWN_BIAS, UNKNOWN_BIAS, yaw_errors};
-use crate::{Bicycle, Error, ImuConfig, ImuSample, ImuTrack, Result, Signal, VehicleMotion};
+use crate::{
+    Bicycle, Error, ExpectedSetting, ImuConfig, ImuSample, ImuTrack, Result, Signal, VehicleMotion,
+};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
@@ -117,7 +119,10 @@ impl FusedTrack {
             return Err(Error::Config {
                 field: "speed_scale",
                 value: config.speed_scale,
-                expected: "0.5 to 2 (a unit is converted, not scaled)",
+                expected: ExpectedSetting::SpeedScale {
+                    from: *SPEED_SCALES.start(),
+                    to: *SPEED_SCALES.end(),
+                },
             });
         }
         let speed = &sensors.speed_mps.map(|v| v * config.speed_scale);
@@ -325,7 +330,7 @@ impl FusionConfig {
                 return Err(Error::Config {
                     field,
                     value,
-                    expected: "0 to 1",
+                    expected: ExpectedSetting::Within { from: 0.0, to: 1.0 },
                 });
             }
         }

@@ -12,7 +12,7 @@
 
 mod align;
 
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting, Result};
 use align::Plane;
 
 /// Smallest picture that can be aligned, in pixels.
@@ -38,14 +38,17 @@ impl GreyFrame {
             return Err(Error::Config {
                 field: "picture size",
                 value: width.min(height) as f64,
-                expected: "at least 32×16 pixels",
+                expected: ExpectedSetting::PictureSize {
+                    width: LEAST.0,
+                    height: LEAST.1,
+                },
             });
         }
         if width.checked_mul(height) != Some(values.len()) {
             return Err(Error::Config {
                 field: "number of pixels",
                 value: values.len() as f64,
-                expected: "width × height",
+                expected: ExpectedSetting::AllPixels,
             });
         }
         let mut pyramid = vec![Plane::new(width, height, values)];

@@ -58,7 +58,7 @@ mod vehicle_track;
 mod yaw_error;
 
 pub use bicycle::Bicycle;
-pub use error::{Error, Result};
+pub use error::{Error, ExpectedSetting, Result};
 pub use fusion::{
     FusedTrack, FusionConfig, MotionConfig, MotionParts, SPEED_SCALES, VehicleSensors,
 };

@@ -2,7 +2,7 @@
 
 use deepfusion_hint::Hint;
 use deepfusion_motion::Error;
-use deepfusion_motion::can::{CanId, Dbc};
+use deepfusion_motion::can::{CanId, Dbc, ExpectedLayout};
 use proptest::prelude::*;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -110,7 +110,13 @@ fn units_in_latin_1_are_read() {
 fn a_signal_beyond_the_longest_frame_is_refused() {
     let dbc = Dbc::parse(&DBC.replace("501|11@1+", "501|12@1+")).unwrap();
     let error = dbc.signal("FD_INERTIAL.LAST_BITS").unwrap_err();
-    assert!(matches!(error, Error::Layout { .. }), "{error}");
+    let expected = ExpectedLayout::EndsWithin { bytes: 64 };
+    assert!(
+        matches!(&error, Error::Layout { field: "start_bit", expected: e, .. } if *e == expected),
+        "{error}"
+    );
+    let said = "start_bit is 501, expected one that ends within 64 bytes";
+    assert!(error.to_string().ends_with(said), "{error}");
 }
 
 proptest! {

@@ -1,4 +1,4 @@
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting as Expected, Result};
 use serde::{Deserialize, Serialize};
 
 /// Limits of ground, obstacles and targets, and the accuracy of depth.
@@ -91,21 +91,26 @@ impl PerceptionConfig {
                 "min_height_m",
                 self.min_height_m,
                 self.join_height_m,
-                "less than join_height_m",
+                Expected::BelowSetting("join_height_m"),
             ),
             (
                 "min_target_height_m",
                 self.min_target_height_m,
                 self.max_target_height_m,
-                "less than max_target_height_m",
+                Expected::BelowSetting("max_target_height_m"),
             ),
             (
                 "camera_height_m",
                 camera_low,
                 camera_high,
-                "the lower height first",
+                Expected::LowerFirst,
             ),
-            ("max_tilt_deg", self.max_tilt_deg, 80.0, "less than 80"),
+            (
+                "max_tilt_deg",
+                self.max_tilt_deg,
+                80.0,
+                Expected::Below(80.0),
+            ),
         ];
         let wrong = |field, value: f32, expected| {
             Err(Error::Config {
@@ -116,12 +121,12 @@ impl PerceptionConfig {
         };
         for (field, value) in above_zero {
             if !(value.is_finite() && value > 0.0) {
-                return wrong(field, value, "a number above 0");
+                return wrong(field, value, Expected::AboveZero);
             }
         }
         for (field, value) in from_zero {
             if !(value.is_finite() && value >= 0.0) {
-                return wrong(field, value, "a number from 0");
+                return wrong(field, value, Expected::NotNegative);
             }
         }
         for (field, low, high, expected) in ordered {
@@ -211,5 +216,30 @@ mod tests {
                 "{error}"
             );
         }
+    }
+
+    #[test]
+    fn what_a_setting_may_be_is_said() {
+        for (expected, said) in [
+            (Expected::AboveZero, "a number above 0"),
+            (Expected::NotNegative, "a number from 0"),
+            (Expected::Below(80.0), "less than 80"),
+            (
+                Expected::BelowSetting("join_height_m"),
+                "less than join_height_m",
+            ),
+            (Expected::LowerFirst, "the lower height first"),
+        ] {
+            assert_eq!(expected.to_string(), said);
+        }
+        let steep = PerceptionConfig {
+            max_tilt_deg: 90.0,
+            ..PerceptionConfig::default()
+        };
+        let error = steep.validate().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "max_tilt_deg is 90, expected less than 80"
+        );
     }
 }

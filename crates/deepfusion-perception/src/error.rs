@@ -24,7 +24,7 @@ pub enum Error {
         /// What it is.
         value: f64,
         /// What it may be.
-        expected: &'static str,
+        expected: ExpectedSetting,
     },
     /// Pixels of an instance that the depth image does not have.
     #[error("instance `{class}`: row {}, columns {} to {} of a depth image of {}x{}", run[0], run[1], run[2], size.0, size.1)]
@@ -39,6 +39,27 @@ pub enum Error {
     /// The intrinsics are no camera's.
     #[error("camera: {0}")]
     Camera(#[from] ImplausibleCamera),
+}
+
+/// What a setting may be.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExpectedSetting {
+    /// A number above 0.
+    #[error("a number above 0")]
+    AboveZero,
+    /// A number that is not negative.
+    #[error("a number from 0")]
+    NotNegative,
+    /// A number below this.
+    #[error("less than {0}")]
+    Below(f64),
+    /// A number below another setting.
+    #[error("less than {0}")]
+    BelowSetting(&'static str),
+    /// Two heights, the lower one first.
+    #[error("the lower height first")]
+    LowerFirst,
 }
 
 /// A result with this crate's [`Error`].

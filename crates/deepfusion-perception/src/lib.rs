@@ -40,7 +40,7 @@ pub use confidence::{ConfidenceModel, Evidence, MOST_ERROR, Reliability};
 pub use config::PerceptionConfig;
 pub use detect::{Detection, detect};
 pub use edges::{flying_pixels, without_flying_pixels};
-pub use error::{Error, Result};
+pub use error::{Error, ExpectedSetting, Result};
 pub use free_space::{Cell, FreeSpace};
 pub use ground::Ground;
 pub use ground_box::GroundBox;

@@ -1,5 +1,5 @@
 use crate::rig::CAMERA_HEIGHT;
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting as Expected, Result};
 use serde::{Deserialize, Serialize};
 
 /// The kind of scene.
@@ -72,7 +72,7 @@ impl Scene {
         found.ok_or_else(|| Error::Config {
             field: "scenes",
             value: name.to_owned(),
-            expected: "urban, park, garage, commercial, night, motorway, country or indoor",
+            expected: Expected::OneOf(Self::EVERY.map(Self::name).to_vec()),
         })
     }
 
@@ -99,7 +99,7 @@ impl std::str::FromStr for Scene {
         found.ok_or_else(|| Error::Config {
             field: "scene",
             value: name.to_owned(),
-            expected: "urban, park, garage, commercial or night",
+            expected: Expected::OneOf(Self::ALL.map(Self::name).to_vec()),
         })
     }
 }
@@ -204,67 +204,90 @@ impl SimConfig {
             (1..=100_000).contains(&self.frames),
             "frames",
             self.frames.to_string(),
-            "1 to 100000",
+            Expected::Within {
+                from: 1.0,
+                to: 100_000.0,
+            },
         )?;
         check(
             size.contains(&self.width),
             "width",
             self.width.to_string(),
-            "16 to 8192",
+            Expected::Within {
+                from: 16.0,
+                to: 8192.0,
+            },
         )?;
         check(
             size.contains(&self.height),
             "height",
             self.height.to_string(),
-            "16 to 8192",
+            Expected::Within {
+                from: 16.0,
+                to: 8192.0,
+            },
         )?;
         check(
             self.moving_cars <= 1000,
             "moving_cars",
             self.moving_cars.to_string(),
-            "0 to 1000",
+            Expected::Within {
+                from: 0.0,
+                to: 1000.0,
+            },
         )?;
         check(
             self.riders <= 1000,
             "riders",
             self.riders.to_string(),
-            "0 to 1000",
+            Expected::Within {
+                from: 0.0,
+                to: 1000.0,
+            },
         )?;
         check(
             self.riders == 0 || self.scene.has_riders(),
             "riders",
             self.riders.to_string(),
-            "0 in garages, in rooms and on motorways",
+            Expected::NoRiders,
         )?;
         check(
             self.fps >= 2.0 && self.fps <= 100.0,
             "fps",
             self.fps.to_string(),
-            "2 to 100",
+            Expected::Within {
+                from: 2.0,
+                to: 100.0,
+            },
         )?;
         check(
             self.frames as f64 / self.fps <= LONGEST_DRIVE_S,
             "frames",
             format!("{} at {} a second", self.frames, self.fps),
-            "a drive of at most 30 minutes",
+            Expected::DriveUpTo {
+                minutes: LONGEST_DRIVE_S / 60.0,
+            },
         )?;
         check(
             self.camera_height_m >= 0.3 && self.camera_height_m <= 4.0,
             "camera_height_m",
             self.camera_height_m.to_string(),
-            "0.3 to 4 metres",
+            Expected::Metres { from: 0.3, to: 4.0 },
         )?;
         check(
             (0.0..=5.0).contains(&self.stereo_baseline_m),
             "stereo_baseline_m",
             self.stereo_baseline_m.to_string(),
-            "0 to 5 metres",
+            Expected::Metres { from: 0.0, to: 5.0 },
         )?;
         check(
             self.scan_step_deg >= 0.05 && self.scan_step_deg <= 5.0,
             "scan_step_deg",
             self.scan_step_deg.to_string(),
-            "0.05 to 5",
+            Expected::Within {
+                from: 0.05,
+                to: 5.0,
+            },
         )
     }
 }
@@ -355,7 +378,10 @@ mod tests {
     #[test]
     fn an_unknown_scene_says_what_there_is() {
         let error = "moon".parse::<Scene>().unwrap_err();
-        assert!(error.to_string().contains("moon") && error.to_string().contains("urban"));
+        assert_eq!(
+            error.to_string(),
+            "simulator setting `scene` is moon, expected urban, park, garage, commercial or night"
+        );
         for scene in Scene::ALL {
             assert_eq!(scene.name().parse::<Scene>().ok(), Some(scene));
         }

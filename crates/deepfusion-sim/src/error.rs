@@ -1,6 +1,10 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
+mod expected;
+
+pub use self::expected::ExpectedSetting;
+
 /// What can go wrong while a drive is made or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -13,7 +17,7 @@ pub enum Error {
         /// The value given.
         value: String,
         /// What would be accepted.
-        expected: &'static str,
+        expected: ExpectedSetting,
     },
     /// The output folder holds something already.
     #[error("{}: the output folder is not empty", path.display())]

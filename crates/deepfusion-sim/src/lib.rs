@@ -49,7 +49,7 @@ mod velodyne;
 
 pub use can::{SpeedReading, SteeringReading, WHEELBASE_M};
 pub use config::{Scene, Sensors, SimConfig};
-pub use error::{Error, Result};
+pub use error::{Error, ExpectedSetting, Result};
 pub use fmcw::FmcwScan;
 pub use imu::ImuReading;
 pub use kitti::write_kitti;

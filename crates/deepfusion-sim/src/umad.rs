@@ -3,7 +3,7 @@
 use crate::fmcw;
 use crate::kitti::{encode_depth, encode_rgb};
 use crate::rig::Rig;
-use crate::{Error, Result, Simulation};
+use crate::{Error, ExpectedSetting, Result, Simulation};
 use deepfusion_rosbag::msg::{
     AckermannDrive, AckermannDriveStamped, CameraInfo, CompressedImage, Header, Imu, Odometry,
     Point, PointCloud2, Pose, PoseWithCovariance, Quaternion, RegionOfInterest, Twist,
@@ -94,14 +94,17 @@ pub fn write_bag(
         return Err(Error::Config {
             field: "stereo_baseline_m",
             value: config.stereo_baseline_m.to_string(),
-            expected: "0 for a bag, which has one camera",
+            expected: ExpectedSetting::OneCamera,
         });
     }
     if !(0.05..=5.0).contains(&settings.lidar_step_deg) {
         return Err(Error::Config {
             field: "lidar_step_deg",
             value: settings.lidar_step_deg.to_string(),
-            expected: "0.05 to 5 degrees",
+            expected: ExpectedSetting::Degrees {
+                from: 0.05,
+                to: 5.0,
+            },
         });
     }
     let existed = crate::kitti::prepare(out)?;

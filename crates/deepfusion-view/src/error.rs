@@ -1,8 +1,10 @@
 //! What can go wrong with showing results.
 
 mod content;
+mod folder_kind;
 
 pub use self::content::{ArrayProblem, ContentProblem};
+pub use self::folder_kind::FolderKind;
 
 use deepfusion_hint::Hint;
 use std::net::SocketAddr;
@@ -41,9 +43,9 @@ pub enum Error {
         /// The second folder.
         path: PathBuf,
         /// What it holds.
-        found: &'static str,
+        found: FolderKind,
         /// What the first holds.
-        expected: &'static str,
+        expected: FolderKind,
     },
     /// A training run, where frames are needed.
     #[error("{}: a training run has no frames", path.display())]

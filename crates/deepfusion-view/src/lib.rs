@@ -22,7 +22,7 @@ mod training;
 pub use depth::{DepthCode, DepthFile};
 #[cfg(feature = "rerun")]
 pub use error::EncodingProblem;
-pub use error::{ArrayProblem, ContentProblem, Error, Result};
+pub use error::{ArrayProblem, ContentProblem, Error, FolderKind, Result};
 pub use folder::Folder;
 #[cfg(feature = "rerun")]
 pub use rerun::{RerunReport, rerun_version, write_rerun};

@@ -18,9 +18,9 @@ use deepfusion_hint::Hint;
 use deepfusion_render::{ColourMap, DepthScale};
 use serde_json::{Value, json};
 
-use crate::folder::{FrameFile, Kind, frame_json, picture_of, targets_of};
+use crate::folder::{FrameFile, frame_json, picture_of, targets_of};
 use crate::http::{Request, Response};
-use crate::{DepthFile, Error, Folder, assets, training};
+use crate::{DepthFile, Error, Folder, FolderKind, assets, training};
 
 /// Frames that one answer of tracks may hold.
 const MOST_TRACK_FRAMES: u64 = 256;
@@ -71,7 +71,7 @@ impl Routes {
             json!({
                 "name": folder.name(),
                 "path": folder.path().display().to_string(),
-                "kind": match folder.kind() { Kind::Predictions => "predictions", Kind::Training => "training" },
+                "kind": match folder.kind() { FolderKind::Predictions => "predictions", FolderKind::Training => "training" },
             })
         });
         let table = |map: ColourMap| -> Vec<[u8; 3]> {
@@ -107,7 +107,7 @@ fn depth_colours(scale: &DepthScale) -> Vec<[u8; 3]> {
 }
 
 fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
-    let (path, training) = (folder.path(), folder.kind() == Kind::Training);
+    let (path, training) = (folder.path(), folder.kind() == FolderKind::Training);
     match rest {
         ["index"] if !training => Response::json(&folder.index_json(request.number("known"))),
         ["tracks"] if !training => {

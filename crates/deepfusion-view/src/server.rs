@@ -40,8 +40,8 @@ impl Server {
         {
             return Err(Error::OtherKind {
                 path: other.path().to_owned(),
-                found: other.kind().describe(),
-                expected: folder.kind().describe(),
+                found: other.kind(),
+                expected: folder.kind(),
             });
         }
         let asked = SocketAddr::new(settings.host, settings.port);

@@ -7,7 +7,7 @@ use crate::support::{
     self, CAMERA, Running, SIZE, any_port, results, steps, write_frame, write_sidecar,
 };
 use deepfusion_hint::Hint;
-use deepfusion_view::{Error, Folder, Server, Settings};
+use deepfusion_view::{Error, Folder, FolderKind, Server, Settings};
 use serde_json::{Value, json};
 
 fn problems(frame: &Value) -> String {
@@ -374,9 +374,18 @@ fn a_run_shows_its_curve_and_panels() {
     let open = |p: &std::path::Path| Folder::open(p).unwrap();
     let error = Server::bind(any_port(), open(run.path()), Some(open(frames.path()))).unwrap_err();
     assert!(
-        matches!(error, Error::OtherKind { .. }) && error.hint().is_some(),
+        matches!(
+            error,
+            Error::OtherKind {
+                found: FolderKind::Predictions,
+                expected: FolderKind::Training,
+                ..
+            }
+        ) && error.hint().is_some(),
         "{error}"
     );
+    let said = "holds predictions, which cannot stand beside a training run";
+    assert!(error.to_string().ends_with(said), "{error}");
 }
 
 /// What this process holds, in MiB; where the system does not say, nothing is checked.

@@ -28,7 +28,7 @@ pub enum ArrayProblem {
         /// Its dimensions.
         found: Vec<usize>,
         /// What they should be.
-        expected: &'static str,
+        expected: ExpectedShape,
     },
     /// An array of other numbers, or of objects.
     #[error("{array} holds values of type {found}, expected float32 or float64")]
@@ -68,6 +68,21 @@ impl ArrayProblem {
             }
         }
     }
+}
+
+/// Of what shape an array must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExpectedShape {
+    /// That of a stack of images.
+    #[error("N×H×W")]
+    Stack,
+    /// That of one image.
+    #[error("H×W")]
+    Image,
+    /// That of one image with at least one pixel.
+    #[error("H×W, not empty")]
+    ImageWithPixels,
 }
 
 /// Which array of a file.

@@ -1,4 +1,4 @@
-use crate::{Error, Result};
+use crate::error::{Error, ExpectedLayout as Expected, Result};
 use serde::{Deserialize, Serialize};
 
 /// The longest frame (CAN FD), in bits.
@@ -72,9 +72,9 @@ impl BitLayout {
             })
         };
         let lengths = match self.number {
-            Number::Unsigned | Number::Signed => (1..=64, "1 to 64 bits"),
-            Number::Float32 => (32..=32, "32 bits for float32"),
-            Number::Float64 => (64..=64, "64 bits for float64"),
+            Number::Unsigned | Number::Signed => (1..=64, Expected::Bits { from: 1, to: 64 }),
+            Number::Float32 => (32..=32, Expected::FloatBits(32)),
+            Number::Float64 => (64..=64, Expected::FloatBits(64)),
         };
         let length = f64::from(self.length);
         check(
@@ -84,19 +84,20 @@ impl BitLayout {
             lengths.1,
         )?;
         let start = f64::from(self.start_bit);
-        let fits = self.start_bit < MOST_BITS && self.last_byte() < usize::from(MOST_BITS / 8);
-        check(fits, "start_bit", start, "one that ends within 64 bytes")?;
+        let bytes = MOST_BITS / 8;
+        let fits = self.start_bit < MOST_BITS && self.last_byte() < usize::from(bytes);
+        check(fits, "start_bit", start, Expected::EndsWithin { bytes })?;
         check(
             self.scale.is_finite(),
             "scale",
             self.scale,
-            "a finite number",
+            Expected::Finite,
         )?;
         check(
             self.offset.is_finite(),
             "offset",
             self.offset,
-            "a finite number",
+            Expected::Finite,
         )
     }
 

@@ -8,7 +8,7 @@ mod dbc;
 mod layout;
 mod signal;
 
-pub use crate::error::SignalProblem;
+pub use crate::error::{ExpectedLayout, SignalProblem};
 pub use dbc::Dbc;
 pub use layout::{BitLayout, ByteOrder, Number};
 pub use signal::{CanFrame, CanId, CanSignal, MultiplexCondition};

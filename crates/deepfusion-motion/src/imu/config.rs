@@ -1,4 +1,4 @@
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting as Expected, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -110,7 +110,7 @@ impl ImuConfig {
                 value.abs() <= turn,
                 "vehicle_from_imu.rotation_rad",
                 value,
-                "angles in radians",
+                Expected::Angles,
             )?;
         }
         for value in mount.translation_m {
@@ -118,7 +118,7 @@ impl ImuConfig {
                 value.abs() <= 50.0,
                 "vehicle_from_imu.translation_m",
                 value,
-                "a place on the vehicle, in metres",
+                Expected::PlaceOnVehicle,
             )?;
         }
         for value in self.gyro_bias_radps.unwrap_or_default() {
@@ -126,7 +126,7 @@ impl ImuConfig {
                 value.abs() <= 1.0,
                 "gyro_bias_radps",
                 value,
-                "below 1 rad/s",
+                Expected::AngularRateBelow(1.0),
             )?;
         }
         let time = self.attitude_time_s;
@@ -134,11 +134,20 @@ impl ImuConfig {
             (0.05..=600.0).contains(&time),
             "attitude_time_s",
             time,
-            "0.05 to 600 s",
+            Expected::Seconds {
+                from: 0.05,
+                to: 600.0,
+            },
         )?;
         let still = &self.standstill;
-        let positive =
-            |field, value: f64| check(value > 0.0 && value.is_finite(), field, value, "above 0");
+        let positive = |field, value: f64| {
+            check(
+                value > 0.0 && value.is_finite(),
+                field,
+                value,
+                Expected::AboveZero,
+            )
+        };
         positive("standstill.speed_mps", still.speed_mps)?;
         positive("standstill.gyro_std_radps", still.gyro_std_radps)?;
         positive(

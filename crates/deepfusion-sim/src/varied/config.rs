@@ -4,7 +4,7 @@ use super::draw::mix;
 use super::ingredient::Ingredient;
 use super::mounted::MountedCamera;
 use crate::config::Scene;
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting as Expected, Result};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`crate::Endless`]. Equal settings give equal views, byte for byte.
@@ -91,25 +91,37 @@ impl EndlessConfig {
             size.contains(&self.width),
             "width",
             self.width.to_string(),
-            "16 to 4096",
+            Expected::Within {
+                from: 16.0,
+                to: 4096.0,
+            },
         )?;
         check(
             size.contains(&self.height),
             "height",
             self.height.to_string(),
-            "16 to 4096",
+            Expected::Within {
+                from: 16.0,
+                to: 4096.0,
+            },
         )?;
         check(
             (1..=100_000).contains(&self.views_per_world),
             "views_per_world",
             self.views_per_world.to_string(),
-            "1 to 100000",
+            Expected::Within {
+                from: 1.0,
+                to: 100_000.0,
+            },
         )?;
         check(
             (1..=256).contains(&self.worlds_at_once),
             "worlds_at_once",
             self.worlds_at_once.to_string(),
-            "1 to 256",
+            Expected::Within {
+                from: 1.0,
+                to: 256.0,
+            },
         )?;
         for (field, share) in [
             ("grey", self.grey),
@@ -122,7 +134,7 @@ impl EndlessConfig {
                 (0.0..=1.0).contains(&share),
                 field,
                 share.to_string(),
-                "0 to 1",
+                Expected::Within { from: 0.0, to: 1.0 },
             )?;
         }
         let names = || {
@@ -133,13 +145,13 @@ impl EndlessConfig {
             self.scenes.is_empty() || self.plain == 0.0 || !self.plain_scenes().is_empty(),
             "scenes",
             names(),
-            "one that simulate draws, where a share of the worlds is plain",
+            Expected::PlainScene,
         )?;
         check(
             !(self.on_cars() && self.is_indoors()),
             "scenes",
             names(),
-            "one that cars drive through, for cameras on cars",
+            Expected::SceneForCars,
         )?;
         self.cameras.iter().try_for_each(MountedCamera::validate)
     }

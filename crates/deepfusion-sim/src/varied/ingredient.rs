@@ -7,7 +7,7 @@ use crate::primitive::V3;
 use crate::render::Air;
 use crate::rig::{CAMERA_HEIGHT, kitti_like_intrinsics};
 use crate::scene::{Variety, World};
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting, Result};
 use serde::{Deserialize, Serialize};
 
 /// One ingredient of the varied views. Left out ([`crate::EndlessConfig::without`]), its part of a view is as in
@@ -69,7 +69,7 @@ impl std::str::FromStr for Ingredient {
         found.ok_or_else(|| Error::Config {
             field: "without",
             value: name.to_owned(),
-            expected: "camera-height, camera-tilt, lenses, squeeze, weather, variety or traffic",
+            expected: ExpectedSetting::OneOf(Self::ALL.map(Self::name).to_vec()),
         })
     }
 }

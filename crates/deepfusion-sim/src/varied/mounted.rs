@@ -2,7 +2,7 @@
 
 use super::camera::HEIGHTS;
 use super::draw::normal;
-use crate::{Error, Result};
+use crate::{Error, ExpectedSetting as Expected, Result};
 use deepfusion_geometry::Intrinsics;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -52,20 +52,22 @@ impl MountedCamera {
             })
         };
         if let Some(why) = self.intrinsics.implausible() {
-            return bad("cameras.intrinsics", why.to_string(), "a lens");
+            return bad("cameras.intrinsics", why.to_string(), Expected::Lens);
         }
         if let Some(height) = self.height_m
             && !(HEIGHTS.0..=HEIGHTS.1).contains(&height)
         {
+            let (from, to) = HEIGHTS;
             let value = height.to_string();
-            return bad("cameras.height_m", value, "0.3 to 2.5 metres");
+            return bad("cameras.height_m", value, Expected::Metres { from, to });
         }
         for (field, angle) in [
             ("cameras.pitch_degrees", self.pitch_degrees),
             ("cameras.roll_degrees", self.roll_degrees),
         ] {
             if !(-MOST_TILT..=MOST_TILT).contains(&angle) {
-                return bad(field, angle.to_string(), "-30 to 30 degrees");
+                let (from, to) = (-MOST_TILT, MOST_TILT);
+                return bad(field, angle.to_string(), Expected::Degrees { from, to });
             }
         }
         Ok(())

@@ -19,32 +19,13 @@ pub(crate) use summary::Summary;
 
 use self::listing::Listing;
 use crate::training;
-use crate::{Error, Result};
-
-/// What a folder holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// The output of `predict` or `perceive`.
-    Predictions,
-    /// A training run without predictions: its learning curve and panels.
-    Training,
-}
-
-impl Kind {
-    /// A description for messages.
-    pub(crate) fn describe(self) -> &'static str {
-        match self {
-            Self::Predictions => "predictions",
-            Self::Training => "a training run",
-        }
-    }
-}
+use crate::{Error, FolderKind, Result};
 
 /// A folder whose results are shown.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    kind: Kind,
+    kind: FolderKind,
     listing: Mutex<Listing>,
 }
 
@@ -71,9 +52,9 @@ impl Folder {
         let mut listing = Listing::new(path);
         listing.refresh().map_err(|e| Error::file(path, e))?;
         let kind = if !listing.is_empty() {
-            Kind::Predictions
+            FolderKind::Predictions
         } else if training::is_run(path) {
-            Kind::Training
+            FolderKind::Training
         } else {
             return Err(Error::NothingToShow {
                 path: path.to_owned(),
@@ -101,10 +82,10 @@ impl Folder {
     /// Whether it is a training run without predictions.
     #[must_use]
     pub fn is_training_run(&self) -> bool {
-        self.kind == Kind::Training
+        self.kind == FolderKind::Training
     }
 
-    pub(crate) fn kind(&self) -> Kind {
+    pub(crate) fn kind(&self) -> FolderKind {
         self.kind
     }
 

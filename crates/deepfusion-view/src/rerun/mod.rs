@@ -21,8 +21,7 @@ mod tracks;
 
 use std::path::Path;
 
-use crate::folder::Kind;
-use crate::{Error, Folder, Result};
+use crate::{Error, Folder, FolderKind, Result};
 
 use self::frame::FrameLogger;
 use self::recording::Recording;
@@ -53,7 +52,7 @@ pub fn write_rerun(
     mut progress: impl FnMut(usize, usize),
     stop: impl Fn() -> bool,
 ) -> Result<RerunReport> {
-    if folder.kind() == Kind::Training {
+    if folder.kind() == FolderKind::Training {
         return Err(Error::NoFrames {
             path: folder.path().to_owned(),
         });
