@@ -33,8 +33,6 @@ pub struct Calibration {
     pub views: Vec<ViewFit>,
     /// Where in the image corners were seen.
     pub coverage: Coverage,
-    /// What makes the calibration less sure than it could be.
-    pub warnings: Vec<String>,
 }
 
 impl Calibration {

@@ -40,6 +40,7 @@ mod model;
 mod pick;
 mod refine;
 mod solve;
+mod warning;
 mod zhang;
 
 pub use board::Board;
@@ -50,3 +51,4 @@ pub use error::{Error, Result, Undetermined};
 pub use model::LensModel;
 pub use pick::{Candidate, pick, sharpness};
 pub use solve::{LEAST_VIEWS, calibrate};
+pub use warning::CalibrationWarning;

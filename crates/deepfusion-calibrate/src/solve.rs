@@ -7,7 +7,6 @@ use crate::{
     Board, Calibration, Coverage, Error, LensModel, Result, StandardErrors, Undetermined, View,
     ViewFit,
 };
-use deepfusion_hint::count_of;
 use nalgebra::{Vector2, Vector3};
 
 /// Fewest views. Three have as many equations as the camera has numbers; with five, a bad one can be found.
@@ -21,16 +20,6 @@ const OUTLYING_PX: f64 = 0.3;
 /// Rounds of leaving out, and the largest part of the views that goes in each.
 const ROUNDS: usize = 4;
 const PART: usize = 4;
-/// Below this tilt, in degrees, a board says little of the focal length.
-const TILTED_DEG: f64 = 12.0;
-/// Views that should be tilted more.
-const TILTED_VIEWS: usize = 3;
-/// Standard error of the focal length, as a share of it, that is warned of.
-const UNSURE: f64 = 0.005;
-/// Root mean square error that is warned of, in pixels per 1000 of the image's longer side, and at least in pixels.
-const ROUGH_PX: (f64, f64) = (0.5, 0.5);
-/// Views that are enough.
-const GOOD_VIEWS: usize = 10;
 
 /// Fits a camera to views of a board. Views whose corners disagree with those of all others are left out.
 ///
@@ -160,7 +149,7 @@ fn calibration(
         coefficients: (4..model.numbers()).map(error).collect(),
     };
     let fits = view_fits(fit, views, used, board);
-    let mut calibration = Calibration {
+    Ok(Calibration {
         intrinsics: fit.camera.intrinsics(size),
         model,
         coefficients: fit.camera.coefficients().to_vec(),
@@ -169,10 +158,7 @@ fn calibration(
         hfov_deg: fit.camera.hfov_deg(size.0),
         coverage: Coverage::of(seen.iter().copied().flatten(), size),
         views: fits,
-        warnings: Vec::new(),
-    };
-    calibration.warnings = warnings(&calibration);
-    Ok(calibration)
+    })
 }
 
 /// Every view, also those left out, under the camera of those used.
@@ -210,71 +196,4 @@ fn alone(fit: &Fit, view: &[Vector2<f64>], board: &[Vector3<f64>]) -> Option<Pos
     });
     let (turn, shift) = pose(&homography(&pairs.collect::<Vec<_>>())?)?;
     Some(Pose { turn, shift })
-}
-
-/// What makes it less sure than it could be.
-fn warnings(found: &Calibration) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let used = found.used();
-    if used < GOOD_VIEWS {
-        warnings.push(format!(
-            "{} {} few: {GOOD_VIEWS} to 30, from many sides, are better",
-            count_of(used, "view"),
-            if used == 1 { "is" } else { "are" }
-        ));
-    }
-    let tilts: Vec<f64> = found
-        .views
-        .iter()
-        .filter(|v| v.used)
-        .filter_map(|v| v.tilt_deg)
-        .collect();
-    let tilted = tilts.iter().filter(|t| **t > TILTED_DEG).count();
-    if tilted < TILTED_VIEWS {
-        let most = tilts.iter().copied().fold(0.0, f64::max);
-        warnings.push(format!(
-            "the boards are all but parallel to the image (tilted by {most:.0} degrees at most): the focal length is unsure; tilt the board by 20 to 45 degrees"
-        ));
-    }
-    let empty = found.coverage.empty_corners();
-    if !empty.is_empty() {
-        warnings.push(format!(
-            "no corner was seen in the image's {}: the lens is guessed there; show the board there, too",
-            empty.join(", ")
-        ));
-    }
-    let margins: Vec<String> = found
-        .coverage
-        .wide_margins()
-        .iter()
-        .map(|(edge, share)| format!("the {edge} {:.0} %", 100.0 * share))
-        .collect();
-    if empty.is_empty() && !margins.is_empty() {
-        warnings.push(format!(
-            "no corner was seen in {} of the image: the lens is guessed there; show the board there, too",
-            margins.join(", ")
-        ));
-    }
-    let k = &found.intrinsics;
-    let unsure = (found.standard_errors.fx / k.fx).max(found.standard_errors.fy / k.fy);
-    if unsure > UNSURE {
-        warnings.push(format!(
-            "the focal length is known to {:.1} % only: more tilted views, and nearer ones, make it surer",
-            100.0 * unsure
-        ));
-    }
-    let side = f64::from(k.width.max(k.height)) / 1000.0;
-    if found.rms_px > (ROUGH_PX.0 * side).max(ROUGH_PX.1) {
-        warnings.push(format!(
-            "the corners are {:.2} px off (root mean square): is the board flat, the picture sharp and unmoved, and the lens model right (fisheye or not)?",
-            found.rms_px
-        ));
-    }
-    if found.hfov_deg.is_none() {
-        warnings.push(
-            "the lens model shows nothing at the image's left or right edge: show the board there, too"
-                .into(),
-        );
-    }
-    warnings
 }

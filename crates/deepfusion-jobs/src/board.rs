@@ -1,6 +1,7 @@
 //! The board of a calibration in pictures and videos, and the camera by it.
 
 mod left_out;
+mod warning;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,8 @@ use image::imageops::grayscale;
 use rayon::prelude::*;
 
 pub use self::left_out::{LeftOut, LeftOutReason};
+pub use self::warning::BoardWarning;
+use self::warning::turned;
 use crate::{Error, Result, find_inputs};
 
 /// Endings of pictures and videos.
@@ -139,26 +142,31 @@ impl BoardViews {
         .into())
     }
 
-    /// The camera that explains the views, and its lens. Its warnings also say what the pictures alone know, and whether images can be
-    /// corrected with the lens.
+    /// The camera that explains the views, and its lens; [`Self::warnings`] say how sure they are.
     ///
     /// # Errors
     /// As [`Self::require_enough`] and [`calibrate`]; [`BoardError::Undetermined`] for a lens that is none.
     pub fn calibrate(&self, board: &Board, model: LensModel) -> Result<(Calibration, Distortion)> {
         self.require_enough(board)?;
-        let mut found = calibrate(&self.views, board, self.size, model)?;
-        found.warnings.extend(self.turned());
+        let found = calibrate(&self.views, board, self.size, model)?;
         let lens = found
             .distortion()
             .map_err(|problem| BoardError::Undetermined {
                 problem: problem.into(),
             })?;
-        if let Err(problem) = Lens::new(found.intrinsics, &lens) {
-            found.warnings.push(format!(
-                "images cannot be corrected with this lens: {problem}; show the board nearer to the image's border"
-            ));
-        }
         Ok((found, lens))
+    }
+
+    /// What makes a camera of these views less sure, what the pictures alone know of it, and whether images can be corrected with its lens.
+    #[must_use]
+    pub fn warnings(&self, found: &Calibration, lens: &Distortion) -> Vec<BoardWarning> {
+        let of_itself = found.warnings().into_iter();
+        let mut warnings: Vec<BoardWarning> = of_itself.map(BoardWarning::from).collect();
+        warnings.extend(self.turned());
+        if let Err(problem) = Lens::new(found.intrinsics, lens) {
+            warnings.push(BoardWarning::NotCorrectable(problem));
+        }
+        warnings
     }
 
     fn add_pictures(
@@ -322,15 +330,11 @@ impl BoardViews {
 
     /// That pictures were turned upright, which the calibration then is of.
     #[must_use]
-    pub fn turned(&self) -> Option<String> {
+    pub fn turned(&self) -> Option<BoardWarning> {
         let (_, orientation) = self.first.as_ref()?;
-        (*orientation != 1).then(|| {
-            format!(
-                "EXIF turns the pictures by {}: the calibration is of the upright ones, {}x{}, which a network sees where it is given the pictures alone; a recording's images are used as they are stored",
-                turned(*orientation),
-                self.size.0,
-                self.size.1
-            )
+        (*orientation != 1).then_some(BoardWarning::Turned {
+            orientation: *orientation,
+            size: self.size,
         })
     }
 }
@@ -348,15 +352,4 @@ fn sharpest(video: &VideoFrames, part: std::ops::Range<usize>) -> Result<(usize,
     }
     // No part is empty; a frame that is would be no board.
     Ok(best.unwrap_or_default())
-}
-
-/// What EXIF's orientation does to a picture.
-fn turned(orientation: u8) -> &'static str {
-    match orientation {
-        1 => "0 degrees",
-        3 => "180 degrees",
-        6 => "90 degrees",
-        8 => "270 degrees",
-        _ => "a mirror",
-    }
 }

@@ -6,7 +6,7 @@ mod summary;
 use deepfusion_calibrate::{Board, Calibration};
 use deepfusion_data::camera_info_yaml;
 use deepfusion_hint::count_of;
-use deepfusion_jobs::board::{LeftOut, SearchProgress, find_views};
+use deepfusion_jobs::board::{BoardWarning, LeftOut, SearchProgress, find_views};
 use serde::Serialize;
 
 use crate::cli::CalibrateArgs;
@@ -20,6 +20,8 @@ use crate::progress::{Progress, say};
 struct Report<'a> {
     #[serde(flatten)]
     calibration: &'a Calibration,
+    /// What makes it less sure than it could be.
+    warnings: &'a [BoardWarning],
     /// Names of `coefficients`.
     coefficient_names: &'a [&'a str],
     board: Board,
@@ -67,11 +69,13 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     )?;
     drop(progress);
     let (found, lens) = seen.calibrate(&board, args.model())?;
+    let warnings = seen.warnings(&found, &lens);
     let name = output::name_of(args.inputs[0].as_ref());
     let yaml = camera_info_yaml(&name, &found.intrinsics, &lens, &comments(&found, &board));
     output::write(&args.out, yaml)?;
     let report = Report {
         calibration: &found,
+        warnings: &warnings,
         coefficient_names: found.model.coefficients(),
         board,
         looked_at: seen.looked_at,
@@ -83,7 +87,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         page::write(path, &report, &seen.views)?;
         say(&format!("report    {}", path.display()));
     }
-    for warning in &found.warnings {
+    for warning in &warnings {
         tracing::warn!("{warning}");
     }
     if args.json {
