@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{fails, ok, run};
+use crate::support::{fails, json, ok, run};
 use serde_json::Value;
 
 const DRIVE: &str = "street/2026_01_01/2026_01_01_drive_0005_sync";
@@ -219,6 +219,32 @@ fn exact_depth_finds_the_simulators_boxes() {
     assert!(lidar.contains("targets from lidar depth"), "{lidar}");
 }
 
+/// Test-time augmentation reaches the depth that targets are found in, and the report says so.
+#[test]
+fn targets_are_measured_in_the_mean_of_predictions() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out street --frames 3 --seed 6 --moving-cars 6 --size 320x96",
+    );
+    let eval = "eval-targets --data street --model tiny";
+    let plain = json(at, &format!("{eval} --json"));
+    let blended = json(at, &format!("{eval} --post-process flip --json"));
+    assert_eq!(plain.get("post_process"), None);
+    assert_eq!(blended["post_process"], "flip");
+    for key in ["depth", "frames", "labels"] {
+        assert_eq!(blended[key], plain[key], "{key}");
+    }
+    assert_eq!(blended["frames"], 3);
+    let text = ok(at, &format!("{eval} --post-process multi-scale")).stdout;
+    let head = "targets from predicted (multi-scale) depth, 3 frames";
+    assert!(text.starts_with(head), "{text}");
+    // What was measured is one depth.
+    let measured = "eval-targets --data street --depth truth --post-process flip";
+    assert_eq!(run(at, measured).code, 2);
+}
+
 /// A model of the instances' crate's own tests.
 fn model(name: &str) -> String {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
@@ -287,6 +313,10 @@ fn what_is_wrong_is_named() {
         ("perceive --model run nowhere.png --out a", "nowhere.png"),
         ("perceive --model run street.mp4x --out b", "street.mp4x"),
         ("eval-targets --data street --model nowhere", "nowhere"),
+        (
+            "eval-targets --data street --model run --post-process multi-scale",
+            "canonical focal length",
+        ),
     ];
     for (args, named) in cases {
         let run = run(at, args);

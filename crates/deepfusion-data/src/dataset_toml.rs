@@ -54,6 +54,9 @@ pub(crate) struct FolderConfig {
     pub(crate) depth_unit_m: Option<f64>,
     /// A value of the depth images, besides 0, that means none.
     pub(crate) depth_invalid: Option<u16>,
+    /// Whether the images are a simulator's.
+    #[serde(default)]
+    pub(crate) simulated: bool,
     /// Where the camera is on the vehicle.
     pub(crate) mount: Option<Mount>,
     /// A point of the inertial unit in the vehicle.

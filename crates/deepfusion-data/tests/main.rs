@@ -25,6 +25,7 @@ mod recording;
 mod rgbd;
 mod ros2;
 mod ros_frames;
+mod simulated;
 mod speed_check;
 mod video;
 mod video_topics;

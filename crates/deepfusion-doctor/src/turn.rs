@@ -92,3 +92,56 @@ pub(super) fn picture_turn(pair: &EpipolarPair) -> Option<Vector3<f64>> {
 pub(super) fn picture_yaw_rate(pair: &EpipolarPair) -> Option<f64> {
     turns(pair).map(|(_, picture)| picture)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::Flow;
+    use deepfusion_geometry::{Intrinsics, Se3};
+
+    const DT_S: f64 = 0.1;
+
+    /// A metre ahead, turning by `rate` rad/s, positive to the left.
+    fn motion(rate: f64) -> Se3 {
+        Se3::from_axis_angle(Vector3::new(0.0, -rate * DT_S, 0.0), Vector3::z())
+    }
+
+    /// Points before a camera that turns by one rate, of a vehicle that says another.
+    fn pair(seen: f64, said: f64) -> EpipolarPair {
+        let k = Intrinsics::centred(200.0, (320, 96));
+        let later_from_earlier = motion(seen).inverse();
+        let points = (0..150).filter_map(|i| {
+            let noise = |by: f64| ((f64::from(i) * by).sin() * 43758.5453).fract();
+            let z = 14.0 + 9.0 * noise(2.7);
+            let point = Vector3::new(0.7 * z * noise(1.3), 0.25 * z * noise(1.9), z);
+            let from = k.project(&point)?;
+            let to = k.project(&later_from_earlier.transform(&point))?;
+            Some(Flow {
+                at: [from.x, from.y],
+                by: [to.x - from.x, to.y - from.y],
+            })
+        });
+        let points: Vec<Flow> = points.collect();
+        EpipolarPair::new(&points, &k, motion(said), (0.0, DT_S)).unwrap()
+    }
+
+    /// Of a vehicle that says so many times the rates at which its camera turns.
+    fn diagnosed(factor: f64) -> Outcome {
+        let rates = (0..20).map(|i| 0.3 * (0.7 * f64::from(i)).sin());
+        let pairs: Vec<EpipolarPair> = rates.map(|rate| pair(rate, factor * rate)).collect();
+        check(&pairs)
+    }
+
+    #[test]
+    fn a_yaw_rate_of_the_wrong_sign_is_to_be_negated() {
+        let right = diagnosed(1.0);
+        assert!(right.findings.is_empty() && right.skipped.is_none());
+        let outcome = diagnosed(-1.0);
+        let [finding] = outcome.findings.as_slice() else {
+            panic!("{outcome:?}")
+        };
+        assert_eq!(finding.severity, Severity::Error);
+        let remedy = finding.remedy.to_string();
+        assert!(remedy.contains("negate the yaw rate"), "{remedy}");
+    }
+}

@@ -4,10 +4,11 @@
 //! one on images that none of them saw ("model soups", Wortsman et al., arXiv 2203.05482; of a network and the one it began from, arXiv 2109.01903).
 //!
 //! What batch norms measured of their inputs is averaged like weights, and not measured anew. Where they were frozen (`frozen_statistics`), as in
-//! `adapt`, all networks have the same.
+//! `adapt`, all networks have the same, and the mean is exact; where they were not, [`Averaged::statistics`] says how far apart they are.
 
 mod ancestors;
 mod fit;
+mod statistics;
 
 use std::path::{Path, PathBuf};
 
@@ -20,6 +21,7 @@ use deepfusion_runtime::{ModelSource, unpacked};
 use deepfusion_weights::Shipped;
 
 pub use self::ancestors::Kinship;
+pub use self::statistics::StatisticsSpread;
 use crate::{Error, NoMean, Result};
 
 /// The parts of a run's checkpoint beside the depth network that training goes on with.
@@ -37,6 +39,8 @@ pub struct Averaged {
     pub kinship: Kinship,
     /// Whether some could say how sure they are and others could not, so that the mean cannot.
     pub lost_uncertainty: bool,
+    /// How far apart their batch norms measured their inputs; `None` where all measured the same.
+    pub statistics: Option<StatisticsSpread>,
 }
 
 /// Writes the mean of the depth networks' weights as a new run into `out`: Σ sᵢ·wᵢ / Σ sᵢ, computed in f64; without `shares` all count alike.
@@ -84,6 +88,7 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
         .map(|network| &network.weights)
         .zip(shares)
         .collect();
+    let statistics = statistics::spread(&weights);
     let depth = mean(&weights);
     let mut config = folder.read_settings()?;
     config.make_absolute();
@@ -119,6 +124,7 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
         networks: origins,
         kinship,
         lost_uncertainty,
+        statistics,
     })
 }
 

@@ -31,6 +31,9 @@ pub enum Error {
     /// The error of a prediction asked for of a network, or an engine, that does not say it.
     #[error("this network, or the engine that runs it, does not say how sure it is of its depth")]
     NoUncertainty,
+    /// Pictures of a network's layers, without what shows these.
+    #[error("pictures of the network's layers are asked for, and nothing shows what these do")]
+    NoLayers,
     /// A pattern of file names that is none.
     #[error(transparent)]
     Pattern(#[from] glob::PatternError),
@@ -628,6 +631,9 @@ impl Hint for Error {
             Self::NoCamera => Some("give fx, fy, cx, cy or a calibration".into()),
             Self::NoUncertainty => Some(
                 "leave out sigma and confidence, or use a network trained with depth_net.uncertainty = true".into(),
+            ),
+            Self::NoLayers => Some(
+                "leave out features; targets have none, and depth has them where a job is given what shows layers".into(),
             ),
             Self::Pattern(_)
             | Self::Picture(_)

@@ -31,7 +31,8 @@ pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
     /// Exact poses, which no real drive has.
     const SIMULATED: &str = "poses.txt";
     let surely_real = |dataset: &Dataset| {
-        dataset.kind() != DatasetKind::Bag && !dataset.folder().join(SIMULATED).exists()
+        let marked = dataset.is_simulated() || dataset.folder().join(SIMULATED).exists();
+        dataset.kind() != DatasetKind::Bag && !marked
     };
     card.simulated_only && datasets.iter().all(surely_real)
 }
@@ -93,4 +94,48 @@ pub fn unseen_frames(
     _: &[Dataset],
 ) -> Unseen {
     Unseen::NotKnown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_data::{OpenOptions, convert_to_bag, convert_to_kitti};
+    use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag};
+
+    /// What became of a simulated bag may be what a network of simulated drives saw: only without the mark nothing tells it from a real drive.
+    #[test]
+    fn a_simulated_drive_is_not_surely_real_in_another_layout() {
+        let at = tempfile::tempdir().unwrap();
+        let at = at.path();
+        let config = SimConfig {
+            frames: 6,
+            width: 64,
+            height: 48,
+            fps: 25.0,
+            sensors: Sensors::Umad,
+            ..SimConfig::default()
+        };
+        let settings = BagSettings {
+            lidar_step_deg: 5.0,
+            ..BagSettings::default()
+        };
+        let simulation = Simulation::new(&config).unwrap();
+        let bag = write_bag(&simulation, &at.join("sim"), &settings, &mut |_, _| ()).unwrap();
+        let open = |path: &Path| Dataset::open(path, &OpenOptions::default()).unwrap();
+        let kitti = at.join("kitti");
+        convert_to_kitti(&open(&bag), &kitti, &mut |_, _| ()).unwrap();
+        let again = at.join("again.bag");
+        let converted = open(&kitti);
+        convert_to_bag(&converted[0], &again, settings.compression, &mut |_, _| ()).unwrap();
+        let mut card = deepfusion_weights::all().unwrap()[0].card.clone();
+        card.simulated_only = true;
+        for path in [&bag, &kitti, &again] {
+            let drives = open(path);
+            assert!(drives[0].is_simulated(), "{}", path.display());
+            assert!(!unseen(&card, &drives), "{}", path.display());
+        }
+        let date = converted[0].folder().parent().unwrap();
+        std::fs::remove_file(date.join("dataset.toml")).unwrap();
+        assert!(unseen(&card, &open(&kitti)));
+    }
 }

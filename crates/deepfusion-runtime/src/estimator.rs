@@ -327,6 +327,30 @@ impl DepthEstimator {
         self.infer(&preparer.prepare(image, camera, focal_correction, crop))
     }
 
+    /// As [`Self::predict`] of the mirror image, mirrored back: beside the image's own prediction pixel by pixel.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::run`].
+    pub fn predict_mirrored(
+        &mut self,
+        image: &RgbImage,
+        camera: Option<&Intrinsics>,
+        focal_correction: bool,
+        crop: bool,
+    ) -> Result<Prediction, Error> {
+        let preparer = self.preparer();
+        let mut prepared = preparer.prepare(image, camera, focal_correction, crop);
+        for view in &mut prepared.views {
+            mirror(&mut view.input, view.size.width);
+        }
+        let mut seen = self.infer(&prepared)?;
+        mirror(&mut seen.disparity, seen.width);
+        if let Some(log_scale) = &mut seen.log_scale {
+            mirror(log_scale, seen.width);
+        }
+        Ok(seen)
+    }
+
     /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Of several views the mean of
     /// the disparities is taken, at the size of the largest; of ln b as well, where it predicts that, so that it says how sure a single
     /// prediction is, not how sure their mean.

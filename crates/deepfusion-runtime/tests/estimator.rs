@@ -247,6 +247,31 @@ fn a_mirrored_image_is_seen_mirrored() -> Result {
     Ok(())
 }
 
+/// As of the mirrored picture, but for what resizing rounds.
+#[test]
+fn a_mirrored_prediction_lies_beside_the_images_own() -> Result {
+    let mut estimator = tiny()?;
+    let image = picture(640, 480, 7);
+    let k = camera(640, 480);
+    let back = estimator.predict_mirrored(&image, Some(&k), true, false)?;
+    let mirrored = image::imageops::flip_horizontal(&image);
+    let mut expected = estimator.predict(&mirrored, Some(&k.flipped()), true, false)?;
+    for row in expected.disparity.chunks_exact_mut(expected.width) {
+        row.reverse();
+    }
+    let differ = |other: &Prediction| {
+        let pairs = back.disparity.iter().zip(&other.disparity);
+        pairs.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f32::max)
+    };
+    let (off, own) = (
+        differ(&expected),
+        differ(&estimator.predict(&image, Some(&k), true, false)?),
+    );
+    assert_eq!((back.width, back.window), (expected.width, expected.window));
+    assert!(off < 0.01 && own > 0.01, "{off}, {own}");
+    Ok(())
+}
+
 #[test]
 fn a_network_of_one_camera_takes_one_size() -> Result {
     let mut network = ModelSource::named(Path::new("tiny"))?.load(None)?;

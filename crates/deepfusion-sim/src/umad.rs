@@ -437,7 +437,7 @@ fn describe(rig: &Rig, scenario: &str) -> String {
         "# What the bag beside this file does not say: where the sensors are, and the vehicle's size.\n\
          # Transforms are target_from_source: metres, and an axis-angle vector in radians.\n",
     );
-    let _ = writeln!(text, "scenario = \"{scenario}\"\n");
+    let _ = writeln!(text, "scenario = \"{scenario}\"\nsimulated = true\n");
     let transforms = [
         ("cam_from_lidar", rig.cam_from_velo()),
         ("cam_from_vehicle", rig.cam_from_imu()),

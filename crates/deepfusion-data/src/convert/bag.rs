@@ -1,4 +1,6 @@
-use super::parts::{Converted, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
+use super::parts::{
+    Converted, SIMULATED, at_ns, cam_from_scanner, moving_at, points, seconds_to_move,
+};
 use crate::{Dataset, Error, GtKind, ImageProblem, Result, TopicProblem};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
@@ -16,8 +18,8 @@ use std::path::Path;
 /// Frames read and written together.
 const BATCH: usize = 8;
 
-/// Writes a data set as a ROS 1 bag, and beside it the file that says where its sensors are: PNG images, CameraInfo,
-/// speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place. Times are the vehicle's
+/// Writes a data set as a ROS 1 bag, and beside it the file that says where its sensors are and whether it is simulated: PNG images,
+/// CameraInfo, speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place. Times are the vehicle's
 /// clock's, for all sensors.
 ///
 /// # Errors
@@ -182,6 +184,9 @@ fn describe(dataset: &Dataset) -> String {
     );
     if let Some(scenario) = dataset.scenario() {
         let _ = writeln!(text, "scenario = {scenario:?}");
+    }
+    if dataset.is_simulated() {
+        text += SIMULATED;
     }
     let mut add = |name: &str, pose: &Se3| {
         let three = |v: nalgebra::Vector3<f64>| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);

@@ -1,7 +1,8 @@
 use super::calendar::{date, stamp};
 use super::parts::{
-    Converted, Moving, at_ns, cam_from_scanner, moving_at, points, seconds_to_move,
+    Converted, Moving, SIMULATED, at_ns, cam_from_scanner, moving_at, points, seconds_to_move,
 };
+use crate::dataset_toml::FolderConfig;
 use crate::{Dataset, Error, Result, save_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -15,7 +16,8 @@ use std::path::{Path, PathBuf};
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
 /// frame's time), not the scanner's own; `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
-/// know: its `navstat` says that there was no fix.
+/// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in `dataset.toml`, the date's where all
+/// is, else the drive's.
 ///
 /// # Errors
 /// [`Error::Exists`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
@@ -44,6 +46,11 @@ pub fn convert_to_kitti(
     let date_name = format!("{year:04}_{month:02}_{day:02}");
     let date_folder = out.join(&date_name);
     write_calibration(&date_folder, &first.intrinsics(0), first.cam_from_vehicle())?;
+    // A drive's own file would hide what one writes into the date's: only where they differ.
+    let all_simulated = datasets.iter().all(Dataset::is_simulated);
+    if all_simulated {
+        mark_simulated(&date_folder)?;
+    }
     let total: usize = datasets.iter().map(|d| d.frames().len()).sum();
     let (mut done, mut folders) = (0, Vec::new());
     for (number, dataset) in datasets.iter().enumerate() {
@@ -52,6 +59,9 @@ pub fn convert_to_kitti(
             done += frames;
             progress(done, total);
         })?;
+        if dataset.is_simulated() && !all_simulated {
+            mark_simulated(&folder)?;
+        }
         folders.push(folder);
     }
     // All at once: a wait for each of its thousands of files would take longer than writing them.
@@ -60,6 +70,12 @@ pub fn convert_to_kitti(
         paths: folders,
         moved_s,
     })
+}
+
+/// Says of a drive, or of all of a date, that nobody drove it.
+fn mark_simulated(folder: &Path) -> Result<()> {
+    let text = format!("# Written by `data convert`, of a simulated recording.\n{SIMULATED}");
+    super::parts::write_text(&folder.join(FolderConfig::NAME), &text)
 }
 
 /// Frames read and written together.

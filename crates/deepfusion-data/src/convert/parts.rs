@@ -67,6 +67,9 @@ pub struct Converted {
     pub moved_s: i64,
 }
 
+/// The line of the file beside a recording that says that nobody drove it.
+pub(super) const SIMULATED: &str = "simulated = true\n";
+
 /// Makes the output folder, which must be new or empty.
 pub(super) fn prepare(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;

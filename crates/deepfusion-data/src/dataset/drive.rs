@@ -83,6 +83,7 @@ pub struct Dataset {
     receiver: Receiver,
     camera_assumed: bool,
     mount_assumed: bool,
+    simulated: bool,
     /// The recording's, and what was noticed about its neighbours.
     warnings: Vec<String>,
     passed_over: Option<String>,
@@ -105,7 +106,22 @@ impl Dataset {
             receiver: Receiver::default(),
             camera_assumed: false,
             mount_assumed: false,
+            simulated: false,
         }
+    }
+
+    /// With the mark of a simulator, or without it.
+    #[must_use]
+    pub fn with_simulated(mut self, simulated: bool) -> Self {
+        self.simulated = simulated;
+        self
+    }
+
+    /// Whether the recording says that nobody drove it: by what only a simulator can write beside the images, or by the key `simulated` of the
+    /// file beside it. [`crate::convert_to_kitti`] and [`crate::convert_to_bag`] hand it on. Without the mark it may be either.
+    #[must_use]
+    pub fn is_simulated(&self) -> bool {
+        self.simulated
     }
 
     /// With a camera that nothing says, or that something does.

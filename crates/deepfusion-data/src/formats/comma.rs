@@ -100,6 +100,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         untimed_poses: false,
     }
     .into_dataset()
+    .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
 /// A segment without its video.

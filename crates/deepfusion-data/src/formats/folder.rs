@@ -73,6 +73,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         untimed_poses: false,
     }
     .into_dataset()
+    .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
 /// Where the images are: a folder that `dataset.toml` names or that has a usual name, else the recording's own.

@@ -46,6 +46,13 @@ impl Dataset {
         Ok(Layout::of(path)?.kind())
     }
 
+    /// Whether every recording at a path is marked as simulated by the files beside its images ([`Self::is_simulated`]), found without opening
+    /// any; of a bag by its own file alone. `false` also where nothing can be opened.
+    #[must_use]
+    pub fn all_simulated_at(path: &Path) -> bool {
+        Layout::of(path).is_ok_and(|layout| layout.says_simulated())
+    }
+
     /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
     /// by type, and the file beside [`MessageSource::path`] says what they do not.
     ///
@@ -173,6 +180,20 @@ impl Layout {
             Self::Bags(_) => DatasetKind::Bag,
             Self::Folder(_) => DatasetKind::Folder,
             Self::Video(_) => DatasetKind::Video,
+        }
+    }
+
+    /// Whether the files beside the images say of each recording that it is simulated.
+    fn says_simulated(&self) -> bool {
+        let says = |folder: &Path| FolderConfig::read(folder).is_ok_and(|config| config.simulated);
+        match self {
+            Self::Kitti(drives) => drives.iter().all(Drive::is_simulated),
+            Self::Bags(bags) => bags.iter().all(|bag| bag::says_simulated(bag)),
+            Self::RgbD(folders) => folders.iter().all(|folder| says(folder)),
+            Self::Comma(folder) | Self::Folder(folder) => says(folder),
+            Self::Video(place) if place.is_dir() => says(place),
+            Self::Video(file) => file.parent().is_some_and(says),
+            Self::KittiOdometry(_) | Self::Kitti360(_) | Self::NuScenes(_) => false,
         }
     }
 

@@ -108,6 +108,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         untimed_poses: false,
     }
     .into_dataset()
+    .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
 /// `frame-<number>.color.png` and `.jpg`, by number.

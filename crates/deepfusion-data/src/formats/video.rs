@@ -153,6 +153,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         folder,
     }
     .into_dataset()
+    .map(|dataset| dataset.with_simulated(config.simulated))
 }
 
 /// What is wrong with the camera of a GoPro's video that was not filmed through its linear lens; nothing where the calibration has its own

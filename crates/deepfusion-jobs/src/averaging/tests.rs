@@ -91,6 +91,35 @@ fn depth_is_the_mean_and_the_rest_the_firsts() {
     assert_eq!(again.unwrap().kinship, Kinship::Network);
 }
 
+/// The mean of the variances lacks what the means are apart: of the first channel 1 beside 2, of the second nothing.
+#[test]
+fn statistics_that_differ_are_said_and_averaged_as_they_are() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let with = |name: &str, mean: [f32; 2], variance: [f32; 2]| {
+        let tensors: [(&str, &[f32]); 5] = [
+            ("depth.a", &[1.0]),
+            ("depth.bn1.running_mean", &mean),
+            ("depth.bn1.running_var", &variance),
+            ("depth.bn2.running_mean", &[0.5]),
+            ("depth.bn2.running_var", &[4.0]),
+        ];
+        run((&at.join(name), LAST), &tensors, STATE, |_, _| {})
+    };
+    let first = with("first", [1.0, 0.0], [2.0, 1.0]);
+    let frozen = with("frozen", [1.0, 0.0], [2.0, 1.0]);
+    let moved = with("moved", [3.0, 0.0], [2.0, 3.0]);
+    let same = average(&[first.clone(), frozen], None, &at.join("same")).unwrap();
+    assert_eq!(same.statistics, None);
+    let made = average(&[first, moved], None, &at.join("mean")).unwrap();
+    let spread = made.statistics.unwrap();
+    assert_eq!((spread.layers, spread.of), (1, 2));
+    assert!((spread.left_out - 0.25).abs() < 1e-4, "{spread:?}");
+    let depth = depth_of(&made);
+    assert_eq!(depth.tensors["bn1.running_mean"].values, [2.0, 0.0]);
+    assert_eq!(depth.tensors["bn1.running_var"].values, [2.0, 2.0]);
+}
+
 #[test]
 fn shares_are_positive_and_one_for_each() {
     let at = tempfile::tempdir().unwrap();

@@ -29,22 +29,26 @@ pub struct DepthJob<'a> {
 }
 
 impl<'a> DepthJob<'a> {
-    /// The work that these settings ask of a network; `estimator` runs that of `model`. What may be wrong with an image's metres goes to
-    /// `warn`.
+    /// The work that these settings ask of a network; `estimator` runs that of `model`, and `show_layers` shows what its layers do, where
+    /// pictures of that are kept ([`DepthOutputs::need_layers`]). What may be wrong with an image's metres goes to `warn`.
     ///
     /// # Errors
-    /// [`Error::NoUncertainty`] for outputs that need it of a network that does not know it; a camera's file that cannot be read; what is
-    /// kept beside the network and cannot be read.
+    /// [`Error::NoUncertainty`] for outputs that need it of a network that does not know it; [`Error::NoLayers`] for those that need
+    /// `show_layers`; a camera's file that cannot be read; what is kept beside the network and cannot be read.
     pub fn new(
         settings: DepthSettings,
         folder: &'a Path,
         outputs: DepthOutputs,
         model: &'a ModelSource,
         estimator: &DepthEstimator,
+        show_layers: Option<ShowLayers>,
         warn: Warn<'a>,
     ) -> Result<Self> {
         if outputs.need_uncertainty() && !estimator.knows_uncertainty() {
             return Err(Error::NoUncertainty);
+        }
+        if outputs.need_layers() && show_layers.is_none() {
+            return Err(Error::NoLayers);
         }
         let loader = settings.loader(estimator)?;
         let writer = DepthWriter {
@@ -64,27 +68,11 @@ impl<'a> DepthJob<'a> {
         Ok(Self {
             loader,
             writer,
-            show_layers: None,
+            show_layers,
             scale: settings.scale,
             correct_scale: settings.correct_scale,
             warnings: Warnings::new(warn),
         })
-    }
-
-    /// Whether pictures of the network's layers are kept. They need [`Self::with_layers`].
-    #[must_use]
-    pub fn keeps_layers(&self) -> bool {
-        let save = self.writer.outputs.save();
-        save.contains(&DepthOutput::Features)
-    }
-
-    /// The same with what shows the network's layers.
-    #[must_use]
-    pub fn with_layers(self, show: ShowLayers) -> Self {
-        Self {
-            show_layers: Some(show),
-            ..self
-        }
     }
 
     /// What there is of the job in its folder.

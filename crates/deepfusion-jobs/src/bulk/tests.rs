@@ -72,7 +72,7 @@ fn depth_of(folder: &Path, names: &[&str]) -> (Summary<Error>, Vec<ImageWarning>
     let warn = |warning: ImageWarning| given.lock().unwrap().push(warning);
     let out = folder_for_outputs(folder);
     let settings = settings(None);
-    let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, &warn).unwrap();
+    let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, None, &warn).unwrap();
     let all = inputs(folder, names);
     let mine: Vec<&Input> = all.iter().collect();
     let begun = job
@@ -114,6 +114,29 @@ fn depth_is_made_once_and_warned_of_once() {
     assert_eq!(made_at(), before);
 }
 
+/// Neither a job nor a frame keeps a picture of layers that nothing shows.
+#[test]
+fn pictures_of_layers_need_what_shows_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (model, mut estimator) = network();
+    let out = folder_for_outputs(at);
+    let warn = |_: ImageWarning| ();
+    let job = |show: Option<ShowLayers>| {
+        let save = DepthOutputs::of([DepthOutput::Features], true, outputs().limits);
+        DepthJob::new(settings(None), &out, save, &model, &estimator, show, &warn)
+    };
+    assert!(matches!(job(None), Err(Error::NoLayers)));
+    let nothing: ShowLayers = Box::new(|_, _| Vec::new());
+    let job = job(Some(nothing)).unwrap();
+    let all = inputs(at, &["a"]);
+    let (loaded, prepared) = job.load(&all[0]).unwrap();
+    let seen = job.see(&mut estimator, &prepared).unwrap();
+    let written = job.writer.write_outputs(&all[0], &loaded, &seen);
+    assert!(matches!(written, Err(Error::NoLayers)));
+    assert!(!out.join("a_features.png").exists());
+}
+
 /// Targets of two images and one that is not there; `told` hears of each frame that is written.
 fn targets_of(
     folder: &Path,
@@ -123,7 +146,7 @@ fn targets_of(
     let out = folder_for_outputs(folder);
     let settings = settings(Some(GivenCamera::Numbers(CAMERA)));
     let warn = |_: ImageWarning| ();
-    let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, &warn).unwrap();
+    let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, None, &warn).unwrap();
     let settings = TargetSettings {
         perception: PerceptionConfig::predicted(),
         instances: None,

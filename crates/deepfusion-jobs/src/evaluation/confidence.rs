@@ -2,11 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Dataset, RgbImage};
-use deepfusion_geometry::Intrinsics;
+use deepfusion_data::Dataset;
 use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
 use deepfusion_runtime::DepthEstimator;
-use image::imageops::flip_horizontal;
 use serde::{Deserialize, Serialize};
 
 use super::division::divide;
@@ -167,8 +165,8 @@ fn of_frame(
     let image = dataset.load_image(frame)?;
     let camera = dataset.intrinsics(frame);
     let seen = estimator.predict(&image, Some(&camera), correct_focal, false)?;
-    let mirrored = mirrored_disparity(estimator, &image, &camera, correct_focal)?;
-    let evidence = Evidence::of(&seen.disparity, Some(&mirrored), seen.width);
+    let mirrored = estimator.predict_mirrored(&image, Some(&camera), correct_focal, false)?;
+    let evidence = Evidence::of(&seen.disparity, Some(&mirrored.disparity), seen.width);
     Ok(known_pixels(&depth, &seen, &RANGE_M)
         .into_iter()
         .map(|(at, z)| {
@@ -176,20 +174,4 @@ fn of_frame(
             (evidence[at], (predicted - z).abs() / z)
         })
         .collect())
-}
-
-/// The disparity that the mirrored image is given, mirrored back: beside the image's own, pixel by pixel.
-fn mirrored_disparity(
-    estimator: &mut DepthEstimator,
-    image: &RgbImage,
-    camera: &Intrinsics,
-    focal_correction: bool,
-) -> Result<Vec<f32>> {
-    let mirror = flip_horizontal(image);
-    let seen = estimator.predict(&mirror, Some(&camera.flipped()), focal_correction, false)?;
-    let mut disparity = seen.disparity;
-    for row in disparity.chunks_exact_mut(seen.width.max(1)) {
-        row.reverse();
-    }
-    Ok(disparity)
 }

@@ -171,6 +171,12 @@ impl DepthOutputs {
         self.limits.max_sigma.is_some() || self.save.iter().any(|save| save.needs_uncertainty())
     }
 
+    /// Whether something of it shows what the network's layers do.
+    #[must_use]
+    pub fn need_layers(&self) -> bool {
+        self.save.contains(&DepthOutput::Features)
+    }
+
     /// Whether something of it has the standard deviation where the network says it.
     pub(super) fn have_sigma(&self) -> bool {
         let has = |save: &DepthOutput| save.needs_uncertainty() || save.is_cloud();
@@ -222,6 +228,9 @@ pub(super) fn write(
         DepthOutput::Video => {}
         DepthOutput::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
         DepthOutput::Features => {
+            if layers.is_empty() {
+                return Err(Error::NoLayers);
+            }
             let picture = features::picture(image, depth, prediction.window, layers)?;
             save_png(&picture, path)?;
         }

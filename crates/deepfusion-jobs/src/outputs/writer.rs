@@ -62,7 +62,8 @@ impl DepthWriter<'_> {
     /// Writes an image's outputs without waiting for the disk, and gives the sidecar that is to be written once they are on it.
     ///
     /// # Errors
-    /// A file that cannot be written; [`crate::Error::NoCamera`] and [`crate::Error::NoUncertainty`] where an output needs what is not known.
+    /// A file that cannot be written; [`crate::Error::NoCamera`], [`crate::Error::NoUncertainty`] and [`crate::Error::NoLayers`] where an
+    /// output needs what is not known.
     pub fn write_outputs(
         &self,
         input: &Input,

@@ -11,8 +11,8 @@ use deepfusion_weights::Shipped;
 
 use crate::{Error, Result};
 
-/// Recordings and networks of a run's past of which nothing shows that their images were simulated: what `simulate` did not write as KITTI raw,
-/// what is not there any more, weights of other projects, packed networks whose cards do not say so.
+/// Recordings and networks of a run's past of which nothing shows that their images were simulated: what bears no mark of it
+/// ([`Dataset::is_simulated`]), what is not there any more, weights of other projects, packed networks whose cards do not say so.
 ///
 /// # Errors
 /// [`Error::SawReal`] for a recording that is known to be real.
@@ -128,7 +128,7 @@ impl Past {
 enum Images {
     /// Of cameras, in a layout that is its authors' drives alone, or on a day of KITTI raw.
     Real(DatasetKind),
-    /// Of `simulate`.
+    /// Of a simulator.
     Simulated,
     /// Of either: anybody may have written them.
     NotKnown,
@@ -141,7 +141,7 @@ fn images_of(path: &Path, split: Option<&Path>) -> Images {
             layout @ (DatasetKind::NuScenes | DatasetKind::Kitti360 | DatasetKind::KittiOdometry),
         ) => Images::Real(layout),
         Ok(DatasetKind::KittiRaw) => images_of_drives(path, split),
-        // A simulated bag says nothing of itself, and what became of it by `data convert` neither.
+        Ok(_) if Dataset::all_simulated_at(path) => Images::Simulated,
         _ => Images::NotKnown,
     }
 }
@@ -158,7 +158,7 @@ fn images_of_drives(path: &Path, split: Option<&Path>) -> Images {
     }
     if drives.iter().any(is_kittis_own) {
         Images::Real(DatasetKind::KittiRaw)
-    } else if !drives.is_empty() && drives.iter().all(is_simulators) {
+    } else if !drives.is_empty() && drives.iter().all(Drive::is_simulated) {
         Images::Simulated
     } else {
         Images::NotKnown
@@ -175,12 +175,6 @@ fn is_kittis_own(drive: &Drive) -> bool {
         "2011_10_03_",
     ];
     DAYS.iter().any(|day| drive.name.starts_with(day))
-}
-
-/// Whether a drive has what `simulate` writes beside its images and nobody can record: exact poses, and exact masks of dynamic objects.
-fn is_simulators(drive: &Drive) -> bool {
-    let has = |part: &str| drive.folder.join(part).exists();
-    has("poses.txt") && has("moving_02")
 }
 
 #[cfg(test)]
@@ -284,7 +278,7 @@ mod tests {
         assert_eq!(imported.unwrap(), [gone]);
     }
 
-    /// Images alone say nothing: what another simulator rendered, or `data convert` made of a bag, has no exact poses either.
+    /// Images alone say nothing: what another simulator rendered has no exact poses either. The mark of `data convert` does.
     #[test]
     fn what_anybody_may_have_written_is_not_known() {
         let at = tempfile::tempdir().unwrap();
@@ -302,8 +296,15 @@ mod tests {
             assert_eq!(Dataset::kind_at(&pictures).unwrap(), DatasetKind::Folder);
             assert_eq!(of(&pictures), Images::NotKnown, "{beside}");
         }
-        let run = trained_on(&at.join("run"), &converted);
-        assert_eq!(of_mean(&[run]).unwrap(), [converted]);
+        let run = [trained_on(&at.join("run"), &converted)];
+        assert_eq!(of_mean(&run).unwrap(), [converted.clone()]);
+        let mark = |folder: &Path| fs::write(folder.join("dataset.toml"), "simulated = true\n");
+        mark(converted.parent().unwrap()).unwrap();
+        mark(&pictures).unwrap();
+        for marked in [&converted, &pictures] {
+            assert_eq!(of(marked), Images::Simulated, "{}", marked.display());
+        }
+        assert!(of_mean(&run).unwrap().is_empty());
     }
 
     /// A root of KITTI raw with a drive of its own, whose exact poses somebody added, and a simulated one.

@@ -6,7 +6,7 @@ use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_kernels::{PhotometricShape, photometric_error};
 use deepfusion_motion::{Alignment, DepthImage, GreyImage, GreyPyramid, View, align, scene_points};
 use deepfusion_runtime::DepthEstimator;
-use image::imageops::{crop_imm, flip_horizontal};
+use image::imageops::crop_imm;
 use nalgebra::Vector3;
 
 use super::Target;
@@ -108,9 +108,8 @@ pub(super) fn evidence_of_frame(
         .map(|p| (f64::from(p.depth_m), p.log_factor))
         .collect();
     if closely {
-        let mirrored = flip_horizontal(&image);
-        let camera = dataset.intrinsics(target.frame).flipped();
-        let other = estimator.predict(&mirrored, Some(&camera), focal_correction, false)?;
+        let camera = dataset.intrinsics(target.frame);
+        let other = estimator.predict_mirrored(&image, Some(&camera), focal_correction, false)?;
         looked.flip = flip(&seen.depth, &other.network_depth(&camera).0);
     }
     Ok(looked)
@@ -227,14 +226,14 @@ fn consistency(seen: &Seen, other: &DepthMap, source_from_target: &Se3) -> Optio
     median(&differences)
 }
 
-/// By how much the depth of the mirrored image differs, the median of pixels.
+/// By how much the depth of the mirrored image, mirrored back, differs, the median of pixels.
 fn flip(depth: &DepthMap, mirrored: &DepthMap) -> Option<f64> {
     if (depth.width, depth.height) != (mirrored.width, mirrored.height) {
         return None;
     }
     let pixels = (0..depth.width * depth.height).filter_map(|i| {
         let (x, y) = (i % depth.width, i / depth.width);
-        let (a, b) = (depth.get(x, y)?, mirrored.get(depth.width - 1 - x, y)?);
+        let (a, b) = (depth.get(x, y)?, mirrored.get(x, y)?);
         Some(f64::from(a / b).ln().abs())
     });
     median(&pixels.collect::<Vec<_>>())

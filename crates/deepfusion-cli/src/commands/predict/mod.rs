@@ -212,13 +212,16 @@ pub(super) fn job<'a>(
     estimator: &DepthEstimator,
 ) -> Result<DepthJob<'a>> {
     let (settings, out) = (settings(args), &args.out);
-    let job = DepthJob::new(settings, out, outputs, model, estimator, &warnings::print)?;
+    let show_layers = if outputs.need_layers() {
+        let network = model.load(args.engine.set.as_deref())?;
+        Some(inspection::open(&network, args.engine.device)?)
+    } else {
+        None
+    };
+    let warn = &warnings::print;
+    let job = DepthJob::new(settings, out, outputs, model, estimator, show_layers, warn)?;
     model::warn_of_one_size(model, estimator.config(), args.post_process);
-    if !job.keeps_layers() {
-        return Ok(job);
-    }
-    let network = model.load(args.engine.set.as_deref())?;
-    Ok(job.with_layers(inspection::open(&network, args.engine.device)?))
+    Ok(job)
 }
 
 /// How images become depth, by the options.

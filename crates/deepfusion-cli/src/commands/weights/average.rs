@@ -1,4 +1,4 @@
-use deepfusion_jobs::averaging::{Kinship, average};
+use deepfusion_jobs::averaging::{Kinship, StatisticsSpread, average};
 
 use crate::cli::AverageArgs;
 use crate::failure::Result;
@@ -30,6 +30,20 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
     }
     if made.lost_uncertainty {
         tracing::warn!("not all of them say how sure they are, so the mean does not");
+    }
+    if let Some(StatisticsSpread {
+        layers,
+        of,
+        left_out,
+        ..
+    }) = made.statistics
+    {
+        tracing::warn!(
+            "the running statistics of {layers} of {of} batch norms differ among these networks. They are averaged like weights, and not measured of the mean's \
+             own inputs: the mean of the variances leaves out how far the means are apart, {:.2} % of it where that is most. Measure the mean beside its \
+             networks; what trains on from it (train --init) measures them anew",
+            100.0 * left_out
+        );
     }
     if args.json {
         return output::print_json(&serde_json::json!({

@@ -21,6 +21,8 @@ pub(super) struct BagConfig {
     pub(super) profile: Option<String>,
     /// The kind of drive, for one row each in the evaluation.
     pub(super) scenario: Option<String>,
+    /// Whether a simulator wrote the bag.
+    pub(super) simulated: bool,
     /// Topics by name, where the type does not decide.
     pub(super) topics: TopicNames,
     /// A camera without distortion, where there is no CameraInfo.
@@ -181,6 +183,11 @@ impl Default for ClockConfig {
             scan_within_s: 0.025,
         }
     }
+}
+
+/// Whether the file beside a bag says that the bag is simulated. One that cannot be read says nothing.
+pub(crate) fn says_simulated(bag: &Path) -> bool {
+    BagConfig::of(bag, &OpenOptions::default()).is_ok_and(|config| config.simulated)
 }
 
 impl BagConfig {

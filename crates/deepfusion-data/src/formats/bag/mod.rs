@@ -29,6 +29,7 @@ mod topics;
 mod video;
 mod write_config;
 
+pub(crate) use config::says_simulated;
 pub use doppler::{DopplerEgo, ego_velocity, ground_radial};
 pub(crate) use frames::Change;
 pub(crate) use inspect::without_images;

@@ -52,6 +52,8 @@ pub(super) struct Topics {
 
 /// Exact data of a simulated drive: never taken for a sensor.
 const TRUTH: &str = "/truth/";
+/// What `simulate` writes beside the sensors and nobody can record: the exact motion, and the exact depth of every pixel.
+const EXACT: [&str; 2] = ["/truth/odometry", "/truth/depth/compressed"];
 /// In the name of a second cloud, of dynamic points only.
 const DYNAMIC: &str = "dynamic";
 
@@ -142,6 +144,11 @@ impl Topics {
         let of_topic = self.found.iter().filter(move |(_, name)| name == topic);
         of_topic.map(|(role, _)| *role)
     }
+}
+
+/// Whether a bag has what only a simulator can write.
+pub(super) fn are_simulated(all: &[TopicInfo]) -> bool {
+    EXACT.iter().all(|name| all.iter().any(|t| t.name == *name))
 }
 
 fn is_depth(name: &str) -> bool {

@@ -1,4 +1,4 @@
-//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say.
+//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, and whether it is simulated.
 
 use super::layout::Drive;
 use crate::dataset_toml::{Clock, check_clock_and_scale, read_or_default};
@@ -11,6 +11,7 @@ use serde::Deserialize;
 struct Keys {
     clock: Clock,
     vehicle: Speed,
+    simulated: bool,
 }
 
 /// The vehicle's speed.
@@ -28,6 +29,13 @@ pub(super) struct DriveConfig {
     pub(super) camera_ahead_s: f64,
     /// True speed over the oxts'.
     pub(super) speed_scale: f64,
+}
+
+/// Whether `dataset.toml` of the drive's folder or of its date's says that the drive is simulated. One that cannot be read says nothing.
+pub(super) fn says_simulated(drive: &Drive) -> bool {
+    let places = drive.folder.ancestors().take(2);
+    let mut files = places.filter_map(|p| read_or_default::<Keys>(&p.join(DriveConfig::NAME)).ok());
+    files.any(|keys| keys.simulated)
 }
 
 impl DriveConfig {

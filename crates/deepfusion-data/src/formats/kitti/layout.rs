@@ -1,6 +1,8 @@
 //! Finding drives below a path, and saying what is there where there are none.
 
 use super::calibration::Calibration;
+use super::config::says_simulated;
+use super::moving::MASKS;
 use crate::formats::files::folders;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
@@ -50,6 +52,16 @@ impl Drive {
             return Ok(Vec::new());
         }
         numbered_files(&data, &["jpeg", "jpg", "png"])
+    }
+
+    /// Whether nobody drove it: it has what `simulate` writes beside its images and nobody can record, exact poses and exact masks of dynamic
+    /// objects, or `dataset.toml`, its own or its date's, says so.
+    #[must_use]
+    pub fn is_simulated(&self) -> bool {
+        /// Exact poses.
+        const POSES: &str = "poses.txt";
+        let has = |part: &str| self.folder.join(part).exists();
+        has(POSES) && has(MASKS) || says_simulated(self)
     }
 
     /// The velodyne scan of a frame, where there is one.

@@ -125,7 +125,7 @@ fn open_drive(
         speed_scale: config.speed_scale,
         times_s,
     };
-    let dataset = Dataset::new(parts, Arc::new(recording));
+    let dataset = Dataset::new(parts, Arc::new(recording)).with_simulated(drive.is_simulated());
     dataset.check_sizes()?;
     Ok(dataset)
 }
