@@ -77,16 +77,19 @@ pub fn simulate(
     scene: &str,
     moving_cars: usize,
     riders: usize,
+    varied: bool,
     width: u32,
     height: u32,
     scan_every: usize,
 ) -> PyResult<PathBuf> {
-    let scene = Scene::ALL.into_iter().find(|known| known.name() == scene);
+    let scene = Scene::EVERY.into_iter().find(|known| known.name() == scene);
     let scene = scene.ok_or_else(|| {
         let names = Scene::ALL.map(Scene::name).join(", ");
         with_hint(
             "scene: there is none of this name".into(),
-            Some(format!("one of {names}")),
+            Some(format!(
+                "one of {names}; with varied=True motorway or country, too"
+            )),
         )
     })?;
     let config = SimConfig {
@@ -96,6 +99,7 @@ pub fn simulate(
         height,
         moving_cars,
         riders,
+        varied,
         scene,
         scan_every,
         ..SimConfig::default()

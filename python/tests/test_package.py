@@ -27,6 +27,20 @@ def model():
     return deepfusion.load("tiny")
 
 
+def test_a_varied_drive_has_a_camera_of_its_own(tmp_path):
+    cameras = []
+    for seed in (1, 2):
+        drive = deepfusion.simulate(tmp_path / f"{seed}", frames=1, seed=seed, scene="country", varied=True, size=(96, 64), scan_every=0)
+        said = json.loads((drive / "varied.json").read_text())["camera"]
+        assert deepfusion.Dataset(drive)[0].intrinsics[0] == pytest.approx(said["intrinsics"]["fx"])
+        assert 0.3 <= said["height_m"] <= 2.5
+        cameras.append(said)
+    assert cameras[0] != cameras[1]
+    with pytest.raises(deepfusion.DeepFusionError, match="only varied drives lead there") as refused:
+        deepfusion.simulate(tmp_path / "plain", frames=1, scene="country")
+    assert "varied" in refused.value.hint
+
+
 def test_networks_are_in_the_package():
     assert {"street", "tiny"} <= set(deepfusion.networks())
     assert deepfusion.__version__.count(".") == 2

@@ -60,6 +60,20 @@ pub(crate) enum CliError {
         /// The layout that it is for.
         layout: &'static str,
     },
+    /// An option for what a varied drive draws, or has no room for.
+    #[error("{option} does not go with --varied: {why}")]
+    NotVaried {
+        /// The option.
+        option: &'static str,
+        /// Why not.
+        why: &'static str,
+    },
+    /// A place that plain drives do not lead to.
+    #[error("--scene {scene}: only varied drives lead there")]
+    OnlyVaried {
+        /// The place.
+        scene: &'static str,
+    },
     /// A log without anything that saw the drive.
     #[error("neither a video nor images are given for the log")]
     NoMedia,
@@ -244,9 +258,11 @@ impl Reportable for CliError {
         match self {
             Self::Interrupted { .. } | Self::Stopped { .. } | Self::Ended { .. } => Exit::Stopped,
             // Clap could not see it: what is needed depends on what is embedded, what applies on what lies at the path.
-            Self::NoModelGiven | Self::OutOfPlace { .. } | Self::OtherLayout { .. } => {
-                Exit::WrongArguments
-            }
+            Self::NoModelGiven
+            | Self::OutOfPlace { .. }
+            | Self::OtherLayout { .. }
+            | Self::NotVaried { .. }
+            | Self::OnlyVaried { .. } => Exit::WrongArguments,
             _ => Exit::Failed,
         }
     }
@@ -320,6 +336,8 @@ impl Reportable for CliError {
                 "leave it out; the columns of a recording's own log stand in its dataset.toml (time_column, speed_column, speed_unit, dbc)".into(),
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
+            Self::NotVaried { option, .. } => Some(format!("leave out {option} or --varied")),
+            Self::OnlyVaried { .. } => Some("add --varied, or choose another --scene".into()),
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{in_folder, json, ok};
+use crate::support::{in_folder, json, ok, run};
 use deepfusion_data::{Dataset, GtKind, OpenOptions};
 use ndarray::{Array2, Array3};
 use ndarray_npy::{NpzReader, NpzWriter, write_npy};
@@ -133,6 +133,47 @@ fn people_ride_and_walk_where_they_are_asked_for() {
     };
     assert!(is_named(&labels("--out with --riders 12")));
     assert!(!is_named(&labels("--out without")));
+}
+
+/// A varied drive says what was drawn, in its folder and as JSON; what is drawn cannot be asked for.
+#[test]
+fn a_varied_drive_says_what_was_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let small = "simulate --frames 1 --size 64x48 --scan-every 0 --scene country --json";
+    let made = json(at, &format!("{small} --varied --seed 5 --out five"));
+    let drive = at.join(made["drive"].as_str().unwrap());
+    let text = std::fs::read_to_string(drive.join("varied.json")).unwrap();
+    let said: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(said["light"]["weather"], made["varied"]["light"]["weather"]);
+    let inspected = json(at, "data inspect five --json");
+    assert_eq!(inspected["size"], serde_json::json!([64, 48]));
+    let other = json(at, &format!("{small} --varied --seed 6 --out six"));
+    let camera = |made: &serde_json::Value| made["varied"]["camera"].clone();
+    assert_ne!(camera(&made), camera(&other));
+    let plain = json(
+        at,
+        "simulate --frames 1 --size 64x48 --scan-every 0 --json --out plain",
+    );
+    assert!(plain.get("varied").is_none());
+
+    for (options, expected) in [
+        (
+            "--varied --camera-height 1.65",
+            "leave out --camera-height or --varied",
+        ),
+        ("--varied --stereo 0.5", "leave out --stereo or --varied"),
+        (
+            "--scene motorway",
+            "add --varied, or choose another --scene",
+        ),
+    ] {
+        let run = run(at, &format!("simulate --out new {options}"));
+        assert_eq!((run.code, run.stdout.as_str()), (2, ""), "{options}");
+        let hint = format!("hint: {expected}");
+        assert!(run.stderr.contains(&hint), "{options}: {}", run.stderr);
+        assert!(!at.join("new").exists(), "{options}");
+    }
 }
 
 /// Velocities stand beside the depths and are never taken for some.

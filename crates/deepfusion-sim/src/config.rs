@@ -1,5 +1,5 @@
 use crate::rig::CAMERA_HEIGHT;
-use crate::{Error, ExpectedSetting as Expected, Result};
+use crate::{Error, ExpectedSetting as Expected, Result, VariedConflict};
 use serde::{Deserialize, Serialize};
 
 /// The kind of scene.
@@ -141,7 +141,7 @@ pub struct SimConfig {
     pub width: u32,
     /// Height of the pictures, in pixels.
     pub height: u32,
-    /// Number of moving cars.
+    /// Number of moving cars; in a varied drive those of them alone that nothing on the street stops.
     pub moving_cars: usize,
     /// Number of people who ride bicycles in traffic, walk along pavements and cross the road; fewer where a street has no room for
     /// them.
@@ -152,7 +152,11 @@ pub struct SimConfig {
     pub scene: Scene,
     /// The sensors of the car, and their mounts.
     pub sensors: Sensors,
-    /// Height of the camera above the road, in metres.
+    /// Whether the camera (lens, height, pitch, roll, imaging), the light, the weather and the world's materials and people are drawn from
+    /// the seed, once for the drive; [`crate::Simulation::drawn`] says them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub varied: bool,
+    /// Height of the camera above the road, in metres; as it is by default where a drive is varied.
     pub camera_height_m: f64,
     /// [`crate::write_kitti`] also writes the pictures of a second camera, so far to the right of the first one, in metres; 0: of none.
     pub stereo_baseline_m: f64,
@@ -174,6 +178,7 @@ impl Default for SimConfig {
             fps: 10.0,
             scene: Scene::Urban,
             sensors: Sensors::Kitti,
+            varied: false,
             camera_height_m: CAMERA_HEIGHT,
             stereo_baseline_m: 0.0,
             scan_every: 1,
@@ -186,7 +191,7 @@ impl SimConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first field out of range.
+    /// [`Error::Config`] naming the first field out of range; [`Error::Varied`] for what a varied drive cannot have.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: String, expected| {
             if ok {
@@ -288,7 +293,46 @@ impl SimConfig {
                 from: 0.05,
                 to: 5.0,
             },
-        )
+        )?;
+        if self.varied {
+            self.check_varied()?;
+        }
+        Ok(())
+    }
+
+    /// That nothing is asked for which is drawn, or for which a varied drive has no room.
+    fn check_varied(&self) -> Result<()> {
+        let why = if self.camera_height_m != CAMERA_HEIGHT {
+            VariedConflict::CameraHeight
+        } else if self.stereo_baseline_m > 0.0 {
+            VariedConflict::SecondCamera
+        } else if self.scene == Scene::Indoor {
+            VariedConflict::Rooms
+        } else {
+            return Ok(());
+        };
+        Err(self.conflict(why))
+    }
+
+    /// That the scene is one that such a drive leads through.
+    ///
+    /// # Errors
+    /// [`Error::Varied`].
+    pub(crate) fn check_scene(&self) -> Result<()> {
+        match self.scene {
+            Scene::Indoor => Err(self.conflict(VariedConflict::Rooms)),
+            scene if self.varied || Scene::ALL.contains(&scene) => Ok(()),
+            _ => Err(self.conflict(VariedConflict::OnlyVaried)),
+        }
+    }
+
+    fn conflict(&self, why: VariedConflict) -> Error {
+        let value = match why {
+            VariedConflict::CameraHeight => self.camera_height_m.to_string(),
+            VariedConflict::SecondCamera => self.stereo_baseline_m.to_string(),
+            VariedConflict::Rooms | VariedConflict::OnlyVaried => self.scene.name().to_owned(),
+        };
+        Error::Varied { value, why }
     }
 }
 
@@ -373,6 +417,55 @@ mod tests {
             assert!(error.hint().is_some_and(|hint| hint.contains(name)));
         }
         assert!(base().validate().is_ok());
+    }
+
+    #[test]
+    fn what_a_varied_drive_cannot_have_is_named() {
+        let varied = || SimConfig {
+            varied: true,
+            ..SimConfig::default()
+        };
+        assert!(varied().validate().is_ok() && varied().check_scene().is_ok());
+        let bad = [
+            (
+                SimConfig {
+                    camera_height_m: 1.2,
+                    ..varied()
+                },
+                "`camera_height_m` is 1.2",
+            ),
+            (
+                SimConfig {
+                    stereo_baseline_m: 0.53,
+                    ..varied()
+                },
+                "`stereo_baseline_m` is 0.53",
+            ),
+            (
+                SimConfig {
+                    scene: Scene::Indoor,
+                    ..varied()
+                },
+                "`scene` is indoor",
+            ),
+        ];
+        for (config, expected) in bad {
+            let error = config.validate().unwrap_err();
+            assert!(error.to_string().contains(expected), "{error}");
+            assert!(error.hint().is_some());
+        }
+        for scene in Scene::EVERY {
+            let is_ok = |varied| {
+                let config = SimConfig {
+                    scene,
+                    varied,
+                    ..SimConfig::default()
+                };
+                config.check_scene().is_ok()
+            };
+            assert_eq!(is_ok(false), Scene::ALL.contains(&scene));
+            assert_eq!(is_ok(true), scene != Scene::Indoor);
+        }
     }
 
     #[test]

@@ -1,5 +1,8 @@
+mod varied_conflict;
+
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
+pub use varied_conflict::VariedConflict;
 
 mod expected;
 
@@ -18,6 +21,14 @@ pub enum Error {
         value: String,
         /// What would be accepted.
         expected: ExpectedSetting,
+    },
+    /// A setting and [`crate::SimConfig::varied`] contradict each other.
+    #[error("simulator setting `{}` is {value}: {why}", why.setting())]
+    Varied {
+        /// The setting's value.
+        value: String,
+        /// Which setting, and why not.
+        why: VariedConflict,
     },
     /// The output folder holds something already.
     #[error("{}: the output folder is not empty", path.display())]
@@ -62,6 +73,7 @@ impl Hint for Error {
             Self::Config {
                 field, expected, ..
             } => Some(format!("set `{field}` to {expected}")),
+            Self::Varied { why, .. } => Some(why.hint()),
             Self::OutputNotEmpty { .. } => {
                 Some("choose a new folder, or empty this one first".to_owned())
             }

@@ -26,7 +26,8 @@ const BATCH: usize = 8;
 /// everything in reach, in the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`,
 /// and with [`crate::SimConfig::riders`] `Cyclist` and `Pedestrian`), and `poses.txt`
 /// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line). With a second camera ([`crate::SimConfig::stereo_baseline_m`])
-/// its pictures are in `image_03`.
+/// its pictures are in `image_03`. A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
+/// ([`Simulation::drawn`]).
 ///
 /// `progress` is called with the frames done and their number. Everything is written to a folder
 /// beside its final place and renamed at the end: after an error `out` is as it was.
@@ -162,6 +163,11 @@ fn write_all(
     write_file(&drive.join("poses.txt"), poses.as_bytes())?;
     let tracklets = tracklets::to_xml(simulation);
     write_file(&drive.join("tracklet_labels.xml"), tracklets.as_bytes())?;
+    if let Some(drawn) = simulation.drawn() {
+        let path = drive.join("varied.json");
+        let text = drawn.to_json().map_err(io(&path, "write this file"))?;
+        write_file(&path, text.as_bytes())?;
+    }
     Ok(name)
 }
 

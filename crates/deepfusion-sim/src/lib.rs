@@ -19,7 +19,7 @@
 //! # Consistency
 //! Textures are attached to the surfaces and never depend on the viewer, and what a pixel cannot
 //! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
-//! one. Shadows under moving cars move with them; the mask of moving pixels holds the cars and the
+//! one, but for a varied drive's ([`SimConfig::varied`]) noise, its exposure, and what its wet road mirrors. Shadows under moving cars move with them; the mask of moving pixels holds the cars and the
 //! people who ride and walk. Whatever moves is a rigid body: nobody pedals or swings their arms.
 
 mod can;
@@ -49,7 +49,7 @@ mod velodyne;
 
 pub use can::{SpeedReading, SteeringReading, WHEELBASE_M};
 pub use config::{Scene, Sensors, SimConfig};
-pub use error::{Error, ExpectedSetting, Result};
+pub use error::{Error, ExpectedSetting, Result, VariedConflict};
 pub use fmcw::FmcwScan;
 pub use imu::ImuReading;
 pub use kitti::write_kitti;
@@ -58,4 +58,6 @@ pub use rig::Rig;
 pub use scene::{ObjectClass, SceneObject, Variety};
 pub use simulation::{SimFrame, Simulation};
 pub use umad::{BagSettings, topic, write_bag};
-pub use varied::{Endless, EndlessConfig, Ingredient, MountedCamera, View, Weather};
+pub use varied::{
+    DrawnDrive, DrawnLight, Endless, EndlessConfig, Ingredient, MountedCamera, View, Weather,
+};

@@ -1,6 +1,6 @@
 //! The sensors' mounting and the camera's intrinsics, after KITTI's car or UMAD's.
 
-use crate::motion::IMU_HEIGHT;
+use crate::motion::{IMU_HEIGHT, rotation};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Vector3};
 
@@ -57,6 +57,23 @@ impl Rig {
             cam0_from_velo: shift(-CAM2_FROM_CAM0_X, 0.08, 0.0) * cam_axes_from_vehicle_axes * tilt,
             velo_from_imu: tilt.inverse() * shift(-1.6, 0.0, -lidar_height),
             head_imu_from_imu: shift(-1.55, 0.0, -lidar_height),
+        }
+    }
+
+    /// The same with camera 2 turned about its own centre: so far down, and clockwise as it looks, radians. The other sensors stay.
+    pub(crate) fn with_camera_turned(self, pitch: f64, roll: f64) -> Self {
+        // Camera axes (right, down, forward) in the vehicle's (forward, left, up).
+        let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        let level_from_turned = axes.transpose() * rotation(0.0, pitch, roll) * axes;
+        let turned_from_level = Se3::from_parts(&level_from_turned.transpose(), Vector3::zeros());
+        let cam2_from_cam0 =
+            Se3::from_axis_angle(Vector3::zeros(), Vector3::new(CAM2_FROM_CAM0_X, 0.0, 0.0));
+        Self {
+            cam0_from_velo: cam2_from_cam0.inverse()
+                * turned_from_level
+                * cam2_from_cam0
+                * self.cam0_from_velo,
+            ..self
         }
     }
 
@@ -129,6 +146,24 @@ mod tests {
         let position = imu_from_cam.translation();
         assert!((position.z + IMU_HEIGHT - CAMERA_HEIGHT).abs() < 1e-12);
         assert!((position.x - 1.082).abs() < 1e-9, "{position}");
+    }
+
+    #[test]
+    fn a_turned_camera_stays_where_it_is() {
+        for level in [Rig::kitti_like(1.2), Rig::umad_like(1.2)] {
+            let turned = level.with_camera_turned(0.1, 0.05);
+            let (before, after) = (
+                level.cam_from_imu().inverse(),
+                turned.cam_from_imu().inverse(),
+            );
+            assert!((before.translation() - after.translation()).norm() < 1e-9);
+            let (forward, right) = (after.rotate(&Vector3::z()), after.rotate(&Vector3::x()));
+            // Down by the pitch, not aside; and clockwise: the right side is the lower one.
+            assert!((forward.z + 0.1f64.sin()).abs() < 1e-9 && forward.y.abs() < 1e-9);
+            let lower = 0.1f64.cos() * 0.05f64.sin();
+            assert!((right.z + lower).abs() < 1e-9, "{right}");
+            assert_eq!(turned.velo_from_imu, level.velo_from_imu);
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::road::Road;
 use crate::scene::{SceneObject, Variety, World};
 use crate::texture::noise::hash;
 use crate::traffic::Traffic;
+use crate::varied::{DrawnDrive, DriveLook};
 use crate::{Result, render, velodyne};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -55,22 +56,32 @@ pub struct Simulation {
     riders: Riders,
     rig: Rig,
     intrinsics: Intrinsics,
+    /// Of a varied drive.
+    look: Option<DriveLook>,
     times: Vec<f64>,
 }
 
 impl Simulation {
-    /// Lays out the street and the drive.
+    /// Lays out the street and the drive; the world is varied where [`SimConfig::varied`] says so.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a setting is out of range.
+    /// [`crate::Error::Config`] where a setting is out of range; [`crate::Error::Varied`] for a scene that such a drive does not lead through, and
+    /// for what a varied drive cannot have.
     pub fn new(config: &SimConfig) -> Result<Self> {
-        Self::varied(config, &Variety::none())
+        config.check_scene()?;
+        let variety = if config.varied {
+            DriveLook::variety(config.seed)
+        } else {
+            Variety::none()
+        };
+        Self::varied(config, &variety)
     }
 
-    /// As [`Simulation::new`], through a varied world; with [`Variety::none`] both are the same.
+    /// As [`Simulation::new`], through a world that is varied in this way, of any scene; with [`Variety::none`] and without [`SimConfig::varied`]
+    /// both are the same.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a setting is out of range.
+    /// [`crate::Error::Config`] where a setting is out of range; [`crate::Error::Varied`] for what a varied drive cannot have.
     pub fn varied(config: &SimConfig, variety: &Variety) -> Result<Self> {
         config.validate()?;
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
@@ -87,6 +98,9 @@ impl Simulation {
         let drive = Drive::simulate(&mut rng, &road, duration_s, config.scene.pace());
         road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
         let mut world = World::furnish_varied(road, config.seed, config.scene, variety);
+        let look = config
+            .varied
+            .then(|| DriveLook::draw(config, variety, &mut world));
         let people = if config.riders > 0 {
             world.people()
         } else {
@@ -94,21 +108,29 @@ impl Simulation {
         };
         let light = GroundLight::bake(&world, Cores::All);
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
-        let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
+        let mut traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
+        if config.varied {
+            traffic.keep_passing(&world, &drive, &times);
+        }
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x0B1C_E5A0);
         let way = (&drive, duration_s);
         let riders = Riders::along(&mut rng, &world, &people, way, &traffic, config.riders);
         let (width, height) = (config.width, config.height);
-        let (rig, intrinsics) = match config.sensors {
+        let above_road = look.as_ref().map(DriveLook::height_m);
+        let above_road = above_road.unwrap_or(config.camera_height_m);
+        let (level, usual) = match config.sensors {
             Sensors::Kitti => (
-                Rig::kitti_like(config.camera_height_m),
+                Rig::kitti_like(above_road),
                 kitti_like_intrinsics(width, height),
             ),
             Sensors::Umad => (
-                Rig::umad_like(config.camera_height_m),
+                Rig::umad_like(above_road),
                 umad_like_intrinsics(width, height),
             ),
         };
+        let (rig, intrinsics) = look
+            .as_ref()
+            .map_or((level, usual), |look| look.mount(level));
         Ok(Self {
             config: config.clone(),
             world,
@@ -118,6 +140,7 @@ impl Simulation {
             riders,
             rig,
             intrinsics,
+            look,
             times,
         })
     }
@@ -126,6 +149,12 @@ impl Simulation {
     #[must_use]
     pub fn config(&self) -> &SimConfig {
         &self.config
+    }
+
+    /// What a varied drive drew from its seed: camera, light, weather, world and imaging; `None` of a plain one.
+    #[must_use]
+    pub fn drawn(&self) -> Option<&DrawnDrive> {
+        self.look.as_ref().map(DriveLook::drawn)
     }
 
     /// Number of frames.
@@ -217,14 +246,23 @@ impl Simulation {
     fn seen_from(&self, frame: usize, world_from_cam: Se3) -> SimFrame {
         let time_s = self.times[frame];
         let solids = self.moving_solids(time_s);
-        let picture = render::render(
-            &self.world,
-            &self.light,
-            &solids,
-            &self.moving_objects(time_s),
-            &world_from_cam,
-            &self.intrinsics,
-        );
+        let objects = self.moving_objects(time_s);
+        let picture = match &self.look {
+            None => render::render(
+                &self.world,
+                &self.light,
+                &solids,
+                &objects,
+                &world_from_cam,
+                &self.intrinsics,
+            ),
+            Some(look) => look.picture(
+                (&self.world, &self.light),
+                (&solids, &objects),
+                &world_from_cam,
+                frame,
+            ),
+        };
         SimFrame {
             rgb: picture.rgb,
             depth: picture.depth,

@@ -16,6 +16,9 @@ const LONG: f64 = 5.0;
 /// Distance kept between two cars of one lane, metres.
 const GAP: f64 = 13.0;
 
+/// The cars of a varied drive neither come nor go within this distance, metres before the camera along the street.
+const SEEN: (f64, f64) = (-20.0, 150.0);
+
 /// One moving car: constant speed along its lane.
 struct MovingCar {
     model: usize,
@@ -112,6 +115,21 @@ impl Traffic {
                 }
             }
         }
+    }
+
+    /// Leaves out whoever would meet something that stands, on a varied street, within 150 m before the camera of a drive: nobody
+    /// vanishes there at any of these times, seconds. Changes nothing on a plain street.
+    pub(crate) fn keep_passing(&mut self, world: &World, drive: &Drive, times: &[f64]) {
+        if world.crowd.is_empty() {
+            return;
+        }
+        self.cars.retain(|car| {
+            times.iter().all(|time_s| {
+                let s = car.s + car.speed * time_s;
+                let ahead = s - drive.progress(*time_s).0;
+                !(SEEN.0..SEEN.1).contains(&ahead) || fits(world, car, s)
+            })
+        });
     }
 
     /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at

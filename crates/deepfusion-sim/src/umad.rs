@@ -76,7 +76,8 @@ impl Default for BagSettings {
 }
 
 /// Writes the drive as `out/<scene>_<seed>.bag` and, beside it, `<scene>_<seed>.toml` with the mounts of the sensors
-/// and the vehicle's wheelbase, which a bag does not contain. `out` must be new or empty. Returns the bag's path.
+/// and the vehicle's wheelbase, which a bag does not contain; of a varied drive also `<scene>_<seed>.varied.json` with what it drew
+/// ([`Simulation::drawn`]). `out` must be new or empty. Returns the bag's path.
 ///
 /// The camera's stamps and those of the LiDAR carry the clock's offset; IMU, speed, steering and truth do not.
 ///
@@ -108,26 +109,39 @@ pub fn write_bag(
         });
     }
     let existed = crate::kitti::prepare(out)?;
-    let name = format!("{}_{:04}", config.scene.name(), config.seed);
+    let scene = config.scene.name();
+    let name = format!("{scene}_{:04}", config.seed);
     let path = out.join(format!("{name}.bag"));
     let sidecar = path.with_extension("toml");
-    let text = describe(&simulation.rig(), config.scene.name());
-    let failed = |source| Error::Io {
-        path: sidecar.clone(),
-        action: "write this file",
-        source,
-    };
-    let write = |out: &mut BufWriter<fs::File>| out.write_all(text.as_bytes()).map_err(failed);
-    let written = deepfusion_fs::write_atomically(&sidecar, failed, write)
+    let drawn = path.with_extension("varied.json");
+    let written = write_beside(&sidecar, || Ok(describe(&simulation.rig(), scene)))
+        .and_then(|()| match simulation.drawn() {
+            Some(what) => write_beside(&drawn, || what.to_json()),
+            None => Ok(()),
+        })
         .and_then(|()| write_messages(simulation, &path, settings, progress));
     if written.is_err() {
         // Best effort: the first error is the one to report.
-        let _ = fs::remove_file(&sidecar);
+        for file in [&sidecar, &drawn] {
+            let _ = fs::remove_file(file);
+        }
         if !existed {
             let _ = fs::remove_dir(out);
         }
     }
     written.map(|()| path)
+}
+
+/// Writes a small file beside the bag, whole or not at all.
+fn write_beside(path: &Path, text: impl FnOnce() -> std::io::Result<String>) -> Result<()> {
+    let failed = |source| Error::Io {
+        path: path.to_owned(),
+        action: "write this file",
+        source,
+    };
+    let text = text().map_err(failed)?;
+    let write = |out: &mut BufWriter<fs::File>| out.write_all(text.as_bytes()).map_err(failed);
+    deepfusion_fs::write_atomically(path, failed, write)
 }
 
 /// The bag's connections.

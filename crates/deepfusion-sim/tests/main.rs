@@ -19,4 +19,5 @@ mod umad_motion;
 mod umad_moving;
 mod umad_sensors;
 mod unchanged;
+mod varied_drives;
 mod worlds;

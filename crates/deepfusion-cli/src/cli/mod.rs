@@ -166,6 +166,7 @@ pub(crate) struct DemoArgs {
 #[command(after_help = "Equal settings give equal drives, byte for byte.\n\n\
     Examples:\n  deepfusion simulate --out street --frames 200 --seed 7\n  \
     deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375\n  \
+    deepfusion simulate --out other --varied --seed 8 --scene country\n  \
     deepfusion simulate --out garage --format bag --scene garage --frames 250")]
 pub(crate) struct SimulateArgs {
     /// Folder to write, new or empty.
@@ -189,6 +190,11 @@ pub(crate) struct SimulateArgs {
     /// Number of people who ride bicycles, walk along pavements and cross the road.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub riders: usize,
+    /// Draw the camera (lens, height, pitch, roll, softness, noise, exposure, JPEG), the light, the weather and what the street looks like from the seed,
+    /// once for the drive, as training draws its simulated views. varied.json in the drive's folder (of a bag: NAME.varied.json beside it) says what was
+    /// drawn. Roads stay flat, a LiDAR sees as in clear air, and of --moving-cars only those drive that nothing on the street stops.
+    #[arg(long)]
+    pub varied: bool,
     /// Size of the pictures [default: 640x192; UMAD's 640x480 in a bag].
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
@@ -198,9 +204,9 @@ pub(crate) struct SimulateArgs {
     /// Sensors of the car [default: those of the layout's data set].
     #[arg(long, value_parser = names::sensors())]
     pub sensors: Option<Sensors>,
-    /// Height of the camera above the road.
-    #[arg(long, value_name = "M", default_value_t = 1.65, value_parser = values::positive)]
-    pub camera_height: f64,
+    /// Height of the camera above the road [default: 1.65].
+    #[arg(long, value_name = "M", value_parser = values::positive)]
+    pub camera_height: Option<f64>,
     /// Write the pictures of a second camera, too, so far to the right of the first one (KITTI's: 0.53).
     #[arg(long, value_name = "M", value_parser = values::positive)]
     pub stereo: Option<f64>,

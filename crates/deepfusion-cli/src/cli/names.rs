@@ -259,6 +259,14 @@ pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
                 "Large houses, wide pavements, many parked cars",
             ),
             (Scene::Night, "The urban street by night, under its lamps"),
+            (
+                Scene::Motorway,
+                "Several lanes, guard rails, embankments; with --varied alone",
+            ),
+            (
+                Scene::Country,
+                "A road between fields, trees and banks; with --varied alone",
+            ),
         ],
     )
 }

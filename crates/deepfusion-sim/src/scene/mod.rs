@@ -255,6 +255,12 @@ impl World {
             .to_vec()
     }
 
+    /// Takes away what hangs lower than `headroom` metres over the camera's lane, for a camera higher than on most cars.
+    pub(crate) fn clear_lane(&mut self, headroom: f64) {
+        variety::clear_lane(self, headroom);
+        self.sort();
+    }
+
     /// Takes the day away where there is none.
     fn dim(&mut self) {
         match self.scene {

@@ -113,6 +113,15 @@ pub(super) fn crowd(world: &mut World) -> Vec<CarModel> {
     people::models(world, &mut rng, &kit)
 }
 
+/// Takes away what hangs lower than `headroom` metres over the camera's lane.
+pub(super) fn clear_lane(world: &mut World, headroom: f64) {
+    let way = sweep::Way {
+        headroom,
+        ..sweep::ROAD
+    };
+    sweep::clear(world, &way);
+}
+
 /// Fills a varied world.
 pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety) {
     let kit = Kit::new(world, rng, variety);

@@ -149,7 +149,7 @@ fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
 }
 
 /// Towards the sun: any azimuth; in a quarter of the worlds low (3° to 17°), else 17° to 65° high.
-fn sun(rng: &mut ChaCha8Rng) -> V3 {
+pub(super) fn sun(rng: &mut ChaCha8Rng) -> V3 {
     let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
     let elevation: f32 = if rng.random_bool(0.25) {
         rng.random_range(0.06..0.3)

@@ -236,7 +236,7 @@ pub(super) struct Mount<'a> {
 
 impl Mount<'_> {
     /// Height above the ground, metres, pitch and roll, radians.
-    fn draw(self, rng: &mut ChaCha8Rng, indoors: bool) -> (f64, f64, f64) {
+    pub(super) fn draw(self, rng: &mut ChaCha8Rng, indoors: bool) -> (f64, f64, f64) {
         if let Some(camera) = self.mounted {
             let usual = on_a_car(rng);
             return camera.pose(rng, usual);

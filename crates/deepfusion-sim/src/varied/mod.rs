@@ -1,4 +1,5 @@
-//! The endless mode: views of ever new streets by ever new cameras, as training data for depth networks.
+//! The endless mode: views of ever new streets by ever new cameras, as training data for depth networks; and drives (`drive`)
+//! with such a camera, light and weather.
 //!
 //! A view depends on the settings and its index alone, so that loaders may request any view, from any thread, in
 //! any order. The depth is exact whatever is done to the colours.
@@ -8,6 +9,7 @@ mod cache;
 mod camera;
 mod config;
 mod draw;
+mod drive;
 mod formation;
 mod hills;
 mod ingredient;
@@ -27,6 +29,8 @@ use camera::Mount;
 pub use config::EndlessConfig;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use draw::generator;
+pub(crate) use drive::DriveLook;
+pub use drive::{DrawnDrive, DrawnLight};
 use formation::{Brightness, Formation};
 use image::RgbImage;
 pub use ingredient::Ingredient;
@@ -168,11 +172,7 @@ impl Endless {
         wet::reflect(&input, &mut exposure);
 
         let mut rng = generator(config.seed, index, 0xF11);
-        let brightness = match weather {
-            Weather::Night | Weather::Indoor => Brightness::Dark,
-            _ => Brightness::Day,
-        };
-        let formation = Formation::draw(&mut rng, brightness, config.grey);
+        let formation = Formation::draw(&mut rng, Brightness::of(weather), config.grey);
         let formed = config.formation && !place.plain;
         let rgb = if formed {
             let (width, height) = (size.0 as usize, size.1 as usize);

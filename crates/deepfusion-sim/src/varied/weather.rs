@@ -10,6 +10,9 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+/// Koschmieder: over the visibility contrast falls to 2 %, or e to the power of minus this.
+const TWO_PERCENT: f32 = 3.9;
+
 /// The weather of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -27,6 +30,26 @@ pub enum Weather {
     Indoor,
     /// Lamps and little else.
     Night,
+}
+
+impl Weather {
+    /// Its name, as files have it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clear => "clear",
+            Self::Cloudy => "cloudy",
+            Self::Overcast => "overcast",
+            Self::Fog => "fog",
+            Self::Indoor => "indoor",
+            Self::Night => "night",
+        }
+    }
+}
+
+/// How far things are seen, metres; none where the air is clear.
+pub(super) fn visibility(air: &Air) -> Option<f32> {
+    air.fog.map(|fog| TWO_PERCENT / fog.extinction)
 }
 
 /// The weather of a world without a random draw.
@@ -74,7 +97,7 @@ fn night(rng: &mut ChaCha8Rng, world: &World) -> Air {
     };
     if rng.random_bool(0.3) {
         air.fog = Some(Fog {
-            extinction: 3.9 / log_uniform(rng, 150.0, 3000.0) as f32,
+            extinction: TWO_PERCENT / log_uniform(rng, 150.0, 3000.0) as f32,
             colour: air.sky.horizon.component_mul(&air.tint) * 1.3,
             height: 300.0,
         });
@@ -173,8 +196,7 @@ fn day(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
             .then(|| log_uniform(rng, 500.0, 20_000.0)),
     };
     air.fog = visibility.map(|metres| Fog {
-        // Koschmieder: contrast falls to 2 % at the visibility.
-        extinction: 3.9 / metres as f32,
+        extinction: TWO_PERCENT / metres as f32,
         colour: mix(&air.sky.horizon, &grey, 0.5).component_mul(&air.tint),
         height: if weather == Weather::Fog { 60.0 } else { 400.0 },
     });

@@ -4,13 +4,16 @@ use super::plane::{Planes, bell, filter, sample};
 use super::{scale, sometimes, stops};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 
 /// A lens, as it was focused and held.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Lens {
     /// Deviation of its blur, pixels; 0: none.
+    #[serde(rename = "blur_px")]
     blur: f32,
-    /// The camera turned while the shutter was open: the length and direction (radians) of the smear, in pixels.
+    /// The camera turned while the shutter was open: the length and direction (radians) of the smear, in pixels. Of one picture alone.
+    #[serde(skip)]
     shake: Option<(f32, f32)>,
     /// How much larger the red and the blue picture are than the green one.
     lateral: [f32; 2],
@@ -30,14 +33,7 @@ impl Lens {
                 4..=6 => scale(rng, 0.25, 0.6),
                 _ => scale(rng, 0.6, 1.6),
             },
-            shake: sometimes(rng, 0.05, None, |rng| {
-                let direction = if rng.random_bool(0.7) {
-                    rng.random_range(-0.3..0.3)
-                } else {
-                    rng.random_range(-1.6..1.6)
-                };
-                Some((rng.random_range(1.5..6.0), direction))
-            }),
+            shake: shake(rng),
             lateral: sometimes(rng, 0.3, [0.0; 2], |rng| {
                 let strength = 0.0015 * stops(rng, 0.5, 2.0);
                 [strength, -strength * rng.random_range(0.2..1.0)]
@@ -45,6 +41,20 @@ impl Lens {
             vignette: sometimes(rng, 0.6, 0.0, |rng| rng.random_range(0.03..0.45)),
             veil: sometimes(rng, 0.2, 0.0, |rng| scale(rng, 0.02, 0.2)),
         }
+    }
+
+    /// The same lens, held for another picture.
+    pub(super) fn of_another_picture(&self, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            shake: shake(rng),
+            ..self.clone()
+        }
+    }
+
+    /// Whether its picture is smeared.
+    #[cfg(test)]
+    pub(super) fn is_shaken(&self) -> bool {
+        self.shake.is_some()
     }
 
     /// Light through the lens.
@@ -99,6 +109,18 @@ impl Lens {
             }
         }
     }
+}
+
+/// How a camera turned during a picture, in one of twenty: the length and direction of the smear.
+fn shake(rng: &mut ChaCha8Rng) -> Option<(f32, f32)> {
+    sometimes(rng, 0.05, None, |rng| {
+        let direction = if rng.random_bool(0.7) {
+            rng.random_range(-0.3..0.3)
+        } else {
+            rng.random_range(-1.6..1.6)
+        };
+        Some((rng.random_range(1.5..6.0), direction))
+    })
 }
 
 /// The mean along a line of this length. A turn of the camera moves near and far things alike, so this is exact for

@@ -9,19 +9,22 @@ mod processing;
 mod sensor;
 
 use super::draw::{FastNoise, log_uniform, normal};
+use super::weather::Weather;
 use crate::texture::Rgb;
 use image::RgbImage;
 use plane::Planes;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 
 /// One camera's image formation, with the random effects of one picture.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Formation {
     lens: lens::Lens,
     sensor: sensor::Sensor,
     processing: processing::Processing,
     /// JPEG quality, where the image went through a file.
+    #[serde(rename = "jpeg_quality")]
     quality: Option<u8>,
 }
 
@@ -32,6 +35,16 @@ pub(super) enum Brightness {
     Day,
     /// Lamps: the exposure stays too short, the gain high.
     Dark,
+}
+
+impl Brightness {
+    /// That of a weather.
+    pub(super) fn of(weather: Weather) -> Self {
+        match weather {
+            Weather::Night | Weather::Indoor => Self::Dark,
+            _ => Self::Day,
+        }
+    }
 }
 
 impl Formation {
@@ -45,6 +58,14 @@ impl Formation {
             quality: rng
                 .random_bool(0.5)
                 .then(|| normal(rng, 78.0, 14.0, 3.5).clamp(30.0, 95.0) as u8),
+        }
+    }
+
+    /// The same camera at another picture: whether and how it turned while the shutter was open is drawn anew.
+    pub(super) fn of_another_picture(&self, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            lens: self.lens.of_another_picture(rng),
+            ..self.clone()
         }
     }
 
@@ -113,6 +134,21 @@ mod tests {
         };
         assert_eq!(image(3).as_raw(), image(3).as_raw());
         assert_ne!(image(3).as_raw(), image(4).as_raw());
+    }
+
+    /// From picture to picture nothing of a camera changes but how it was held, which one of twenty shows.
+    #[test]
+    fn one_camera_takes_many_pictures() {
+        let formation = Formation::draw(&mut generator(1, 3, 2), Brightness::Day, 0.15);
+        let mut smeared = 0;
+        for number in 0..1000 {
+            let other = formation.of_another_picture(&mut generator(1, number, 7));
+            smeared += usize::from(other.lens.is_shaken());
+            assert_eq!(other.sensor, formation.sensor);
+            assert_eq!(other.processing, formation.processing);
+            assert_eq!(other.quality, formation.quality);
+        }
+        assert!((20..100).contains(&smeared), "{smeared}");
     }
 
     /// Whatever is drawn, the image keeps the order of brightness of the scene and shows something.

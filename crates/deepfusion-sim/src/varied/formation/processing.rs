@@ -8,12 +8,13 @@ use image::{ImageFormat, RgbImage};
 use jpeg_encoder::{ColorType, Encoder};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 
 /// Entries of a tone curve.
 const TONES: usize = 2048;
 
 /// A camera's processor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Processing {
     /// Weights of red, green and blue, where the camera sees no colours.
     pub grey: Option<[f32; 3]>,

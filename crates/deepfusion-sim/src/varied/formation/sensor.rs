@@ -5,12 +5,13 @@ use super::{Brightness, scale, sometimes, stops};
 use crate::varied::draw::FastNoise;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 
 /// Weights of red, green and blue in the light that an exposure is measured by (ITU-R BT.709).
 pub(super) const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// A sensor and its automatic exposure.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Sensor {
     /// The mean the exposure aims at, as a share of full scale, its error included.
     aim: f32,
@@ -21,6 +22,7 @@ pub(super) struct Sensor {
     /// Variance of the noise per unit of signal, and of the noise without any.
     noise: [f32; 2],
     /// Deviation of the blur of the noise, pixels, where a processor has smoothed it; 0: none.
+    #[serde(rename = "grain_px")]
     grain: f32,
     /// Errors of the white balance: gains of red, green and blue.
     balance: [f32; 3],
