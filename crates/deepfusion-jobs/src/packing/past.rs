@@ -297,7 +297,7 @@ mod tests {
             assert_eq!(of(&pictures), Images::NotKnown, "{beside}");
         }
         let run = [trained_on(&at.join("run"), &converted)];
-        assert_eq!(of_mean(&run).unwrap(), [converted.clone()]);
+        assert_eq!(of_mean(&run).unwrap(), std::slice::from_ref(&converted));
         let mark = |folder: &Path| fs::write(folder.join("dataset.toml"), "simulated = true\n");
         mark(converted.parent().unwrap()).unwrap();
         mark(&pictures).unwrap();
