@@ -81,6 +81,10 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     );
     let shares: Vec<&Value> = (0..2).map(|i| &third["networks"][i]["share"]).collect();
     assert_eq!(shares, [0.75, 0.25]);
+    let differ = |key: &str| third["statistics"][key].as_u64().unwrap();
+    assert!(0 < differ("layers") && differ("layers") <= differ("of"));
+    let left_out = &third["statistics"]["left_out"];
+    assert!(left_out.as_f64().unwrap() > 0.0, "{left_out}");
     // Of what it was made nothing is known but its kind.
     assert_eq!(held_out(at, "c", "third"), Value::Null);
 

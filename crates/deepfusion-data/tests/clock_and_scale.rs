@@ -178,6 +178,9 @@ fn a_date_s_file_is_for_all_its_drives_and_a_drive_s_own_goes_before_it() {
     fs::write(&date, "vehicle.speed_scale = 0.5\n").unwrap();
     let speed = || open(&drive, &OpenOptions::default()).frames()[5].speed_mps;
     assert_eq!(speed(), Some(5.0));
+    // What its own does not say is the date's.
+    fs::write(drive.join("dataset.toml"), "simulated = true\n").unwrap();
+    assert_eq!(speed(), Some(5.0));
     fs::write(drive.join("dataset.toml"), "vehicle.speed_scale = 0.75\n").unwrap();
     assert_eq!(speed(), Some(7.5));
     // The path that OXTS gives is as long as the speeds say.

@@ -2,7 +2,7 @@
 
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::folder;
-use deepfusion_data::{Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
+use deepfusion_data::{Dataset, DatasetKind, OpenOptions, convert_to_bag, convert_to_kitti};
 use deepfusion_rosbag::Compression;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ fn the_mark_goes_from_layout_to_layout() {
     assert!(!Dataset::all_simulated_at(&root.join("nowhere")));
 }
 
-/// Of a date with both, each drive has its own; a file of a drive's does not take the date's mark away.
+/// Of a date with both, each drive has its own mark, which goes with it to another date. What it does not say is the date's.
 #[test]
 fn drives_of_one_date_are_told_apart() {
     let root = tempfile::tempdir().unwrap();
@@ -61,35 +61,50 @@ fn drives_of_one_date_are_told_apart() {
     let real = open(&bag).remove(0);
     mark(&bag);
     let simulated = open(&bag).remove(0);
-    let convert = |name: &str, drives: &[Dataset]| {
-        let kitti = root.join(name);
-        let paths = convert_to_kitti(drives, &kitti, &mut |_, _| {})
-            .unwrap()
-            .paths;
-        (kitti, paths)
+    let kitti = root.join("kitti");
+    let converted = convert_to_kitti(&[real, simulated], &kitti, &mut |_, _| {}).unwrap();
+    let [of_real, of_simulated] = converted.paths.as_slice() else {
+        panic!("{:?}", converted.paths)
     };
-    let marks =
-        |path: &Path| -> Vec<bool> { open(path).iter().map(Dataset::is_simulated).collect() };
-    let (both, _) = convert("both", &[real, simulated.clone()]);
-    assert_eq!(marks(&both), [false, true]);
-    assert!(!Dataset::all_simulated_at(&both));
-    let (alone, paths) = convert("alone", &[simulated.clone(), simulated]);
-    fs::write(paths[0].join("dataset.toml"), "vehicle.speed_scale = 0.9\n").unwrap();
-    assert_eq!(marks(&alone), [true, true]);
+    let marks = || -> Vec<bool> { open(&kitti).iter().map(Dataset::is_simulated).collect() };
+    assert_eq!(marks(), [false, true]);
+    assert!(!Dataset::all_simulated_at(&kitti));
+    let elsewhere = root.join(of_simulated.file_name().unwrap());
+    fs::rename(of_simulated, &elsewhere).unwrap();
+    assert!(Dataset::all_simulated_at(&elsewhere));
+    fs::rename(&elsewhere, of_simulated).unwrap();
+    let date = of_real.parent().unwrap();
+    fs::write(date.join("dataset.toml"), "simulated = true\n").unwrap();
+    assert_eq!(marks(), [true, true]);
+    fs::write(of_real.join("dataset.toml"), "simulated = false\n").unwrap();
+    assert_eq!(marks(), [false, true]);
 }
 
-/// What nobody can record tells it of a bag whose file is lost; one of the two may be a better sensor's.
+/// What nobody can record tells it of a bag whose file is lost or says nothing; one of the two may be a better sensor's, or only named so.
 #[test]
 fn exact_motion_and_depth_are_a_simulators() {
-    for (with_depth, expected) in [(false, false), (true, true)] {
+    type Topics = fn(&mut TinyBag);
+    let motion: Topics = |bag| {
+        bag.odometry("/truth/odometry", 5.0);
+    };
+    let both: Topics = |bag| {
+        bag.odometry("/truth/odometry", 5.0);
+        bag.images("/truth/depth/compressed");
+    };
+    let named: Topics = |bag| {
+        bag.twist("/truth/odometry", 5.0);
+        bag.images("/truth/depth/compressed");
+    };
+    for (topics, says, expected) in [
+        (motion, "", false),
+        (named, "", false),
+        (both, "", true),
+        (both, "simulated = false\n", false),
+    ] {
         let root = tempfile::tempdir().unwrap();
-        let bag = bag(root.path(), |bag| {
-            bag.odometry("/truth/odometry", 5.0);
-            if with_depth {
-                bag.images("/truth/depth/compressed");
-            }
-        });
-        assert_eq!(open(&bag)[0].is_simulated(), expected);
+        let bag = bag(root.path(), topics);
+        fs::write(bag.with_extension("toml"), format!("{says}{CAMERA}")).unwrap();
+        assert_eq!(open(&bag)[0].is_simulated(), expected, "{says}");
     }
 }
 
@@ -100,5 +115,59 @@ fn a_folder_says_it_in_its_file() {
     assert!(!open(root.path())[0].is_simulated());
     fs::write(root.path().join("dataset.toml"), "simulated = true\n").unwrap();
     assert!(open(root.path())[0].is_simulated());
-    assert!(Dataset::all_simulated_at(root.path()));
+}
+
+/// Of every layout that has such a file, without opening what is there: empty files are enough.
+#[test]
+fn the_file_of_each_layout_is_asked() {
+    const DRIVE: &str = "2026_01_01/2026_01_01_drive_0001_sync";
+    let within = |name: &str| format!("{DRIVE}/{name}");
+    let (image, poses) = (within("image_02/data/0000000000.png"), within("poses.txt"));
+    let (masks, own) = (within("moving_02/0000000000.png"), within("dataset.toml"));
+    let [image, poses, masks, own] = [&image, &poses, &masks, &own].map(String::as_str);
+    let date = "2026_01_01/dataset.toml";
+    let kitti = DatasetKind::KittiRaw;
+    // What is there, the path that is given, and its file; the last is simulated where that says nothing.
+    let layouts: [(DatasetKind, &[&str], &str, &str); 10] = [
+        (kitti, &[image], ".", own),
+        (kitti, &[image, poses], ".", own),
+        (kitti, &[image], DRIVE, date),
+        (DatasetKind::Bag, &["a.bag"], "a.bag", "a.toml"),
+        (
+            DatasetKind::Comma2k19,
+            &["global_pose/frame_times"],
+            ".",
+            "dataset.toml",
+        ),
+        (
+            DatasetKind::RgbD,
+            &["room/frame-000000.color.png"],
+            ".",
+            "room/dataset.toml",
+        ),
+        (DatasetKind::Folder, &["images/0.png"], ".", "dataset.toml"),
+        (DatasetKind::Video, &["a.mp4"], ".", "dataset.toml"),
+        (DatasetKind::Video, &["a.mp4"], "a.mp4", "dataset.toml"),
+        (kitti, &[image, poses, masks], ".", own),
+    ];
+    let last = layouts.len() - 1;
+    for (number, (kind, files, path, says)) in layouts.into_iter().enumerate() {
+        let root = tempfile::tempdir().unwrap();
+        for file in files {
+            let file = root.path().join(file);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, "").unwrap();
+        }
+        let (path, says) = (root.path().join(path), root.path().join(says));
+        assert_eq!(Dataset::kind_at(&path).unwrap(), kind);
+        for (text, expected) in [
+            ("", number == last),
+            ("simulated = false\n", false),
+            ("simulated = true\n", true),
+        ] {
+            fs::write(&says, text).unwrap();
+            let found = Dataset::all_simulated_at(&path);
+            assert_eq!(found, expected, "{kind:?} by {}: {text}", says.display());
+        }
+    }
 }

@@ -216,11 +216,11 @@ pub(crate) fn turned(direction: &Vector3<f64>, error: Vector2<f64>) -> Vector3<f
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    /// Points of a scene before a camera that moves by `t` and turns by `omega`.
-    pub(super) fn pair(t: Vector3<f64>, omega: Vector3<f64>, said: Se3) -> EpipolarPair {
+    /// Points of a scene before a camera that moves by `t` and turns by `omega` in a tenth of a second.
+    pub(crate) fn pair(t: Vector3<f64>, omega: Vector3<f64>, said: Se3) -> EpipolarPair {
         let later_from_earlier = Se3::exp(omega, Vector3::zeros());
         let later_from_earlier = Se3::from_axis_angle(later_from_earlier.axis_angle(), t).inverse();
         let points = (0..150).map(|i| {

@@ -96,39 +96,20 @@ pub(super) fn picture_yaw_rate(pair: &EpipolarPair) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::Flow;
-    use deepfusion_geometry::{Intrinsics, Se3};
+    use crate::epipolar::tests::pair;
+    use deepfusion_geometry::Se3;
 
-    const DT_S: f64 = 0.1;
-
-    /// A metre ahead, turning by `rate` rad/s, positive to the left.
-    fn motion(rate: f64) -> Se3 {
-        Se3::from_axis_angle(Vector3::new(0.0, -rate * DT_S, 0.0), Vector3::z())
-    }
-
-    /// Points before a camera that turns by one rate, of a vehicle that says another.
-    fn pair(seen: f64, said: f64) -> EpipolarPair {
-        let k = Intrinsics::centred(200.0, (320, 96));
-        let later_from_earlier = motion(seen).inverse();
-        let points = (0..150).filter_map(|i| {
-            let noise = |by: f64| ((f64::from(i) * by).sin() * 43758.5453).fract();
-            let z = 14.0 + 9.0 * noise(2.7);
-            let point = Vector3::new(0.7 * z * noise(1.3), 0.25 * z * noise(1.9), z);
-            let from = k.project(&point)?;
-            let to = k.project(&later_from_earlier.transform(&point))?;
-            Some(Flow {
-                at: [from.x, from.y],
-                by: [to.x - from.x, to.y - from.y],
-            })
-        });
-        let points: Vec<Flow> = points.collect();
-        EpipolarPair::new(&points, &k, motion(said), (0.0, DT_S)).unwrap()
+    /// A vehicle that goes a metre ahead in a tenth of a second. Its camera turns by one rate, rad/s to the left, and it says another.
+    fn ahead(seen: f64, said: f64) -> EpipolarPair {
+        let turn = |rate: f64| Vector3::new(0.0, -0.1 * rate, 0.0);
+        let said = Se3::from_axis_angle(turn(said), Vector3::z());
+        pair(Vector3::z(), turn(seen), said)
     }
 
     /// Of a vehicle that says so many times the rates at which its camera turns.
     fn diagnosed(factor: f64) -> Outcome {
         let rates = (0..20).map(|i| 0.3 * (0.7 * f64::from(i)).sin());
-        let pairs: Vec<EpipolarPair> = rates.map(|rate| pair(rate, factor * rate)).collect();
+        let pairs: Vec<EpipolarPair> = rates.map(|rate| ahead(rate, factor * rate)).collect();
         check(&pairs)
     }
 

@@ -329,8 +329,7 @@ impl BoardViews {
     }
 
     /// That pictures were turned upright, which the calibration then is of.
-    #[must_use]
-    pub fn turned(&self) -> Option<BoardWarning> {
+    fn turned(&self) -> Option<BoardWarning> {
         let (_, orientation) = self.first.as_ref()?;
         (*orientation != 1).then_some(BoardWarning::Turned {
             orientation: *orientation,

@@ -134,8 +134,7 @@ mod tests {
             assert!(drives[0].is_simulated(), "{}", path.display());
             assert!(!unseen(&card, &drives), "{}", path.display());
         }
-        let date = converted[0].folder().parent().unwrap();
-        std::fs::remove_file(date.join("dataset.toml")).unwrap();
+        std::fs::remove_file(converted[0].folder().join("dataset.toml")).unwrap();
         assert!(unseen(&card, &open(&kitti)));
     }
 }

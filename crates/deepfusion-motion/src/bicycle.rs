@@ -62,24 +62,20 @@ impl Bicycle {
                 expected,
             })
         };
+        let (from, to) = (0.3, 20.0);
         check(
-            (0.3..=20.0).contains(&self.wheelbase_m),
+            (from..=to).contains(&self.wheelbase_m),
             "wheelbase_m",
             self.wheelbase_m,
-            Expected::Metres {
-                from: 0.3,
-                to: 20.0,
-            },
+            Expected::Metres { from, to },
         )?;
         // Some makers count to the right: a negative ratio says so.
+        let (from, to) = (0.5, 60.0);
         check(
-            (0.5..=60.0).contains(&self.steering_ratio.abs()),
+            (from..=to).contains(&self.steering_ratio.abs()),
             "steering_ratio",
             self.steering_ratio,
-            Expected::SteeringRatio {
-                from: 0.5,
-                to: 60.0,
-            },
+            Expected::SteeringRatio { from, to },
         )?;
         check(
             self.steering_offset_rad.abs() < 3.2,
@@ -87,14 +83,12 @@ impl Bicycle {
             self.steering_offset_rad,
             Expected::Angle,
         )?;
+        let (from, to) = (0.0, 0.02);
         check(
-            (0.0..=0.02).contains(&self.understeer_s2_per_m2),
+            (from..=to).contains(&self.understeer_s2_per_m2),
             "understeer_s2_per_m2",
             self.understeer_s2_per_m2,
-            Expected::Understeer {
-                from: 0.0,
-                to: 0.02,
-            },
+            Expected::Understeer { from, to },
         )
     }
 

@@ -325,12 +325,13 @@ impl FusionConfig {
             ("alpha_distance", self.alpha_distance),
             ("alpha_yaw", self.alpha_yaw),
         ];
+        let (from, to) = (0.0, 1.0);
         for (field, value) in weights {
-            if !(0.0..=1.0).contains(&value) {
+            if !(from..=to).contains(&value) {
                 return Err(Error::Config {
                     field,
                     value,
-                    expected: ExpectedSetting::Within { from: 0.0, to: 1.0 },
+                    expected: ExpectedSetting::Within { from, to },
                 });
             }
         }

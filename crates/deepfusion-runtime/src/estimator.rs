@@ -327,30 +327,6 @@ impl DepthEstimator {
         self.infer(&preparer.prepare(image, camera, focal_correction, crop))
     }
 
-    /// As [`Self::predict`] of the mirror image, mirrored back: beside the image's own prediction pixel by pixel.
-    ///
-    /// # Errors
-    /// As [`DepthRunner::run`].
-    pub fn predict_mirrored(
-        &mut self,
-        image: &RgbImage,
-        camera: Option<&Intrinsics>,
-        focal_correction: bool,
-        crop: bool,
-    ) -> Result<Prediction, Error> {
-        let preparer = self.preparer();
-        let mut prepared = preparer.prepare(image, camera, focal_correction, crop);
-        for view in &mut prepared.views {
-            mirror(&mut view.input, view.size.width);
-        }
-        let mut seen = self.infer(&prepared)?;
-        mirror(&mut seen.disparity, seen.width);
-        if let Some(log_scale) = &mut seen.log_scale {
-            mirror(log_scale, seen.width);
-        }
-        Ok(seen)
-    }
-
     /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Of several views the mean of
     /// the disparities is taken, at the size of the largest; of ln b as well, where it predicts that, so that it says how sure a single
     /// prediction is, not how sure their mean.
@@ -358,6 +334,22 @@ impl DepthEstimator {
     /// # Errors
     /// As [`DepthRunner::run`].
     pub fn infer(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
+        self.mean_over_views(image, |of, view| of.infer_view(view, image.flip))
+    }
+
+    /// As [`Self::infer`] of the mirror image alone, mirrored back: beside the image's own prediction pixel by pixel.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::run`].
+    pub fn infer_mirrored(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
+        self.mean_over_views(image, Self::run_mirrored)
+    }
+
+    fn mean_over_views(
+        &mut self,
+        image: &PreparedImage,
+        look: impl Fn(&mut Self, &View) -> Result<NetworkOutput, Error>,
+    ) -> Result<Prediction, Error> {
         let Some(&View {
             size, focal_factor, ..
         }) = image.largest()
@@ -369,7 +361,7 @@ impl DepthEstimator {
         };
         let mut predictions = Vec::with_capacity(image.views.len());
         for view in &image.views {
-            predictions.push((view.size, self.infer_view(view, image.flip)?));
+            predictions.push((view.size, look(self, view)?));
         }
         let NetworkOutput {
             disparity,
@@ -388,20 +380,28 @@ impl DepthEstimator {
 
     /// What the network predicts of one view, with metres corrected; blended with its mirror image's where `flip` says so.
     fn infer_view(&mut self, view: &View, flip: bool) -> Result<NetworkOutput, Error> {
-        let (width, factor) = (view.size.width, view.focal_factor);
-        let mut own = self.run(&view.input, view.size, factor)?;
+        let mut own = self.run(&view.input, view.size, view.focal_factor)?;
         if flip {
-            let mut input = view.input.clone();
-            mirror(&mut input, width);
-            let mut mirrored = self.run(&input, view.size, factor)?;
-            mirror(&mut mirrored.disparity, width);
+            let (mirrored, width) = (self.run_mirrored(view)?, view.size.width);
             blend_flipped(&mut own.disparity, &mirrored.disparity, width);
-            if let (Some(own), Some(mirrored)) = (&mut own.log_scale, &mut mirrored.log_scale) {
-                mirror(mirrored, width);
+            if let (Some(own), Some(mirrored)) = (&mut own.log_scale, &mirrored.log_scale) {
                 blend_flipped(own, mirrored, width);
             }
         }
         Ok(own)
+    }
+
+    /// What the network predicts of the mirror image of one view, mirrored back, with metres corrected.
+    fn run_mirrored(&mut self, view: &View) -> Result<NetworkOutput, Error> {
+        let width = view.size.width;
+        let mut input = view.input.clone();
+        mirror(&mut input, width);
+        let mut seen = self.run(&input, view.size, view.focal_factor)?;
+        mirror(&mut seen.disparity, width);
+        if let Some(log_scale) = &mut seen.log_scale {
+            mirror(log_scale, width);
+        }
+        Ok(seen)
     }
 
     /// Runs the network once.

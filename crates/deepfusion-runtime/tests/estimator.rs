@@ -250,25 +250,33 @@ fn a_mirrored_image_is_seen_mirrored() -> Result {
 /// As of the mirrored picture, but for what resizing rounds.
 #[test]
 fn a_mirrored_prediction_lies_beside_the_images_own() -> Result {
-    let mut estimator = tiny()?;
-    let image = picture(640, 480, 7);
-    let k = camera(640, 480);
-    let back = estimator.predict_mirrored(&image, Some(&k), true, false)?;
+    let mut estimator = DepthEstimator::load("street")?;
+    let image = picture(640, 192, 7);
+    let k = camera(640, 192);
+    let prepared = estimator.preparer().prepare(&image, Some(&k), true, false);
+    let back = estimator.infer_mirrored(&prepared)?;
     let mirrored = image::imageops::flip_horizontal(&image);
     let mut expected = estimator.predict(&mirrored, Some(&k.flipped()), true, false)?;
-    for row in expected.disparity.chunks_exact_mut(expected.width) {
-        row.reverse();
-    }
-    let differ = |other: &Prediction| {
-        let pairs = back.disparity.iter().zip(&other.disparity);
-        pairs.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f32::max)
-    };
-    let (off, own) = (
-        differ(&expected),
-        differ(&estimator.predict(&image, Some(&k), true, false)?),
-    );
     assert_eq!((back.width, back.window), (expected.width, expected.window));
-    assert!(off < 0.01 && own > 0.01, "{off}, {own}");
+    let scale = expected.log_scale.as_mut().ok_or("no ln b")?;
+    for values in [&mut expected.disparity, scale] {
+        for row in values.chunks_exact_mut(back.width) {
+            row.reverse();
+        }
+    }
+    let differ = |other: &Prediction| -> [f32; 2] {
+        let pairs = back.disparity.iter().zip(&other.disparity);
+        let disparity = pairs.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f32::max);
+        let other = other.log_scale.iter().flatten();
+        let pairs = back.log_scale.iter().flatten().zip(other);
+        [
+            disparity,
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max),
+        ]
+    };
+    let (off, own) = (differ(&expected), differ(&estimator.infer(&prepared)?));
+    assert!(off.iter().all(|off| *off < 0.01), "{off:?}");
+    assert!(own.iter().all(|own| *own > 0.01), "{own:?}");
     Ok(())
 }
 

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
 /// frame's time), not the scanner's own; `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
-/// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in `dataset.toml`, the date's where all
-/// is, else the drive's.
+/// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in the drive's `dataset.toml`, which goes
+/// with the drive wherever it is moved.
 ///
 /// # Errors
 /// [`Error::Exists`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
@@ -46,11 +46,6 @@ pub fn convert_to_kitti(
     let date_name = format!("{year:04}_{month:02}_{day:02}");
     let date_folder = out.join(&date_name);
     write_calibration(&date_folder, &first.intrinsics(0), first.cam_from_vehicle())?;
-    // A drive's own file would hide what one writes into the date's: only where they differ.
-    let all_simulated = datasets.iter().all(Dataset::is_simulated);
-    if all_simulated {
-        mark_simulated(&date_folder)?;
-    }
     let total: usize = datasets.iter().map(|d| d.frames().len()).sum();
     let (mut done, mut folders) = (0, Vec::new());
     for (number, dataset) in datasets.iter().enumerate() {
@@ -59,7 +54,7 @@ pub fn convert_to_kitti(
             done += frames;
             progress(done, total);
         })?;
-        if dataset.is_simulated() && !all_simulated {
+        if dataset.is_simulated() {
             mark_simulated(&folder)?;
         }
         folders.push(folder);
@@ -72,7 +67,7 @@ pub fn convert_to_kitti(
     })
 }
 
-/// Says of a drive, or of all of a date, that nobody drove it.
+/// Says of a drive that nobody drove it.
 fn mark_simulated(folder: &Path) -> Result<()> {
     let text = format!("# Written by `data convert`, of a simulated recording.\n{SIMULATED}");
     super::parts::write_text(&folder.join(FolderConfig::NAME), &text)

@@ -117,8 +117,8 @@ impl Dataset {
         self
     }
 
-    /// Whether the recording says that nobody drove it: by what only a simulator can write beside the images, or by the key `simulated` of the
-    /// file beside it. [`crate::convert_to_kitti`] and [`crate::convert_to_bag`] hand it on. Without the mark it may be either.
+    /// Whether the recording says that nobody drove it: by the key `simulated` of the file beside it, else by what only a simulator can write
+    /// beside the images. [`crate::convert_to_kitti`] and [`crate::convert_to_bag`] hand it on. Without the mark it may be either.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
         self.simulated

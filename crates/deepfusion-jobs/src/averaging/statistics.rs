@@ -2,6 +2,7 @@
 
 use deepfusion_model::BATCH_NORM_EPSILON;
 use deepfusion_model::weights::Weights;
+use serde::Serialize;
 
 /// The ends of the names of a batch norm's running statistics, after its own.
 const MEAN: &str = "running_mean";
@@ -12,15 +13,15 @@ const VARIANCE: &str = "running_var";
 /// Inputs of several networks together have the variance Σ sᵢ·σᵢ² + Σ sᵢ·(μᵢ − μ)²; the mean of the variances has the first part alone. The mean
 /// network's own inputs are neither's: only data that goes through it tells their statistics, as stochastic weight averaging measures them anew
 /// (Izmailov et al., arXiv 1803.05407).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct StatisticsSpread {
     /// Batch norms that have other statistics in one network than in another.
     pub layers: usize,
     /// All batch norms.
     pub of: usize,
-    /// What the mean of the variances leaves out, as a share of it: Σ sᵢ·(μᵢ − μ)² / Σ sᵢ·σᵢ², the mean over a batch norm's channels, of the one
-    /// where that is largest.
+    /// What the mean of the variances leaves out, as a share of it: Σ sᵢ·(μᵢ − μ)² / Σ sᵢ·σᵢ², of the channel of all batch norms where that is
+    /// largest.
     pub left_out: f64,
 }
 
@@ -42,8 +43,8 @@ pub(super) fn spread(networks: &[(&Weights, f64)]) -> Option<StatisticsSpread> {
         let alike = |all: &[&[f32]]| all.windows(2).all(|pair| pair[0] == pair[1]);
         if !(alike(&means) && alike(&variances)) {
             spread.layers += 1;
-            let left_out = left_out(&means, &variances, &shares);
-            spread.left_out = spread.left_out.max(left_out);
+            let most = left_out(&means, &variances, &shares);
+            spread.left_out = spread.left_out.max(most);
         }
     }
     (spread.layers > 0).then_some(spread)
@@ -58,7 +59,7 @@ fn values_of<'a>(networks: &[(&'a Weights, f64)], name: &str) -> Option<Vec<&'a 
     networks.iter().map(values).collect()
 }
 
-/// [`StatisticsSpread::left_out`] of one batch norm.
+/// [`StatisticsSpread::left_out`] of the channels of one batch norm.
 fn left_out(means: &[&[f32]], variances: &[&[f32]], shares: &[f64]) -> f64 {
     let lengths = means.iter().chain(variances).map(|values| values.len());
     let channels = lengths.min().unwrap_or_default();
@@ -71,5 +72,5 @@ fn left_out(means: &[&[f32]], variances: &[&[f32]], shares: &[f64]) -> f64 {
         // A channel that is always 0 has no variance.
         apart / (mean_of(&|i| f64::from(variances[i][channel])) + BATCH_NORM_EPSILON)
     };
-    (0..channels).map(of_channel).sum::<f64>() / channels.max(1) as f64
+    (0..channels).map(of_channel).fold(0.0, f64::max)
 }

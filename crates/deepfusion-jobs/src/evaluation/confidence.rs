@@ -164,8 +164,10 @@ fn of_frame(
     };
     let image = dataset.load_image(frame)?;
     let camera = dataset.intrinsics(frame);
-    let seen = estimator.predict(&image, Some(&camera), correct_focal, false)?;
-    let mirrored = estimator.predict_mirrored(&image, Some(&camera), correct_focal, false)?;
+    let preparer = estimator.preparer();
+    let prepared = preparer.prepare(&image, Some(&camera), correct_focal, false);
+    let seen = estimator.infer(&prepared)?;
+    let mirrored = estimator.infer_mirrored(&prepared)?;
     let evidence = Evidence::of(&seen.disparity, Some(&mirrored.disparity), seen.width);
     Ok(known_pixels(&depth, &seen, &RANGE_M)
         .into_iter()

@@ -5,7 +5,7 @@ use deepfusion_eval::median;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_kernels::{PhotometricShape, photometric_error};
 use deepfusion_motion::{Alignment, DepthImage, GreyImage, GreyPyramid, View, align, scene_points};
-use deepfusion_runtime::DepthEstimator;
+use deepfusion_runtime::{DepthEstimator, PreparedImage};
 use image::imageops::crop_imm;
 use nalgebra::Vector3;
 
@@ -36,6 +36,7 @@ pub(super) struct FrameEvidence {
 
 /// A frame as the network sees it.
 struct Seen {
+    prepared: PreparedImage,
     grey: GreyPyramid,
     depth: DepthMap,
     camera: Intrinsics,
@@ -109,7 +110,7 @@ pub(super) fn evidence_of_frame(
         .collect();
     if closely {
         let camera = dataset.intrinsics(target.frame);
-        let other = estimator.predict_mirrored(&image, Some(&camera), focal_correction, false)?;
+        let other = estimator.infer_mirrored(&seen.prepared)?;
         looked.flip = flip(&seen.depth, &other.network_depth(&camera).0);
     }
     Ok(looked)
@@ -123,11 +124,14 @@ fn see(
     focal_correction: bool,
 ) -> Result<Seen> {
     let camera = dataset.intrinsics(frame);
-    let prediction = estimator.predict(image, Some(&camera), focal_correction, false)?;
+    let preparer = estimator.preparer();
+    let prepared = preparer.prepare(image, Some(&camera), focal_correction, false);
+    let prediction = estimator.infer(&prepared)?;
     let window = prediction.window;
     let (depth, camera) = prediction.network_depth(&camera);
     let grey = grey_like(image, window, (depth.width as u32, depth.height as u32));
     Ok(Seen {
+        prepared,
         grey: GreyPyramid::new(grey),
         depth,
         camera,

@@ -121,23 +121,22 @@ impl ImuConfig {
                 Expected::PlaceOnVehicle,
             )?;
         }
+        let most = 1.0;
         for value in self.gyro_bias_radps.unwrap_or_default() {
             check(
-                value.abs() <= 1.0,
+                value.abs() <= most,
                 "gyro_bias_radps",
                 value,
-                Expected::AngularRateBelow(1.0),
+                Expected::AngularRateBelow(most),
             )?;
         }
         let time = self.attitude_time_s;
+        let (from, to) = (0.05, 600.0);
         check(
-            (0.05..=600.0).contains(&time),
+            (from..=to).contains(&time),
             "attitude_time_s",
             time,
-            Expected::Seconds {
-                from: 0.05,
-                to: 600.0,
-            },
+            Expected::Seconds { from, to },
         )?;
         let still = &self.standstill;
         let positive = |field, value: f64| {

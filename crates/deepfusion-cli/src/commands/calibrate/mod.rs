@@ -6,7 +6,7 @@ mod summary;
 use deepfusion_calibrate::{Board, Calibration};
 use deepfusion_data::camera_info_yaml;
 use deepfusion_hint::count_of;
-use deepfusion_jobs::board::{BoardWarning, LeftOut, SearchProgress, find_views};
+use deepfusion_jobs::board::{LeftOut, SearchProgress, find_views};
 use serde::Serialize;
 
 use crate::cli::CalibrateArgs;
@@ -21,7 +21,7 @@ struct Report<'a> {
     #[serde(flatten)]
     calibration: &'a Calibration,
     /// What makes it less sure than it could be.
-    warnings: &'a [BoardWarning],
+    warnings: Vec<String>,
     /// Names of `coefficients`.
     coefficient_names: &'a [&'a str],
     board: Board,
@@ -75,7 +75,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     output::write(&args.out, yaml)?;
     let report = Report {
         calibration: &found,
-        warnings: &warnings,
+        warnings: warnings.iter().map(ToString::to_string).collect(),
         coefficient_names: found.model.coefficients(),
         board,
         looked_at: seen.looked_at,
@@ -87,7 +87,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         page::write(path, &report, &seen.views)?;
         say(&format!("report    {}", path.display()));
     }
-    for warning in &warnings {
+    for warning in &report.warnings {
         tracing::warn!("{warning}");
     }
     if args.json {

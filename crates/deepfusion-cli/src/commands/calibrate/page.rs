@@ -21,8 +21,9 @@ pub(super) fn write(path: &Path, report: &Report, views: &[View]) -> Result<()> 
     let mut page =
         HtmlReport::new("Camera calibration", subtitle).properties(&summary::rows(report));
     if !report.warnings.is_empty() {
-        let warnings: Vec<String> = report.warnings.iter().map(ToString::to_string).collect();
-        page = page.section("What would make it surer").list(&warnings);
+        page = page
+            .section("What would make it surer")
+            .list(&report.warnings);
     }
     page = page.section("Where corners were seen").picture(
         "All corners of the views used, in the image; those of views left out are red",

@@ -212,6 +212,10 @@ pub(super) fn job<'a>(
     estimator: &DepthEstimator,
 ) -> Result<DepthJob<'a>> {
     let (settings, out) = (settings(args), &args.out);
+    // What shows the layers is a second network: it is not opened for a job that is refused.
+    if outputs.need_uncertainty() && !estimator.knows_uncertainty() {
+        return Err(Error::NoUncertainty.into());
+    }
     let show_layers = if outputs.need_layers() {
         let network = model.load(args.engine.set.as_deref())?;
         Some(inspection::open(&network, args.engine.device)?)

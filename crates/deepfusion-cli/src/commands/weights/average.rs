@@ -39,9 +39,8 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
     }) = made.statistics
     {
         tracing::warn!(
-            "the running statistics of {layers} of {of} batch norms differ among these networks. They are averaged like weights, and not measured of the mean's \
-             own inputs: the mean of the variances leaves out how far the means are apart, {:.2} % of it where that is most. Measure the mean beside its \
-             networks; what trains on from it (train --init) measures them anew",
+            "the running statistics of {layers} of {of} batch norms differ; their mean is not exact (the variance lacks up to {:.2} %): measure this network \
+             beside the others; training on from it without frozen_statistics measures them anew",
             100.0 * left_out
         );
     }
@@ -50,6 +49,7 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
             "checkpoint": made.checkpoint,
             "networks": made.networks,
             "related": made.kinship == Kinship::Network,
+            "statistics": made.statistics,
         }));
     }
     output::print(&format!("{}\n", made.checkpoint.display()))

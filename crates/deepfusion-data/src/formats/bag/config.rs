@@ -21,8 +21,8 @@ pub(super) struct BagConfig {
     pub(super) profile: Option<String>,
     /// The kind of drive, for one row each in the evaluation.
     pub(super) scenario: Option<String>,
-    /// Whether a simulator wrote the bag.
-    pub(super) simulated: bool,
+    /// Whether a simulator wrote the bag; where nothing is said, its topics decide.
+    pub(super) simulated: Option<bool>,
     /// Topics by name, where the type does not decide.
     pub(super) topics: TopicNames,
     /// A camera without distortion, where there is no CameraInfo.
@@ -187,7 +187,7 @@ impl Default for ClockConfig {
 
 /// Whether the file beside a bag says that the bag is simulated. One that cannot be read says nothing.
 pub(crate) fn says_simulated(bag: &Path) -> bool {
-    BagConfig::of(bag, &OpenOptions::default()).is_ok_and(|config| config.simulated)
+    BagConfig::of(bag, &OpenOptions::default()).is_ok_and(|config| config.simulated == Some(true))
 }
 
 impl BagConfig {

@@ -8,7 +8,7 @@ use super::packet::VideoTopic;
 use super::recording::BagRecording;
 use super::scans::BagScans;
 use super::streams::{damage_of, oddities_of, streams};
-use super::topics::{Role, Topics, are_simulated};
+use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use super::{camera, image, sensors, source};
 use crate::dataset::assumed_warning;
@@ -91,7 +91,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let yaw_known = motion.as_ref().is_some_and(|m| m.yaw_known);
     let track = motion.map(|m| m.track);
 
-    let simulated = config.simulated || are_simulated(&bag.topics()?);
+    let simulated = config.simulated.unwrap_or(topics.simulated);
     let name = source::name(path);
     let parts = DatasetParts {
         name: name.clone(),

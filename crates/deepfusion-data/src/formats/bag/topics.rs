@@ -48,12 +48,15 @@ impl Role {
 #[derive(Debug, Clone)]
 pub(super) struct Topics {
     pub(super) found: Vec<(Role, String)>,
+    /// Whether there are those that only a simulator can write.
+    pub(super) simulated: bool,
 }
 
 /// Exact data of a simulated drive: never taken for a sensor.
 const TRUTH: &str = "/truth/";
 /// What `simulate` writes beside the sensors and nobody can record: the exact motion, and the exact depth of every pixel.
-const EXACT: [&str; 2] = ["/truth/odometry", "/truth/depth/compressed"];
+const EXACT_MOTION: &str = "/truth/odometry";
+const EXACT_DEPTH: &str = "/truth/depth/compressed";
 /// In the name of a second cloud, of dynamic points only.
 const DYNAMIC: &str = "dynamic";
 
@@ -130,7 +133,10 @@ impl Topics {
                 add(Role::Frames, Some(topic.name.clone()));
             }
         }
-        Ok(Self { found })
+        Ok(Self {
+            found,
+            simulated: are_simulated(&all),
+        })
     }
 
     /// The topic of a role.
@@ -147,8 +153,10 @@ impl Topics {
 }
 
 /// Whether a bag has what only a simulator can write.
-pub(super) fn are_simulated(all: &[TopicInfo]) -> bool {
-    EXACT.iter().all(|name| all.iter().any(|t| t.name == *name))
+fn are_simulated(all: &[TopicInfo]) -> bool {
+    let has = |fits: &dyn Fn(&TopicInfo) -> bool| all.iter().any(fits);
+    has(&|t| t.name == EXACT_MOTION && t.type_name == Odometry::TYPE)
+        && has(&|t| t.name == EXACT_DEPTH)
 }
 
 fn is_depth(name: &str) -> bool {

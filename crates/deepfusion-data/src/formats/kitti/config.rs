@@ -1,17 +1,26 @@
 //! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, and whether it is simulated.
 
 use super::layout::Drive;
-use crate::dataset_toml::{Clock, check_clock_and_scale, read_or_default};
+use crate::dataset_toml::{Clock, FolderConfig, check_clock_and_scale, read_or_default};
 use crate::{Error, OpenOptions, Result};
 use serde::Deserialize;
+use std::path::Path;
 
 /// The keys that mean something beside KITTI's own files; any other is an error.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Keys {
-    clock: Clock,
+    clock: Ahead,
     vehicle: Speed,
-    simulated: bool,
+    simulated: Option<bool>,
+}
+
+/// The cameras' clock.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Ahead {
+    /// How far it is ahead of the oxts', in seconds.
+    camera_ahead_s: Option<f64>,
 }
 
 /// The vehicle's speed.
@@ -31,33 +40,54 @@ pub(super) struct DriveConfig {
     pub(super) speed_scale: f64,
 }
 
-/// Whether `dataset.toml` of the drive's folder or of its date's says that the drive is simulated. One that cannot be read says nothing.
-pub(super) fn says_simulated(drive: &Drive) -> bool {
-    let places = drive.folder.ancestors().take(2);
-    let mut files = places.filter_map(|p| read_or_default::<Keys>(&p.join(DriveConfig::NAME)).ok());
-    files.any(|keys| keys.simulated)
+/// Whether a drive is simulated, as `dataset.toml` of its folder or else of its date's says. Files that cannot be read say nothing.
+pub(super) fn says_simulated(drive: &Drive) -> Option<bool> {
+    Keys::of(drive).ok()?.simulated
+}
+
+impl Keys {
+    /// Each as `dataset.toml` in the drive's folder has it, else as the one in its date's.
+    ///
+    /// # Errors
+    /// [`Error::Config`], [`Error::File`].
+    fn of(drive: &Drive) -> Result<Self> {
+        let own = Self::read(&drive.folder)?;
+        let date = drive.folder.parent().map(Self::read);
+        let date = date.transpose()?.unwrap_or_default();
+        Ok(Self {
+            clock: Ahead {
+                camera_ahead_s: own.clock.camera_ahead_s.or(date.clock.camera_ahead_s),
+            },
+            vehicle: Speed {
+                speed_scale: own.vehicle.speed_scale.or(date.vehicle.speed_scale),
+            },
+            simulated: own.simulated.or(date.simulated),
+        })
+    }
+
+    /// Those of one folder; without a file none.
+    fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(FolderConfig::NAME);
+        let keys: Self = read_or_default(&path)?;
+        let clock = Clock {
+            camera_ahead_s: keys.clock.camera_ahead_s.unwrap_or_default(),
+        };
+        check_clock_and_scale(clock, keys.vehicle.speed_scale)
+            .map_err(|problem| Error::Config { path, problem })?;
+        Ok(keys)
+    }
 }
 
 impl DriveConfig {
-    const NAME: &str = "dataset.toml";
-
-    /// Reads `dataset.toml` in the drive's folder, else in its date's; without one nothing is said. What the options give
-    /// goes before it.
+    /// What the files of the drive and of its date say; without one nothing is said. What the options give goes before them.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
     pub(super) fn of(drive: &Drive, options: &OpenOptions) -> Result<Self> {
-        let mut places = drive.folder.ancestors().take(2).map(|p| p.join(Self::NAME));
-        let path = places.find(|path| path.is_file());
-        let keys: Keys = match &path {
-            Some(path) => read_or_default(path)?,
-            None => Keys::default(),
-        };
-        let path = path.unwrap_or_default();
-        check_clock_and_scale(keys.clock, keys.vehicle.speed_scale)
-            .map_err(|problem| Error::Config { path, problem })?;
+        let keys = Keys::of(drive)?;
+        let ahead = options.camera_ahead_s.or(keys.clock.camera_ahead_s);
         Ok(Self {
-            camera_ahead_s: options.camera_ahead_s.unwrap_or(keys.clock.camera_ahead_s),
+            camera_ahead_s: ahead.unwrap_or_default(),
             speed_scale: keys.vehicle.speed_scale.unwrap_or(1.0),
         })
     }

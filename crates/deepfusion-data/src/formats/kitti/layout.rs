@@ -54,14 +54,14 @@ impl Drive {
         numbered_files(&data, &["jpeg", "jpg", "png"])
     }
 
-    /// Whether nobody drove it: it has what `simulate` writes beside its images and nobody can record, exact poses and exact masks of dynamic
-    /// objects, or `dataset.toml`, its own or its date's, says so.
+    /// Whether nobody drove it: `dataset.toml`, its own or else its date's, says so; where neither says anything, it has what `simulate` writes
+    /// beside its images and nobody can record, exact poses and exact masks of dynamic objects.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
         /// Exact poses.
         const POSES: &str = "poses.txt";
         let has = |part: &str| self.folder.join(part).exists();
-        has(POSES) && has(MASKS) || says_simulated(self)
+        says_simulated(self).unwrap_or_else(|| has(POSES) && has(MASKS))
     }
 
     /// The velodyne scan of a frame, where there is one.
