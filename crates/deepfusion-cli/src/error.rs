@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use deepfusion_hint::count_of;
+use deepfusion_sim::VariedConflict;
 
 use crate::failure::{Exit, Reportable};
 
@@ -60,19 +61,13 @@ pub(crate) enum CliError {
         /// The layout that it is for.
         layout: &'static str,
     },
-    /// An option for what a varied drive draws, or has no room for.
-    #[error("{option} does not go with --varied: {why}")]
-    NotVaried {
-        /// The option.
-        option: &'static str,
+    /// What a varied drive, or one that is not, cannot have.
+    #[error("{given}: {why}")]
+    Varied {
+        /// The option, as it was given.
+        given: String,
         /// Why not.
-        why: &'static str,
-    },
-    /// A place that plain drives do not lead to.
-    #[error("--scene {scene}: only varied drives lead there")]
-    OnlyVaried {
-        /// The place.
-        scene: &'static str,
+        why: VariedConflict,
     },
     /// A log without anything that saw the drive.
     #[error("neither a video nor images are given for the log")]
@@ -261,8 +256,7 @@ impl Reportable for CliError {
             Self::NoModelGiven
             | Self::OutOfPlace { .. }
             | Self::OtherLayout { .. }
-            | Self::NotVaried { .. }
-            | Self::OnlyVaried { .. } => Exit::WrongArguments,
+            | Self::Varied { .. } => Exit::WrongArguments,
             _ => Exit::Failed,
         }
     }
@@ -336,8 +330,15 @@ impl Reportable for CliError {
                 "leave it out; the columns of a recording's own log stand in its dataset.toml (time_column, speed_column, speed_unit, dbc)".into(),
             ),
             Self::OtherLayout { layout, .. } => Some(format!("leave it out, or give --format {layout}")),
-            Self::NotVaried { option, .. } => Some(format!("leave out {option} or --varied")),
-            Self::OnlyVaried { .. } => Some("add --varied, or choose another --scene".into()),
+            Self::Varied { why, .. } => Some(
+                match why {
+                    VariedConflict::CameraHeight => "leave out --camera-height or --varied",
+                    VariedConflict::SecondCamera => "leave out --stereo or --varied",
+                    VariedConflict::OnlyVaried => "add --varied, or choose another --scene",
+                    _ => "choose another --scene",
+                }
+                .into(),
+            ),
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
         }
     }

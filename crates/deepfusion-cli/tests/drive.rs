@@ -145,34 +145,62 @@ fn a_varied_drive_says_what_was_drawn() {
     let drive = at.join(made["drive"].as_str().unwrap());
     let text = std::fs::read_to_string(drive.join("varied.json")).unwrap();
     let said: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(said["light"]["weather"], made["varied"]["light"]["weather"]);
+    assert_eq!(said, made["varied"]);
     let inspected = json(at, "data inspect five --json");
     assert_eq!(inspected["size"], serde_json::json!([64, 48]));
     let other = json(at, &format!("{small} --varied --seed 6 --out six"));
     let camera = |made: &serde_json::Value| made["varied"]["camera"].clone();
     assert_ne!(camera(&made), camera(&other));
+    assert_eq!(made["moving_cars"], 0);
     let plain = json(
         at,
         "simulate --frames 1 --size 64x48 --scan-every 0 --json --out plain",
     );
     assert!(plain.get("varied").is_none());
 
-    for (options, expected) in [
+    for (options, problem, expected) in [
         (
             "--varied --camera-height 1.65",
+            "--camera-height 1.65: a varied drive draws the height of its camera",
             "leave out --camera-height or --varied",
         ),
-        ("--varied --stereo 0.5", "leave out --stereo or --varied"),
+        (
+            "--varied --stereo 0.5",
+            "--stereo 0.5: a varied drive has one camera",
+            "leave out --stereo or --varied",
+        ),
         (
             "--scene motorway",
+            "--scene motorway: only varied drives lead there",
             "add --varied, or choose another --scene",
         ),
     ] {
         let run = run(at, &format!("simulate --out new {options}"));
         assert_eq!((run.code, run.stdout.as_str()), (2, ""), "{options}");
         let hint = format!("hint: {expected}");
-        assert!(run.stderr.contains(&hint), "{options}: {}", run.stderr);
+        let says = |text: &str| run.stderr.contains(text);
+        assert!(says(problem) && says(&hint), "{options}: {}", run.stderr);
         assert!(!at.join("new").exists(), "{options}");
+    }
+}
+
+/// How many cars drive stands in the JSON, and a warning says where they are fewer than were asked for.
+#[test]
+fn cars_that_a_varied_street_stops_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (seed, varied) in [(1, ""), (1, "--varied"), (2, "--varied")] {
+        let run = ok(
+            at,
+            &format!(
+                "simulate --frames 1 --seed {seed} --size 32x32 --scan-every 0 --scene commercial --moving-cars 30 {varied} --json --out {seed}{varied}"
+            ),
+        );
+        let made: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+        let driving = made["moving_cars"].as_u64().unwrap();
+        assert!(driving == 30 || (driving < 30 && !varied.is_empty()));
+        let is_warned_of = run.stderr.contains("--moving-cars 30: only");
+        assert_eq!(is_warned_of, driving < 30, "{seed}: {}", run.stderr);
     }
 }
 

@@ -153,10 +153,10 @@ pub struct SimConfig {
     /// The sensors of the car, and their mounts.
     pub sensors: Sensors,
     /// Whether the camera (lens, height, pitch, roll, imaging), the light, the weather and the world's materials and people are drawn from
-    /// the seed, once for the drive; [`crate::Simulation::drawn`] says them.
+    /// the seed, once for the drive; [`crate::Simulation::drawn`] gives what was drawn.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub varied: bool,
-    /// Height of the camera above the road, in metres; as it is by default where a drive is varied.
+    /// Height of the camera above the road, in metres; must keep its default in a varied drive.
     pub camera_height_m: f64,
     /// [`crate::write_kitti`] also writes the pictures of a second camera, so far to the right of the first one, in metres; 0: of none.
     pub stereo_baseline_m: f64,
@@ -188,7 +188,7 @@ impl Default for SimConfig {
 }
 
 impl SimConfig {
-    /// Checks every field.
+    /// Checks every field; [`crate::Simulation::new`] also checks the scene.
     ///
     /// # Errors
     /// [`Error::Config`] naming the first field out of range; [`Error::Varied`] for what a varied drive cannot have.
@@ -204,67 +204,34 @@ impl SimConfig {
                 })
             }
         };
-        let size = 16..=8192;
-        check(
-            (1..=100_000).contains(&self.frames),
-            "frames",
-            self.frames.to_string(),
-            Expected::Within {
-                from: 1.0,
-                to: 100_000.0,
-            },
-        )?;
-        check(
-            size.contains(&self.width),
-            "width",
-            self.width.to_string(),
-            Expected::Within {
-                from: 16.0,
-                to: 8192.0,
-            },
-        )?;
-        check(
-            size.contains(&self.height),
-            "height",
-            self.height.to_string(),
-            Expected::Within {
-                from: 16.0,
-                to: 8192.0,
-            },
-        )?;
-        check(
-            self.moving_cars <= 1000,
-            "moving_cars",
-            self.moving_cars.to_string(),
-            Expected::Within {
-                from: 0.0,
-                to: 1000.0,
-            },
-        )?;
-        check(
-            self.riders <= 1000,
-            "riders",
-            self.riders.to_string(),
-            Expected::Within {
-                from: 0.0,
-                to: 1000.0,
-            },
-        )?;
+        let within = |field, value: f64, from: f64, to: f64| {
+            check(
+                (from..=to).contains(&value),
+                field,
+                value.to_string(),
+                Expected::Within { from, to },
+            )
+        };
+        let metres = |field, value: f64, from: f64, to: f64| {
+            check(
+                (from..=to).contains(&value),
+                field,
+                value.to_string(),
+                Expected::Metres { from, to },
+            )
+        };
+        within("frames", self.frames as f64, 1.0, 100_000.0)?;
+        within("width", f64::from(self.width), 16.0, 8192.0)?;
+        within("height", f64::from(self.height), 16.0, 8192.0)?;
+        within("moving_cars", self.moving_cars as f64, 0.0, 1000.0)?;
+        within("riders", self.riders as f64, 0.0, 1000.0)?;
         check(
             self.riders == 0 || self.scene.has_riders(),
             "riders",
             self.riders.to_string(),
             Expected::NoRiders,
         )?;
-        check(
-            self.fps >= 2.0 && self.fps <= 100.0,
-            "fps",
-            self.fps.to_string(),
-            Expected::Within {
-                from: 2.0,
-                to: 100.0,
-            },
-        )?;
+        within("fps", self.fps, 2.0, 100.0)?;
         check(
             self.frames as f64 / self.fps <= LONGEST_DRIVE_S,
             "frames",
@@ -273,27 +240,9 @@ impl SimConfig {
                 minutes: LONGEST_DRIVE_S / 60.0,
             },
         )?;
-        check(
-            self.camera_height_m >= 0.3 && self.camera_height_m <= 4.0,
-            "camera_height_m",
-            self.camera_height_m.to_string(),
-            Expected::Metres { from: 0.3, to: 4.0 },
-        )?;
-        check(
-            (0.0..=5.0).contains(&self.stereo_baseline_m),
-            "stereo_baseline_m",
-            self.stereo_baseline_m.to_string(),
-            Expected::Metres { from: 0.0, to: 5.0 },
-        )?;
-        check(
-            self.scan_step_deg >= 0.05 && self.scan_step_deg <= 5.0,
-            "scan_step_deg",
-            self.scan_step_deg.to_string(),
-            Expected::Within {
-                from: 0.05,
-                to: 5.0,
-            },
-        )?;
+        metres("camera_height_m", self.camera_height_m, 0.3, 4.0)?;
+        metres("stereo_baseline_m", self.stereo_baseline_m, 0.0, 5.0)?;
+        within("scan_step_deg", self.scan_step_deg, 0.05, 5.0)?;
         if self.varied {
             self.check_varied()?;
         }

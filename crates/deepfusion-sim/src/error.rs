@@ -1,12 +1,11 @@
+mod expected;
 mod varied_conflict;
+
+pub use expected::ExpectedSetting;
+pub use varied_conflict::VariedConflict;
 
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
-pub use varied_conflict::VariedConflict;
-
-mod expected;
-
-pub use self::expected::ExpectedSetting;
 
 /// What can go wrong while a drive is made or written.
 #[derive(Debug, thiserror::Error)]

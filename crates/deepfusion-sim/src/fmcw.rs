@@ -19,6 +19,9 @@ const TOP_DEG: f32 = 3.2;
 /// Field of view to the sides, degrees.
 const WIDTH_DEG: f32 = 100.0;
 
+/// Scans a second, in a bag.
+pub(crate) const SCAN_RATE_HZ: f64 = 10.0;
+
 /// Angle between two columns of the sensor, degrees.
 pub(crate) const COLUMN_STEP_DEG: f32 = 0.1;
 

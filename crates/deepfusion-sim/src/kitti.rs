@@ -27,7 +27,7 @@ const BATCH: usize = 8;
 /// and with [`crate::SimConfig::riders`] `Cyclist` and `Pedestrian`), and `poses.txt`
 /// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line). With a second camera ([`crate::SimConfig::stereo_baseline_m`])
 /// its pictures are in `image_03`. A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
-/// ([`Simulation::drawn`]).
+/// ([`Simulation::drawn`]). Its boxes also hold what of an object was cut away over the camera's lane, as of a tree's crown.
 ///
 /// `progress` is called with the frames done and their number. Everything is written to a folder
 /// beside its final place and renamed at the end: after an error `out` is as it was.
@@ -165,8 +165,7 @@ fn write_all(
     write_file(&drive.join("tracklet_labels.xml"), tracklets.as_bytes())?;
     if let Some(drawn) = simulation.drawn() {
         let path = drive.join("varied.json");
-        let text = drawn.to_json().map_err(io(&path, "write this file"))?;
-        write_file(&path, text.as_bytes())?;
+        write_file(&path, drawn.to_json().as_bytes())?;
     }
     Ok(name)
 }

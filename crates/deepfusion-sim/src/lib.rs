@@ -19,8 +19,10 @@
 //! # Consistency
 //! Textures are attached to the surfaces and never depend on the viewer, and what a pixel cannot
 //! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
-//! one, but for a varied drive's ([`SimConfig::varied`]) noise, its exposure, and what its wet road mirrors. Shadows under moving cars move with them; the mask of moving pixels holds the cars and the
-//! people who ride and walk. Whatever moves is a rigid body: nobody pedals or swings their arms.
+//! one. Of a varied drive ([`SimConfig::varied`]) that holds of depth, pose and surfaces, not of what
+//! the air, wet ground, the lens and the sensor do to colours. Shadows under moving cars move with
+//! them; the mask of moving pixels holds the cars and the people who ride and walk. Whatever moves is
+//! a rigid body: nobody pedals or swings their arms.
 
 mod can;
 mod config;

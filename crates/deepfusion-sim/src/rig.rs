@@ -10,6 +10,10 @@ pub(crate) const CAMERA_HEIGHT: f64 = 1.65;
 /// Camera 2 sits this far left of camera 0, metres (KITTI's P_rect_02 has the same 6 cm).
 pub(crate) const CAM2_FROM_CAM0_X: f64 = 0.06;
 
+/// Camera axes (right, down, forward) in the vehicle's (forward, left, up).
+pub(crate) const VEHICLE_FROM_CAM_AXES: Matrix3<f64> =
+    Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+
 /// The mounts of the sensors on the car. "The IMU" is KITTI's: it represents the car itself, above the middle of
 /// the rear axle.
 #[derive(Debug, Clone, Copy)]
@@ -26,8 +30,7 @@ impl Rig {
     /// KITTI's arrangement: the velodyne 27 cm behind the camera and 8 cm above it, turned against
     /// it by fractions of a degree; the IMU 81 cm behind the velodyne and 32 cm left of it.
     pub fn kitti_like(camera_height_m: f64) -> Self {
-        // Camera axes (right, down, forward) of the vehicle's (forward, left, up).
-        let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+        let axes = VEHICLE_FROM_CAM_AXES.transpose();
         let cam0_from_vehicle_axes = Se3::from_parts(&axes, Vector3::zeros());
         let tilt = Se3::from_axis_angle(Vector3::new(0.004, -0.006, 0.009), Vector3::zeros());
         let cam0_from_velo =
@@ -48,7 +51,7 @@ impl Rig {
     /// UMAD's arrangement on a roof: the camera 80 mm above the LiDAR, a 6-axis unit 50 mm behind it, all of them
     /// 1.6 m before the rear axle; the LiDAR turned against the car by fractions of a degree.
     pub fn umad_like(camera_height_m: f64) -> Self {
-        let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+        let axes = VEHICLE_FROM_CAM_AXES.transpose();
         let cam_axes_from_vehicle_axes = Se3::from_parts(&axes, Vector3::zeros());
         let shift = |x, y, z| Se3::from_axis_angle(Vector3::zeros(), Vector3::new(x, y, z));
         let tilt = Se3::from_axis_angle(Vector3::new(0.003, -0.005, 0.006), Vector3::zeros());
@@ -62,31 +65,29 @@ impl Rig {
 
     /// The same with camera 2 turned about its own centre: so far down, and clockwise as it looks, radians. The other sensors stay.
     pub(crate) fn with_camera_turned(self, pitch: f64, roll: f64) -> Self {
-        // Camera axes (right, down, forward) in the vehicle's (forward, left, up).
-        let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        let axes = VEHICLE_FROM_CAM_AXES;
         let level_from_turned = axes.transpose() * rotation(0.0, pitch, roll) * axes;
         let turned_from_level = Se3::from_parts(&level_from_turned.transpose(), Vector3::zeros());
-        let cam2_from_cam0 =
-            Se3::from_axis_angle(Vector3::zeros(), Vector3::new(CAM2_FROM_CAM0_X, 0.0, 0.0));
         Self {
-            cam0_from_velo: cam2_from_cam0.inverse()
-                * turned_from_level
-                * cam2_from_cam0
-                * self.cam0_from_velo,
+            cam0_from_velo: cam2_from_cam0().inverse() * turned_from_level * self.cam_from_velo(),
             ..self
         }
     }
 
     /// Rectified camera 2 from the velodyne.
     pub fn cam_from_velo(&self) -> Se3 {
-        Se3::from_axis_angle(Vector3::zeros(), Vector3::new(CAM2_FROM_CAM0_X, 0.0, 0.0))
-            * self.cam0_from_velo
+        cam2_from_cam0() * self.cam0_from_velo
     }
 
     /// Rectified camera 2 from the IMU.
     pub fn cam_from_imu(&self) -> Se3 {
         self.cam_from_velo() * self.velo_from_imu
     }
+}
+
+/// Rectified camera 2 from rectified camera 0.
+fn cam2_from_cam0() -> Se3 {
+    Se3::from_axis_angle(Vector3::zeros(), Vector3::new(CAM2_FROM_CAM0_X, 0.0, 0.0))
 }
 
 /// KITTI's camera 2, resized to `width` × `height`.

@@ -1,6 +1,6 @@
 use crate::can::{SPEED_RATE_HZ, STEERING_RATE_HZ, SpeedReading, SteeringReading};
 use crate::config::{Scene, Sensors, SimConfig};
-use crate::fmcw::{self, FmcwScan, MovingSolids, VELOCITY_STEP_S};
+use crate::fmcw::{self, FmcwScan, MovingSolids, SCAN_RATE_HZ, VELOCITY_STEP_S};
 use crate::imu::{self, BodyMotion, ImuReading};
 use crate::light::GroundLight;
 use crate::motion::Drive;
@@ -78,7 +78,7 @@ impl Simulation {
     }
 
     /// As [`Simulation::new`], through a world that is varied in this way, of any scene; with [`Variety::none`] and without [`SimConfig::varied`]
-    /// both are the same.
+    /// both are the same, for the scenes that `new` takes.
     ///
     /// # Errors
     /// [`crate::Error::Config`] where a setting is out of range; [`crate::Error::Varied`] for what a varied drive cannot have.
@@ -110,7 +110,7 @@ impl Simulation {
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let mut traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
         if config.varied {
-            traffic.keep_passing(&world, &drive, &times);
+            traffic.keep_passing(&world, &drive, &looked_at(&times));
         }
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x0B1C_E5A0);
         let way = (&drive, duration_s);
@@ -155,6 +155,12 @@ impl Simulation {
     #[must_use]
     pub fn drawn(&self) -> Option<&DrawnDrive> {
         self.look.as_ref().map(DriveLook::drawn)
+    }
+
+    /// How many cars move: [`SimConfig::moving_cars`], but in a varied drive those of them alone that nothing on the street stops.
+    #[must_use]
+    pub fn moving_cars(&self) -> usize {
+        self.traffic.count()
     }
 
     /// Number of frames.
@@ -380,7 +386,8 @@ impl Simulation {
         (motion.velocity.xy().norm(), yaw_rate)
     }
 
-    /// Everything on the street at a frame, static or dynamic, with exact boxes.
+    /// Everything on the street at a frame, static or dynamic, with exact boxes. In a varied drive they also hold what of an object was cut
+    /// away over the camera's lane, as of a tree's crown.
     ///
     /// # Panics
     /// Where there is no such frame.
@@ -421,4 +428,68 @@ fn frame_times(rng: &mut ChaCha8Rng, config: &SimConfig) -> Vec<f64> {
             i as f64 / config.fps + shift
         })
         .collect()
+}
+
+/// When a drive of these frames is looked at, seconds: at its frames, and where it becomes a bag at its scans.
+fn looked_at(frames: &[f64]) -> Vec<f64> {
+    let end_s = frames.last().copied().unwrap_or_default();
+    let scans = (0u32..)
+        .map(|scan| f64::from(scan) / SCAN_RATE_HZ)
+        .take_while(|time_s| *time_s < end_s + 1e-9);
+    frames.iter().copied().chain(scans).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scans_between_frames_are_looked_at() {
+        let found = looked_at(&[0.0, 0.25]);
+        assert_eq!(found, [0.0, 0.25, 0.0, 0.1, 0.2]);
+        let found = looked_at(&[0.0, 0.3]);
+        assert_eq!(found, [0.0, 0.3, 0.0, 0.1, 0.2, 0.3]);
+    }
+
+    /// Who is before the camera at a scan is there at the next one, too, though frames are half a second apart.
+    #[test]
+    fn no_car_vanishes_from_scan_to_scan() {
+        let simulation = Simulation::new(&SimConfig {
+            seed: 2,
+            frames: 8,
+            fps: 2.0,
+            moving_cars: 9,
+            varied: true,
+            ..SimConfig::default()
+        })
+        .unwrap();
+        let near = |time_s: f64| -> Vec<u64> {
+            let imu_from_world = simulation.imu_at(time_s).inverse();
+            let mut cars = simulation.moving_objects(time_s);
+            cars.retain(|car| {
+                let p = imu_from_world.transform(&car.world_from_object.translation());
+                p.x > 4.0 && p.norm() < 60.0
+            });
+            cars.iter().map(|car| car.id).collect()
+        };
+        let all = |time_s: f64| -> Vec<u64> {
+            let cars = simulation.moving_objects(time_s);
+            cars.iter().map(|car| car.id).collect()
+        };
+        let mut met = 0;
+        for scan in 0..34 {
+            let (now, next) = (
+                f64::from(scan) / SCAN_RATE_HZ,
+                f64::from(scan + 1) / SCAN_RATE_HZ,
+            );
+            for id in near(now) {
+                met += 1;
+                assert!(all(next).contains(&id), "{id} at {now}");
+            }
+            for id in near(next) {
+                assert!(all(now).contains(&id), "{id} at {next}");
+            }
+        }
+        println!("{met} cars in scans");
+    }
 }

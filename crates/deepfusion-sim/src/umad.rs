@@ -1,6 +1,6 @@
 //! Writes a drive as a bag with UMAD's sensors.
 
-use crate::fmcw;
+use crate::fmcw::{self, SCAN_RATE_HZ};
 use crate::kitti::{encode_depth, encode_rgb};
 use crate::rig::Rig;
 use crate::{Error, ExpectedSetting, Result, Simulation};
@@ -14,14 +14,10 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Noon of the first of January 2026, UTC, in nanoseconds since 1970: time 0 of every drive.
 const EPOCH_NS: i64 = 1_767_268_800_000_000_000;
-
-/// Scans of the LiDAR a second.
-const SCAN_RATE_HZ: f64 = 10.0;
 
 /// What the vehicle calls moving: a point whose speed over ground along its ray exceeds this, m/s.
 const DYNAMIC_MPS: f32 = 0.5;
@@ -108,21 +104,21 @@ pub fn write_bag(
             },
         });
     }
-    let existed = crate::kitti::prepare(out)?;
     let scene = config.scene.name();
-    let name = format!("{scene}_{:04}", config.seed);
-    let path = out.join(format!("{name}.bag"));
-    let sidecar = path.with_extension("toml");
-    let drawn = path.with_extension("varied.json");
-    let written = write_beside(&sidecar, || Ok(describe(&simulation.rig(), scene)))
-        .and_then(|()| match simulation.drawn() {
-            Some(what) => write_beside(&drawn, || what.to_json()),
-            None => Ok(()),
-        })
+    let path = out.join(format!("{scene}_{:04}.bag", config.seed));
+    let mounts = describe(&simulation.rig(), scene);
+    let mut beside = vec![(path.with_extension("toml"), mounts)];
+    if let Some(drawn) = simulation.drawn() {
+        beside.push((path.with_extension("varied.json"), drawn.to_json()));
+    }
+    let existed = crate::kitti::prepare(out)?;
+    let written = beside
+        .iter()
+        .try_for_each(|(file, text)| write_beside(file, text))
         .and_then(|()| write_messages(simulation, &path, settings, progress));
     if written.is_err() {
         // Best effort: the first error is the one to report.
-        for file in [&sidecar, &drawn] {
+        for (file, _) in &beside {
             let _ = fs::remove_file(file);
         }
         if !existed {
@@ -133,15 +129,12 @@ pub fn write_bag(
 }
 
 /// Writes a small file beside the bag, whole or not at all.
-fn write_beside(path: &Path, text: impl FnOnce() -> std::io::Result<String>) -> Result<()> {
-    let failed = |source| Error::Io {
+fn write_beside(path: &Path, text: &str) -> Result<()> {
+    deepfusion_fs::write(path, text).map_err(|source| Error::Io {
         path: path.to_owned(),
         action: "write this file",
         source,
-    };
-    let text = text().map_err(failed)?;
-    let write = |out: &mut BufWriter<fs::File>| out.write_all(text.as_bytes()).map_err(failed);
-    deepfusion_fs::write_atomically(path, failed, write)
+    })
 }
 
 /// The bag's connections.

@@ -82,11 +82,13 @@ fn one_seed_gives_the_same_bytes_and_another_another_camera() {
 fn a_plain_drive_draws_nothing() {
     let plain = SimConfig {
         varied: false,
+        moving_cars: 5,
         ..config(Scene::Urban, 3)
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let simulation = drive(&plain);
     assert!(simulation.drawn().is_none());
+    assert_eq!(simulation.moving_cars(), 5);
     write_kitti(&simulation, folder.path(), &mut |_, _| ()).expect("written");
     let written = files(folder.path());
     assert!(written.keys().all(|name| !name.ends_with("varied.json")));
@@ -260,6 +262,8 @@ fn no_car_vanishes_before_the_camera() {
         });
         let standing = simulation.objects(0).into_iter();
         let standing = standing.filter(|o| o.velocity.norm() == 0.0).count() as u64;
+        let kept = simulation.moving_cars() as u64;
+        assert!(kept <= 9, "{kept}");
         let seen = |frame: usize| -> BTreeMap<u64, Vector3<f64>> {
             let cam_from_world = simulation.world_from_cam(frame).inverse();
             let moving = simulation.objects(frame).into_iter();
@@ -274,6 +278,7 @@ fn no_car_vanishes_before_the_camera() {
             let near = |p: &Vector3<f64>| p.z > 3.0 && p.norm() < 60.0;
             for (id, place) in before.iter().filter(|(_, place)| near(place)) {
                 met += 1;
+                assert!(*id < standing + kept, "{seed}: {id}, {standing} stand");
                 assert!(now.contains_key(id), "{seed}, {frame}: {id} at {place}");
             }
             for (id, place) in now.iter().filter(|(_, place)| near(place)) {

@@ -184,7 +184,7 @@ pub(crate) struct SimulateArgs {
     /// Kind of place.
     #[arg(long, value_parser = names::scene(), default_value = "urban")]
     pub scene: Scene,
-    /// Number of cars that move.
+    /// Number of cars that move; with --varied those of them alone that nothing on the street stops.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub moving_cars: usize,
     /// Number of people who ride bicycles, walk along pavements and cross the road.
@@ -192,7 +192,7 @@ pub(crate) struct SimulateArgs {
     pub riders: usize,
     /// Draw the camera (lens, height, pitch, roll, softness, noise, exposure, JPEG), the light, the weather and what the street looks like from the seed,
     /// once for the drive, as training draws its simulated views. varied.json in the drive's folder (of a bag: NAME.varied.json beside it) says what was
-    /// drawn. Roads stay flat, a LiDAR sees as in clear air, and of --moving-cars only those drive that nothing on the street stops.
+    /// drawn. Roads stay flat, and a LiDAR sees as in clear air.
     #[arg(long)]
     pub varied: bool,
     /// Size of the pictures [default: 640x192; UMAD's 640x480 in a bag].

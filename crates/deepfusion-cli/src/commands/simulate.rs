@@ -6,7 +6,8 @@ use crate::progress::{Progress, say};
 use deepfusion_hint::count_of;
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{
-    BagSettings, DrawnDrive, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti,
+    BagSettings, DrawnDrive, Scene, Sensors, SimConfig, Simulation, VariedConflict, write_bag,
+    write_kitti,
 };
 
 /// `deepfusion simulate`.
@@ -15,6 +16,9 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     check_varied(args)?;
     let config = config(args);
     let simulation = Simulation::new(&config)?;
+    if let Some(warning) = fewer_cars(config.moving_cars, simulation.moving_cars()) {
+        tracing::warn!("{warning}");
+    }
     let mut progress = Progress::new("simulating");
     let mut report = |done, total| progress.set(done, total);
     let drive = match args.format {
@@ -35,6 +39,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
             "frames": config.frames,
             "size": [config.width, config.height],
             "seed": config.seed,
+            "moving_cars": simulation.moving_cars(),
         });
         if let Some(drawn) = simulation.drawn() {
             made["varied"] = serde_json::json!(drawn);
@@ -79,26 +84,36 @@ fn check_layout(args: &SimulateArgs) -> Result<(), CliError> {
     })
 }
 
-/// That nothing is asked for which a varied drive draws or has no room for, nor a place that only varied drives lead to.
+/// That nothing is asked for which a varied drive draws or has no room for, nor a place that only varied drives lead to. The library refuses
+/// the same, but sees no difference between a height that is given and the usual one.
 ///
 /// # Errors
-/// [`CliError::NotVaried`], [`CliError::OnlyVaried`].
+/// [`CliError::Varied`].
 fn check_varied(args: &SimulateArgs) -> Result<(), CliError> {
-    let (option, why) = match args {
-        args if !args.varied && !Scene::ALL.contains(&args.scene) => {
-            let scene = args.scene.name();
-            return Err(CliError::OnlyVaried { scene });
+    let (given, why) = match (args.camera_height, args.stereo) {
+        _ if !args.varied && !Scene::ALL.contains(&args.scene) => {
+            let given = format!("--scene {}", args.scene.name());
+            (given, VariedConflict::OnlyVaried)
         }
-        args if args.varied && args.camera_height.is_some() => {
-            ("--camera-height", "the height is drawn, too")
+        (Some(metres), _) if args.varied => {
+            let given = format!("--camera-height {metres}");
+            (given, VariedConflict::CameraHeight)
         }
-        args if args.varied && args.stereo.is_some() => (
-            "--stereo",
-            "cars may park beside the lane, where the second camera would be",
-        ),
+        (_, Some(metres)) if args.varied => {
+            let given = format!("--stereo {metres}");
+            (given, VariedConflict::SecondCamera)
+        }
         _ => return Ok(()),
     };
-    Err(CliError::NotVaried { option, why })
+    Err(CliError::Varied { given, why })
+}
+
+/// What to say where fewer cars drive than were asked for.
+fn fewer_cars(asked: usize, driving: usize) -> Option<String> {
+    let drive = if driving == 1 { "drives" } else { "drive" };
+    (driving < asked).then(|| {
+        format!("--moving-cars {asked}: only {driving} {drive}, the others would meet something that stands on this street")
+    })
 }
 
 /// The camera and the weather of a varied drive, for people.
@@ -145,5 +160,18 @@ fn config(args: &SimulateArgs) -> SimConfig {
         stereo_baseline_m: args.stereo.unwrap_or(0.0),
         scan_every: args.scan_every.unwrap_or(1),
         ..usual
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fewer_cars;
+
+    #[test]
+    fn a_street_with_room_for_fewer_cars_is_warned_of() {
+        let warning = fewer_cars(6, 1).unwrap();
+        assert!(warning.starts_with("--moving-cars 6: only 1 drives"));
+        assert_eq!(fewer_cars(6, 6), None);
+        assert_eq!(fewer_cars(0, 0), None);
     }
 }

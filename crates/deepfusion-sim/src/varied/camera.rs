@@ -7,8 +7,9 @@ use super::mounted::MountedCamera;
 use crate::config::Scene;
 use crate::motion::rotation;
 use crate::primitive::{Primitive, V3, enter};
+use crate::rig::VEHICLE_FROM_CAM_AXES;
 use deepfusion_geometry::{Intrinsics, Se3};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
@@ -304,9 +305,7 @@ fn pose(
     } else {
         f64::from(road.kerb)
     };
-    // Camera axes (right, down, forward) in the vehicle's (forward, left, up).
-    let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
-    let rotation = rotation(heading + turn, pitch, roll) * axes;
+    let rotation = rotation(heading + turn, pitch, roll) * VEHICLE_FROM_CAM_AXES;
     Viewpoint {
         world_from_cam: Se3::from_parts(&rotation, Vector3::new(x, y, ground + height)),
         height,

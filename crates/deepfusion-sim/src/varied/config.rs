@@ -86,43 +86,23 @@ impl EndlessConfig {
                 })
             }
         };
-        let size = 16..=4096;
-        check(
-            size.contains(&self.width),
-            "width",
-            self.width.to_string(),
-            Expected::Within {
-                from: 16.0,
-                to: 4096.0,
-            },
-        )?;
-        check(
-            size.contains(&self.height),
-            "height",
-            self.height.to_string(),
-            Expected::Within {
-                from: 16.0,
-                to: 4096.0,
-            },
-        )?;
-        check(
-            (1..=100_000).contains(&self.views_per_world),
+        let within = |field, value: f64, from: f64, to: f64| {
+            check(
+                (from..=to).contains(&value),
+                field,
+                value.to_string(),
+                Expected::Within { from, to },
+            )
+        };
+        within("width", f64::from(self.width), 16.0, 4096.0)?;
+        within("height", f64::from(self.height), 16.0, 4096.0)?;
+        within(
             "views_per_world",
-            self.views_per_world.to_string(),
-            Expected::Within {
-                from: 1.0,
-                to: 100_000.0,
-            },
+            self.views_per_world as f64,
+            1.0,
+            100_000.0,
         )?;
-        check(
-            (1..=256).contains(&self.worlds_at_once),
-            "worlds_at_once",
-            self.worlds_at_once.to_string(),
-            Expected::Within {
-                from: 1.0,
-                to: 256.0,
-            },
-        )?;
+        within("worlds_at_once", self.worlds_at_once as f64, 1.0, 256.0)?;
         for (field, share) in [
             ("grey", self.grey),
             ("daylight", self.daylight),
@@ -130,12 +110,7 @@ impl EndlessConfig {
             ("hills", self.hills),
             ("riders", self.riders),
         ] {
-            check(
-                (0.0..=1.0).contains(&share),
-                field,
-                share.to_string(),
-                Expected::Within { from: 0.0, to: 1.0 },
-            )?;
+            within(field, share, 0.0, 1.0)?;
         }
         let names = || {
             let names: Vec<&str> = self.scenes.iter().map(|scene| scene.name()).collect();

@@ -5,6 +5,7 @@
 use super::built_world::sun;
 use super::camera::{self, HEIGHTS, Mount};
 use super::config::EndlessConfig;
+use super::digits::{in_few_digits, widened};
 use super::draw::generator;
 use super::formation::{Brightness, Formation};
 use super::ingredient::Without;
@@ -47,41 +48,36 @@ pub struct DrawnDrive {
     /// How the world is varied.
     pub world: Variety,
     /// From light to an image: lens, sensor, processing, file.
+    #[serde(serialize_with = "in_few_digits")]
     imaging: Formation,
 }
 
-/// The light and the weather of a varied drive. They change colours alone, and no depth.
+/// The light and the weather of a varied drive. They change colours alone, and no depth. Light is relative: it has no unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct DrawnLight {
     /// The weather.
     pub weather: Weather,
-    /// How high the sun stands (by night the moon), degrees.
-    pub sun_elevation_degrees: f32,
-    /// Where it stands, degrees from the world's x axis towards y.
-    pub sun_azimuth_degrees: f32,
-    /// Irradiance of the sun on a surface that faces it: linear red, green, blue.
-    pub sun: [f32; 3],
-    /// Irradiance of the sky on the ground: linear red, green, blue.
-    pub sky: [f32; 3],
-    /// Clouds, 0 (a few) to 1 (overcast); below 0 fewer.
-    pub clouds: f32,
+    /// How high the sun stands (by night the moon), degrees. None in a garage, which has no sky.
+    pub sun_elevation_degrees: Option<f64>,
+    /// Where it stands, degrees from the world's x axis towards y. None in a garage.
+    pub sun_azimuth_degrees: Option<f64>,
+    /// Relative irradiance of the sun on a surface that faces it: linear red, green, blue.
+    pub sun: [f64; 3],
+    /// Relative irradiance of the sky, or of a garage's lamps, on the ground: linear red, green, blue.
+    pub sky: [f64; 3],
+    /// Clouds, −1 (none) to 1; in overcast and fog only the structure of the cover. None in a garage.
+    pub clouds: Option<f64>,
     /// How far things are seen through fog or haze, metres: contrast falls to 2 % there. None in clear air.
-    pub visibility_m: Option<f32>,
+    pub visibility_m: Option<f64>,
     /// How wet the ground is, 0 to 1.
-    pub wetness: f32,
+    pub wetness: f64,
 }
 
 impl DrawnDrive {
-    /// Whether the camera sees no colours: its pictures have three equal channels.
-    #[must_use]
-    pub fn is_grey(&self) -> bool {
-        self.imaging.is_grey()
-    }
-
     /// As JSON, with a line's end.
-    pub(crate) fn to_json(&self) -> std::io::Result<String> {
-        Ok(serde_json::to_string_pretty(self)? + "\n")
+    pub(crate) fn to_json(&self) -> String {
+        format!("{:#}\n", serde_json::json!(self))
     }
 }
 
@@ -134,7 +130,7 @@ impl DriveLook {
         self.drawn.camera.height_m.unwrap_or(CAMERA_HEIGHT)
     }
 
-    /// The mounts with the drawn camera, of those with a level one at its height, and its lens.
+    /// The rig with the drawn camera in place of a level one of the same height, and the camera's intrinsics.
     pub(crate) fn mount(&self, level: Rig) -> (Rig, Intrinsics) {
         let camera = &self.drawn.camera;
         let (pitch, roll) = (camera.pitch_degrees, camera.roll_degrees);
@@ -212,21 +208,22 @@ fn draw_camera(config: &SimConfig) -> (Intrinsics, (f64, f64, f64)) {
 /// Whether the lower edge of the picture shows a level road within [`ROAD_WITHIN`], of a camera so high (metres) and pitched (radians).
 fn sees_road(k: &Intrinsics, height: f64, pitch: f64) -> bool {
     let lowest = (f64::from(k.height) - 1.0 - k.cy) / k.fy;
-    (lowest.atan() + pitch).tan() > height / ROAD_WITHIN
+    lowest.atan() + pitch > (height / ROAD_WITHIN).atan()
 }
 
 /// The light and the weather, in numbers.
 fn in_numbers(weather: Weather, air: &Air, sun: &V3) -> DrawnLight {
-    let colour = |of: Rgb| [of.x, of.y, of.z];
+    let colour = |of: Rgb| [of.x, of.y, of.z].map(widened);
+    let of_the_sky = |number: f32| (weather != Weather::Indoor).then(|| widened(number));
     DrawnLight {
         weather,
-        sun_elevation_degrees: sun.z.asin().to_degrees(),
-        sun_azimuth_degrees: sun.y.atan2(sun.x).to_degrees(),
+        sun_elevation_degrees: of_the_sky(sun.z.asin().to_degrees()),
+        sun_azimuth_degrees: of_the_sky(sun.y.atan2(sun.x).to_degrees()),
         sun: colour(air.light.0),
         sky: colour(air.light.1),
-        clouds: air.sky.clouds,
-        visibility_m: weather::visibility(air),
-        wetness: air.wet,
+        clouds: of_the_sky(air.sky.clouds),
+        visibility_m: weather::visibility(air).map(widened),
+        wetness: widened(air.wet),
     }
 }
 
@@ -243,11 +240,15 @@ mod tests {
         }
     }
 
-    fn look(seed: u64) -> DriveLook {
+    fn look(scene: Scene, seed: u64) -> DriveLook {
         let mut rng = generator(seed, 0, 1);
         let road = Road::generate(&mut rng, -60.0, 100.0);
-        let mut world = World::furnish(road, seed, Scene::Urban);
-        DriveLook::draw(&config(seed), &Variety::none(), &mut world)
+        let mut world = World::furnish(road, seed, scene);
+        let config = SimConfig {
+            scene,
+            ..config(seed)
+        };
+        DriveLook::draw(&config, &Variety::none(), &mut world)
     }
 
     #[test]
@@ -281,12 +282,21 @@ mod tests {
     }
 
     #[test]
+    fn the_lower_edge_may_lie_behind_the_foot_of_the_camera() {
+        let k = Intrinsics::from_hfov(110.0, (192, 640));
+        let lowest = (639.0 - k.cy) / k.fy;
+        assert!(lowest.atan() + 0.26 > std::f64::consts::FRAC_PI_2);
+        assert!(sees_road(&k, 1.6, 0.26));
+        assert!(!sees_road(&k, 1.6, -1.4));
+    }
+
+    #[test]
     fn the_noise_is_each_frames_own() {
         let light: Vec<Rgb> = (0..640 * 192)
             .map(|i| Rgb::new(0.3, 0.3, 0.3) * (0.5 + (i % 640) as f32 / 640.0))
             .collect();
         for seed in 1..4 {
-            let look = look(seed);
+            let look = look(Scene::Urban, seed);
             let first = look.develop(&light, 0);
             assert_eq!(first, look.develop(&light, 0));
             assert_ne!(first, look.develop(&light, 1));
@@ -295,8 +305,8 @@ mod tests {
 
     #[test]
     fn what_was_drawn_is_said() {
-        let look = look(2);
-        let text = look.drawn().to_json().unwrap();
+        let look = look(Scene::Urban, 2);
+        let text = look.drawn().to_json();
         let said: serde_json::Value = serde_json::from_str(&text).unwrap();
         let height = said["camera"]["height_m"].as_f64().unwrap();
         assert!((height - look.height_m()).abs() < 1e-9);
@@ -306,5 +316,20 @@ mod tests {
             assert!(said["imaging"].get(part).is_some(), "{part}: {text}");
         }
         assert!(said["imaging"]["lens"].get("shake").is_none());
+        assert!(said["light"]["sun_elevation_degrees"].is_f64(), "{text}");
+    }
+
+    #[test]
+    fn a_garage_has_no_sun() {
+        let look = look(Scene::Garage, 2);
+        let light = &look.drawn().light;
+        assert_eq!(light.weather, Weather::Indoor);
+        assert_eq!((light.sun_elevation_degrees, light.clouds), (None, None));
+        assert_eq!(light.sun, [0.0; 3]);
+        assert!(
+            look.drawn()
+                .to_json()
+                .contains("\"sun_azimuth_degrees\": null")
+        );
     }
 }

@@ -8,6 +8,7 @@ mod built_world;
 mod cache;
 mod camera;
 mod config;
+mod digits;
 mod draw;
 mod drive;
 mod formation;

@@ -13,6 +13,15 @@ use serde::Serialize;
 /// Entries of a tone curve.
 const TONES: usize = 2048;
 
+/// Unsharp masking.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct Sharpen {
+    /// How much of what differs from the soft picture is added.
+    strength: f32,
+    /// Deviation of the soft picture's blur, pixels.
+    deviation_px: f32,
+}
+
 /// A camera's processor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Processing {
@@ -28,8 +37,8 @@ pub(super) struct Processing {
     shoulder: f32,
     /// The level of black, as a share of white.
     black: f32,
-    /// Strength and deviation (pixels) of unsharp masking.
-    sharpen: Option<(f32, f32)>,
+    /// Unsharp masking, if any.
+    sharpen: Option<Sharpen>,
     /// Levels of a channel, at most 256.
     levels: f32,
 }
@@ -54,7 +63,10 @@ impl Processing {
             shoulder: sometimes(rng, 0.6, 1.0, |rng| rng.random_range(0.4..0.9)),
             black: sometimes(rng, 0.2, 0.0, |rng| rng.random_range(0.0..0.07)),
             sharpen: sometimes(rng, 0.6, None, |rng| {
-                Some((rng.random_range(0.2..1.3), rng.random_range(0.5..1.3)))
+                Some(Sharpen {
+                    strength: rng.random_range(0.2..1.3),
+                    deviation_px: rng.random_range(0.5..1.3),
+                })
             }),
             levels: sometimes(rng, 0.03, 256.0, |rng| rng.random_range(40.0..128.0)),
         }
@@ -74,8 +86,12 @@ impl Processing {
                 *value = tones[index] + (tones[index + 1] - tones[index]) * part;
             }
         }
-        if let Some((strength, deviation)) = self.sharpen {
-            let taps = bell(deviation);
+        if let Some(Sharpen {
+            strength,
+            deviation_px,
+        }) = self.sharpen
+        {
+            let taps = bell(deviation_px);
             let mut work = vec![0.0; planes.width * planes.height];
             for plane in &mut planes.of[..channels] {
                 let mut soft = plane.clone();
