@@ -1,6 +1,5 @@
 //! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, and whether it is simulated.
 
-use super::layout::Drive;
 use crate::dataset_toml::{Clock, FolderConfig, check_clock_and_scale, read_or_default};
 use crate::{Error, OpenOptions, Result};
 use serde::Deserialize;
@@ -40,8 +39,8 @@ pub(super) struct DriveConfig {
     pub(super) speed_scale: f64,
 }
 
-/// Whether a drive is simulated, as `dataset.toml` of its folder or else of its date's says. Files that cannot be read say nothing.
-pub(super) fn says_simulated(drive: &Drive) -> Option<bool> {
+/// Whether the drive in a folder is simulated, as `dataset.toml` of that folder or else of its date's says. Files that cannot be read say nothing.
+pub(super) fn says_simulated(drive: &Path) -> Option<bool> {
     Keys::of(drive).ok()?.simulated
 }
 
@@ -50,9 +49,9 @@ impl Keys {
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
-    fn of(drive: &Drive) -> Result<Self> {
-        let own = Self::read(&drive.folder)?;
-        let date = drive.folder.parent().map(Self::read);
+    fn of(drive: &Path) -> Result<Self> {
+        let own = Self::read(drive)?;
+        let date = drive.parent().map(Self::read);
         let date = date.transpose()?.unwrap_or_default();
         Ok(Self {
             clock: Ahead {
@@ -83,7 +82,7 @@ impl DriveConfig {
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
-    pub(super) fn of(drive: &Drive, options: &OpenOptions) -> Result<Self> {
+    pub(super) fn of(drive: &Path, options: &OpenOptions) -> Result<Self> {
         let keys = Keys::of(drive)?;
         let ahead = options.camera_ahead_s.or(keys.clock.camera_ahead_s);
         Ok(Self {

@@ -61,7 +61,7 @@ impl Drive {
         /// Exact poses.
         const POSES: &str = "poses.txt";
         let has = |part: &str| self.folder.join(part).exists();
-        says_simulated(self).unwrap_or_else(|| has(POSES) && has(MASKS))
+        says_simulated(&self.folder).unwrap_or_else(|| has(POSES) && has(MASKS))
     }
 
     /// The velodyne scan of a frame, where there is one.

@@ -74,7 +74,7 @@ fn open_drive(
     files: &[(u64, PathBuf)],
     options: &OpenOptions,
 ) -> Result<Dataset> {
-    let config = DriveConfig::of(drive, options)?;
+    let config = DriveConfig::of(&drive.folder, options)?;
     let calibration = Calibration::read(&drive.date_folder, camera)?;
     let folder = drive.folder.join(format!("image_0{}", camera.number()));
     let times = optional(TimeStamps::read(&folder.join("timestamps.txt")))?;
