@@ -1,3 +1,4 @@
+use crate::error::{check, within};
 use crate::rig::CAMERA_HEIGHT;
 use crate::{Error, ExpectedSetting as Expected, Result, VariedConflict};
 use serde::{Deserialize, Serialize};
@@ -193,25 +194,6 @@ impl SimConfig {
     /// # Errors
     /// [`Error::Config`] naming the first field out of range; [`Error::Varied`] for what a varied drive cannot have.
     pub fn validate(&self) -> Result<()> {
-        let check = |ok: bool, field, value: String, expected| {
-            if ok {
-                Ok(())
-            } else {
-                Err(Error::Config {
-                    field,
-                    value,
-                    expected,
-                })
-            }
-        };
-        let within = |field, value: f64, from: f64, to: f64| {
-            check(
-                (from..=to).contains(&value),
-                field,
-                value.to_string(),
-                Expected::Within { from, to },
-            )
-        };
         let metres = |field, value: f64, from: f64, to: f64| {
             check(
                 (from..=to).contains(&value),

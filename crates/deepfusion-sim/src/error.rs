@@ -98,3 +98,37 @@ impl Hint for Error {
 
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// That a setting is as it must be.
+///
+/// # Errors
+/// [`Error::Config`].
+pub(crate) fn check(
+    ok: bool,
+    field: &'static str,
+    value: String,
+    expected: ExpectedSetting,
+) -> Result<()> {
+    if ok {
+        Ok(())
+    } else {
+        Err(Error::Config {
+            field,
+            value,
+            expected,
+        })
+    }
+}
+
+/// That a setting without a unit lies between two bounds, both allowed.
+///
+/// # Errors
+/// [`Error::Config`].
+pub(crate) fn within(field: &'static str, value: f64, from: f64, to: f64) -> Result<()> {
+    check(
+        (from..=to).contains(&value),
+        field,
+        value.to_string(),
+        ExpectedSetting::Within { from, to },
+    )
+}

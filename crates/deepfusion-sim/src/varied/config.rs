@@ -4,7 +4,8 @@ use super::draw::mix;
 use super::ingredient::Ingredient;
 use super::mounted::MountedCamera;
 use crate::config::Scene;
-use crate::{Error, ExpectedSetting as Expected, Result};
+use crate::error::{check, within};
+use crate::{ExpectedSetting as Expected, Result};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`crate::Endless`]. Equal settings give equal views, byte for byte.
@@ -73,27 +74,8 @@ impl EndlessConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first field out of range.
+    /// [`crate::Error::Config`] naming the first field out of range.
     pub fn validate(&self) -> Result<()> {
-        let check = |ok: bool, field, value: String, expected| {
-            if ok {
-                Ok(())
-            } else {
-                Err(Error::Config {
-                    field,
-                    value,
-                    expected,
-                })
-            }
-        };
-        let within = |field, value: f64, from: f64, to: f64| {
-            check(
-                (from..=to).contains(&value),
-                field,
-                value.to_string(),
-                Expected::Within { from, to },
-            )
-        };
         within("width", f64::from(self.width), 16.0, 4096.0)?;
         within("height", f64::from(self.height), 16.0, 4096.0)?;
         within(
