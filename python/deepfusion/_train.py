@@ -20,7 +20,7 @@ TrainEvent = dict[str, Any]
 
 - "started": from_step, steps, samples, validation_samples, mean_displacement_m (of a pair of frames, metres)
 - "step": step (from 1), steps, losses (name to value, as in log.csv; the mean of the step's samples), learning_rate,
-  images_per_second, remaining_s, scale_ratio (1 where the scale is metric), gradient_norm
+  images_per_second, remaining_s, scale_ratio (1 where the scale is metric, NaN where nothing says it), gradient_norm
 - "validated": step, losses, selection (what `best` is chosen by), scale_ratio, best (whether this is the best so far)
 - "saved": step, path of the checkpoint
 - "panel": step, name, image (3 x H x W, 0 to 1), disparity (H x W)
@@ -50,7 +50,8 @@ class Run:
     best_validation: float | None
     """The lowest value that `best` is chosen by."""
     scale_ratio: float | None
-    """Displacement by the vehicle's speed over displacement by PoseNet at the end: 1 where the scale is metric."""
+    """Displacement by the vehicle's speed over displacement by PoseNet at the end: 1 where the scale is metric. Of known depth alone and without
+    PoseNet, true over predicted depth; None where nothing says it."""
     skipped_steps: int
     """Steps skipped for a gradient that was not finite."""
     skipped_drives: list[str]

@@ -112,7 +112,8 @@ pub fn train<'py>(
     figures.set_item("stopped", summary.stopped)?;
     figures.set_item("losses", listener.losses.map(terms))?;
     figures.set_item("validation", listener.validation.map(terms))?;
-    figures.set_item("scale_ratio", listener.scale_ratio)?;
+    let scale_ratio = listener.scale_ratio.filter(|ratio| ratio.is_finite());
+    figures.set_item("scale_ratio", scale_ratio)?;
     figures.set_item("skipped_drives", skipped)?;
     Ok(figures)
 }

@@ -332,7 +332,9 @@ fn parameter_lengths(model: &Model) -> BTreeMap<String, usize> {
         lengths.extend(named.map(|(name, tensor)| (name, tensor.values.len())));
     };
     note("depth.", weights::collect(&model.depth_net));
-    note("pose.", weights::collect(&model.pose_net));
+    if let Some(pose_net) = &model.pose_net {
+        note("pose.", weights::collect(pose_net));
+    }
     if let Some(decoder) = &model.flow_decoder {
         note("flow.", weights::collect(decoder));
     }

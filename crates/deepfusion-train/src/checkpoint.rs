@@ -60,7 +60,9 @@ impl Checkpoints for RunFolder {
         state: &Checkpoint,
     ) -> Result<PathBuf, Error> {
         let mut all = weights::collect(&model.depth_net).with_prefix("depth.");
-        all = all.merged(weights::collect(&model.pose_net).with_prefix("pose."));
+        if let Some(pose_net) = &model.pose_net {
+            all = all.merged(weights::collect(pose_net).with_prefix("pose."));
+        }
         // Only training needs it, but a run that starts from `best` trains.
         if let Some(decoder) = &model.flow_decoder {
             all = all.merged(weights::collect(decoder).with_prefix("flow."));
@@ -95,7 +97,9 @@ impl Checkpoints for RunFolder {
         let named = |prefix: &str| -> Weights { all.under(prefix) };
         let mut model = Model::new(config, device)?;
         model.depth_net = weights::apply(model.depth_net, &named("depth."))?;
-        model.pose_net = weights::apply(model.pose_net, &named("pose."))?;
+        if let Some(pose_net) = model.pose_net.take() {
+            model.pose_net = Some(weights::apply(pose_net, &named("pose."))?);
+        }
         let new_decoder = take_flow_decoder(&mut model, &named("flow."))?;
         if let Some(focal) = model.focal.take() {
             model.focal = Some(weights::apply(focal, &named("focal."))?);
@@ -137,15 +141,28 @@ impl Checkpoints for RunFolder {
                 reason: ArchitectureProblem::EncodersForOther { network: kind },
             })?;
             model.depth_net.encoder = Some(weights::apply(encoder, &depth)?);
-            model.pose_net.encoder = weights::apply(model.pose_net.encoder, &pose)?;
+            if let Some(pose_net) = &mut model.pose_net {
+                pose_net.encoder = weights::apply(pose_net.encoder.clone(), &pose)?;
+            }
             return Ok((model, vec!["everything but the encoders"]));
         }
         let (depth_net, new_head) = model.depth_net.with_weights(&depth)?;
         model.depth_net = depth_net;
-        let (pose_net, new_masks) = model.pose_net.with_weights(&pose)?;
-        model.pose_net = pose_net;
+        let (mut new_pose_net, mut new_masks) = (false, false);
+        if let Some(pose_net) = model.pose_net.take() {
+            // Of a run that left PoseNet out there is none.
+            new_pose_net = pose.tensors.is_empty();
+            model.pose_net = Some(if new_pose_net {
+                pose_net
+            } else {
+                let (pose_net, without_masks) = pose_net.with_weights(&pose)?;
+                new_masks = without_masks;
+                pose_net
+            });
+        }
         let new_decoder = take_flow_decoder(&mut model, &named("flow.")?)?;
         let new = [
+            new_pose_net.then_some("PoseNet"),
             new_masks.then_some("the explainability masks"),
             new_decoder.then_some("the flow decoder"),
             new_head.then_some("the head for uncertainty"),

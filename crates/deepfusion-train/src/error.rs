@@ -1,6 +1,7 @@
 use crate::SharedFrames;
 use crate::stereo::NoStereo;
 use deepfusion_hint::Hint;
+use std::path::PathBuf;
 
 mod samples;
 mod stopped;
@@ -36,6 +37,12 @@ pub enum Error {
         drive: String,
         /// Why not.
         why: NoStereo,
+    },
+    /// A run that was asked for a vehicle's motion as its PoseNet sees it.
+    #[error("{}: this run has no PoseNet", run.display())]
+    NoPoseNet {
+        /// The run, or a checkpoint of it.
+        run: PathBuf,
     },
     /// A recording to learn depth from that has none.
     #[error("{drive}: no frame has depth, and `learn` asks for it")]
@@ -180,6 +187,9 @@ impl Hint for Error {
                 "the last good checkpoint is kept; look at the frames named above, or lower the \
                  learning rate, and resume"
                     .into(),
+            ),
+            Self::NoPoseNet { .. } => Some(
+                "it learned by the vehicle's motion alone (`freeze` names `pose`); without that it learns a PoseNet, too".into(),
             ),
             Self::Precision { .. } => Some("set `precision` so in the configuration".into()),
             Self::Threads { .. } => Some(

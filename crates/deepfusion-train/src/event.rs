@@ -34,7 +34,7 @@ pub enum TrainEvent {
         /// Seconds until the end at the present pace.
         remaining_s: f64,
         /// Displacement by the vehicle's speed over displacement by PoseNet, smoothed over the last
-        /// steps: 1 when the scale is metric.
+        /// steps: 1 when the scale is metric. Of known depth alone and without PoseNet, true over predicted depth; NaN where neither is learned from.
         scale_ratio: f64,
         /// Norm of the gradient before clipping.
         gradient_norm: f64,
@@ -47,7 +47,7 @@ pub enum TrainEvent {
         losses: LossTerms,
         /// The value that selects `best`: the part of the loss that depth can change.
         selection: f64,
-        /// Displacement by speed over displacement by PoseNet.
+        /// As of a step.
         scale_ratio: f64,
         /// Whether this is the best so far.
         best: bool,

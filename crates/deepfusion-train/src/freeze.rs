@@ -30,14 +30,19 @@ pub(crate) fn freeze(
     };
     let model = Model {
         depth_net: freeze.under("depth", model.depth_net),
-        pose_net: freeze.under("pose", model.pose_net),
+        pose_net: model.pose_net.map(|net| freeze.under("pose", net)),
         flow_decoder: model.flow_decoder.map(|net| freeze.under("flow", net)),
         ..model
     };
     let wrong = |expected: ExpectedSetting, found: String| {
         Error::from(ModelError::config("freeze", expected, found))
     };
-    if let Some((name, _)) = freeze.names.iter().find(|(_, found)| !found) {
+    let left_out = |name: &str| name == TrainConfig::POSE_NET && config.leaves_pose_net_out();
+    if let Some((name, _)) = freeze
+        .names
+        .iter()
+        .find(|(name, found)| !found && !left_out(name))
+    {
         return Err(wrong(ExpectedSetting::Weights, (*name).to_owned()));
     }
     if !train.samples.is_empty() && freeze.from_video == 0 {

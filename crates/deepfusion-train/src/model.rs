@@ -10,8 +10,8 @@ use deepfusion_nn::{DepthNet, FlowDecoder, PoseNet, SCALES, WeightRng};
 pub struct Model {
     /// Disparity of an image.
     pub depth_net: DepthNet,
-    /// Motion between two.
-    pub pose_net: PoseNet,
+    /// Motion between two; not of a run that [leaves it out](TrainConfig::leaves_pose_net_out).
+    pub pose_net: Option<PoseNet>,
     /// Optical flow from the depth network's features of both; only while training with a flow loss.
     pub flow_decoder: Option<FlowDecoder>,
     /// The focal length of a camera that nobody gave, in a run that learns it.
@@ -35,7 +35,7 @@ pub struct ViewFlow {
 pub struct ForwardPass {
     /// Sigmoid disparities of the targets, T×1×H/2ˢ×W/2ˢ, as of [`DepthNet::forward`].
     pub disparities: Vec<Tensor<4>>,
-    /// PoseNet's `source_from_target`, by view, T each; of the other camera's view the calibrated one.
+    /// PoseNet's `source_from_target`, by view, T each, the measured one without PoseNet; of the other camera's view the calibrated one.
     pub motions: Vec<Motion>,
     /// The same, measured by the vehicle's sensors.
     pub measured: Vec<Motion>,
@@ -69,11 +69,14 @@ impl Model {
     /// [`Error::Model`] for a configuration that cannot be built.
     pub fn new(config: &TrainConfig, device: &Device) -> Result<Self, Error> {
         let depth_net = DepthNet::with_seed(&config.depth_net, config.seed, device)?;
-        let mut pose_net =
-            PoseNet::with_seed(&config.pose_net, config.seed.wrapping_add(1), device)?;
-        if config.start_moving && config.reversed_pose == ReversedPose::Inverted {
-            pose_net = start_moving(pose_net);
-        }
+        let pose_net = if config.leaves_pose_net_out() {
+            None
+        } else {
+            let seed = config.seed.wrapping_add(1);
+            let new = PoseNet::with_seed(&config.pose_net, seed, device)?;
+            let moving = config.start_moving && config.reversed_pose == ReversedPose::Inverted;
+            Some(if moving { start_moving(new) } else { new })
+        };
         let mut model = Self::with_networks(config, depth_net, pose_net, device);
         if config.loss.flow.weight > 0.0 {
             let mut rng = WeightRng::new(config.seed.wrapping_add(2));
@@ -89,7 +92,7 @@ impl Model {
     pub fn with_networks(
         config: &TrainConfig,
         depth_net: DepthNet,
-        pose_net: PoseNet,
+        pose_net: impl Into<Option<PoseNet>>,
         device: &Device,
     ) -> Self {
         let (height, width) = (config.size.height, config.size.width);
@@ -98,7 +101,7 @@ impl Model {
             .collect();
         Self {
             depth_net,
-            pose_net,
+            pose_net: pose_net.into(),
             flow_decoder: None,
             focal: config.learned_camera().map(|_| LearnedFocal::new(device)),
             config: config.clone(),
@@ -112,7 +115,7 @@ impl Model {
         let mut model = Self::with_networks(
             &self.config,
             self.depth_net.valid(),
-            self.pose_net.valid(),
+            self.pose_net.as_ref().map(Module::valid),
             &device.clone().inner(),
         );
         model.focal = self.focal.as_ref().map(Module::valid);
@@ -171,7 +174,8 @@ impl Model {
             Reprojection::Bidirectional => self.forward_bidirectional(batch),
             Reprojection::Minimum | Reprojection::Mean => self.forward_target(batch),
         };
-        if let Some(factors) = &batch.factors {
+        // What was measured is in metres already.
+        if let (Some(factors), Some(_)) = (&batch.factors, &self.pose_net) {
             pass.motions = pass.motions.iter().map(|m| factors.scale(m)).collect();
         }
         // In metres already, and nobody's guess.
@@ -185,16 +189,20 @@ impl Model {
         let pair =
             |a: &Tensor<4>, b: &Tensor<4>, axis| Tensor::cat(vec![a.clone(), b.clone()], axis);
         let (first, second) = (&batch.network[0], &batch.network[1]);
-        let in_order = pair(first, second, 1);
-        let motion = match self.config.reversed_pose {
-            ReversedPose::Predicted => {
+        let both_ways = |forward: Motion| {
+            let backward = forward.inverse();
+            Motion::cat(vec![forward, backward])
+        };
+        let measured = both_ways(batch.measured[0].clone());
+        let motion = match (&self.pose_net, self.config.reversed_pose) {
+            (None, _) => measured.clone(),
+            (Some(pose_net), ReversedPose::Predicted) => {
+                let in_order = pair(first, second, 1);
                 let reversed = pair(second, first, 1);
-                self.motion(pair(&in_order, &reversed, 0))
+                motion(pose_net, pair(&in_order, &reversed, 0))
             }
-            ReversedPose::Inverted => {
-                let forward = self.motion(in_order);
-                let backward = forward.inverse();
-                Motion::cat(vec![forward, backward])
+            (Some(pose_net), ReversedPose::Inverted) => {
+                both_ways(motion(pose_net, pair(first, second, 1)))
             }
         };
         let twice = |k: &Tensor<3>| Tensor::cat(vec![k.clone(), k.clone()], 0);
@@ -218,10 +226,7 @@ impl Model {
             explained: Vec::new(),
             flows,
             motions: vec![motion],
-            measured: vec![Motion::cat(vec![
-                batch.measured[0].clone(),
-                batch.measured[0].inverse(),
-            ])],
+            measured: vec![measured],
             targets: pair(&batch.clean[0], &batch.clean[1], 0),
             sources: vec![pair(&batch.clean[1], &batch.clean[0], 0)],
             intrinsics: twice(&batch.intrinsics),
@@ -231,49 +236,19 @@ impl Model {
 
     /// Frame 0 is the target of every source: T = B, a view each.
     fn forward_target(&self, batch: &SnippetBatch) -> ForwardPass {
-        let target = &batch.network[0];
-        // The pose network is given the frames in time order; for a source before the target it
-        // then says `target_from_source`.
-        let stacked = batch
-            .offsets
-            .iter()
-            .zip(&batch.network[1..])
-            .map(|(o, source)| {
-                let (a, b) = if *o < 0 {
-                    (source, target)
-                } else {
-                    (target, source)
-                };
-                Tensor::cat(vec![a.clone(), b.clone()], 1)
-            });
-        let (pose, logits) = self
-            .pose_net
-            .forward_explained(Tensor::cat(stacked.collect(), 0));
-        let all = Motion::new(pose.axis_angle, pose.translation);
-        let n = batch.len();
-        let explained = logits.into_iter().flat_map(|logits| {
-            let views = batch.offsets.iter().enumerate();
-            views.map(move |(i, offset)| {
-                // Where the source is before it, the target is the second of the two.
-                let target = usize::from(*offset < 0);
-                logits.clone().narrow(0, i * n, n).narrow(1, target, 1)
-            })
-        });
-        let explained = explained.collect();
-        let motions = batch.offsets.iter().enumerate().map(|(i, offset)| {
-            let motion = all.narrow(i * n, n);
-            if *offset < 0 {
-                motion.inverse()
-            } else {
-                motion
+        let (motions, explained) = match &self.pose_net {
+            Some(pose_net) => motions_from_target(pose_net, batch),
+            None => {
+                let in_time = batch.measured.iter().take(batch.offsets.len());
+                (in_time.cloned().collect(), Vec::new())
             }
-        });
+        };
         let (disparities, flows) = self.depth_and_flows(batch);
         ForwardPass {
             disparities,
             explained,
             flows,
-            motions: motions.collect(),
+            motions,
             measured: batch.measured.clone(),
             targets: batch.clean[0].clone(),
             sources: batch.clean[1..].to_vec(),
@@ -300,11 +275,50 @@ impl Model {
         let flows = flows.collect();
         (self.depth_net.decode(targets), flows)
     }
+}
 
-    fn motion(&self, stacked: Tensor<4>) -> Motion {
-        let pose = self.pose_net.forward(stacked);
-        Motion::new(pose.axis_angle, pose.translation)
-    }
+/// PoseNet's motions of frame 0 to every source, and the logits of the masks.
+fn motions_from_target(pose_net: &PoseNet, batch: &SnippetBatch) -> (Vec<Motion>, Vec<Tensor<4>>) {
+    let target = &batch.network[0];
+    // The pose network is given the frames in time order; for a source before the target it
+    // then says `target_from_source`.
+    let stacked = batch
+        .offsets
+        .iter()
+        .zip(&batch.network[1..])
+        .map(|(o, source)| {
+            let (a, b) = if *o < 0 {
+                (source, target)
+            } else {
+                (target, source)
+            };
+            Tensor::cat(vec![a.clone(), b.clone()], 1)
+        });
+    let (pose, logits) = pose_net.forward_explained(Tensor::cat(stacked.collect(), 0));
+    let all = Motion::new(pose.axis_angle, pose.translation);
+    let n = batch.len();
+    let explained = logits.into_iter().flat_map(|logits| {
+        let views = batch.offsets.iter().enumerate();
+        views.map(move |(i, offset)| {
+            // Where the source is before it, the target is the second of the two.
+            let target = usize::from(*offset < 0);
+            logits.clone().narrow(0, i * n, n).narrow(1, target, 1)
+        })
+    });
+    let motions = batch.offsets.iter().enumerate().map(|(i, offset)| {
+        let motion = all.narrow(i * n, n);
+        if *offset < 0 {
+            motion.inverse()
+        } else {
+            motion
+        }
+    });
+    (motions.collect(), explained.collect())
+}
+
+fn motion(pose_net: &PoseNet, stacked: Tensor<4>) -> Motion {
+    let pose = pose_net.forward(stacked);
+    Motion::new(pose.axis_angle, pose.translation)
 }
 
 /// The second half of the batch, then the first.

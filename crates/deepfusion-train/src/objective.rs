@@ -130,7 +130,8 @@ impl Model {
         sum.add(added(smooth), settings.smoothness, |terms| {
             &mut terms.smoothness
         });
-        let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
+        let speed = (settings.speed > 0.0 && self.pose_net.is_some())
+            .then(|| self.motion_loss(pass, batch));
         sum.add(speed, schedule.speed_weight, |terms| &mut terms.speed);
         let explained =
             (settings.explainability > 0.0).then(|| losses::explainability(&pass.explained));

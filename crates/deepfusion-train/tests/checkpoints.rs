@@ -144,7 +144,7 @@ fn imported_encoders_start_a_network_with_other_parts() {
     let (ours, anew) = run.load_networks(kind, &paper, &device).unwrap();
     assert_eq!(anew, ["everything but the encoders"]);
     let depth = |m: &Model| weights::collect(&m.depth_net.encoder).tensors;
-    let pose = |m: &Model| weights::collect(&m.pose_net.encoder).tensors;
+    let pose = |m: &Model| weights::collect(&m.pose_net.as_ref().unwrap().encoder).tensors;
     assert!(depth(&ours) == depth(&theirs) && pose(&ours) == pose(&theirs));
     let new = Model::new(&paper, &device).unwrap();
     assert!(depth(&ours) != depth(&new));

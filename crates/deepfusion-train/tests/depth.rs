@@ -315,7 +315,7 @@ fn depth_and_motion_are_learned_in_one_step_and_resume_exactly() {
         let model = trainer.model();
         let networks = [
             weights::collect(&model.depth_net),
-            weights::collect(&model.pose_net),
+            weights::collect(model.pose_net.as_ref().unwrap()),
         ];
         networks.map(|network| network.tensors)
     };

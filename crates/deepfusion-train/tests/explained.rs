@@ -44,7 +44,8 @@ fn loss(model: &Model, pass: &ForwardPass, batch: &SnippetBatch) -> BatchLoss {
 fn with_logits(config: &TrainConfig, logits: [f32; 2]) -> Model {
     let device = Device::flex().autodiff();
     let mut model = Model::new(config, &device).unwrap();
-    let head = &mut model.pose_net.explainability.as_mut().unwrap().head;
+    let pose_net = model.pose_net.as_mut().unwrap();
+    let head = &mut pose_net.explainability.as_mut().unwrap().head;
     let none = TensorData::new(vec![0.0_f32; 2 * 16 * 9], [2, 16, 3, 3]);
     head.weight = Param::from_data(none, &device);
     head.bias = Some(Param::from_data(logits, &device));
@@ -100,7 +101,8 @@ fn masks_weigh_the_error_and_have_their_price() {
     let total = half + smooth + 0.2 * 2.0_f64.ln();
     assert!((with.terms.total - total).abs() < 1e-5, "{:?}", with.terms);
     let gradients = with.total.backward();
-    let masks = model.pose_net.explainability.as_ref().unwrap();
+    let pose_net = model.pose_net.as_ref().unwrap();
+    let masks = pose_net.explainability.as_ref().unwrap();
     let size = |gradient: Tensor<1>| gradient.abs().max().into_scalar::<f32>();
     let bias = masks.head.bias.as_ref().unwrap().val();
     // ½·(½·error − 0.2·½) for each frame's pixels: the price is higher here.

@@ -25,4 +25,5 @@ mod support;
 mod trainer;
 mod video_sizes;
 mod whole_step;
+mod without_pose_net;
 mod workers;

@@ -96,9 +96,10 @@ impl Recorder {
                 ..
             } => {
                 let line = format!(
-                    "loss {:.4} ({}), scale ratio {scale_ratio:.3}, {images_per_second:.1} images/s, {} left",
+                    "loss {:.4} ({}){}, {images_per_second:.1} images/s, {} left",
                     losses.total,
                     terms_of_a_step(&losses),
+                    scale_text(scale_ratio),
                     clock(remaining_s)
                 );
                 self.progress.note(&line);
@@ -123,9 +124,10 @@ impl Recorder {
                 best,
             } => {
                 say(&format!(
-                    "step {step}: held out {selection:.4}{} ({}), scale ratio {scale_ratio:.3}",
+                    "step {step}: held out {selection:.4}{} ({}){}",
                     if best { ", the best so far" } else { "" },
                     held_out_terms(&losses),
+                    scale_text(scale_ratio),
                 ));
             }
             TrainEvent::Camera { camera, learned } => {
@@ -152,9 +154,10 @@ fn terms_of_a_step(losses: &LossTerms) -> String {
     let mut terms = Vec::new();
     if losses.reprojection > 0.0 {
         terms.push(format!(
-            "reprojection {:.4}, smoothness {:.4}, speed {:.3} m",
-            losses.reprojection, losses.smoothness, losses.speed
+            "reprojection {:.4}, smoothness {:.4}",
+            losses.reprojection, losses.smoothness
         ));
+        terms.extend(speed_text(losses));
     }
     if losses.flow > 0.0 {
         let moving = 100.0 * losses.moving_share;
@@ -166,14 +169,26 @@ fn terms_of_a_step(losses: &LossTerms) -> String {
     terms.join(", ")
 }
 
+/// Nothing where the run has no PoseNet.
+fn speed_text(losses: &LossTerms) -> Option<String> {
+    (losses.speed > 0.0).then(|| format!("speed {:.3} m", losses.speed))
+}
+
+/// Nothing where no network says a scale.
+fn scale_text(ratio: f64) -> String {
+    if ratio.is_finite() {
+        format!(", scale ratio {ratio:.3}")
+    } else {
+        String::new()
+    }
+}
+
 /// What was learned from, of the held-out samples.
 fn held_out_terms(losses: &LossTerms) -> String {
     let mut terms = Vec::new();
     if losses.reprojection > 0.0 {
-        terms.push(format!(
-            "reprojection {:.4}, speed {:.3} m",
-            losses.reprojection, losses.speed
-        ));
+        terms.push(format!("reprojection {:.4}", losses.reprojection));
+        terms.extend(speed_text(losses));
     }
     if losses.depth > 0.0 {
         terms.push(format!("depth {:.4}", losses.depth));

@@ -343,7 +343,8 @@ impl Start {
                 let weights = unpacked_weights(network)?;
                 let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
                 model.depth_net = depth_net;
-                let mut new = vec!["PoseNet"];
+                let pose_net = model.pose_net.is_some().then_some("PoseNet");
+                let mut new: Vec<_> = pose_net.into_iter().collect();
                 new.extend(new_head.then_some("the head for uncertainty"));
                 let path = path.as_deref();
                 report(Began::Packed { network, path, new });
@@ -352,7 +353,10 @@ impl Start {
             Self::Path(path) => {
                 let Some((folder, kind)) = run_of(path)? else {
                     model.depth_net = model.depth_net.with_torchvision_encoder(path)?;
-                    model.pose_net.encoder = load_torchvision_resnet(model.pose_net.encoder, path)?;
+                    if let Some(pose_net) = &mut model.pose_net {
+                        let encoder = pose_net.encoder.clone();
+                        pose_net.encoder = load_torchvision_resnet(encoder, path)?;
+                    }
                     return Ok(model);
                 };
                 let learned = !folder.read_state(kind)?.encoders_only;

@@ -120,7 +120,11 @@ impl TimeEstimate {
 fn work(config: &TrainConfig) -> u64 {
     let depth = config.depth_net.costs(config.size);
     let depth: u64 = depth.iter().map(|part| part.multiply_adds).sum();
-    let pose = config.pose_net.cost(config.size).multiply_adds;
+    let pose = if config.leaves_pose_net_out() {
+        0
+    } else {
+        config.pose_net.cost(config.size).multiply_adds
+    };
     // PoseNet does not look at the other camera's view.
     let sources = config.frames.len() as u64;
     // Both ways, the sources have depth, too.

@@ -14,13 +14,17 @@ const FOCAL_TOLERANCE: f64 = 0.05;
 const LEAST_WAY_M: f64 = 0.1;
 
 /// Whether a run's PoseNet has learned the metres between neighbouring frames: from video, with the vehicle's speed, and not from frames at a
-/// distance of their own.
+/// distance of their own; not of a run that left it out or froze it.
 #[must_use]
 pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
     let mut sets = 0..config.data.sets.len().max(1);
     let from_video = sets.any(|set| config.learn(set).from_motion());
+    let learned = !config
+        .freeze
+        .iter()
+        .any(|name| name == TrainConfig::POSE_NET);
     let neighbours = config.frames.iter().all(|offset| offset.abs() == 1);
-    from_video && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
+    from_video && learned && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
 }
 
 /// PoseNet's way from each frame that [`super::verdict`] looks at to the one before, against the vehicle's, by speed. Nothing of recordings with

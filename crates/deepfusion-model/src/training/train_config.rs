@@ -226,7 +226,8 @@ pub struct TrainConfig {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
     /// Weights that do not learn, by the beginning of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's
-    /// statistics are none of them (`frozen_statistics`).
+    /// statistics are none of them (`frozen_statistics`). With all of `pose` and `view_motion = "vehicle"`, PoseNet is left out: nothing would read
+    /// what it says, steps are shorter, and the run has no odometry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub freeze: Vec<String>,
     /// The camera of recordings that do not say theirs.
@@ -412,6 +413,17 @@ impl TrainConfig {
             self.view_motion = ViewMotion::PoseNet;
         }
         Ok(())
+    }
+
+    /// The name of the whole of PoseNet in [`Self::freeze`].
+    pub const POSE_NET: &'static str = "pose";
+
+    /// Whether there is no PoseNet: it would not learn, and neither are the views warped by its poses nor are there masks of its own.
+    #[must_use]
+    pub fn leaves_pose_net_out(&self) -> bool {
+        self.view_motion == ViewMotion::Vehicle
+            && !self.pose_net.explainability
+            && self.freeze.iter().any(|name| name == Self::POSE_NET)
     }
 
     /// Steps of the optimiser in a run whose epochs have so many.

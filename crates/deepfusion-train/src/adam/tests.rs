@@ -1,7 +1,7 @@
 use super::*;
 use crate::Preset;
 use burn::tensor::Device;
-use deepfusion_nn::{InputSize, PoseNet};
+use deepfusion_nn::InputSize;
 
 /// Parameters before and after some steps, and the optimiser's state.
 fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
@@ -9,9 +9,10 @@ fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
     let mut config = Preset::Tiny.config();
     config.size = InputSize::new(64, 64).unwrap();
     config.pose_net.metres_per_unit = 1.0;
-    let mut model = Model::new(&config, &device).unwrap();
+    let model = Model::new(&config, &device).unwrap();
+    let mut pose_net = model.pose_net.clone().unwrap();
     let mut adam = Adam::default();
-    let start = weights::collect(&model.pose_net);
+    let start = weights::collect(&pose_net);
     for step in 0..4 {
         if step == restore_after {
             adam = Adam::restore(adam.state(), adam.steps(), &model).unwrap();
@@ -23,10 +24,10 @@ fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
         let mut gradients = NamedGradients::default();
         // Of two batches, as with `accumulate = 2`.
         for part in [1.0, 3.0] {
-            let motion = model.pose_net.forward(images.clone().mul_scalar(part));
+            let motion = pose_net.forward(images.clone().mul_scalar(part));
             let loss = motion.axis_angle.sum() * 100.0 + motion.translation.sum();
             let (mut raw, mut of_batch) = (loss.backward(), NamedGradients::default());
-            of_batch.add("pose", &model.pose_net, &mut raw, 0.5);
+            of_batch.add("pose", &pose_net, &mut raw, 0.5);
             for (name, values) in of_batch.0 {
                 // As a GPU's would be.
                 let tensor = || Tensor::from_data(values.to_vec().as_slice(), &Device::flex());
@@ -43,10 +44,9 @@ fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
             panic!("{outcome:?}");
         };
         assert!(gradient_norm > 0.7, "the step is clipped: {gradient_norm}");
-        let pose_net: PoseNet = model.pose_net.clone();
-        model.pose_net = adam.apply(&step.unwrap(), "pose", pose_net, &gradients);
+        pose_net = adam.apply(&step.unwrap(), "pose", pose_net, &gradients);
     }
-    [start, weights::collect(&model.pose_net), adam.state()]
+    [start, weights::collect(&pose_net), adam.state()]
 }
 
 /// The root of the summed squares of the differences.

@@ -15,10 +15,15 @@ impl Trainer {
         let mut weights = DefaultHasher::new();
         let focal = self.model.focal.as_ref().map(LearnedFocal::ratio);
         focal.map(f64::to_bits).hash(&mut weights);
-        for (prefix, values) in [
-            ("depth", collect(&self.model.depth_net)),
-            ("pose", collect(&self.model.pose_net)),
-        ] {
+        let pose = self.model.pose_net.as_ref().map(collect);
+        let networks = [
+            ("depth", Some(collect(&self.model.depth_net))),
+            ("pose", pose),
+        ];
+        for (prefix, values) in networks {
+            let Some(values) = values else {
+                continue;
+            };
             prefix.hash(&mut weights);
             for tensor in values.tensors.values() {
                 tensor
@@ -49,19 +54,13 @@ impl Trainer {
         if self.workers.count() == 1 {
             return Ok(());
         }
-        let (depth, pose) = (self.model.depth_net.clone(), self.model.pose_net.clone());
-        self.model.depth_net = apply(
-            depth,
-            &self
-                .workers
-                .mean_statistics(collect(&self.model.depth_net))?,
-        )?;
-        self.model.pose_net = apply(
-            pose,
-            &self
-                .workers
-                .mean_statistics(collect(&self.model.pose_net))?,
-        )?;
+        let depth_net = &self.model.depth_net;
+        let means = self.workers.mean_statistics(collect(depth_net))?;
+        self.model.depth_net = apply(depth_net.clone(), &means)?;
+        if let Some(pose_net) = &self.model.pose_net {
+            let means = self.workers.mean_statistics(collect(pose_net))?;
+            self.model.pose_net = Some(apply(pose_net.clone(), &means)?);
+        }
         Ok(())
     }
 }

@@ -44,14 +44,17 @@ impl Trainer {
                     let (loss, numbers) = self.model.loss_on_device(&pass, &batch, schedule);
                     (pass, loss, numbers)
                 });
-                numbers.note_displacements(displacements(&pass, &batch));
+                let says_scale = self.model.pose_net.is_some();
+                if says_scale {
+                    numbers.note_displacements(displacements(&pass, &batch));
+                }
                 self.note(
                     learned,
                     UnreadBatch {
                         numbers,
                         names: batch.names.clone(),
                         is_video: true,
-                        says_scale: true,
+                        says_scale,
                     },
                 )?;
                 self.model
@@ -73,7 +76,7 @@ impl Trainer {
                         numbers,
                         names: batch.names.clone(),
                         is_video: false,
-                        says_scale: loaders.video.is_none(),
+                        says_scale: loaders.video.is_none() || self.model.pose_net.is_none(),
                     },
                 )?;
                 self.model
@@ -157,7 +160,9 @@ impl Model {
     pub fn add_gradients(&self, total: &Tensor<1>, scale: f32, step: &mut NamedGradients) {
         let mut raw = total.backward();
         step.add("depth", &self.depth_net, &mut raw, scale);
-        step.add("pose", &self.pose_net, &mut raw, scale);
+        if let Some(pose_net) = &self.pose_net {
+            step.add("pose", pose_net, &mut raw, scale);
+        }
         if let Some(decoder) = &self.flow_decoder {
             step.add("flow", decoder, &mut raw, scale);
         }
@@ -171,7 +176,9 @@ impl Model {
     pub fn updated(self, adam: &mut Adam, step: &AdamStep, gradients: &NamedGradients) -> Self {
         Self {
             depth_net: adam.apply(step, "depth", self.depth_net, gradients),
-            pose_net: adam.apply(step, "pose", self.pose_net, gradients),
+            pose_net: self
+                .pose_net
+                .map(|pose_net| adam.apply(step, "pose", pose_net, gradients)),
             flow_decoder: self
                 .flow_decoder
                 .map(|decoder| adam.apply(step, "flow", decoder, gradients)),
@@ -230,7 +237,7 @@ struct UnreadBatch {
     /// Drives and frames.
     names: Vec<String>,
     is_video: bool,
-    /// Whether its scale is the run's: that of known depth is only without video.
+    /// Whether its scale is the run's: that of known depth is only without PoseNet's on video.
     says_scale: bool,
 }
 

@@ -118,7 +118,7 @@ fn numbers_read_at_the_end_are_those_read_at_once() {
 #[test]
 fn a_loss_that_is_not_finite_is_named_either_way() {
     let spoiled = |mut model: Model| {
-        let output = &mut model.pose_net.decoder.output;
+        let output = &mut model.pose_net.as_mut().unwrap().decoder.output;
         output.bias = output
             .bias
             .take()

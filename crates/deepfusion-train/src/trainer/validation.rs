@@ -8,7 +8,8 @@ use crate::{
 use burn::tensor::Device;
 
 /// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which exists
-/// only in training; and the ratio of measured to predicted displacement.
+/// only in training; and the ratio of measured to predicted displacement, without PoseNet of true to predicted depth: NaN where nothing
+/// says it.
 ///
 /// # Errors
 /// [`Error::NoSamples`] without samples, [`Error::Data`] if an image cannot be read, [`Error::Loader`] if the
@@ -36,11 +37,13 @@ pub fn validation_loss(
             let batch = model.see(batch?);
             let pass = model.forward(&batch);
             let (_, mut unread) = model.loss_on_device(&pass, &batch, schedule);
-            unread.note_displacements(displacements(&pass, &batch));
+            if model.pose_net.is_some() {
+                unread.note_displacements(displacements(&pass, &batch));
+            }
             let numbers = unread.read();
             mean.add(batch.len(), &numbers.terms, numbers.scale_ratio);
         }
-        scale_ratio = Some(mean.ratio / mean.count);
+        scale_ratio = (model.pose_net.is_some()).then_some(mean.ratio / mean.count);
         terms.add(&mean.terms, 1.0 / mean.count);
     }
     if !samples.depth.is_empty() {

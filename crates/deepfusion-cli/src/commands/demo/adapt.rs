@@ -111,6 +111,8 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     let steps = demo.steps(STEPS);
     let mut config = TrainConfig {
         view_motion: ViewMotion::Vehicle,
+        // The views are warped by the vehicle's motion, and nobody asks for another.
+        freeze: vec![TrainConfig::POSE_NET.into()],
         precision,
         size: demo.input_size(own.size),
         batch: BATCH,

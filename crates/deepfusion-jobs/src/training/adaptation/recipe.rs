@@ -99,6 +99,9 @@ pub(super) fn config(
         config.loss.depth.gradient = 0.5;
     }
     assign(&mut config, &settings.set)?;
+    if !learned_from_drives {
+        leave_new_pose_net_out(&mut config, &settings.set);
+    }
     // Around the size as it is now; a setting of the sizes themselves has the last word.
     if own.canonical_focal_px.is_some() {
         learn_at_several_sizes(&mut config, settings.simulated > 0);
@@ -112,6 +115,15 @@ fn assign(config: &mut TrainConfig, settings: &[String]) -> Result<()> {
         config.set(assignment)?;
     }
     Ok(())
+}
+
+/// A new PoseNet would learn beside depth what depth does not need. It stays where views are warped by its poses, and where the settings say
+/// what is frozen.
+fn leave_new_pose_net_out(config: &mut TrainConfig, set: &[String]) {
+    let says_frozen = set.iter().any(|key| key.trim_start().starts_with("freeze"));
+    if config.view_motion == ViewMotion::Vehicle && !says_frozen {
+        config.freeze = vec![TrainConfig::POSE_NET.into()];
+    }
 }
 
 /// A network of many cameras stays as good by several predictions as it was. One that learned at several sizes already keeps those.
@@ -234,5 +246,23 @@ mod tests {
         assert_eq!(config.augmentation.sizes, video);
         assign(&mut config, &["augmentation.video_sizes=[]".into()]).unwrap();
         assert!(config.augmentation.video_sizes.is_empty());
+    }
+
+    #[test]
+    fn a_new_pose_net_is_left_out_unless_something_needs_it() {
+        let left_out = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|&key| key.into()).collect();
+            let mut config = Preset::Monodepth2.config();
+            config.view_motion = ViewMotion::Vehicle;
+            assign(&mut config, &set).unwrap();
+            leave_new_pose_net_out(&mut config, &set);
+            config.validate().unwrap();
+            config.leaves_pose_net_out()
+        };
+        assert!(left_out(&[]));
+        assert!(left_out(&["loss.smoothness=0.01"]));
+        assert!(!left_out(&["freeze=[]"]));
+        assert!(!left_out(&["view_motion=distance"]));
+        assert!(!left_out(&["freeze=[\"depth.encoder\"]"]));
     }
 }
