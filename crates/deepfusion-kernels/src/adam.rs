@@ -1,3 +1,4 @@
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Values handled by one task.
@@ -41,8 +42,6 @@ pub fn adam(
         [gradient.len(), first.len(), second.len()] == [n; 3],
         "parameter, gradient and moments have the same length"
     );
-    let s = *step;
-    let keep = 1.0 - s.learning_rate * s.weight_decay;
     parameter
         .par_chunks_mut(CHUNK)
         .zip(gradient.par_chunks(CHUNK))
@@ -52,15 +51,45 @@ pub fn adam(
                 .zip(second.par_chunks_mut(CHUNK)),
         )
         .for_each(|((parameter, gradient), (first, second))| {
-            let moments = first.iter_mut().zip(second);
-            for ((p, g), (m, v)) in parameter.iter_mut().zip(gradient).zip(moments) {
-                let g = g * s.gradient_scale;
-                *m = s.beta1 * *m + (1.0 - s.beta1) * g;
-                *v = s.beta2 * *v + (1.0 - s.beta2) * g * g;
-                let root = (*v / s.correction2).sqrt() + s.epsilon;
-                *p = *p * keep - s.learning_rate * (*m / s.correction1) / root;
-            }
+            Arch::new().dispatch(Update {
+                step,
+                parameter,
+                gradient,
+                first,
+                second,
+            });
         });
+}
+
+/// The step on a part of the values. The loop is compiled for each instruction set.
+struct Update<'a> {
+    step: &'a AdamStep,
+    parameter: &'a mut [f32],
+    gradient: &'a [f32],
+    first: &'a mut [f32],
+    second: &'a mut [f32],
+}
+
+impl WithSimd for Update<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let s = *self.step;
+        let keep = 1.0 - s.learning_rate * s.weight_decay;
+        // One division and one root a value: with three divisions they, not the memory, would set the pace.
+        let rate = s.learning_rate / s.correction1;
+        let shrink = 1.0 / s.correction2.sqrt();
+        let moments = self.first.iter_mut().zip(self.second);
+        let values = self.parameter.iter_mut().zip(self.gradient);
+        for ((p, g), (m, v)) in values.zip(moments) {
+            let g = g * s.gradient_scale;
+            *m = s.beta1 * *m + (1.0 - s.beta1) * g;
+            *v = s.beta2 * *v + (1.0 - s.beta2) * g * g;
+            let root = v.sqrt() * shrink + s.epsilon;
+            *p = *p * keep - rate * *m / root;
+        }
+    }
 }
 
 /// The sum of squares, in f64 and in an order that does not depend on the number of threads.
@@ -68,19 +97,28 @@ pub fn adam(
 pub fn sum_of_squares(values: &[f32]) -> f64 {
     values
         .par_chunks(CHUNK)
-        .map(|chunk| {
-            let mut lanes = [0.0f64; 8];
-            let (groups, rest) = chunk.as_chunks::<8>();
-            for group in groups {
-                for (lane, v) in lanes.iter_mut().zip(group) {
-                    *lane += f64::from(*v) * f64::from(*v);
-                }
-            }
-            lanes.iter().sum::<f64>() + rest.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>()
-        })
+        .map(|chunk| Arch::new().dispatch(Squares(chunk)))
         .collect::<Vec<_>>()
         .iter()
         .sum()
+}
+
+struct Squares<'a>(&'a [f32]);
+
+impl WithSimd for Squares<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let mut lanes = [0.0f64; 8];
+        let (groups, rest) = self.0.as_chunks::<8>();
+        for group in groups {
+            for (lane, v) in lanes.iter_mut().zip(group) {
+                *lane += f64::from(*v) * f64::from(*v);
+            }
+        }
+        lanes.iter().sum::<f64>() + rest.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>()
+    }
 }
 
 #[cfg(test)]

@@ -35,7 +35,8 @@ pub struct Trainer {
     config: TrainConfig,
     folder: RunFolder,
     device: Device,
-    model: Model,
+    /// There but while the optimiser has it.
+    model: Option<Model>,
     adam: Adam,
     state: Checkpoint,
     train: SampleSet,
@@ -120,7 +121,7 @@ impl Trainer {
             config,
             folder,
             device,
-            model,
+            model: Some(model),
             adam: Adam::default(),
             state: Checkpoint {
                 step: 0,
@@ -176,7 +177,7 @@ impl Trainer {
             config,
             folder,
             device,
-            model,
+            model: Some(model),
             adam,
             state,
             train,
@@ -217,8 +218,9 @@ impl Trainer {
 
     /// The networks as they are now.
     #[must_use]
+    #[expect(clippy::expect_used, reason = "a step gives back what it took")]
     pub fn model(&self) -> &Model {
-        &self.model
+        self.model.as_ref().expect("no step is being made")
     }
 
     /// The samples that are learned from.

@@ -13,13 +13,11 @@ impl Trainer {
             return Ok(());
         }
         let mut weights = DefaultHasher::new();
-        let focal = self.model.focal.as_ref().map(LearnedFocal::ratio);
+        let focal = self.model().focal.as_ref().map(LearnedFocal::ratio);
         focal.map(f64::to_bits).hash(&mut weights);
-        let pose = self.model.pose_net.as_ref().map(collect);
-        let networks = [
-            ("depth", Some(collect(&self.model.depth_net))),
-            ("pose", pose),
-        ];
+        let model = self.model();
+        let pose = model.pose_net.as_ref().map(collect);
+        let networks = [("depth", Some(collect(&model.depth_net))), ("pose", pose)];
         for (prefix, values) in networks {
             let Some(values) = values else {
                 continue;
@@ -54,13 +52,14 @@ impl Trainer {
         if self.workers.count() == 1 {
             return Ok(());
         }
-        let depth_net = &self.model.depth_net;
-        let means = self.workers.mean_statistics(collect(depth_net))?;
-        self.model.depth_net = apply(depth_net.clone(), &means)?;
-        if let Some(pose_net) = &self.model.pose_net {
-            let means = self.workers.mean_statistics(collect(pose_net))?;
-            self.model.pose_net = Some(apply(pose_net.clone(), &means)?);
+        let mut model = self.model().clone();
+        let means = self.workers.mean_statistics(collect(&model.depth_net))?;
+        model.depth_net = apply(model.depth_net, &means)?;
+        if let Some(pose_net) = model.pose_net.take() {
+            let means = self.workers.mean_statistics(collect(&pose_net))?;
+            model.pose_net = Some(apply(pose_net, &means)?);
         }
+        self.model = Some(model);
         Ok(())
     }
 }

@@ -51,7 +51,7 @@ impl Trainer {
         }
         if validate && !self.validation.is_empty() {
             let (losses, scale_ratio) =
-                validation_loss(&self.model, &self.config, &self.validation, &self.device)?;
+                validation_loss(self.model(), &self.config, &self.validation, &self.device)?;
             let selection = selection(&self.config, &losses);
             let best =
                 selection.is_finite() && self.state.best_validation.is_none_or(|b| selection < b);
@@ -68,7 +68,7 @@ impl Trainer {
             if best {
                 let path =
                     self.folder
-                        .save(CheckpointKind::Best, &self.model, None, &self.state)?;
+                        .save(CheckpointKind::Best, self.model(), None, &self.state)?;
                 listen(TrainEvent::Saved { step, path });
             }
         }
@@ -80,7 +80,7 @@ impl Trainer {
         &self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
     ) -> Result<(), Error> {
-        let Some(focal) = self.model.focal.as_ref().filter(|_| self.workers.leads()) else {
+        let Some(focal) = self.model().focal.as_ref().filter(|_| self.workers.leads()) else {
             return Ok(());
         };
         let size = self.train.camera().map(|k| (k.width, k.height));
@@ -88,7 +88,7 @@ impl Trainer {
         let Some(camera) = camera else {
             return Ok(());
         };
-        let spread = focal_spread(&self.model, &self.config, &self.train, &self.device)?;
+        let spread = focal_spread(self.model(), &self.config, &self.train, &self.device)?;
         let step = self.state.step;
         let learned = LearnedCamera {
             focal_px: [camera.fx, camera.fy],
@@ -119,7 +119,7 @@ impl Trainer {
         let step = self.state.step;
         let path = self.folder.save(
             CheckpointKind::Last,
-            &self.model,
+            self.model(),
             Some(&self.adam),
             &self.state,
         )?;

@@ -37,14 +37,14 @@ impl Trainer {
         let scale = 1.0 / self.config.accumulate as f64;
         for _ in 0..self.config.accumulate {
             if let Some(loader) = &loaders.video {
-                let batch = self.model.see(next(|| loader.next(&self.device))?);
+                let batch = self.model().see(next(|| loader.next(&self.device))?);
                 learned.images += batch.len() * (1 + batch.offsets.len());
                 let (pass, loss, mut numbers) = autocast(self.config.precision, || {
-                    let pass = self.model.forward(&batch);
-                    let (loss, numbers) = self.model.loss_on_device(&pass, &batch, schedule);
+                    let pass = self.model().forward(&batch);
+                    let (loss, numbers) = self.model().loss_on_device(&pass, &batch, schedule);
                     (pass, loss, numbers)
                 });
-                let says_scale = self.model.pose_net.is_some();
+                let says_scale = self.model().pose_net.is_some();
                 if says_scale {
                     numbers.note_displacements(displacements(&pass, &batch));
                 }
@@ -57,7 +57,7 @@ impl Trainer {
                         says_scale,
                     },
                 )?;
-                self.model
+                self.model()
                     .add_gradients(&loss.total, scale as f32, &mut learned.gradients);
                 // The pass's first target is the batch's first sample.
                 let shown = batch.names.first().cloned().unwrap_or_default();
@@ -68,7 +68,7 @@ impl Trainer {
                 let batch = next(|| loader.next(&self.device))?;
                 learned.images += batch.len();
                 let (pass, numbers) = autocast(self.config.precision, || {
-                    self.model.learn_depth_on_device(&batch)
+                    self.model().learn_depth_on_device(&batch)
                 });
                 self.note(
                     learned,
@@ -76,10 +76,10 @@ impl Trainer {
                         numbers,
                         names: batch.names.clone(),
                         is_video: false,
-                        says_scale: loaders.video.is_none() || self.model.pose_net.is_none(),
+                        says_scale: loaders.video.is_none() || self.model().pose_net.is_none(),
                     },
                 )?;
-                self.model
+                self.model()
                     .add_gradients(&pass.total, scale as f32, &mut learned.gradients);
                 learned.names.extend(batch.names.iter().cloned());
                 let panel = learned.panel.take();
@@ -143,15 +143,19 @@ impl Trainer {
 
     /// A step of the optimiser on everything that learns.
     pub(super) fn apply(&mut self, step: AdamStep, gradients: &NamedGradients) {
-        let model = self.model.clone();
-        let focal = model.focal.clone();
-        self.model = model.updated(&mut self.adam, &step, gradients);
+        // Moved, not cloned: what nobody else holds is changed where it is.
+        let Some(model) = self.model.take() else {
+            return;
+        };
+        let mut model = model.updated(&mut self.adam, &step, gradients);
         let step = self.focal_step(step);
+        let focal = model.focal.take();
         let applied = focal.map(|focal| self.adam.apply(&step, FOCAL, focal, gradients));
-        self.model.focal = match self.config.learned_camera() {
+        model.focal = match self.config.learned_camera() {
             Some(camera) => applied.map(|focal| focal.held_to(camera)),
             None => applied,
         };
+        self.model = Some(model);
     }
 }
 

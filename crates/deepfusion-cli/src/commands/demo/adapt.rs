@@ -37,7 +37,7 @@ const GAP: usize = 5;
 const STEPS: usize = 60;
 const BATCH: usize = 2;
 /// A network that knows its trade takes smaller steps than one that begins.
-const LEARNING_RATE: f64 = 1e-5;
+const LEARNING_RATE: f64 = 2e-5;
 
 /// Arguments of `perceive` alone.
 #[derive(Parser)]
@@ -59,6 +59,7 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
         height,
         scan_every: SCAN_EVERY,
         moving_cars: MOVING_CARS,
+        varied: true,
         ..usual
     };
     let drive = demo.simulate("street", &street)?;
