@@ -73,6 +73,10 @@ fn what_gets_no_worse_is_kept_and_can_be_undone() {
     let height = seen_height(at, "mine");
     assert!((height - 1.65).abs() < 0.15, "{height}");
 
+    // The vehicle's motion warps the views: nobody asks a PoseNet, so there is none.
+    let odometry = "eval-odometry --model mine --data drive";
+    fails(at, odometry, &["mine", "has no PoseNet", "`freeze`"]);
+
     // The run is one like any other, without a word of its data sets.
     let given = depth_of(at, "tiny", "given");
     let learned = depth_of(at, "mine", "learned");

@@ -37,7 +37,11 @@ pub(crate) fn freeze(
     let wrong = |expected: ExpectedSetting, found: String| {
         Error::from(ModelError::config("freeze", expected, found))
     };
-    let left_out = |name: &str| name == TrainConfig::POSE_NET && config.leaves_pose_net_out();
+    let left_out = |name: &str| {
+        let part = name.strip_prefix(TrainConfig::POSE_NET);
+        let of_pose_net = part.is_some_and(|part| part.is_empty() || part.starts_with('.'));
+        of_pose_net && config.leaves_pose_net_out()
+    };
     if let Some((name, _)) = freeze
         .names
         .iter()

@@ -44,7 +44,10 @@ fn step(config: &TrainConfig, drive: &Path, at: &Path) -> (LossTerms, [bool; 2])
     let of = |trainer: &Trainer| {
         let model = trainer.model();
         let depth = weights::collect(&model.depth_net).tensors;
-        (depth, weights::collect(model.pose_net.as_ref().unwrap()).tensors)
+        (
+            depth,
+            weights::collect(model.pose_net.as_ref().unwrap()).tensors,
+        )
     };
     let before = of(&trainer);
     let mut found = None;

@@ -313,7 +313,7 @@ fn the_views_follow_the_motion_that_is_asked_for() {
         config.loss.compare_at = compare_at;
         config.pose_net.metres_per_unit = metres_per_unit;
         let mut model = Model::new(&config, &device).unwrap();
-        model.pose_net = PoseNet::with_seed(&config.pose_net, seed, &device).unwrap();
+        model.pose_net = Some(PoseNet::with_seed(&config.pose_net, seed, &device).unwrap());
         let (losses, _) = validation_loss(&model, &config, &samples, &device).unwrap();
         losses.reprojection
     };

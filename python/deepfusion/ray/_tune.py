@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -28,7 +29,7 @@ class Trial:
     selection: float | None
     """The lowest value that `best` is chosen by: a loss on held-out samples."""
     metrics: dict[str, Any]
-    """What was reported last: `step`, `selection`, `scale_ratio`, and the held-out losses by their names in log.csv."""
+    """What was reported last: `step`, `selection`, `scale_ratio` where something says it, and the held-out losses by their names in log.csv."""
     error: str | None
     """Why it failed; None where it did not."""
 
@@ -118,7 +119,9 @@ def _run(
             if event["event"] == "validated":
                 value = event["selection"]
                 best = value if best is None else min(best, value)
-                figures = {"step": event["step"], "selection": best, "scale_ratio": event["scale_ratio"], "path": str(out)}
+                figures = {"step": event["step"], "selection": best, "path": str(out)}
+                if math.isfinite(event["scale_ratio"]):
+                    figures["scale_ratio"] = event["scale_ratio"]
                 ray_tune.report(figures | dict(event["losses"] or {}))
 
         deepfusion.train({**fixed, **settings(drawn)}, data, report, out=out, init=init)

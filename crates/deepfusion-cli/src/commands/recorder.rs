@@ -263,4 +263,21 @@ mod tests {
             "{line}"
         );
     }
+
+    #[test]
+    fn what_no_network_says_is_not_printed() {
+        let mut losses = LossTerms {
+            reprojection: 0.125,
+            speed: 0.25,
+            ..LossTerms::default()
+        };
+        assert_eq!(
+            held_out_terms(&losses),
+            "reprojection 0.1250, speed 0.250 m"
+        );
+        assert_eq!(scale_text(1.5), ", scale ratio 1.500");
+        losses.speed = 0.0;
+        assert_eq!(held_out_terms(&losses), "reprojection 0.1250");
+        assert_eq!(scale_text(f64::NAN), "");
+    }
 }

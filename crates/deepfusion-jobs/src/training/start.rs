@@ -300,8 +300,11 @@ impl Start {
             && config.pose_net.metres_per_unit == 0.0
             && !folder.read_state(kind)?.encoders_only
         {
-            // Its PoseNet speaks of this unit.
-            config.pose_net.metres_per_unit = folder.read_config()?.pose_net.metres_per_unit;
+            let its = folder.read_config()?;
+            if !its.leaves_pose_net_out() {
+                // Its PoseNet speaks of this unit.
+                config.pose_net.metres_per_unit = its.pose_net.metres_per_unit;
+            }
         }
         Ok(())
     }

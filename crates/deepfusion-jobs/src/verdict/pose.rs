@@ -14,15 +14,12 @@ const FOCAL_TOLERANCE: f64 = 0.05;
 const LEAST_WAY_M: f64 = 0.1;
 
 /// Whether a run's PoseNet has learned the metres between neighbouring frames: from video, with the vehicle's speed, and not from frames at a
-/// distance of their own; not of a run that left it out or froze it.
+/// distance of their own; not of a run that left it out.
 #[must_use]
 pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
     let mut sets = 0..config.data.sets.len().max(1);
     let from_video = sets.any(|set| config.learn(set).from_motion());
-    let learned = !config
-        .freeze
-        .iter()
-        .any(|name| name == TrainConfig::POSE_NET);
+    let learned = !config.leaves_pose_net_out();
     let neighbours = config.frames.iter().all(|offset| offset.abs() == 1);
     from_video && learned && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
 }

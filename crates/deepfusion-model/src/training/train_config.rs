@@ -226,8 +226,8 @@ pub struct TrainConfig {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
     /// Weights that do not learn, by the beginning of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's
-    /// statistics are none of them (`frozen_statistics`). With all of `pose` and `view_motion = "vehicle"`, PoseNet is left out: nothing would read
-    /// what it says, steps are shorter, and the run has no odometry.
+    /// statistics are none of them (`frozen_statistics`). With `pose` and `view_motion = "vehicle"` PoseNet is left out, unless it has masks
+    /// (`explainability`): nothing would read what it says, steps are shorter, and the run has no odometry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub freeze: Vec<String>,
     /// The camera of recordings that do not say theirs.

@@ -23,7 +23,7 @@ const TITLES: [(&str, &str); 13] = [
     ("explained_share", "Share explained by the warp"),
     ("moving_share", "Share masked as moving"),
     ("learning_rate", "Learning rate"),
-    ("scale_ratio", "Displacement by speed / by PoseNet"),
+    ("scale_ratio", "Scale ratio, 1 where metric"),
     ("selection", "What `best` is chosen by"),
 ];
 
@@ -54,7 +54,7 @@ impl HtmlReport {
             self = self.chart(&learning_chart(log, column, images_a_step));
         }
         if !off.is_empty() {
-            self = self.note(&format!("Zero throughout: {}.", off.join(", ")));
+            self = self.note(&format!("Zero or absent throughout: {}.", off.join(", ")));
         }
         self
     }

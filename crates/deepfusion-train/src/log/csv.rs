@@ -23,7 +23,7 @@ pub struct CsvRecord<'a> {
     pub losses: &'a LossTerms,
     /// The learning rate; 0 for a validation.
     pub learning_rate: f64,
-    /// Displacement by speed over displacement by PoseNet.
+    /// As of a [`crate::TrainEvent::Step`].
     pub scale_ratio: f64,
     /// Images per second; 0 for a validation.
     pub images_per_second: f64,

@@ -241,7 +241,7 @@ struct UnreadBatch {
     /// Drives and frames.
     names: Vec<String>,
     is_video: bool,
-    /// Whether its scale is the run's: that of known depth is only without PoseNet's on video.
+    /// Whether its scale is the run's: known depth says it only where no PoseNet on video does.
     says_scale: bool,
 }
 

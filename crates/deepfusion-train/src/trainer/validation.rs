@@ -43,7 +43,7 @@ pub fn validation_loss(
             let numbers = unread.read();
             mean.add(batch.len(), &numbers.terms, numbers.scale_ratio);
         }
-        scale_ratio = (model.pose_net.is_some()).then_some(mean.ratio / mean.count);
+        scale_ratio = model.pose_net.is_some().then_some(mean.ratio / mean.count);
         terms.add(&mean.terms, 1.0 / mean.count);
     }
     if !samples.depth.is_empty() {

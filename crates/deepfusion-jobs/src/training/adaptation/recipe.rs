@@ -61,7 +61,8 @@ pub(super) fn config(
     // Of two cameras each is a view of the other: their baseline is known better than any speed.
     let both = settings.camera == Cameras::Both;
     config.stereo = both && (config.stereo || (!learned_from_drives && has_pairs(opened)));
-    if !learned_from_drives {
+    let new_pose_net = !learned_from_drives || own.leaves_pose_net_out();
+    if new_pose_net {
         // A new PoseNet's unit is found from these drives.
         config.pose_net.metres_per_unit = 0.0;
     }
@@ -99,8 +100,8 @@ pub(super) fn config(
         config.loss.depth.gradient = 0.5;
     }
     assign(&mut config, &settings.set)?;
-    if !learned_from_drives {
-        leave_new_pose_net_out(&mut config, &settings.set);
+    if new_pose_net {
+        leave_pose_net_out(&mut config, &settings.set);
     }
     // Around the size as it is now; a setting of the sizes themselves has the last word.
     if own.canonical_focal_px.is_some() {
@@ -117,12 +118,21 @@ fn assign(config: &mut TrainConfig, settings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// A new PoseNet would learn beside depth what depth does not need. It stays where views are warped by its poses, and where the settings say
-/// what is frozen.
-fn leave_new_pose_net_out(config: &mut TrainConfig, set: &[String]) {
+/// A new PoseNet would learn beside depth what depth does not need. It is there, and learns, where the views are warped by its poses or its masks
+/// are wanted; where the settings say what is frozen, that holds.
+fn leave_pose_net_out(config: &mut TrainConfig, set: &[String]) {
     let says_frozen = set.iter().any(|key| key.trim_start().starts_with("freeze"));
-    if config.view_motion == ViewMotion::Vehicle && !says_frozen {
-        config.freeze = vec![TrainConfig::POSE_NET.into()];
+    if says_frozen {
+        return;
+    }
+    let others = config
+        .freeze
+        .iter()
+        .filter(|name| *name != TrainConfig::POSE_NET);
+    let others: Vec<String> = others.cloned().collect();
+    config.freeze.push(TrainConfig::POSE_NET.into());
+    if !config.leaves_pose_net_out() {
+        config.freeze = others;
     }
 }
 
@@ -250,19 +260,24 @@ mod tests {
 
     #[test]
     fn a_new_pose_net_is_left_out_unless_something_needs_it() {
-        let left_out = |set: &[&str]| {
+        let frozen = |before: &[&str], set: &[&str]| {
             let set: Vec<String> = set.iter().map(|&key| key.into()).collect();
             let mut config = Preset::Monodepth2.config();
             config.view_motion = ViewMotion::Vehicle;
+            config.freeze = before.iter().map(|&name| name.into()).collect();
             assign(&mut config, &set).unwrap();
-            leave_new_pose_net_out(&mut config, &set);
-            config.validate().unwrap();
-            config.leaves_pose_net_out()
+            leave_pose_net_out(&mut config, &set);
+            config.freeze
         };
-        assert!(left_out(&[]));
-        assert!(left_out(&["loss.smoothness=0.01"]));
-        assert!(!left_out(&["freeze=[]"]));
-        assert!(!left_out(&["view_motion=distance"]));
-        assert!(!left_out(&["freeze=[\"depth.encoder\"]"]));
+        let (nothing, pose): ([&str; 0], _) = ([], ["pose"]);
+        // From a network without PoseNet, and from one that an earlier adaptation left without.
+        for before in [&nothing[..], &pose[..]] {
+            assert_eq!(frozen(before, &["loss.smoothness=0.01"]), pose);
+            assert_eq!(frozen(before, &["view_motion=distance"]), nothing);
+            assert_eq!(frozen(before, &["pose_net.explainability=true"]), nothing);
+            assert_eq!(frozen(before, &["freeze=[]"]), nothing);
+            let encoder = ["depth.encoder"];
+            assert_eq!(frozen(before, &["freeze=[\"depth.encoder\"]"]), encoder);
+        }
     }
 }
