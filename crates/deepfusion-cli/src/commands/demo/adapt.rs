@@ -25,8 +25,7 @@ use crate::failure::Result;
 use crate::interrupt;
 use crate::progress::{clock, say};
 
-/// Added to the demo's seed. By the default's the camera looks with another lens from another height than the usual one, in rain or fog or not:
-/// what learning adds differs from street to street (docs/BENCHMARKS.md).
+/// Added to the demo's seed. What learning adds differs from street to street: docs/BENCHMARKS.md.
 const STREET_SEED: u64 = 21;
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
 const FRAMES: usize = 200;
@@ -250,8 +249,8 @@ fn report(
         .map(|t| t.unscaled.abs_rel);
     let mut page = HtmlReport::new(
         "DeepFusion: metric depth from one camera and a speed signal",
-        "A simulated street that the embedded network has never seen: zero-shot, and after learning on its first part from images, \
-         speed and yaw rate, without any depth label",
+        "A simulated street that the embedded network has never seen, by a camera and in a light of its own: zero-shot, and after learning on \
+         its first part from images, speed and yaw rate, without any depth label",
     )
     .facts(&[
         ("Abs Rel zero-shot", &number(before.unscaled.abs_rel)),
@@ -270,7 +269,10 @@ fn report(
         let caption = "3D targets: boxes with distance, followed over time";
         page = page.picture(caption, &picture, PictureFormat::Png)?;
     }
-    page = page.section("After learning here");
+    page = page.section("After learning here").paragraph(
+        "The metre is learned here. A minute of video alone also lets the sky come nearer and softens edges; `deepfusion adapt` learns simulated \
+         depth beside, takes longer, and keeps both.",
+    );
     page = second.add_to(page, "its depth in metres after learning")?;
     page = second.add_error_to(page, "error_learned", "Relative error after learning")?;
     page = page
