@@ -130,6 +130,7 @@ fn leave_pose_net_out(config: &mut TrainConfig, set: &[String]) {
         .iter()
         .filter(|name| *name != TrainConfig::POSE_NET);
     let others: Vec<String> = others.cloned().collect();
+    config.freeze.clone_from(&others);
     config.freeze.push(TrainConfig::POSE_NET.into());
     if !config.leaves_pose_net_out() {
         config.freeze = others;
