@@ -13,9 +13,9 @@ impl Trainer {
             return Ok(());
         }
         let mut weights = DefaultHasher::new();
-        let focal = self.model().focal.as_ref().map(LearnedFocal::ratio);
-        focal.map(f64::to_bits).hash(&mut weights);
         let model = self.model();
+        let focal = model.focal.as_ref().map(LearnedFocal::ratio);
+        focal.map(f64::to_bits).hash(&mut weights);
         let pose = model.pose_net.as_ref().map(collect);
         let networks = [("depth", Some(collect(&model.depth_net))), ("pose", pose)];
         for (prefix, values) in networks {

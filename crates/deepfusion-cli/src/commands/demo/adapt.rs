@@ -270,8 +270,8 @@ fn report(
         page = page.picture(caption, &picture, PictureFormat::Png)?;
     }
     page = page.section("After learning here").paragraph(
-        "The metre is learned here. A minute of video alone also lets the sky come nearer and softens edges; `deepfusion adapt` learns simulated \
-         depth beside, takes longer, and keeps both.",
+        "What is learned is the metre. So little video alone may also let the sky come nearer and soften edges; simulated depth beside it, as \
+         `deepfusion adapt` learns, holds edges but needs more steps.",
     );
     page = second.add_to(page, "its depth in metres after learning")?;
     page = second.add_error_to(page, "error_learned", "Relative error after learning")?;
