@@ -380,7 +380,9 @@ fn what_comes_before_the_first_key_frame_is_left_out_and_said() {
     late[..3].fill(None);
     let bag = drive.bag("late.bag", Kind::Packet, "h264", &late);
     drive.came_back(&bag, KEYS);
-    let warnings = open(&bag).unwrap().warnings().join("\n");
+    let opened = open(&bag).unwrap();
+    let warnings: Vec<String> = opened.warnings().iter().map(ToString::to_string).collect();
+    let warnings = warnings.join("\n");
     let said = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
     assert!(warnings.contains(&said), "{warnings}");
 

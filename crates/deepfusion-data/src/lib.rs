@@ -25,12 +25,13 @@ pub use convert::{
     write_overlays,
 };
 pub use dataset::{
-    CalibrationPlace, Camera, CameraPath, Cameras, ClockOffset, Dataset, DatasetKind, DatasetParts,
-    DriveInspection, Ego, EgoMotion, Frame, FrameImage, Heading, Inspection, IntrinsicsSummary,
-    Mount, NamedTopic, NoMotion, NoNamedTopic, NoSuchCamera, OpenOptions, PLAUSIBLE_HEIGHT_M,
+    CalibrationPlace, Camera, CameraPath, CameraWarning, Cameras, ClockOffset, DataWarning,
+    Dataset, DatasetKind, DatasetParts, DriveInspection, Ego, EgoMotion, Frame, FrameImage,
+    Heading, IncompleteWarning, Inspection, IntrinsicsSummary, MotionWarning, Mount, MountWarning,
+    NamedTopic, NoMotion, NoNamedTopic, NoSuchCamera, NotByFrames, OpenOptions, PLAUSIBLE_HEIGHT_M,
     Receiver, Recording, SeenTurn, Snippet, Source, SpeedRange, SpeedWarning, Split, SplitCoverage,
-    SplitEntry, Stream, TopicRole, Unreadable, grey_image, hold_out, road_camera_height,
-    speed_unit_warning,
+    SplitEntry, Stream, TimesWarning, TopicRole, Unreadable, grey_image, hold_out,
+    road_camera_height, speed_unit_warning,
 };
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use error::{

@@ -1,6 +1,7 @@
 //! Which of a bag's sources drives, and the files beside a bag.
 
 use crate::common::bag::{CAMERA, TinyBag};
+use crate::common::text_of;
 use deepfusion_data::{Dataset, Error, OpenOptions, inspect};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::Frame;
@@ -281,7 +282,7 @@ fn a_signal_without_a_frame_is_an_error() {
     });
     let dataset = open(&drive.bag).unwrap();
     assert_eq!(dataset.frames()[12].speed_mps, None);
-    says(&dataset.warnings().join("\n"), &["can.speed", "0x158"]);
+    says(&text_of(dataset.warnings()), &["can.speed", "0x158"]);
 }
 
 const CALIBRATION: &str = "%YAML:1.0\n---\n\
@@ -377,7 +378,7 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     bag.finish().unwrap();
     let all = Dataset::open(drive.folder.path(), &OpenOptions::default()).unwrap();
     assert_eq!(all.len(), 1);
-    let warnings = all[0].warnings().join("\n");
+    let warnings = text_of(all[0].warnings());
     assert!(
         warnings.contains("left out") && warnings.contains("lidar"),
         "{warnings}"
@@ -385,7 +386,7 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     let seen = inspect(drive.folder.path()).unwrap();
     assert_eq!((seen.frames, seen.drives.len()), (all[0].frames().len(), 1));
     assert!(seen.unreadable.is_empty(), "{:?}", seen.unreadable);
-    let noted = seen.drives[0].warnings.join("\n");
+    let noted = text_of(&seen.drives[0].warnings);
     assert!(noted.contains("no images: lidar.bag"), "{noted}");
     // Alone it is what it is.
     let error = open(&other).unwrap_err().to_string();
@@ -412,7 +413,7 @@ fn what_cannot_be_read_of_a_folder_stands_beside_what_can() {
     let files = seen.unreadable.iter().map(|one| one.path.file_name());
     let files: Vec<_> = files.flatten().collect();
     assert_eq!(files, ["a.bag", "z.bag"]);
-    let noted = seen.drives[0].warnings.join("\n");
+    let noted = text_of(&seen.drives[0].warnings);
     assert!(noted.contains("no images: m.bag"), "{noted}");
     let error = &seen.unreadable[0].error;
     assert!(matches!(**error, Error::Bag(_)), "{error}");
@@ -495,7 +496,7 @@ fn messages_without_a_time_have_that_of_their_recording() {
         "{}",
         drive.turn_rad()
     );
-    let warnings = dataset.warnings().join("\n");
+    let warnings = text_of(dataset.warnings());
     for topic in ["/twist", "/imu", "/drive"] {
         says(
             &warnings,
@@ -508,7 +509,7 @@ fn messages_without_a_time_have_that_of_their_recording() {
     let stamped = Drive::new(sidecar, |bag| {
         bag.twist("/twist", 10.0).float("/bare", 1.0);
     });
-    let warnings = open(&stamped.bag).unwrap().warnings().join("\n");
+    let warnings = text_of(open(&stamped.bag).unwrap().warnings());
     assert!(!warnings.contains("no time"), "{warnings}");
 }
 
@@ -520,7 +521,7 @@ fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
     });
     near(drive.speed(), 10.0);
     says(
-        &open(&drive.bag).unwrap().warnings().join("\n"),
+        &text_of(open(&drive.bag).unwrap().warnings()),
         &["/can: 25 messages"],
     );
 }
@@ -541,6 +542,7 @@ fn damage_is_a_list_of_its_own_among_the_warnings() {
     let [damage] = cut.damage() else {
         panic!("{:?}", cut.damage());
     };
-    assert!(damage.starts_with("the bag is damaged: "), "{damage}");
+    let said = damage.to_string();
+    assert!(said.starts_with("the bag is damaged: "), "{said}");
     assert!(cut.warnings().contains(damage), "{:?}", cut.warnings());
 }

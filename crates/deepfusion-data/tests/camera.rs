@@ -1,5 +1,6 @@
 //! Where a recording's camera comes from when nobody calibrated it: a field of view, or what the photographs say.
 
+use crate::common::text_of;
 use deepfusion_data::{Dataset, Error, OpenOptions, load_photo};
 use deepfusion_hint::Hint;
 use exif::experimental::Writer;
@@ -196,8 +197,8 @@ fn photographs_say_what_their_camera_is() {
             "{name} {k:?}"
         );
         assert_eq!((k.fx, k.cx, k.cy), (k.fy, 31.5, 23.5));
-        let warnings = dataset.warnings();
-        let warning = warnings.iter().find(|r| r.contains("EXIF")).unwrap();
+        let warnings = text_of(dataset.warnings());
+        let warning = warnings.lines().find(|r| r.contains("EXIF")).unwrap();
         assert!(warning.contains(part), "{warning}");
         assert_eq!(
             warning.contains("fisheye"),

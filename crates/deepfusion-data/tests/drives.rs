@@ -1,6 +1,6 @@
 //! Opening recordings: every layout, and every reason not to.
 
-use crate::common::{self, TinyDrive};
+use crate::common::{self, TinyDrive, text_of};
 use deepfusion_data::kitti::{Calibration, find_drives};
 use deepfusion_data::{Camera, Cameras, Dataset, Error, OpenOptions, inspect, inspect_with};
 use deepfusion_hint::Hint;
@@ -395,7 +395,7 @@ fn an_inspection_lists_what_cannot_be_read() {
     };
     assert!(unreadable.path.ends_with("2030_01_02_drive_0008_sync"));
     assert!(matches!(*unreadable.error, Error::TimeStamp { .. }));
-    let warnings = seen.drives[0].warnings.join("\n");
+    let warnings = text_of(&seen.drives[0].warnings);
     for part in ["of camera 2", "drive_0009_sync", "drive_0010_sync"] {
         assert!(warnings.contains(part), "{part}: {warnings}");
     }

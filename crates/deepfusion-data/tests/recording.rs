@@ -1,14 +1,18 @@
 //! A layout of somebody else's: what it takes to be a [`Dataset`].
 
 use deepfusion_data::{
-    CalibrationPlace, Camera, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind,
-    MovingLabels, MovingPixels, MovingSource, NoTrackReason, Recording, Result, RgbImage, Stream,
-    VehicleTrack, speed_unit_warning,
+    CalibrationPlace, Camera, DataWarning, Dataset, DatasetKind, DatasetParts, Error, Frame,
+    FrameImage, GtKind, MovingLabels, MovingPixels, MovingSource, NoTrackReason, Recording, Result,
+    RgbImage, Stream, VehicleTrack, speed_unit_warning,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What no variant of this library's says.
+static WARNINGS: [DataWarning; 1] = [DataWarning::Other(Cow::Borrowed("its gyroscope was warm"))];
 
 /// Images that are made when they are asked for, as a bag's are decoded.
 #[derive(Debug, Default)]
@@ -51,6 +55,10 @@ impl Recording for Messages {
                 remedy: "record one".into(),
             },
         }
+    }
+
+    fn warnings(&self) -> &[DataWarning] {
+        &WARNINGS
     }
 
     fn moving_labels(&self, _: &Dataset) -> Result<Option<MovingLabels>> {
@@ -139,6 +147,14 @@ fn an_image_of_another_size_and_missing_speeds_are_reported_by_place() {
         dataset.camera_paths().unwrap_err(),
         Error::NoPath { .. }
     ));
+}
+
+#[test]
+fn a_layout_warns_in_its_own_words() {
+    let dataset = dataset(Messages::default(), None);
+    assert_eq!(dataset.warnings(), &WARNINGS);
+    assert_eq!(dataset.warnings()[0].to_string(), "its gyroscope was warm");
+    assert!(dataset.damage().is_empty() && dataset.passed_over().is_none());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! and no file beside them.
 
 use crate::common::bag::{CAMERA, TinyBag};
+use crate::common::text_of;
 use deepfusion_data::{Dataset, Error, GtKind, NamedTopic, OpenOptions, inspect, write_bag_config};
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
@@ -89,7 +90,7 @@ fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
     let rms = (of(|p| (p.0 - p.1).powi(2)) / pairs.len() as f64).sqrt();
     assert!(rms < 0.5, "{rms} m/s");
 
-    let warnings = dataset.warnings().join("\n");
+    let warnings = text_of(dataset.warnings());
     assert!(!warnings.contains("nothing says"), "{warnings}");
     says(
         &warnings,
@@ -223,7 +224,7 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
     let alone = Drive::new("", frames).opened();
     is_near(&camera(&alone).0, place);
     is_near(&camera(&alone).1, [1.0, 0.0, 0.0]);
-    let warnings = alone.warnings().join("\n");
+    let warnings = text_of(alone.warnings());
     assert!(!warnings.contains("cam_from_vehicle"), "{warnings}");
 
     let file = |x: f64| {
@@ -233,11 +234,11 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
     };
     let same = Drive::new(&file(-1.501), frames).opened();
     is_near(&camera(&same).0, [1.501, 0.0, 1.2]);
-    assert!(!same.warnings().join("\n").contains("apart"));
+    assert!(!text_of(same.warnings()).contains("apart"));
     let other = Drive::new(&file(-1.9), frames).opened();
     is_near(&camera(&other).0, [1.9, 0.0, 1.2]);
     says(
-        &other.warnings().join("\n"),
+        &text_of(other.warnings()),
         &[
             "cam_from_vehicle",
             "drive.toml and frames base_link → camera are 0.400 m and 0.00° apart",
@@ -272,7 +273,7 @@ fn the_frames_go_before_a_profile() {
     // 0.3 m above the camera, where its y looks down.
     is_near(&mount(&both).translation.into(), [0.0, -0.3, 0.0]);
     assert_eq!(mount(&both).source, "frames lidar → base_link → camera");
-    says(&both.warnings().join("\n"), &["the profile umad", "apart"]);
+    says(&text_of(both.warnings()), &["the profile umad", "apart"]);
     assert!(both.has_ground_truth(3, GtKind::Z));
 }
 
@@ -375,7 +376,7 @@ fn a_camera_that_pans_has_no_mount() {
         });
     });
     let dataset = drive.opened();
-    let warnings = dataset.warnings().join("\n");
+    let warnings = text_of(dataset.warnings());
     says(
         &warnings,
         &[
@@ -418,7 +419,7 @@ fn a_frame_that_is_not_optical_is_reported_and_turned() {
         ahead.x > 0.99 && ahead.y > 0.05 && ahead.z < -0.03,
         "{ahead}"
     );
-    let warnings = dataset.warnings().join("\n");
+    let warnings = text_of(dataset.warnings());
     says(&warnings, &["the images' frame camera has its z axis up"]);
     // The scan's point is 10 m ahead of the LiDAR, 0.4 m higher than the camera: in the picture, or it were not seen.
     let lidar = dataset.mounts().iter().find(|m| m.name == "cam_from_lidar");
@@ -438,7 +439,7 @@ fn frames_that_lead_nowhere_are_errors() {
             vec![("base_link", "cam0", [1.0, 0.0, 1.0], OPTICAL)]
         });
     });
-    let warnings = missing.opened().warnings().join("\n");
+    let warnings = text_of(missing.opened().warnings());
     says(
         &warnings,
         &[
@@ -463,7 +464,7 @@ fn frames_that_lead_nowhere_are_errors() {
             vec![("chassis", "camera", [1.0, 0.0, 1.0], OPTICAL)]
         });
     });
-    let warnings = nameless.opened().warnings().join("\n");
+    let warnings = text_of(nameless.opened().warnings());
     says(
         &warnings,
         &[

@@ -1,5 +1,6 @@
 //! Videos, read by the machine's ffmpeg where it has one.
 
+use crate::common::text_of;
 use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
 use deepfusion_hint::Hint;
 use deepfusion_video::{VideoPicture, shown_for};
@@ -107,8 +108,7 @@ fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
             ..OpenOptions::default()
         };
         let given = Dataset::open(&video, &hfov).unwrap();
-        let bends =
-            |dataset: &Dataset| dataset.warnings().iter().any(|w| w.contains("bends lines"));
+        let bends = |dataset: &Dataset| text_of(dataset.warnings()).contains("bends lines");
         if letter == b'L' {
             // Half a diagonal of 80 pixels over tan 45°.
             let found = &Dataset::open(&video, &OpenOptions::default()).unwrap()[0];
@@ -118,11 +118,8 @@ fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
                 "{k:?}"
             );
             assert!(!found.camera_assumed());
-            let said = found
-                .warnings()
-                .iter()
-                .any(|w| w.contains("linear lens of a HERO11 Black"));
-            assert!(said, "{:?}", found.warnings());
+            let said = text_of(found.warnings());
+            assert!(said.contains("linear lens of a HERO11 Black"), "{said}");
             assert!(!bends(&given[0]));
             // What is given counts more.
             assert!((given[0].intrinsics(0).fx - 32.0 / 30_f64.to_radians().tan()).abs() < 1e-6);

@@ -76,12 +76,12 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         };
         let remedy = if damaged {
             "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
-        } else if survey.dataset.passed_over() == Some(warning.as_str()) {
+        } else if survey.dataset.passed_over() == Some(warning) {
             "give what is to be read as well by its own path"
         } else {
             "see that it is so, or say otherwise in the file beside the recording"
         };
-        outcome.find(severity, None, warning.clone(), remedy);
+        outcome.find(severity, None, warning.to_string(), remedy);
     }
     outcome
 }

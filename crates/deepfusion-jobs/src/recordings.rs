@@ -349,13 +349,21 @@ mod tests {
         (ahead.x, ahead.y)
     }
 
+    fn said(drive: &Dataset) -> String {
+        let warnings = drive.warnings().iter();
+        warnings
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n")
+    }
+
     #[test]
     fn a_camera_whose_mount_is_not_given_is_aimed() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
         let folder = folder(at.path())?;
         let options = OpenOptions::default();
         let taken = &open_recordings(std::slice::from_ref(&folder), &options)?[0];
-        assert!(taken.mount_assumed() && taken.warnings().iter().any(|w| w.contains("straight")));
+        assert!(taken.mount_assumed() && said(taken).contains("straight"));
         let straight = |(right, down): (f64, f64)| right.abs() < 1e-9 && down.abs() < 1e-9;
         assert!(straight(ahead(taken)));
 
@@ -368,7 +376,7 @@ mod tests {
         );
         assert!((down + off.sin()).abs() < 0.008 && right.abs() < 0.008);
         assert!(!aimed.mount_assumed());
-        let said = aimed.warnings().join("\n");
+        let said = said(aimed);
         assert!(
             said.contains("degrees down") && !said.contains("straight ahead"),
             "{said}"

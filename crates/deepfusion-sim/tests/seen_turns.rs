@@ -91,7 +91,8 @@ fn images_show_how_the_vehicle_turned() {
         // The camera then moves between images as it did.
         alone.take_turns(&without_yaw);
         assert!(alone.yaw_known() && !alone.tilt_unknown());
-        let said = alone.warnings().join("\n");
+        let said: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
+        let said = said.join("\n");
         assert!(
             said.contains("taken from the images") && !said.contains("no yaw rate"),
             "{said}"

@@ -9,16 +9,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use deepfusion::data::{self, Dataset, DatasetParts, Frame, FrameImage, Recording, RgbImage};
+use deepfusion::data::{
+    self, DataWarning, Dataset, DatasetParts, Frame, FrameImage, Recording, RgbImage,
+};
 use deepfusion::geometry::Intrinsics;
 
 /// What all layouts share lies in the dataset; this is the rest, read when it is asked for. More can be said, such as ground truth.
 #[derive(Debug)]
-struct NamedByTime(PathBuf);
+struct NamedByTime {
+    folder: PathBuf,
+    warnings: Vec<DataWarning>,
+}
 
 impl Recording for NamedByTime {
     fn folder(&self) -> &Path {
-        &self.0
+        &self.folder
+    }
+    fn warnings(&self) -> &[DataWarning] {
+        &self.warnings
     }
     fn load_image(&self, frame: &Frame) -> data::Result<RgbImage> {
         data::load_rgb(frame.image.path())
@@ -39,8 +47,10 @@ fn main() -> Result<()> {
     images.sort();
     let (_, first) = images.first().context("no image is named by its time")?;
     let size = data::image_size(first)?;
-    // Taken to be 90 degrees wide.
     let camera = Intrinsics::centred(f64::from(size.0) / 2.0, size);
+    let warnings = vec![DataWarning::Other(
+        "the camera is taken to be 90 degrees wide".into(),
+    )];
     let frame = |(number, (ms, path)): (usize, (u64, PathBuf))| Frame {
         drive: "own".into(),
         number: number as u64,
@@ -50,7 +60,10 @@ fn main() -> Result<()> {
     };
     let frames = images.into_iter().enumerate().map(frame).collect();
     let parts = DatasetParts::of_frames("own", frames, camera);
-    let dataset = Dataset::new(parts, Arc::new(NamedByTime(folder)));
+    let dataset = Dataset::new(parts, Arc::new(NamedByTime { folder, warnings }));
+    for warning in dataset.warnings() {
+        eprintln!("warning: {warning}");
+    }
     let pairs = dataset.snippets(&[1], 0.5)?.len();
     let frames = dataset.frames().len();
     println!("{frames} frames, {pairs} pairs to learn from");

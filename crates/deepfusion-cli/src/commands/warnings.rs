@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-use deepfusion_data::Dataset;
+use deepfusion_data::{DataWarning, Dataset};
 
 /// Those that were printed: both cameras of a drive, and a recording that is opened again, have the same warnings.
 static PRINTED: LazyLock<Mutex<HashSet<String>>> = LazyLock::new(Mutex::default);
@@ -19,7 +19,7 @@ pub(super) fn warn_once(warning: String) {
 /// in common.
 pub(super) fn print(datasets: &[Dataset]) {
     for warning in datasets.iter().filter_map(Dataset::passed_over) {
-        warn_once(warning.to_owned());
+        warn_once(warning.to_string());
     }
     for (warning, places) in by_warning(datasets.iter().flat_map(warnings)) {
         let new: Vec<String> = places
@@ -61,9 +61,9 @@ fn warnings(dataset: &Dataset) -> impl Iterator<Item = (String, String)> {
     let image = dataset.frames().first().map(|frame| &frame.image);
     let container = image.filter(|i| i.file().is_none()).map(|i| i.path());
     let place = container.unwrap_or(dataset.folder()).display();
-    let about_it = move |warning: &&String| dataset.passed_over() != Some(warning.as_str());
+    let about_it = move |warning: &&DataWarning| dataset.passed_over() != Some(*warning);
     let warnings = dataset.warnings().iter().filter(about_it);
-    warnings.map(move |warning| (place.to_string(), warning.clone()))
+    warnings.map(move |warning| (place.to_string(), warning.to_string()))
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 
 use super::calibration::CameraCalibration;
 use super::source::CalibrationSource;
-use crate::dataset::{assumed_warning, numbers_of_hfov};
+use crate::dataset::numbers_of_hfov;
 use crate::dataset_toml::FolderConfig;
 use crate::pictures::{ExifCamera, exif_camera};
-use crate::{CameraProblem, DatasetKind, Error, OpenOptions, Result};
+use crate::{CameraProblem, CameraWarning, DataWarning, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_logs::GoproLens;
 use std::path::{Path, PathBuf};
 
@@ -59,7 +59,7 @@ pub(crate) fn find_camera(
     size: (u32, u32),
     layout: DatasetKind,
     pictures: Pictures<'_>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<DataWarning>,
 ) -> Result<CameraCalibration> {
     if let Some(given) = options.given_camera(size) {
         let given = CameraCalibration::given(given, size, CalibrationSource::Given)?;
@@ -89,12 +89,13 @@ pub(crate) fn find_camera(
         Pictures::Video(_, None) => None,
     };
     if let Some((calibration, warning)) = said {
-        warnings.push(warning);
+        warnings.push(warning.into());
         return Ok(calibration);
     }
     match options.assumed_numbers(size) {
         Some(assumed) => {
-            warnings.push(assumed_warning(assumed));
+            let [fx, fy, ..] = assumed;
+            warnings.push(CameraWarning::Assumed { fx, fy }.into());
             let calibration = CameraCalibration::given(assumed, size, folder.into())?;
             Ok(CameraCalibration {
                 assumed: true,
@@ -111,11 +112,14 @@ pub(crate) fn find_camera(
 /// How many images of a recording are asked whether the camera stayed as it was.
 const ASKED: usize = 9;
 
-/// The camera that the images' EXIF blocks say, and a sentence that says so; `None` where the first says nothing.
+/// The camera that the images' EXIF blocks say, and a warning that they do; `None` where the first says nothing.
 ///
 /// # Errors
 /// [`Error::CameraFile`] where another image, of those asked, was taken with another focal length.
-fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibration, String)>> {
+fn by_exif(
+    images: &[PathBuf],
+    size: (u32, u32),
+) -> Result<Option<(CameraCalibration, CameraWarning)>> {
     let said = |path: &PathBuf| exif_camera(path, size);
     let Some((path, first)) = images.first().and_then(|path| Some((path, said(path)?))) else {
         return Ok(None);
@@ -140,42 +144,35 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
         action_camera,
         turned,
     } = first;
-    let mut warning = format!(
-        "the camera is taken from EXIF in {}: {by}, so fx = fy = {:.1}, the principal point in the middle; a calibration is better",
-        name(path),
-        k.fx
-    );
-    if action_camera {
-        warning += "; an action camera's wide lens bends lines, which no pinhole does: take pictures through its linear lens, or calibrate it as \
-                    a fisheye lens";
-    }
-    if turned {
-        warning +=
-            "; the images are used as they are stored, not turned as EXIF's orientation says";
-    }
+    let warning = CameraWarning::ByExif {
+        image: path.clone(),
+        by,
+        focal_px: k.fx,
+        action_camera,
+        turned,
+    };
     let calibration =
         CameraCalibration::given([k.fx, k.fy, k.cx, k.cy], size, path.as_path().into())?;
     Ok(Some((calibration, warning)))
 }
 
-/// The camera that a GoPro's video says, and a sentence that says so; `None` for another than the linear lens.
+/// The camera that a GoPro's video says, and a warning that it does; `None` for another than the linear lens.
 fn by_gopro(
     file: &Path,
     lens: &GoproLens,
     size: (u32, u32),
-) -> Result<Option<(CameraCalibration, String)>> {
-    let Some(focal) = lens.focal_px(size) else {
+) -> Result<Option<(CameraCalibration, CameraWarning)>> {
+    let Some(focal_px) = lens.focal_px(size) else {
         return Ok(None);
     };
-    let hfov_deg = 2.0 * (f64::from(size.0) / 2.0 / focal).atan().to_degrees();
+    let hfov_deg = 2.0 * (f64::from(size.0) / 2.0 / focal_px).atan().to_degrees();
     let calibration = CameraCalibration::given(numbers_of_hfov(hfov_deg, size), size, file.into())?;
-    let warning = format!(
-        "the camera is taken from {}: the linear lens of a {}, {:.1}° from corner to corner, so fx = fy = {focal:.1}, the principal point in the \
-         middle; a calibration is better",
-        name(file),
-        lens.model,
-        lens.diagonal_deg
-    );
+    let warning = CameraWarning::ByGopro {
+        video: file.to_owned(),
+        model: lens.model.clone(),
+        diagonal_deg: lens.diagonal_deg,
+        focal_px,
+    };
     Ok(Some((calibration, warning)))
 }
 

@@ -1,14 +1,15 @@
 use super::camera::Camera;
 use super::ego::{Ego, Receiver};
 use super::frame::Frame;
-use super::heading::{Heading, NO_MOUNT, NOT_GIVEN};
+use super::heading::Heading;
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use super::options::OpenOptions;
 use super::recording::{CameraPath, Recording};
-use super::seen_turn::{self, NO_YAW_RATE, SeenTurn};
+use super::seen_turn::{self, SeenTurn};
 use super::selection::Selection;
 use super::split::drive_name;
+use super::warning::{DataWarning, IncompleteWarning, MotionWarning, MountWarning};
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
 use crate::{Error, MotionModel, Result, VehicleTrack, image_size};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -85,8 +86,7 @@ pub struct Dataset {
     mount_assumed: bool,
     simulated: bool,
     /// The recording's, and what was noticed about its neighbours.
-    warnings: Vec<String>,
-    passed_over: Option<String>,
+    warnings: Vec<DataWarning>,
 }
 
 /// Between the samples of a track whose turns are those of a course, in seconds.
@@ -101,7 +101,6 @@ impl Dataset {
             selected: (0..parts.frames.len()).collect(),
             parts,
             warnings: recording.warnings().to_vec(),
-            passed_over: None,
             recording,
             receiver: Receiver::default(),
             camera_assumed: false,
@@ -160,8 +159,9 @@ impl Dataset {
         if let Some(cam_from_vehicle) = mount {
             *cam_from_vehicle = heading.turn() * *cam_from_vehicle;
             self.mount_assumed = false;
-            self.warnings.retain(|warning| warning != NO_MOUNT);
-            self.warnings.push(format!("{NOT_GIVEN} {heading}"));
+            self.warnings
+                .retain(|warning| !matches!(warning, DataWarning::Mount(MountWarning::NotGiven)));
+            self.warnings.push(MountWarning::Aimed(*heading).into());
         }
     }
 
@@ -184,11 +184,15 @@ impl Dataset {
         let track = self.parts.track.take();
         self.parts.track = track.map(|track| seen_turn::put_into(track, turns, yaw_known));
         self.parts.yaw_known = true;
-        self.warnings
-            .retain(|warning| !warning.contains(NO_YAW_RATE));
+        self.warnings.retain(|warning| {
+            !matches!(
+                warning,
+                DataWarning::Motion(MotionWarning::NoYawRate { .. })
+            )
+        });
         let images = self.frames().len();
-        self.warnings
-            .push(seen_turn::warning(turns, images, yaw_known));
+        let taken = seen_turn::warning(turns, images, yaw_known);
+        self.warnings.push(taken.into());
     }
 
     /// Whether these are the turns of nine tenths of the neighbours between which the vehicle moved.
@@ -524,34 +528,33 @@ impl Dataset {
         self.recording.mounts()
     }
 
-    /// What was taken for granted, looks odd or cannot be read, in sentences.
+    /// What was taken for granted, looks odd or cannot be read.
     #[must_use]
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[DataWarning] {
         &self.warnings
     }
 
     /// Those of [`Self::warnings`] that say what of the recording cannot be read.
     #[must_use]
-    pub fn damage(&self) -> &[String] {
+    pub fn damage(&self) -> &[DataWarning] {
         self.recording.damage()
     }
 
     /// That of [`Self::warnings`] which says what else in the folder that was [opened](Self::open) looks like a recording and is not read. It
     /// names the folder, and is about no single recording in it: the first of them has it.
     #[must_use]
-    pub fn passed_over(&self) -> Option<&str> {
-        self.passed_over.as_deref()
-    }
-
-    /// Adds what is not read with it.
-    pub(crate) fn pass_over(&mut self, warning: String) {
-        self.warnings.push(warning.clone());
-        self.passed_over = Some(warning);
+    pub fn passed_over(&self) -> Option<&DataWarning> {
+        self.warnings.iter().find(|warning| {
+            matches!(
+                warning,
+                DataWarning::Incomplete(IncompleteWarning::PassedOver { .. })
+            )
+        })
     }
 
     /// Adds what was noticed beside it.
-    pub(crate) fn warning(&mut self, warning: String) {
-        self.warnings.push(warning);
+    pub(crate) fn warn(&mut self, warning: impl Into<DataWarning>) {
+        self.warnings.push(warning.into());
     }
 
     /// Stretches of at least two frames whose numbers follow each other, by index.

@@ -7,14 +7,6 @@ use deepfusion_geometry::Se3;
 use nalgebra::{Vector2, Vector3};
 use std::fmt;
 
-/// What is said first where nothing tells where the camera is.
-pub(crate) const NOT_GIVEN: &str =
-    "the camera's place on the vehicle is not given ([mount] in dataset.toml):";
-
-/// What is said where nothing, not even its images, tells where the camera is.
-pub(crate) const NO_MOUNT: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight \
-     ahead and to move as the vehicle does";
-
 /// Standard error of a heading that is sure enough to be taken, radians: a quarter of a degree.
 const SURE: f64 = 0.0044;
 /// A heading that is further off is another error, or no road vehicle's: ten degrees, in radians.

@@ -1,6 +1,7 @@
 //! What is in a recording, as `data inspect` prints it.
 
 use super::kind::DatasetKind;
+use super::warning::DataWarning;
 use crate::Error;
 use deepfusion_geometry::Intrinsics;
 use serde::{Serialize, Serializer};
@@ -61,6 +62,10 @@ fn text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::
     serializer.collect_str(value)
 }
 
+fn texts<S: Serializer>(warnings: &[DataWarning], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(warnings.iter().map(ToString::to_string))
+}
+
 /// One drive of an [`Inspection`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriveInspection {
@@ -94,9 +99,9 @@ pub struct DriveInspection {
     pub time_offset: Option<ClockOffset>,
     /// Where its sensors are, and by whom; of a bag.
     pub mounts: Vec<Mount>,
-    /// What was taken for granted or looks odd; `remarks` in JSON.
-    #[serde(rename = "remarks")]
-    pub warnings: Vec<String>,
+    /// What was taken for granted or looks odd; `remarks` in JSON, in sentences.
+    #[serde(rename = "remarks", serialize_with = "texts")]
+    pub warnings: Vec<DataWarning>,
 }
 
 /// Where a sensor is, as the file beside a bag has it.

@@ -1,25 +1,26 @@
 //! What every layout becomes: a [`Dataset`] of [`Frame`]s, with [`Snippet`]s to train on.
 //!
 //! `recording` is what a layout has to offer, `drive` what is made of it; `ego` says how the camera moved, `split` and `selection` which
-//! frames are meant, `inspection` what is there.
+//! frames are meant, `inspection` what is there, `warning` what is unsure about it.
 
 mod camera;
 mod coverage;
 mod drive;
 mod ego;
 mod frame;
-pub(crate) mod heading;
+mod heading;
 mod inspection;
 mod inspection_text;
 mod kind;
 mod options;
 mod recording;
-pub(crate) mod seen_turn;
+mod seen_turn;
 pub(crate) mod selection;
 mod snippet;
 mod speed_check;
 mod split;
 mod topic;
+mod warning;
 
 pub use camera::{Camera, Cameras, NoSuchCamera};
 pub use coverage::SplitCoverage;
@@ -33,7 +34,7 @@ pub use inspection::{
 };
 pub use kind::DatasetKind;
 pub use options::OpenOptions;
-pub(crate) use options::{assumed_warning, numbers_of_hfov};
+pub(crate) use options::numbers_of_hfov;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
 pub use seen_turn::SeenTurn;
 pub use snippet::{Snippet, Source, hold_out};
@@ -42,3 +43,7 @@ pub use speed_check::{
 };
 pub use split::{Split, SplitEntry};
 pub use topic::{NamedTopic, NoNamedTopic, TopicRole};
+pub use warning::{
+    CameraWarning, DataWarning, IncompleteWarning, MotionWarning, MountWarning, NotByFrames,
+    TimesWarning,
+};

@@ -50,13 +50,6 @@ impl OpenOptions {
     }
 }
 
-/// What is said of a camera that is assumed.
-pub(crate) fn assumed_warning([fx, fy, ..]: [f64; 4]) -> String {
-    format!(
-        "nothing says what the camera is: fx = {fx:.1}, fy = {fy:.1} are assumed, the principal point in the middle"
-    )
-}
-
 /// fx, fy, cx, cy of images of a size that see `hfov_deg` degrees from left to right. An angle that is none gives numbers that
 /// are no camera, which [`crate::CameraCalibration::given`] refuses.
 pub(crate) fn numbers_of_hfov(hfov_deg: f64, size: (u32, u32)) -> [f64; 4] {

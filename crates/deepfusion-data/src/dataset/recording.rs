@@ -4,6 +4,7 @@ use super::drive::Dataset;
 use super::frame::Frame;
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
+use super::warning::DataWarning;
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
 use crate::{CalibrationSource, Error, MissingPart, Result};
 use deepfusion_geometry::{DepthMap, Se3};
@@ -54,13 +55,13 @@ pub trait Recording: fmt::Debug + Send + Sync {
         }
     }
 
-    /// What was taken for granted, looks odd or cannot be read, in sentences for the inspection.
-    fn warnings(&self) -> &[String] {
+    /// What was taken for granted, looks odd or cannot be read; what no other variant says is a [`DataWarning::Other`].
+    fn warnings(&self) -> &[DataWarning] {
         &[]
     }
 
     /// Those of [`Self::warnings`] that say what cannot be read.
-    fn damage(&self) -> &[String] {
+    fn damage(&self) -> &[DataWarning] {
         &[]
     }
 

@@ -1,10 +1,7 @@
 //! How a vehicle turned, as its images show it.
 
+use super::warning::MotionWarning;
 use crate::MotionModel;
-use deepfusion_hint::count_of;
-
-/// What is said of a log of speeds that knows no turns.
-pub(crate) const NO_YAW_RATE: &str = "no yaw rate, here or in imu.csv";
 
 /// How a vehicle turned from one image to the next, as these show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,25 +52,15 @@ fn rates(turns: &[SeenTurn]) -> Vec<(f64, (f64, [f64; 2]))> {
 }
 
 /// What is said of a recording of so many images whose turns were taken from them.
-pub(super) fn warning(turns: &[SeenTurn], images: usize, yaw_known: bool) -> String {
+pub(super) fn warning(turns: &[SeenTurn], images: usize, yaw_known: bool) -> MotionWarning {
     let mut pitches: Vec<f64> = turns.iter().map(|turn| turn.tilt_rad[1].abs()).collect();
     pitches.sort_by(f64::total_cmp);
-    let pitch = pitches.get(pitches.len() / 2).copied().unwrap_or(0.0);
-    let what = if yaw_known {
-        "roll and pitch"
-    } else {
-        "the vehicle's turns (yaw, roll and pitch)"
-    };
-    let pairs = images.saturating_sub(1);
-    let seen = if turns.len() == pairs {
-        String::new()
-    } else {
-        format!(" ({} of {})", turns.len(), count_of(pairs, "pair"))
-    };
-    format!(
-        "{what} are not recorded: they are taken from the images{seen}, {:.2} degrees of pitch from one to the next (median)",
-        pitch.to_degrees()
-    )
+    MotionWarning::TurnsOfImages {
+        yaw_recorded: yaw_known,
+        seen: turns.len(),
+        pairs: images.saturating_sub(1),
+        pitch_rad: pitches.get(pitches.len() / 2).copied().unwrap_or(0.0),
+    }
 }
 
 #[cfg(test)]
@@ -138,6 +125,7 @@ mod tests {
         let tilt = |from_s: f64| measured.motion(from_s, from_s + 2.0).unwrap().tilt_rad;
         assert!((tilt(2.0)[1] - 0.02).abs() < 1e-3);
         assert_eq!(tilt(12.0), [0.0; 2]);
-        assert!(warning(&seen, 11, false).contains("(6 of 10 pairs)"));
+        let said = warning(&seen, 11, false).to_string();
+        assert!(said.contains("(6 of 10 pairs)"), "{said}");
     }
 }

@@ -11,10 +11,9 @@ use crate::logs::samples::Samples;
 use crate::logs::speed_log::SpeedLog;
 use crate::logs::vehicle_log::VehicleLog;
 use crate::{
-    Camera, Dataset, DatasetKind, DriveInspection, Error, Inspection, MissingPart, OpenOptions,
-    Result, SegmentProblem, SpeedRange, Stream,
+    Camera, DataWarning, Dataset, DatasetKind, DriveInspection, Error, Inspection, MissingPart,
+    MotionWarning, OpenOptions, Result, SegmentProblem, SpeedRange, Stream, TimesWarning,
 };
-use deepfusion_hint::count_of;
 use deepfusion_motion::{ImuMount, comma};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -63,12 +62,13 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     )?;
     let times = frame_times(folder)?;
     if times.len() != video.count() {
-        warnings.push(format!(
-            "{FRAME_TIMES} has {}, {VIDEO} {}: the first {} are taken",
-            count_of(times.len(), "time"),
-            count_of(video.count(), "frame"),
-            times.len().min(video.count())
-        ));
+        let other_count = TimesWarning::OtherCount {
+            list: FRAME_TIMES,
+            times: times.len(),
+            video: VIDEO,
+            frames: video.count(),
+        };
+        warnings.push(other_count.into());
     }
     let numbers = numbers_by_time(&times);
     let images = numbers.into_iter().zip(&times).take(video.count());
@@ -202,11 +202,7 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
     let vehicle = vehicle(folder, config)?;
     let warnings = match &vehicle {
         Some(_) => Vec::new(),
-        None => vec![
-            "the segment has neither gyroscope and accelerometer nor a steering angle of a known vehicle: how the car \
-             turned is unknown"
-                .into(),
-        ],
+        None => vec![DataWarning::from(MotionWarning::SegmentWithoutTurns)],
     };
     Ok(Some(SpeedLog {
         vehicle,

@@ -4,8 +4,9 @@ use super::files::name_of;
 use super::layout::Layout;
 use super::{bag, comma};
 use crate::{
-    Cameras, ClockOffset, Dataset, DatasetKind, DriveInspection, Error, GtKind, Inspection,
-    IntrinsicsSummary, OpenOptions, Result, SpeedRange, Stream, Unreadable,
+    Cameras, ClockOffset, DataWarning, Dataset, DatasetKind, DriveInspection, Error, GtKind,
+    IncompleteWarning, Inspection, IntrinsicsSummary, OpenOptions, Result, SpeedRange, Stream,
+    Unreadable,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ pub fn inspect_with(
     let passed_over = layout.passed_over(path);
     let mut inspection = inspect_layout(path, layout, options, time_offset)?;
     if let Some(first) = inspection.drives.first_mut() {
-        first.warnings.extend(passed_over);
+        first.warnings.extend(passed_over.map(DataWarning::from));
     }
     Ok(inspection)
 }
@@ -73,15 +74,12 @@ fn inspect_layout(
     if let Some(first) = seen.first_mut()
         && !without_images.is_empty()
     {
-        let which = match kind {
-            DatasetKind::Bag => String::new(),
-            _ => format!(" of camera {}", first.drive.camera),
-        };
         let names = without_images.iter().map(|one| name_of(&one.path));
-        let names: Vec<String> = names.collect();
-        let names = names.join(", ");
-        let warning = format!("left out, as they give no images{which}: {names}");
-        first.drive.warnings.push(warning);
+        let left_out = IncompleteWarning::NoImages {
+            camera: (kind != DatasetKind::Bag).then_some(first.drive.camera),
+            recordings: names.collect(),
+        };
+        first.drive.warnings.push(left_out.into());
     }
     let several = seen.len() > 1;
     let mut streams = Vec::new();

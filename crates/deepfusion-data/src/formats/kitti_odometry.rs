@@ -14,8 +14,8 @@ use crate::logs::clock::TimeUnit;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::measured::{MeasuredDepth, velodyne};
 use crate::{
-    Camera, CameraCalibration, Dataset, DatasetKind, Error, MissingPart, OpenOptions, Result,
-    TimeStampProblem, image_size,
+    Camera, CameraCalibration, DataWarning, Dataset, DatasetKind, Error, MissingPart, MountWarning,
+    OpenOptions, Result, TimeStampProblem, image_size,
 };
 use deepfusion_geometry::{Distortion, Intrinsics, Se3};
 use nalgebra::Matrix3x4;
@@ -27,8 +27,6 @@ const IMAGES: [&str; 3] = ["jpeg", "jpg", "png"];
 /// The unit above KITTI's rear axle in rectified camera 0, in metres: R_rect_00 · (cam0_from_velo · velo_from_imu) by KITTI raw's
 /// calibration of 2011_09_26.
 const VEHICLE_IN_CAM0: [f64; 3] = [-0.314, 0.719, -1.089];
-const MOUNT: &str = "KITTI odometry does not say where the cameras are on the car: their place is taken from KITTI raw's calibration, \
-     their direction from the way the car goes";
 
 /// The sequences at a path: the folder itself, those in `sequences`, or those in it.
 pub(crate) fn find(path: &Path) -> Result<Vec<PathBuf>> {
@@ -183,7 +181,10 @@ impl<'a> Sequence<'a> {
             },
             camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
             image_size: size,
-            warnings: speeds.iter().map(|_| MOUNT.to_owned()).collect(),
+            warnings: speeds
+                .iter()
+                .map(|_| DataWarning::from(MountWarning::OfKittiRaw))
+                .collect(),
             speeds,
             mount_assumed: false,
             cam_from_vehicle: cam_from_cam0 * cam0_from_vehicle,

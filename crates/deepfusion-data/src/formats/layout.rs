@@ -5,7 +5,10 @@ use super::kitti::{self, Drive, drive_around, find_drives};
 use super::neighbours::{Wanted, unread};
 use super::{bag, comma, folder, found_instead, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
-use crate::{ConfigProblem, Dataset, DatasetKind, Error, FoundInstead, OpenOptions, Result};
+use crate::{
+    ConfigProblem, Dataset, DatasetKind, Error, FoundInstead, IncompleteWarning, OpenOptions,
+    Result,
+};
 use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,7 +36,7 @@ impl Dataset {
         let layout = Layout::of(path)?;
         let mut datasets = layout.open(path, options)?;
         if let (Some(first), Some(warning)) = (datasets.first_mut(), layout.passed_over(path)) {
-            first.pass_over(warning);
+            first.warn(warning);
         }
         Ok(datasets)
     }
@@ -218,11 +221,9 @@ impl Layout {
         Ok(())
     }
 
-    /// What else lies in the folder at a path, looks like a recording and is not read, in a sentence that names the folder; `None` where
-    /// there is nothing of the kind, and for a file.
-    pub(crate) fn passed_over(&self, path: &Path) -> Option<String> {
-        /// Names that are said.
-        const MOST: usize = 6;
+    /// What else lies in the folder at a path, looks like a recording and is not read; `None` where there is nothing of the kind, and for a
+    /// file.
+    pub(crate) fn passed_over(&self, path: &Path) -> Option<IncompleteWarning> {
         let folder = path.canonicalize().ok()?;
         // A bag of ROS 2 may be a folder of its files.
         if !folder.is_dir() || [path, folder.as_path()].into_iter().any(bag::is_bag) {
@@ -239,27 +240,16 @@ impl Layout {
                 _ => false,
             },
         };
-        let names = unread(&folder, wanted);
-        let said = names.get(..MOST).unwrap_or(&names).join(", ");
-        let more = match names.len().checked_sub(MOST) {
-            None | Some(0) => String::new(),
-            Some(more) => format!(" and {more} more"),
-        };
-        let (these, are, each) = match names.len() {
-            0 => return None,
-            1 => ("this", "looks like a recording and is", "it"),
-            _ => ("these", "look like recordings and are", "each"),
-        };
-        // `.` and `..` name nothing.
-        let shown: &Path = match path.file_name() {
-            Some(_) => path,
-            None => &folder,
-        };
-        Some(format!(
-            "{} is read as {} alone; {these} in it {are} not read: {said}{more} (give {each} by its own path)",
-            shown.display(),
-            self.kind().label()
-        ))
+        let recordings = unread(&folder, wanted);
+        (!recordings.is_empty()).then(|| IncompleteWarning::PassedOver {
+            // `.` and `..` name nothing.
+            folder: match path.file_name() {
+                Some(_) => path.to_owned(),
+                None => folder,
+            },
+            layout: self.kind(),
+            recordings,
+        })
     }
 
     /// Files and folders that are read of a recording in a folder, as far as they could be taken for other recordings.
@@ -347,7 +337,8 @@ mod tests {
     }
 
     fn passed_over(at: &Path) -> Option<String> {
-        Layout::of(at).unwrap().passed_over(at)
+        let found = Layout::of(at).unwrap().passed_over(at);
+        found.map(|warning| warning.to_string())
     }
 
     #[test]

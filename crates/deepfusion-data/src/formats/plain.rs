@@ -1,18 +1,16 @@
 //! What the layouts of frames in files or in a video have in common: one camera, times, speeds, poses, measured depth.
 
-use crate::dataset::heading::NO_MOUNT;
 use crate::dataset::selection::Selection;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::logs::frame_times::TimedImage;
 use crate::logs::speed_log::SpeedLog;
 use crate::truth::measured::MeasuredDepth;
 use crate::{
-    CalibrationPlace, CalibrationSource, Camera, CameraCalibration, CameraPath, Dataset,
-    DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind, Lens, NoTrackReason, OpenOptions,
-    Receiver, Recording, Result, Stream, load_rgb,
+    CalibrationPlace, Camera, CameraCalibration, CameraPath, CameraWarning, DataWarning, Dataset,
+    DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind, Lens, MotionWarning, MountWarning,
+    NoTrackReason, OpenOptions, Receiver, Recording, Result, Stream, load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
-use deepfusion_hint::count_of;
 use deepfusion_video::VideoFrames;
 use image::RgbImage;
 use std::collections::BTreeMap;
@@ -57,7 +55,7 @@ pub(crate) struct PlainRecording {
     truth: Option<MeasuredDepth>,
     world_from_cam: BTreeMap<u64, Se3>,
     streams: Vec<Stream>,
-    warnings: Vec<String>,
+    warnings: Vec<DataWarning>,
     /// Why there is no ego-motion, where there is none.
     no_motion: NoTrackReason,
 }
@@ -84,7 +82,7 @@ pub(crate) struct PlainParts {
     pub(crate) world_from_cam: BTreeMap<u64, Se3>,
     /// Beside those of the images, the speeds, the poses and the measured depth.
     pub(crate) streams: Vec<Stream>,
-    pub(crate) warnings: Vec<String>,
+    pub(crate) warnings: Vec<DataWarning>,
     /// Whether there are poses, but no times to make speeds of them.
     pub(crate) untimed_poses: bool,
 }
@@ -97,7 +95,7 @@ impl PlainParts {
     /// [`Error::FrameSize`], [`Error::Image`], [`Error::Motion`].
     pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
         if self.mount_assumed {
-            self.warnings.push(NO_MOUNT.into());
+            self.warnings.push(MountWarning::NotGiven.into());
         }
         for ns in self.images.iter_mut().filter_map(|i| i.ns.as_mut()) {
             *ns = on_the_vehicles_clock(*ns, self.camera_ahead_s);
@@ -229,37 +227,27 @@ impl PlainParts {
             });
         }
         if known < timed {
-            self.warnings.push(format!(
-                "no speed is measured about the time of {} of {}",
-                timed - known,
-                count_of(timed, "frame")
-            ));
+            let frames = timed - known;
+            let unknown = MotionWarning::FramesWithoutSpeed { frames, of: timed };
+            self.warnings.push(unknown.into());
         }
         Ok(())
     }
 
     fn describe_camera(&mut self, lens: &Lens) {
-        let file = match &self.calibration.source {
-            CalibrationSource::File(path) => path.file_name(),
-            CalibrationSource::Given => None,
-        };
-        let file = file.map_or_else(
-            || self.calibration.source.to_string(),
-            |name| name.to_string_lossy().into_owned(),
-        );
         // A layout with a calibration of its own has images of one size, and what is assumed is learned.
         let known = self.calibration.size_in_file || self.calibration.assumed;
         if !known && !self.kind.brings_calibration() {
             let k = &self.calibration.intrinsics;
-            self.warnings.push(format!(
-                "{file} does not say for which size its camera is: taken for the images' {}x{}",
-                k.width, k.height
-            ));
+            let unknown = CameraWarning::SizeUnknown {
+                by: self.calibration.source.clone(),
+                width: k.width,
+                height: k.height,
+            };
+            self.warnings.push(unknown.into());
         }
         if lens.distorts() {
-            self.warnings.push(
-                "the lens' distortion is taken out of the images; fx, fy, cx, cy are those of the result".into(),
-            );
+            self.warnings.push(CameraWarning::LensCorrected.into());
         }
     }
 }
@@ -302,7 +290,7 @@ impl Recording for PlainRecording {
         }
     }
 
-    fn warnings(&self) -> &[String] {
+    fn warnings(&self) -> &[DataWarning] {
         &self.warnings
     }
 

@@ -7,7 +7,8 @@ use crate::logs::clock::{TimeUnit, seconds};
 use crate::logs::frame_times::{TimedImage, from_start, numbers_by_time};
 use crate::logs::speed_log::SpeedLog;
 use crate::{
-    Camera, CameraProblem, ConfigProblem, Dataset, DatasetKind, Error, OpenOptions, Result,
+    Camera, CameraProblem, CameraWarning, ConfigProblem, DataWarning, Dataset, DatasetKind, Error,
+    OpenOptions, Result, TimesWarning,
 };
 use deepfusion_geometry::Distortion;
 use deepfusion_logs::{GoproLens, may_hold_log};
@@ -89,7 +90,8 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         (Error::NoCameraFile { .. }, Some(lens)) => no_pinhole(&file, lens),
         (other, _) => other,
     })?;
-    warnings.extend(lens.and_then(|lens| bent_warning(&lens, &calibration)));
+    let bent = lens.and_then(|lens| bent_warning(&lens, &calibration));
+    warnings.extend(bent.map(DataWarning::from));
     let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
             let ns = |i: usize| Some((i as f64 / fps * 1e9).round() as i64);
@@ -97,7 +99,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         }
         (Some(times), None) => times.iter().copied().map(Some).collect(),
         (None, None) => {
-            warnings.push("the video has no time stamps: set fps in dataset.toml".into());
+            warnings.push(TimesWarning::VideoUntimed.into());
             vec![None; video.count()]
         }
     };
@@ -105,13 +107,9 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let start_s = config.start_s.or_else(|| {
         let (created, log) = (video.created_ns()?, speeds.as_ref()?);
         let ns = &log.speeds_mps.ns;
-        let start = begun(created, &times, (*ns.first()?, *ns.last()?))?;
-        warnings.push(format!(
-            "the video is taken to begin at {}, as its recorder says (start_s = {:.3} in dataset.toml; another moves it)",
-            jiff::Timestamp::from_nanosecond(start.into()).map_or_else(|_| "?".into(), |t| t.to_string()),
-            seconds(start, 0)
-        ));
-        Some(seconds(start, 0))
+        let start_ns = begun(created, &times, (*ns.first()?, *ns.last()?))?;
+        warnings.push(TimesWarning::VideoBegins { start_ns }.into());
+        Some(seconds(start_ns, 0))
     });
     let times = from_start(times, start_s);
     let known: Option<Vec<i64>> = times.iter().copied().collect();
@@ -121,10 +119,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     };
     // Neither matters to a film alone.
     if start_s.is_none() && speeds.is_some() {
-        warnings.push(
-            "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
-                .into(),
-        );
+        warnings.push(TimesWarning::VideoOnTablesClock.into());
     }
     let image = |(number, ns): (u64, Option<i64>)| TimedImage {
         number,
@@ -158,36 +153,36 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
 
 /// What is wrong with the camera of a GoPro's video that was not filmed through its linear lens; nothing where the calibration has its own
 /// model of the lens.
-fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<String> {
+fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<CameraWarning> {
     if lens.is_linear() || calibration.distortion != Distortion::default() {
         return None;
     }
-    Some(format!("{}: {}", bends(lens), CameraProblem::OTHER_LENS))
+    Some(CameraWarning::BendsLines {
+        lens: name_of(lens),
+        model: lens.model.clone(),
+    })
 }
 
-fn bends(lens: &GoproLens) -> CameraProblem {
-    let digital = match lens.digital {
+/// The name of a lens in the GoPro's menu.
+fn name_of(lens: &GoproLens) -> String {
+    match lens.digital {
         'N' => "narrow".to_owned(),
         'W' => "wide".to_owned(),
         'S' => "SuperView".to_owned(),
         'H' => "HyperView".to_owned(),
         'M' => "max".to_owned(),
         other => other.to_string(),
-    };
-    CameraProblem::BendsLines {
-        lens: digital,
-        model: lens.model.clone(),
     }
 }
 
 /// Why a GoPro's video does not say its camera.
 fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
+    let model = lens.model.clone();
     let problem = if lens.is_linear() {
-        CameraProblem::LinearZoomed {
-            model: lens.model.clone(),
-        }
+        CameraProblem::LinearZoomed { model }
     } else {
-        bends(lens)
+        let lens = name_of(lens);
+        CameraProblem::BendsLines { lens, model }
     };
     Error::CameraFile {
         by: video.into(),

@@ -5,7 +5,10 @@ use super::date_time;
 use super::table::Table;
 use super::times::times;
 use crate::dataset_toml::FolderConfig;
-use crate::{ColumnsProblem, Error, ExpectedCell, Result, TableProblem, TimeStampProblem};
+use crate::{
+    ColumnsProblem, DataWarning, Error, ExpectedCell, IncompleteWarning, Result, TableProblem,
+    TimeStampProblem, TimesWarning,
+};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +36,7 @@ pub(crate) fn timed_images(
     folder: &Path,
     images: Vec<PathBuf>,
     config: &FolderConfig,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<DataWarning>,
 ) -> Result<Vec<TimedImage>> {
     let mut images = in_order(images);
     let table = folder.join(TABLE);
@@ -53,16 +56,11 @@ pub(crate) fn timed_images(
         let ns = |n: &u64| Some((*n as f64 / fps * 1e9).round() as i64);
         numbers.iter().map(ns).collect()
     } else if let Some((dates, unit)) = &dates {
-        warnings.push(format!(
-            "the images' names are their times, in {}",
-            unit.symbol()
-        ));
+        let unit = unit.symbol();
+        warnings.push(TimesWarning::ImagesByName { unit }.into());
         dates.iter().copied().map(Some).collect()
     } else {
-        warnings.push(
-            "nothing says when the images were taken: no frames.csv, no timestamps.txt, no fps in dataset.toml"
-                .into(),
-        );
+        warnings.push(TimesWarning::ImagesUntimed.into());
         vec![None; images.len()]
     };
     let times = from_start(times, config.start_s);
@@ -158,7 +156,7 @@ fn from_table(
     path: &Path,
     images: &[PathBuf],
     config: &FolderConfig,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<DataWarning>,
 ) -> Result<(Vec<PathBuf>, Vec<Option<i64>>)> {
     let table = Table::read(path)?;
     let ns = times(&table, config, warnings, TABLE)?;
@@ -180,7 +178,11 @@ fn from_table(
     }
     let unlisted = images.len().saturating_sub(listed.len());
     if unlisted > 0 {
-        warnings.push(format!("{TABLE} leaves {unlisted} of the images out"));
+        let unlisted = IncompleteWarning::ImagesUnlisted {
+            table: TABLE,
+            images: unlisted,
+        };
+        warnings.push(unlisted.into());
     }
     Ok((listed, ns.into_iter().map(Some).collect()))
 }

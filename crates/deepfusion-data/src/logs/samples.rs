@@ -1,6 +1,7 @@
 //! Values at times, and the gaps between them.
 
 use super::clock::seconds;
+use crate::{DataWarning, MotionWarning};
 
 /// Samples farther apart are not bridged, as in [`crate::VehicleTrack`].
 const MAX_GAP_S: f64 = 0.5;
@@ -26,7 +27,7 @@ impl Samples {
     pub(crate) fn bridged(
         mut self,
         most: Option<f64>,
-        warnings: Option<(&mut Vec<String>, &str, &str)>,
+        warnings: Option<(&mut Vec<DataWarning>, &str, &'static str)>,
     ) -> Self {
         let steps = self.ns.windows(2).map(|w| seconds(w[1], w[0]));
         let mut steps: Vec<f64> = steps.collect();
@@ -62,24 +63,23 @@ impl Samples {
             values.push(self.values[i]);
         }
         if let Some((warnings, name, setting)) = warnings {
-            let gaps = |n: usize| {
-                if n == 1 {
-                    "1 gap".into()
-                } else {
-                    format!("{n} gaps")
-                }
-            };
             if filled > 0 {
-                warnings.push(format!(
-                    "{name}: {} of up to {longest:.1} s between speeds are bridged in a straight line ({setting})",
-                    gaps(filled)
-                ));
+                let bridged = MotionWarning::Bridged {
+                    log: name.to_owned(),
+                    gaps: filled,
+                    longest_s: longest,
+                    setting,
+                };
+                warnings.push(bridged.into());
             }
             if left > 0 {
-                warnings.push(format!(
-                    "{name}: {} of more than {most:.1} s, across which the speed counts as unknown ({setting})",
-                    gaps(left)
-                ));
+                let not_bridged = MotionWarning::NotBridged {
+                    log: name.to_owned(),
+                    gaps: left,
+                    most_s: most,
+                    setting,
+                };
+                warnings.push(not_bridged.into());
             }
         }
         (self.ns, self.values) = (ns, values);

@@ -6,9 +6,11 @@ use super::table::{Column, Table};
 use super::times::{TIMES, times};
 use super::vehicle_log::{VehicleLog, imu_readings};
 use crate::Receiver;
-use crate::dataset::seen_turn::NO_YAW_RATE;
 use crate::dataset_toml::FolderConfig;
-use crate::{ConfigProblem, Error, MotionModel, Quantity, Result, Stream, VehicleTrack};
+use crate::{
+    ConfigProblem, DataWarning, Error, MotionModel, MotionWarning, Quantity, Result, Stream,
+    TimesWarning, VehicleTrack,
+};
 use deepfusion_logs::{Clock, DriveLog, ReadOptions, YawRate, is_gps_track};
 use deepfusion_motion::{ImuMount, Signal};
 use std::path::{Path, PathBuf};
@@ -44,7 +46,7 @@ pub(crate) struct SpeedLog {
     pub(crate) vehicle: Option<VehicleLog>,
     /// What was found, for the inspection.
     pub(crate) streams: Vec<Stream>,
-    pub(crate) warnings: Vec<String>,
+    pub(crate) warnings: Vec<DataWarning>,
 }
 
 impl SpeedLog {
@@ -122,10 +124,8 @@ impl SpeedLog {
         } else if let Some(turns) = &yaw_rates_radps {
             streams.push(stream(&path, "imu", &turns.ns));
         } else {
-            warnings.push(format!(
-                "{}: {NO_YAW_RATE}: how the car turned is not recorded",
-                name(&path)
-            ));
+            let log = name(&path);
+            warnings.push(MotionWarning::NoYawRate { log }.into());
         }
         let turns_known = yaw_rates_radps.is_some() || vehicle.is_some();
         if course_rates_radps.is_none() && !turns_known {
@@ -265,14 +265,17 @@ fn speeds(
     path: &Path,
     log: &DriveLog,
     config: &FolderConfig,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<DataWarning>,
 ) -> Samples {
     let name = name(path);
-    warnings.extend(log.notes.iter().map(|note| format!("{name}: {note}")));
+    warnings.extend(log.notes.iter().map(|note| {
+        DataWarning::from(MotionWarning::Understood {
+            log: name.clone(),
+            note: note.clone(),
+        })
+    }));
     if log.clock == Clock::LocalDate {
-        warnings.push(format!(
-            "{name}: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)"
-        ));
+        warnings.push(TimesWarning::NoZone { log: name }.into());
     }
     Samples {
         ns: log.speeds.iter().map(|s| s.ns).collect(),
@@ -303,7 +306,7 @@ fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
 fn course_table(
     folder: &Path,
     config: &FolderConfig,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<DataWarning>,
 ) -> Result<Option<Samples>> {
     let Some(path) = config.find(folder, "course", None, &["course.csv"])? else {
         return Ok(None);
@@ -311,12 +314,12 @@ fn course_table(
     let table = match Table::read(&path) {
         Ok(table) if table.column(&COURSE_RATES).is_some() => table,
         Ok(_) => {
-            let why = "course.csv: not read, as it has no column course_rate_radps";
-            warnings.push(why.into());
+            warnings.push(MotionWarning::NoCourseRates.into());
             return Ok(None);
         }
-        Err(why @ Error::Table { .. }) => {
-            warnings.push(format!("not read: {why}"));
+        Err(error @ Error::Table { .. }) => {
+            let why = error.to_string();
+            warnings.push(MotionWarning::CourseNotRead { why }.into());
             return Ok(None);
         }
         Err(error) => return Err(error),

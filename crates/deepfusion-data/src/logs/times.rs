@@ -3,7 +3,7 @@
 use super::clock::{TimeUnit, seconds};
 use super::table::Table;
 use crate::dataset_toml::FolderConfig;
-use crate::{ColumnsProblem, ExpectedCell, Result, TableProblem};
+use crate::{ColumnsProblem, DataWarning, ExpectedCell, Result, TableProblem, TimesWarning};
 
 pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
@@ -11,7 +11,7 @@ pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timesta
 pub(crate) fn times(
     table: &Table,
     config: &FolderConfig,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<DataWarning>,
     name: &str,
 ) -> Result<Vec<i64>> {
     let column = table.require(&TIMES, "time_s,speed_mps")?;
@@ -23,11 +23,12 @@ pub(crate) fn times(
         (None, None) => {
             let unit = TimeUnit::of_numbers(&table.numbers(column)?);
             if let Some(unit) = unit {
-                warnings.push(format!(
-                    "{name}: column {} has no unit, taken as {} by its numbers",
-                    column.header,
-                    unit.symbol()
-                ));
+                let no_unit = TimesWarning::NoUnit {
+                    table: name.to_owned(),
+                    column: column.header.clone(),
+                    unit: unit.symbol(),
+                };
+                warnings.push(no_unit.into());
             }
             unit
         }
@@ -57,10 +58,12 @@ pub(crate) fn times(
         all.push(ns);
     }
     if let Some(first) = repeated.first() {
-        warnings.push(match repeated.len() {
-            1 => format!("{name}: 1 row repeats the time of the row above (in line {first}) and is left out"),
-            n => format!("{name}: {n} rows repeat the time of the row above (first in line {first}) and are left out"),
-        });
+        let repeated = TimesWarning::Repeated {
+            table: name.to_owned(),
+            rows: repeated.len(),
+            line: *first,
+        };
+        warnings.push(repeated.into());
     }
     Ok(all)
 }

@@ -4,6 +4,7 @@ pub(crate) mod bag;
 pub(crate) mod folder;
 pub(crate) mod street;
 
+use deepfusion_data::DataWarning;
 use deepfusion_geometry::cloud::PointCloud;
 use image::{Rgb, RgbImage};
 use std::fs;
@@ -119,6 +120,12 @@ pub(crate) fn packet(speed_mps: f64, yaw_rate_radps: f64) -> String {
     values[19] = yaw_rate_radps;
     let words: Vec<String> = values.iter().map(f64::to_string).collect();
     words.join(" ")
+}
+
+/// What warnings say, a line each.
+pub(crate) fn text_of(warnings: &[DataWarning]) -> String {
+    let lines: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    lines.join("\n")
 }
 
 /// A folder of real recordings: below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says

@@ -3,7 +3,7 @@
 use super::can_config::SignalConfig;
 use super::config::BagConfig;
 use crate::error::{HIGHEST_EXTENDED, HIGHEST_STANDARD};
-use crate::{CanProblem, ConfigProblem, ExpectedValue, Result};
+use crate::{CanProblem, ConfigProblem, DataWarning, ExpectedValue, MotionWarning, Result};
 use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
 use deepfusion_rosbag::msg::Frame;
 
@@ -107,8 +107,8 @@ impl Can {
         }
     }
 
-    /// Signals without a value, as a sentence each: they are configured, so no other source was looked for.
-    pub(super) fn silent(&self, speeds: usize, angles: usize) -> Vec<String> {
+    /// Signals without a value: they are configured, so no other source was looked for.
+    pub(super) fn silent(&self, speeds: usize, angles: usize) -> Vec<DataWarning> {
         let signals = [
             ("can.speed", &self.speed, speeds),
             ("can.steering", &self.steering, angles),
@@ -116,11 +116,8 @@ impl Can {
         let silent = signals.into_iter().filter(|(_, _, values)| *values == 0);
         silent
             .filter_map(|(key, signal, _)| {
-                let id = match signal.as_ref()?.0.id {
-                    CanId::Standard(id) => format!("0x{id:x}"),
-                    CanId::Extended { extended } => format!("0x{extended:x} (29 bits)"),
-                };
-                Some(format!("{key}: no CAN frame {id} holds a value of it"))
+                let id = signal.as_ref()?.0.id;
+                Some(DataWarning::from(MotionWarning::SilentSignal { key, id }))
             })
             .collect()
     }

@@ -1,7 +1,7 @@
 //! The vehicle's speed by a satellite receiver's positions (NavSatFix).
 
 use crate::logs::samples::Samples;
-use deepfusion_hint::count_of;
+use crate::{DataWarning, MotionWarning};
 use deepfusion_motion::{Fix, speeds_of_fixes};
 use deepfusion_rosbag::msg::NavSatFix;
 
@@ -44,16 +44,16 @@ impl Fixes {
         &mut self,
         topic: &str,
         max_gap_s: Option<f64>,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<DataWarning>,
     ) -> Vec<(i64, f64)> {
         self.places.sort_by_key(|(ns, _)| *ns);
         if self.without > 0 {
-            let all = self.without + self.places.len();
-            warnings.push(format!(
-                "{topic}: left out, as they have no position: {} of {}",
-                self.without,
-                count_of(all, "message")
-            ));
+            let left_out = MotionWarning::NoPosition {
+                topic: topic.to_owned(),
+                messages: self.without,
+                of: self.without + self.places.len(),
+            };
+            warnings.push(left_out.into());
         }
         let Some(&(origin_ns, _)) = self.places.first() else {
             return Vec::new();
@@ -68,15 +68,18 @@ impl Fixes {
         let mut sigmas: Vec<f64> = smoothed.iter().map(|s| s.sigma_mps).collect();
         sigmas.sort_by(f64::total_cmp);
         let Some(usual) = sigmas.get(sigmas.len() / 2) else {
-            warnings.push(format!(
-                "{topic}: no speed from {}, at least two in ten seconds are needed",
-                count_of(self.places.len(), "position")
-            ));
+            let too_few = MotionWarning::TooFewPositions {
+                topic: topic.to_owned(),
+                positions: self.places.len(),
+            };
+            warnings.push(too_few.into());
             return Vec::new();
         };
-        warnings.push(format!(
-            "{topic}: speeds are those of its positions, smoothed, sure to {usual:.2} m/s in the middle"
-        ));
+        let of_positions = MotionWarning::OfPositions {
+            topic: topic.to_owned(),
+            sigma_mps: *usual,
+        };
+        warnings.push(of_positions.into());
         let ns = |s: f64| origin_ns + (s * 1e9).round() as i64;
         let samples = Samples {
             ns: smoothed.iter().map(|s| ns(s.time_s)).collect(),
@@ -126,6 +129,7 @@ mod tests {
         );
         let steps = speeds.windows(2).map(|w| w[1].0 - w[0].0);
         assert_eq!(steps.max(), Some(250_000_000), "3 s are bridged too");
+        let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         let warnings = warnings.join("\n");
         for said in [
             "left out, as they have no position: 2 of 20 messages",
@@ -144,6 +148,7 @@ mod tests {
         lone.add(0, &fix(0.0, 0));
         let mut warnings = Vec::new();
         assert!(lone.speeds("/fix", None, &mut warnings).is_empty());
-        assert!(warnings[0].contains("at least two"), "{warnings:?}");
+        let said = warnings[0].to_string();
+        assert!(said.contains("at least two"), "{said}");
     }
 }

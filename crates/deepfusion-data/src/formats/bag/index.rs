@@ -6,7 +6,7 @@ use super::fixes::Fixes;
 use super::frames::Frames;
 use super::packet::{VideoTopic, packet};
 use super::topics::{Role, Topics};
-use crate::{ConfigProblem, Error, ImageProblem, Result};
+use crate::{ConfigProblem, DataWarning, Error, ImageProblem, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
@@ -72,10 +72,10 @@ pub(super) struct Index {
     pub(super) speed_frame: Option<String>,
     /// Chunks or messages that could not be read, in sentences.
     pub(super) lost: Vec<String>,
-    /// CAN signals that no frame holds, in sentences.
-    pub(super) silent: Vec<String>,
-    /// How speeds were computed, in sentences.
-    pub(super) computed: Vec<String>,
+    /// CAN signals that no frame holds.
+    pub(super) silent: Vec<DataWarning>,
+    /// How speeds were computed.
+    pub(super) computed: Vec<DataWarning>,
     /// Messages whose header has no time, by topic: the time of recording stands for it.
     pub(super) unstamped: BTreeMap<String, usize>,
 }

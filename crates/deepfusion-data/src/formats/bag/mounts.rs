@@ -4,10 +4,12 @@
 use super::config::BagConfig;
 use super::frames::{Chain, Change, Way};
 use super::index::Index;
-use crate::{ConfigProblem, Error, FramesProblem, Mount, Result};
+use crate::{
+    ConfigProblem, DataWarning, Error, FramesProblem, Mount, MountWarning, NotByFrames, Result,
+};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Names of the vehicle's frame, the likelier to be at the rear axle first; the last part of a name counts. REP 105 lets
 /// `base_link` lie anywhere on the base; vehicles' stacks put it below the middle of the rear axle.
@@ -42,7 +44,7 @@ impl Mounts {
         bag: &Path,
         config: &BagConfig,
         index: &Index,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<DataWarning>,
     ) -> Result<Self> {
         let by_frames = ByFrames::new(bag, config, index)?;
         let mut search = Search {
@@ -50,14 +52,9 @@ impl Mounts {
             warnings,
             said: Vec::new(),
         };
-        if index.frames.broken > 0 {
-            search.warnings.push(match index.frames.broken {
-                1 => "1 transform of frames has no rotation, or holds NaN, and is left out"
-                    .to_owned(),
-                n => format!(
-                    "{n} transforms of frames have no rotation, or hold NaN, and are left out"
-                ),
-            });
+        let transforms = index.frames.broken;
+        if transforms > 0 {
+            search.warn(MountWarning::BrokenTransforms { transforms });
         }
         let (own, profile) = (config, &config.profile_mounts);
         let place = |t: Option<super::config::Transform>| t.map(|t| t.se3());
@@ -85,14 +82,12 @@ impl Mounts {
             .as_ref()
             .filter(|_| by_frames.body_axes && by_tf)
         {
-            search.warnings.push(format!(
-                "the images' frame {name} has its z axis up, so it is no optical frame: its x is taken to look ahead and its y to the left"
-            ));
+            search.warn(MountWarning::BodyAxes {
+                frame: name.clone(),
+            });
         }
         if cam_from_vehicle.is_none() {
-            search.warnings.push(
-                "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does".into(),
-            );
+            search.warn(MountWarning::CameraUnknown);
         }
         Ok(Self {
             cam_from_vehicle: cam_from_vehicle.unwrap_or_else(looking_ahead),
@@ -109,7 +104,7 @@ const BY_FRAMES: &str = "frames ";
 /// Sources in their order, for one mount after the other.
 struct Search<'a> {
     config: &'a BagConfig,
-    warnings: &'a mut Vec<String>,
+    warnings: &'a mut Vec<DataWarning>,
     said: Vec<Mount>,
 }
 
@@ -145,7 +140,7 @@ impl Search<'_> {
             }
             (None, other) => {
                 if let Said::No(why) = other {
-                    self.warnings.push(format!("{name}: {why}"));
+                    self.warn(MountWarning::NotByFrames { mount: name, why });
                 }
                 match profile {
                     Some(profile) => (profile, format!("profile {of_profile}")),
@@ -163,14 +158,21 @@ impl Search<'_> {
     }
 
     /// Two sources that do not say the same: the first is taken.
-    fn compare(&mut self, name: &str, taken: (&Se3, &str), other: (&Se3, &str)) {
+    fn compare(&mut self, mount: &'static str, taken: (&Se3, &str), other: (&Se3, &str)) {
         let change = Change::between(taken.0, other.0);
         if !change.is_small() {
-            self.warnings.push(format!(
-                "{name}: {} and {} are {change} apart; the former is taken",
-                taken.1, other.1
-            ));
+            self.warn(MountWarning::Apart {
+                mount,
+                taken: taken.1.to_owned(),
+                other: other.1.to_owned(),
+                metres: change.metres,
+                radians: change.radians,
+            });
         }
+    }
+
+    fn warn(&mut self, warning: MountWarning) {
+        self.warnings.push(warning.into());
     }
 }
 
@@ -179,48 +181,9 @@ enum Said {
     /// It, and by which way.
     Here(Se3, String),
     /// Why nothing, where something could be expected.
-    No(Unsaid),
+    No(NotByFrames),
     /// Nothing, and nothing was to be expected.
     Nothing,
-}
-
-/// Why the frames do not say a mount that they could be expected to.
-#[derive(Debug, thiserror::Error)]
-enum Unsaid {
-    #[error(
-        "none of the frames {} is known as the vehicle's ({}); frames.vehicle in {} names it",
-        frames.join(", "), VEHICLES.concat().join(", "), config.display()
-    )]
-    NoVehicle {
-        frames: Vec<String>,
-        config: PathBuf,
-    },
-    #[error(
-        "the frame of {whose}, {frame}, is in no transform of the bag; frames.{key} in {} names another",
-        config.display()
-    )]
-    Absent {
-        whose: &'static str,
-        frame: String,
-        key: &'static str,
-        config: PathBuf,
-    },
-    #[error(
-        "the frames {source_frame} and {target} are not fixed to each other: {} moves in {} by up to {change}, so it is not \
-         taken from them",
-        moving[0], moving[1]
-    )]
-    Moves {
-        source_frame: String,
-        target: String,
-        moving: [String; 2],
-        change: Change,
-    },
-    #[error("no transforms lead from the frame {source_frame} to {target}")]
-    NoWay {
-        source_frame: String,
-        target: String,
-    },
 }
 
 /// The frames with the sensors' names in them.
@@ -283,8 +246,9 @@ impl<'a> ByFrames<'a> {
         };
         let Some(vehicle) = self.vehicle(camera)? else {
             let frames = self.index.frames.names().into_iter();
-            return Ok(Said::No(Unsaid::NoVehicle {
+            return Ok(Said::No(NotByFrames::NoVehicle {
                 frames: frames.map(str::to_owned).collect(),
+                known: VEHICLES.concat(),
                 config: self.config.path.clone(),
             }));
         };
@@ -324,7 +288,7 @@ impl<'a> ByFrames<'a> {
         let Some(frame) = frame else {
             return Said::Nothing;
         };
-        Said::No(Unsaid::Absent {
+        Said::No(NotByFrames::Absent {
             whose,
             frame: frame.clone(),
             key,
@@ -401,15 +365,16 @@ impl<'a> ByFrames<'a> {
                     config: self.config.path.clone(),
                 }));
             }
-            Way::Moves(moving, change) => Said::No(Unsaid::Moves {
-                source_frame: source.to_owned(),
-                target: target.to_owned(),
+            Way::Moves(moving, change) => Said::No(NotByFrames::Moves {
+                from: source.to_owned(),
+                to: target.to_owned(),
                 moving,
-                change,
+                metres: change.metres,
+                radians: change.radians,
             }),
-            Way::Unknown => Said::No(Unsaid::NoWay {
-                source_frame: source.to_owned(),
-                target: target.to_owned(),
+            Way::Unknown => Said::No(NotByFrames::NoWay {
+                from: source.to_owned(),
+                to: target.to_owned(),
             }),
         })
     }

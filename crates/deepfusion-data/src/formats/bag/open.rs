@@ -11,11 +11,10 @@ use super::streams::{damage_of, oddities_of, streams};
 use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use super::{camera, image, sensors, source};
-use crate::dataset::assumed_warning;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::{
-    Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, NoFramesReason,
-    OpenOptions, Result,
+    Camera, CameraWarning, DataWarning, Dataset, DatasetParts, Error, Frame, FrameImage,
+    IncompleteWarning, MotionModel, MountWarning, NoFramesReason, OpenOptions, Result,
 };
 use deepfusion_geometry::{StampedPose, Trajectory};
 use deepfusion_rosbag::MessageSource;
@@ -45,8 +44,10 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
     match (datasets.first_mut(), refused) {
         (None, Some(error)) => Err(error),
         (Some(first), _) if !without_camera.is_empty() => {
-            let names = without_camera.join(", ");
-            first.warning(format!("left out, as they give no images: {names}"));
+            first.warn(IncompleteWarning::NoImages {
+                camera: None,
+                recordings: without_camera,
+            });
             Ok(datasets)
         }
         _ => Ok(datasets),
@@ -81,9 +82,10 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         camera::find(bag.as_ref(), &topics, &index, size, &config, options)?;
     if assumed {
         let k = lens.intrinsics();
-        warnings.push(assumed_warning([k.fx, k.fy, k.cx, k.cy]));
+        warnings.push(CameraWarning::Assumed { fx: k.fx, fy: k.fy }.into());
     }
-    warnings.extend(lens.intrinsics().implausible().map(|why| why.to_string()));
+    let implausible = lens.intrinsics().implausible();
+    warnings.extend(implausible.map(|why| DataWarning::from(CameraWarning::from(why))));
     let mounts = Mounts::find(path, &config, &index, &mut warnings)?;
     let cam_from_vehicle = mounts.cam_from_vehicle;
     let imu = mounts.vehicle_from_imu.as_ref();
@@ -123,10 +125,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
             track,
         })),
         (Some(_), None) => {
-            warnings.push(
-                "nothing says where the LiDAR is (cam_from_lidar): its scans give no ground truth"
-                    .into(),
-            );
+            warnings.push(MountWarning::LidarUnknown.into());
             None
         }
         _ => None,

@@ -1,6 +1,6 @@
 //! The packets of a video stream among a bag's messages.
 
-use crate::{Error, Result};
+use crate::{Error, IncompleteWarning, Result};
 use deepfusion_rosbag::msg::{
     CompressedImage, CompressedVideo, FfmpegPacket, OldFfmpegPacket, RosMessage,
 };
@@ -47,18 +47,12 @@ impl VideoTopic {
         true
     }
 
-    /// What is left out, in a sentence.
-    pub(super) fn warning(&self) -> Option<String> {
-        let Self { name, before, .. } = self;
-        match before {
-            0 => None,
-            1 => Some(format!(
-                "{name}: the first message comes before the first key frame and cannot be decoded: it is left out"
-            )),
-            _ => Some(format!(
-                "{name}: the first {before} messages come before the first key frame and cannot be decoded: they are left out"
-            )),
-        }
+    /// What is left out.
+    pub(super) fn warning(&self) -> Option<IncompleteWarning> {
+        (self.before > 0).then(|| IncompleteWarning::BeforeKeyFrame {
+            topic: self.name.clone(),
+            messages: self.before,
+        })
     }
 }
 

@@ -6,9 +6,9 @@ use super::scans::{BagScans, MovingPoints};
 use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use crate::{
-    CalibrationPlace, CameraPath, Dataset, DatasetKind, DynamicAgreement, Error, Frame, GtKind,
-    ImageProblem, Lens, LidarMotion, Mount, MovingLabels, MovingSource, NoTrackReason, Recording,
-    Result, ScanTruth, Stream,
+    CalibrationPlace, CameraPath, DataWarning, Dataset, DatasetKind, DynamicAgreement, Error,
+    Frame, GtKind, ImageProblem, Lens, LidarMotion, Mount, MovingLabels, MovingSource,
+    NoTrackReason, Recording, Result, ScanTruth, Stream,
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Se3, Trajectory};
@@ -28,9 +28,9 @@ pub(super) struct BagRecording {
     pub(super) lens: Lens,
     pub(super) streams: Vec<Stream>,
     pub(super) mounts: Vec<Mount>,
-    pub(super) damage: Vec<String>,
+    pub(super) damage: Vec<DataWarning>,
     /// Those of `damage` among them.
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<DataWarning>,
     /// Where the vehicle was, exactly, on the vehicle's clock.
     pub(super) truth: Trajectory,
     pub(super) cam_from_vehicle: Se3,
@@ -83,11 +83,11 @@ impl Recording for BagRecording {
         }
     }
 
-    fn warnings(&self) -> &[String] {
+    fn warnings(&self) -> &[DataWarning] {
         &self.warnings
     }
 
-    fn damage(&self) -> &[String] {
+    fn damage(&self) -> &[DataWarning] {
         &self.damage
     }
 

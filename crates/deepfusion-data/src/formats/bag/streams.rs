@@ -1,8 +1,9 @@
 //! What a bag holds, topic by topic, and what of it cannot be read.
 
 use super::index::Index;
+use super::packet::VideoTopic;
 use super::topics::{Role, Topics};
-use crate::{Result, Stream};
+use crate::{DataWarning, IncompleteWarning, Result, Stream, TimesWarning};
 use deepfusion_rosbag::MessageSource;
 
 pub(super) fn streams(
@@ -44,33 +45,31 @@ pub(super) fn streams(
     Ok(streams.collect())
 }
 
-/// What of a bag cannot be read, in sentences.
-pub(super) fn damage_of(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
-    let damage = bag.damage();
-    let mut damage = Vec::from_iter(damage.map(|damage| format!("the bag is damaged: {damage}")));
-    if let Some(lost) = index.lost.first() {
-        damage.push(match index.lost.len() {
-            1 => format!("1 message or chunk cannot be read: {lost}"),
-            n => format!("{n} messages or chunks cannot be read; the first: {lost}"),
+/// What of a bag cannot be read.
+pub(super) fn damage_of(bag: &dyn MessageSource, index: &Index) -> Vec<DataWarning> {
+    let damaged = bag.damage().map(IncompleteWarning::Damaged);
+    let unreadable = index
+        .lost
+        .first()
+        .map(|first| IncompleteWarning::Unreadable {
+            parts: index.lost.len(),
+            first: first.clone(),
         });
-    }
-    damage
+    let damage = damaged.into_iter().chain(unreadable);
+    damage.map(DataWarning::from).collect()
 }
 
-/// What is odd about a bag that can be read, in sentences.
-pub(super) fn oddities_of(index: &Index) -> Vec<String> {
-    let mut warnings = Vec::from_iter(index.video.iter().filter_map(|video| video.warning()));
+/// What is odd about a bag that can be read.
+pub(super) fn oddities_of(index: &Index) -> Vec<DataWarning> {
+    let late = index.video.as_ref().and_then(VideoTopic::warning);
+    let mut warnings: Vec<DataWarning> = late.into_iter().map(DataWarning::from).collect();
     warnings.extend(index.silent.iter().cloned());
     warnings.extend(index.computed.iter().cloned());
-    let unstamped = index.unstamped.iter();
-    warnings.extend(unstamped.map(|(topic, messages)| {
-        let untimed = match messages {
-            1 => "1 message has no time in its header".to_owned(),
-            n => format!("{n} messages have no time in their header"),
-        };
-        format!(
-            "{topic}: {untimed}; the time of recording is used, which is late by the transport delay"
-        )
+    warnings.extend(index.unstamped.iter().map(|(topic, messages)| {
+        DataWarning::from(TimesWarning::Unstamped {
+            topic: topic.clone(),
+            messages: *messages,
+        })
     }));
     warnings
 }

@@ -15,8 +15,8 @@ use super::pose_track::speed_log;
 use crate::logs::frame_times::{TimedImage, numbers_by_time};
 use crate::truth::measured::{MeasuredDepth, PlacedScan, Scans};
 use crate::{
-    Camera, CameraCalibration, CameraProblem, Dataset, DatasetKind, Error, NoFramesReason,
-    OpenOptions, Result, image_size,
+    Camera, CameraCalibration, CameraProblem, Dataset, DatasetKind, Error, IncompleteWarning,
+    NoFramesReason, OpenOptions, Result, image_size,
 };
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -119,14 +119,13 @@ impl TableFolder {
         let here = numbered.zip(there).filter(|(_, there)| **there);
         let here: Vec<(u64, &SensorFrame)> = here.map(|(image, _)| image).collect();
         let mut warnings = Vec::new();
-        let lost = images.len() - here.len();
-        if lost > 0 {
-            let gone = images.iter().zip(there).find(|(_, there)| !**there);
-            warnings.push(format!(
-                "{lost} of {} images are not there, such as {}",
-                images.len(),
-                gone.map_or("", |(image, _)| &image.file)
-            ));
+        if let Some((gone, _)) = images.iter().zip(there).find(|(_, there)| !**there) {
+            let missing = IncompleteWarning::ImagesMissing {
+                missing: images.len() - here.len(),
+                of: images.len(),
+                such_as: gone.file.clone(),
+            };
+            warnings.push(missing.into());
         }
         let calibrations = self.tables.join(CALIBRATED_SENSOR);
         let one_camera = images.iter().all(|image| image.sensor == images[0].sensor);

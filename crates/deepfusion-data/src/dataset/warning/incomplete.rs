@@ -1,0 +1,197 @@
+//! What of a recording is left out, is not there or cannot be read.
+
+use crate::DatasetKind;
+use std::path::{Path, PathBuf};
+
+/// What of a recording, or of the folder in which it lies, is left out, is not there or cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IncompleteWarning {
+    /// Of several recordings some give no images.
+    #[error("left out, as they give no images{}: {}", of_camera(*camera), recordings.join(", "))]
+    NoImages {
+        /// The camera whose images are missing, where the layout numbers them.
+        camera: Option<u8>,
+        /// The recordings' names.
+        recordings: Vec<String>,
+    },
+    /// Something in the folder looks like a recording and is not read ([`crate::Dataset::passed_over`]).
+    #[error("{}", passed_over(folder, *layout, recordings))]
+    PassedOver {
+        /// The folder.
+        folder: PathBuf,
+        /// As what it is read.
+        layout: DatasetKind,
+        /// The names of what is not read, in their order.
+        recordings: Vec<String>,
+    },
+    /// Tables name images that are not there.
+    #[error("{missing} of {of} images are not there, such as {such_as}")]
+    ImagesMissing {
+        /// How many are not.
+        missing: usize,
+        /// How many are named.
+        of: usize,
+        /// The first that is not.
+        such_as: String,
+    },
+    /// A table of the images leaves some out.
+    #[error("{table} leaves {images} of the images out")]
+    ImagesUnlisted {
+        /// The table's name.
+        table: &'static str,
+        /// How many.
+        images: usize,
+    },
+    /// A video stream was recorded from the middle on.
+    #[error(
+        "{topic}: the first {} before the first key frame and cannot be decoded: {} left out",
+        messages_come(*messages),
+        if *messages == 1 { "it is" } else { "they are" }
+    )]
+    BeforeKeyFrame {
+        /// The stream's topic.
+        topic: String,
+        /// How many messages came before its first key frame.
+        messages: u64,
+    },
+    /// A bag is damaged: how, in the words of [`deepfusion_rosbag::MessageSource::damage`].
+    #[error("the bag is damaged: {0}")]
+    Damaged(String),
+    /// Messages or chunks of a bag cannot be read.
+    #[error("{}", unreadable(*parts, first))]
+    Unreadable {
+        /// How many.
+        parts: usize,
+        /// The first one's error, in words.
+        first: String,
+    },
+}
+
+fn of_camera(camera: Option<u8>) -> String {
+    camera.map_or_else(String::new, |number| format!(" of camera {number}"))
+}
+
+fn passed_over(folder: &Path, layout: DatasetKind, recordings: &[String]) -> String {
+    /// Names that are said.
+    const MOST: usize = 6;
+    let said = recordings.get(..MOST).unwrap_or(recordings).join(", ");
+    let more = match recordings.len().checked_sub(MOST) {
+        None | Some(0) => String::new(),
+        Some(more) => format!(" and {more} more"),
+    };
+    let (these, are, each) = if recordings.len() == 1 {
+        ("this", "looks like a recording and is", "it")
+    } else {
+        ("these", "look like recordings and are", "each")
+    };
+    format!(
+        "{} is read as {} alone; {these} in it {are} not read: {said}{more} (give {each} by its own path)",
+        folder.display(),
+        layout.label()
+    )
+}
+
+fn messages_come(messages: u64) -> String {
+    match messages {
+        1 => "message comes".to_owned(),
+        n => format!("{n} messages come"),
+    }
+}
+
+fn unreadable(parts: usize, first: &str) -> String {
+    match parts {
+        1 => format!("1 message or chunk cannot be read: {first}"),
+        n => format!("{n} messages or chunks cannot be read; the first: {first}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(count: usize) -> Vec<String> {
+        (1..=count).map(|n| format!("drive{n}.bag")).collect()
+    }
+
+    #[test]
+    fn what_is_passed_over_is_named_as_far_as_there_is_room() {
+        let said = |count| {
+            let passed_over = IncompleteWarning::PassedOver {
+                folder: "drives".into(),
+                layout: DatasetKind::Folder,
+                recordings: names(count),
+            };
+            passed_over.to_string()
+        };
+        assert_eq!(
+            said(1),
+            "drives is read as image folder alone; this in it looks like a recording and is not read: drive1.bag (give it by its own path)"
+        );
+        let these = "drives is read as image folder alone; these in it look like recordings and are not read: drive1.bag, drive2.bag";
+        let each = "(give each by its own path)";
+        assert_eq!(said(2), format!("{these} {each}"));
+        let six = format!("{these}, drive3.bag, drive4.bag, drive5.bag, drive6.bag");
+        assert_eq!(said(6), format!("{six} {each}"));
+        assert_eq!(said(8), format!("{six} and 2 more {each}"));
+    }
+
+    #[test]
+    fn what_is_missing_is_counted() {
+        let no_images = |camera| IncompleteWarning::NoImages {
+            camera,
+            recordings: names(2),
+        };
+        let before = |messages| IncompleteWarning::BeforeKeyFrame {
+            topic: "/camera".into(),
+            messages,
+        };
+        let unreadable = |parts| IncompleteWarning::Unreadable {
+            parts,
+            first: "drive.bag: the chunk at byte 7 is too short".into(),
+        };
+        for (warning, said) in [
+            (
+                no_images(None),
+                "left out, as they give no images: drive1.bag, drive2.bag",
+            ),
+            (
+                no_images(Some(2)),
+                "left out, as they give no images of camera 2: drive1.bag, drive2.bag",
+            ),
+            (
+                IncompleteWarning::ImagesMissing {
+                    missing: 6,
+                    of: 8,
+                    such_as: "sweeps/CAM_FRONT/1.jpg".into(),
+                },
+                "6 of 8 images are not there, such as sweeps/CAM_FRONT/1.jpg",
+            ),
+            (
+                IncompleteWarning::ImagesUnlisted {
+                    table: "frames.csv",
+                    images: 2,
+                },
+                "frames.csv leaves 2 of the images out",
+            ),
+            (
+                before(1),
+                "/camera: the first message comes before the first key frame and cannot be decoded: it is left out",
+            ),
+            (
+                before(9),
+                "/camera: the first 9 messages come before the first key frame and cannot be decoded: they are left out",
+            ),
+            (
+                unreadable(1),
+                "1 message or chunk cannot be read: drive.bag: the chunk at byte 7 is too short",
+            ),
+            (
+                unreadable(2),
+                "2 messages or chunks cannot be read; the first: drive.bag: the chunk at byte 7 is too short",
+            ),
+        ] {
+            assert_eq!(warning.to_string(), said);
+        }
+    }
+}
