@@ -74,7 +74,7 @@ impl AdaptRequest {
 
 /// Learns on new drives, judges before and after, and keeps the result or lays it aside; the outcome as JSON.
 #[pyfunction]
-pub fn adapt(
+pub(crate) fn adapt(
     py: Python<'_>,
     asked: Bound<'_, PyDict>,
     callback: Option<Py<PyAny>>,
@@ -147,6 +147,6 @@ fn loaded(
 
 /// Makes an adapted network predict as the one that it began from.
 #[pyfunction]
-pub fn undo_adaptation(out: PathBuf) -> PyResult<()> {
+pub(crate) fn undo_adaptation(out: PathBuf) -> PyResult<()> {
     undo(Path::new(&out)).map_err(raise)
 }

@@ -18,7 +18,7 @@ use crate::error::{Failure, raise};
 use crate::model::{Prediction, Source};
 
 /// What is asked of the network.
-pub struct BulkRequest {
+pub(crate) struct BulkRequest {
     pub images: Py<PyIterator>,
     pub intrinsics: Option<[f64; 4]>,
     pub focal_correction: bool,
@@ -39,7 +39,7 @@ struct LoadedImage {
 
 /// The predictions of many images, in their order.
 #[pyclass(module = "deepfusion")]
-pub struct Predictions {
+pub(crate) struct Predictions {
     request: BulkRequest,
     /// None once the images have ended.
     to_read: Option<Sender<(Source, Answer)>>,
@@ -51,7 +51,7 @@ pub struct Predictions {
 
 impl Predictions {
     /// The threads end when this goes.
-    pub fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
+    pub(crate) fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
         let readers = Threads::for_this_machine().before;
         let (to_read, images) = channel::<(Source, Answer)>();
         let (to_network, read) = sync_channel::<LoadedImage>(readers);

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 /// Runs the command line with these words (the program's name not among them), and gives its exit code.
 #[pyfunction]
-pub fn command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+pub(crate) fn command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     let words = std::iter::once(OsString::from("deepfusion")).chain(arguments);
     let code = py.detach(|| deepfusion_cli::run(words));
     // An exit code does not say its number, only which it equals.

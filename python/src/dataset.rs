@@ -15,7 +15,7 @@ use crate::model::image_array;
 
 /// A recording of any known layout: one drive, one camera.
 #[pyclass(frozen, module = "deepfusion")]
-pub struct Dataset {
+pub(crate) struct Dataset {
     inner: Arc<data::Dataset>,
 }
 
@@ -137,7 +137,7 @@ impl Frames {
 
 /// One frame of a recording.
 #[pyclass(frozen, module = "deepfusion")]
-pub struct Frame {
+pub(crate) struct Frame {
     dataset: Arc<data::Dataset>,
     index: usize,
 }

@@ -11,14 +11,14 @@ use crate::error::Failure;
 /// The names of the backends that this package was built with.
 #[pyfunction]
 #[pyo3(name = "devices")]
-pub fn built() -> Vec<&'static str> {
+pub(crate) fn built() -> Vec<&'static str> {
     let built = Backend::ALL.into_iter().filter(|one| one.is_built());
     built.map(Backend::name).collect()
 }
 
 /// Raises where a word is no device of this package; whether the machine has it is not asked.
 #[pyfunction]
-pub fn check_device(device: &str) -> PyResult<()> {
+pub(crate) fn check_device(device: &str) -> PyResult<()> {
     // Which one that is, whoever computes finds out.
     if device == "auto" {
         return Ok(());
@@ -32,7 +32,7 @@ pub fn check_device(device: &str) -> PyResult<()> {
 }
 
 /// The device that a word means.
-pub fn named(word: &str) -> Result<ComputeDevice, Failure> {
+pub(crate) fn named(word: &str) -> Result<ComputeDevice, Failure> {
     ComputeDevice::chosen(word).map_err(|why| Failure {
         message: format!("device: {word:?}: {why}"),
         hint: why.hint(),
@@ -40,12 +40,12 @@ pub fn named(word: &str) -> Result<ComputeDevice, Failure> {
 }
 
 /// Opens it.
-pub fn open(device: ComputeDevice) -> Result<Device, Failure> {
+pub(crate) fn open(device: ComputeDevice) -> Result<Device, Failure> {
     devices::open(device).map_err(failure)
 }
 
 /// An error of the library, with what helps in Python.
-pub fn failure(error: Error) -> Failure {
+pub(crate) fn failure(error: Error) -> Failure {
     let hint = match &error {
         Error::NoBackend { device } => Some(format!(
             "build the package with it, in a checkout: pip install ./python --config-settings=build-args=\"--features {device}\"; or device=\"cpu\""

@@ -12,7 +12,7 @@ pyo3::create_exception!(
 );
 
 /// What went wrong and what to do about it, before the interpreter is at hand.
-pub struct Failure {
+pub(crate) struct Failure {
     pub message: String,
     pub hint: Option<String>,
 }
@@ -33,12 +33,12 @@ impl From<Failure> for PyErr {
 }
 
 /// A library's error as an exception: its message, and its remedy as `hint` and as a note.
-pub fn raise(error: impl Hint) -> PyErr {
+pub(crate) fn raise(error: impl Hint) -> PyErr {
     with_hint(error.to_string(), error.hint())
 }
 
 /// An exception with this message and remedy.
-pub fn with_hint(message: String, hint: Option<String>) -> PyErr {
+pub(crate) fn with_hint(message: String, hint: Option<String>) -> PyErr {
     let error = DeepFusionError::new_err(message);
     Python::attach(|py| {
         let value = error.value(py);

@@ -13,18 +13,18 @@ const PERIOD: Duration = Duration::from_millis(50);
 
 /// Whether the work should end, asked by the work where nothing is lost.
 #[derive(Default)]
-pub struct Stop(AtomicBool);
+pub(crate) struct Stop(AtomicBool);
 
 /// What unwinds out of work that has a listener and no way to be stopped.
 struct Stopped;
 
 impl Stop {
-    pub fn asked(&self) -> bool {
+    pub(crate) fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
     /// For a listener: unwinds to [`interruptible`] where the work should end. No panic: nothing is printed.
-    pub fn unwind_if_asked(&self) {
+    pub(crate) fn unwind_if_asked(&self) {
         if self.asked() {
             std::panic::resume_unwind(Box::new(Stopped));
         }
@@ -33,7 +33,10 @@ impl Stop {
 
 /// Does `work` without the interpreter on a thread in rayon's pool, while this thread asks for signals. After Ctrl-C `work` is asked to
 /// stop, is waited for, and KeyboardInterrupt raised.
-pub fn interruptible<R: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> R + Send) -> PyResult<R> {
+pub(crate) fn interruptible<R: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Stop) -> R + Send,
+) -> PyResult<R> {
     let stop = &Stop::default();
     let (done, end) = mpsc::channel::<()>();
     let (result, interrupted) = py.detach(move || {
@@ -61,7 +64,7 @@ pub fn interruptible<R: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> R + Se
 }
 
 /// Does `work` that only reads and cannot be stopped: after Ctrl-C it is left alone, to end by itself.
-pub fn abandonable<R: Send + 'static>(
+pub(crate) fn abandonable<R: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> R + Send + 'static,
 ) -> PyResult<R> {

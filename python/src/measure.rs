@@ -21,7 +21,7 @@ type Pair<'py> = (
 
 /// The report as JSON, as `deepfusion eval --json` prints it.
 #[pyfunction]
-pub fn evaluate(
+pub(crate) fn evaluate(
     py: Python<'_>,
     pairs: Vec<Pair<'_>>,
     kind: &str,
@@ -69,7 +69,7 @@ fn grid(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Grid> {
 /// Writes a simulated drive; gives its folder.
 #[expect(clippy::too_many_arguments, reason = "by name in Python")]
 #[pyfunction]
-pub fn simulate(
+pub(crate) fn simulate(
     py: Python<'_>,
     out: PathBuf,
     frames: usize,
@@ -113,7 +113,7 @@ pub fn simulate(
 
 /// What `deepfusion doctor PATH` finds, as JSON.
 #[pyfunction]
-pub fn doctor(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+pub(crate) fn doctor(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let diagnosis = abandonable(py, move || {
         deepfusion_cli::in_options(checks::doctor(&path, None))
     })?;

@@ -26,13 +26,13 @@ use crate::perceive::depth_map;
 
 /// The names of the networks inside the package.
 #[pyfunction]
-pub fn networks() -> Vec<&'static str> {
+pub(crate) fn networks() -> Vec<&'static str> {
     embedded_names()
 }
 
 /// A trained network by its path or name.
 #[pyfunction]
-pub fn load(
+pub(crate) fn load(
     py: Python<'_>,
     model: PathBuf,
     precision: &str,
@@ -65,7 +65,7 @@ pub fn load(
 
 /// A trained network.
 #[pyclass(frozen, module = "deepfusion")]
-pub struct Model {
+pub(crate) struct Model {
     estimator: Mutex<DepthEstimator>,
     device: ComputeDevice,
 }
@@ -204,7 +204,7 @@ fn augmentation_named(name: Option<&str>) -> PyResult<Augmentation> {
 }
 
 /// A camera that can be one, of an image of this size.
-pub fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsics, Failure> {
+pub(crate) fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsics, Failure> {
     let finite = [fx, fy, cx, cy].iter().all(|v| v.is_finite());
     if !(finite && fx > 0.0 && fy > 0.0) {
         return Err(Failure {
@@ -216,7 +216,7 @@ pub fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsic
 }
 
 /// Where an image is.
-pub enum Source {
+pub(crate) enum Source {
     /// Here.
     Pixels(RgbImage),
     /// In a file.
@@ -225,7 +225,7 @@ pub enum Source {
 
 impl Source {
     /// From an array (NumPy's, or another's by DLPack), a PIL image, or a path.
-    pub fn of(image: &Bound<'_, PyAny>) -> PyResult<Self> {
+    pub(crate) fn of(image: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(array) = image.extract::<PyReadonlyArray3<'_, u8>>() {
             return of_array(&array).map(Self::Pixels);
         }
@@ -251,7 +251,7 @@ impl Source {
     }
 
     /// The pixels, and the camera: the one given, else what a file's EXIF says of the lens.
-    pub fn read(
+    pub(crate) fn read(
         self,
         intrinsics: Option<[f64; 4]>,
     ) -> Result<(RgbImage, Option<Intrinsics>), Failure> {
@@ -289,7 +289,7 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 
 /// The metric depth of an image.
 #[pyclass(frozen, module = "deepfusion")]
-pub struct Prediction {
+pub(crate) struct Prediction {
     /// Where it was made ahead of whoever asks.
     made: Mutex<Option<DepthMap>>,
     prediction: deepfusion::Prediction,
@@ -306,7 +306,7 @@ pub struct Prediction {
 type Plane = Py<PyArray2<f32>>;
 
 impl Prediction {
-    pub fn new(
+    pub(crate) fn new(
         prediction: deepfusion::Prediction,
         image: RgbImage,
         camera: Option<Intrinsics>,
@@ -324,7 +324,7 @@ impl Prediction {
     }
 
     /// With its depth made already.
-    pub fn with_depth(self) -> Self {
+    pub(crate) fn with_depth(self) -> Self {
         let made = Mutex::new(Some(self.prediction.depth()));
         Self { made, ..self }
     }
@@ -439,7 +439,7 @@ fn columns<T: numpy::Element>(
 }
 
 /// H×W, without a copy.
-pub fn image_array(
+pub(crate) fn image_array(
     py: Python<'_>,
     height: usize,
     width: usize,

@@ -20,7 +20,7 @@ const WIDTH: usize = 640;
 
 /// Follows targets from image to image.
 #[pyclass(frozen, module = "deepfusion._native")]
-pub struct Perception {
+pub(crate) struct Perception {
     inner: Mutex<Perceiver>,
 }
 
@@ -50,9 +50,10 @@ impl Perception {
     /// `settings`: a JSON object over those for predicted depth, or for `exact` depth.
     #[new]
     fn new(settings: &str, exact: bool) -> PyResult<Self> {
-        let base = match exact {
-            true => PerceptionConfig::default(),
-            false => PerceptionConfig::predicted(),
+        let base = if exact {
+            PerceptionConfig::default()
+        } else {
+            PerceptionConfig::predicted()
         };
         // As the command does.
         let base = PerceptionConfig {
@@ -152,7 +153,7 @@ fn over(base: &PerceptionConfig, settings: &str) -> PyResult<PerceptionConfig> {
 }
 
 /// The values of an array of H x W metres.
-pub fn depth_map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
+pub(crate) fn depth_map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
     DepthMap {
         width: array.shape()[1],
         height: array.shape()[0],

@@ -76,7 +76,7 @@ impl Workers for PythonWorkers {
 
 /// Trains; gives the run's figures as a dict.
 #[pyfunction]
-pub fn train<'py>(
+pub(crate) fn train<'py>(
     py: Python<'py>,
     asked: Bound<'py, PyDict>,
     callback: Option<Py<PyAny>>,
@@ -120,14 +120,14 @@ pub fn train<'py>(
 
 /// What may not be meant of the recordings.
 #[derive(Default)]
-pub struct Warnings {
+pub(crate) struct Warnings {
     /// Why drives were left out.
     pub skipped: Vec<String>,
     pub others: Vec<String>,
 }
 
 impl Warnings {
-    pub fn add(&mut self, warning: SampleWarning) {
+    pub(crate) fn add(&mut self, warning: SampleWarning) {
         match warning {
             SampleWarning::Skipped(reason) => self.skipped.push(reason.to_string()),
             other => self.others.push(other.to_string()),
@@ -241,7 +241,7 @@ fn choose_data(config: &mut TrainConfig, asked: &TrainRequest) -> Result<(), Fai
 }
 
 /// Hears the trainer's events, logs them as the command does, and calls Python.
-pub struct Listener {
+pub(crate) struct Listener {
     callback: Option<Py<PyAny>>,
     log: Option<RunLog>,
     /// What went wrong in it: training stops, and this is raised.
@@ -252,7 +252,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    pub fn new(callback: Option<Py<PyAny>>) -> Self {
+    pub(crate) fn new(callback: Option<Py<PyAny>>) -> Self {
         Self {
             callback,
             log: None,
@@ -264,13 +264,13 @@ impl Listener {
     }
 
     /// Writes the run's files from now on.
-    pub fn keep_log(&mut self, trainer: &Trainer) -> Result<(), Failure> {
+    pub(crate) fn keep_log(&mut self, trainer: &Trainer) -> Result<(), Failure> {
         self.log = Some(RunLog::open(trainer.folder(), trainer.step())?);
         Ok(())
     }
 
     /// As Python's own warnings; where those are errors, the first stops the run.
-    pub fn warn(&mut self, warnings: &Warnings) {
+    pub(crate) fn warn(&mut self, warnings: &Warnings) {
         for text in &warnings.others {
             let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
             let warned =
@@ -281,7 +281,7 @@ impl Listener {
         }
     }
 
-    pub fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
+    pub(crate) fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
         match self.handle(event) {
             Ok(true) if !stop.asked() && self.raised.is_none() => Control::Continue,
             Ok(_) => Control::Stop,
@@ -403,9 +403,9 @@ fn as_dict(py: Python<'_>, event: TrainEvent) -> PyResult<Bound<'_, PyDict>> {
             dict.set_item("path", path)?;
             "saved"
         }
-        TrainEvent::Warning { step, message } => {
+        TrainEvent::Warning { step, warning } => {
             dict.set_item("step", step)?;
-            dict.set_item("message", message)?;
+            dict.set_item("message", warning.to_string())?;
             "warning"
         }
     };

@@ -4,7 +4,7 @@ use super::finding::{Figure, Limit, Outcome, Remedy, Severity, median};
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
 use deepfusion_hint::{Hint, count_of};
-use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, may_hold_log, read};
+use deepfusion_logs::{Clock, DriveLog, Error, Format, LogNote, ReadOptions, may_hold_log, read};
 use std::path::Path;
 
 /// Names of the files that are looked at as logs where they are no recording.
@@ -95,6 +95,7 @@ fn remedy(error: &Error) -> Option<Remedy> {
 /// What it is, and what it still needs.
 fn opened(path: &Path, log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log");
+    let notes: Vec<String> = log.notes.iter().map(LogNote::to_string).collect();
     outcome.find(
         Severity::Note,
         None,
@@ -103,7 +104,7 @@ fn opened(path: &Path, log: &DriveLog) -> Outcome {
             log.format,
             count_of(log.speeds.len(), "speed"),
             count_of(log.yaw_rates.len(), "yaw rate"),
-            log.notes.join("; ")
+            notes.join("; ")
         ),
         Remedy::Import {
             log: path.to_owned(),

@@ -18,6 +18,7 @@
 //! | [`devices`], [`engine`] | where a network computes, and what runs it there |
 //! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
 //! | [`machine`] | what this machine has: vector instructions, memory, disk |
+//! | [`importing`] | other projects' weights: which are known, and with the feature `train` as a run |
 //! | [`RunHistory`] | how a run learned, by what its folder keeps |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
@@ -26,7 +27,7 @@
 )]
 #![cfg_attr(
     feature = "train",
-    doc = "| [`importing`], [`export`] | other projects' weights as a run; a network as an ONNX file, compared with it |"
+    doc = "| [`export`] | a network as an ONNX file, compared with it |"
 )]
 #![cfg_attr(
     feature = "train",
@@ -53,7 +54,6 @@ pub mod export;
 mod figures;
 mod files;
 pub mod held_out;
-#[cfg(feature = "train")]
 pub mod importing;
 mod inputs;
 pub mod int8;

@@ -3,10 +3,10 @@
 use crate::blf;
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed};
+use crate::note::{CanNote, LogNote};
 use crate::problem::{FrameProblem, SignalProblem, SpeedProblem};
 use crate::rows::{enough, text_of};
 use crate::units::SpeedUnit;
-use deepfusion_hint::count_of;
 use deepfusion_motion::can::{CanId, Dbc};
 use std::io::Read;
 use std::path::Path;
@@ -91,30 +91,26 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         });
     }
     enough(path, &speeds)?;
-    let mut notes = vec![format!(
-        "speed from the signal {name} in {unit}: {} of {}",
-        speeds.len(),
-        count_of(all, "frame")
-    )];
-    notes.extend(several);
-    if repeated > 0 {
-        let left_out = count_of(repeated, "frame");
-        notes.push(format!(
-            "left out, not later than the one before: {left_out}"
-        ));
-    }
+    let read = CanNote::Signal {
+        signal: name.to_owned(),
+        unit,
+        speeds: speeds.len(),
+        frames: all,
+    };
+    let left_out = (repeated > 0).then_some(CanNote::NotLater { frames: repeated });
+    let notes = [Some(read), several, left_out];
     Ok(DriveLog {
         format: Format::CanTrace,
         clock,
         speeds,
         yaw_rates: Vec::new(),
         course_rates: Vec::new(),
-        notes,
+        notes: notes.into_iter().flatten().map(LogNote::from).collect(),
     })
 }
 
 /// Keeps the frames of one bus, the one with the most: a gateway repeats a message on another, later. A note where there are several.
-fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
+fn one_channel(frames: &mut Vec<Frame>) -> Option<CanNote> {
     let mut counts: Vec<(String, usize)> = Vec::new();
     for frame in frames.iter() {
         match counts.iter_mut().find(|(name, _)| *name == frame.channel) {
@@ -125,18 +121,12 @@ fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
     if counts.len() < 2 {
         return None;
     }
-    let channels: Vec<String> = counts
-        .iter()
-        .map(|(name, count)| format!("{name} ({})", count_of(*count, "frame")))
-        .collect();
+    let channels = counts.clone();
     // Of as many, the first.
     counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    let (kept, _) = counts.swap_remove(0);
-    frames.retain(|frame| frame.channel == kept);
-    Some(format!(
-        "its message comes on the channels {}: {kept} is read",
-        channels.join(", ")
-    ))
+    let (read, _) = counts.swap_remove(0);
+    frames.retain(|frame| frame.channel == read);
+    Some(CanNote::Channels { channels, read })
 }
 
 /// What of a trace is used.
@@ -391,9 +381,12 @@ mod tests {
         assert_eq!(one_channel(&mut one), None);
         let mut two = vec![frame(0, "can1"), frame(1, "can0"), frame(2, "can0")];
         let note = one_channel(&mut two).unwrap();
-        assert!(
-            note.contains("can1 (1 frame), can0 (2 frames): can0 is read"),
-            "{note}"
+        assert_eq!(
+            note,
+            CanNote::Channels {
+                channels: vec![("can1".into(), 1), ("can0".into(), 2)],
+                read: "can0".into(),
+            }
         );
         assert_eq!(two.iter().map(|f| f.ns).collect::<Vec<_>>(), [1, 2]);
         // A gateway's copies: the bus that was heard first.

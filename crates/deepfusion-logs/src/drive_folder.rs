@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Speed};
+use crate::note::{ClockNote, LogNote};
 use deepfusion_fs::write_atomically;
 use std::fmt::Write as _;
 use std::io::{ErrorKind, Write as _};
@@ -71,7 +72,7 @@ impl DriveFolder<'_> {
     /// # Errors
     /// [`Error::NoStart`] where nothing connects the log's clock with the video's; [`Error::Exists`] for a folder with files of these
     /// names; [`Error::File`].
-    pub fn write(&self, out: &Path) -> Result<Vec<String>> {
+    pub fn write(&self, out: &Path) -> Result<Vec<LogNote>> {
         self.check(out)?;
         let (start_ns, notes) = self.start()?;
         let files = Self::FILES.map(|name| out.join(name));
@@ -104,7 +105,7 @@ impl DriveFolder<'_> {
         &mut self,
         out: &Path,
         measure: impl FnOnce(&Path) -> std::result::Result<Option<f64>, E>,
-    ) -> std::result::Result<Vec<String>, E> {
+    ) -> std::result::Result<Vec<LogNote>, E> {
         self.check(out)?;
         let made = !out.exists();
         self.write(out)?;
@@ -126,26 +127,17 @@ impl DriveFolder<'_> {
     }
 
     /// When the first frame was taken, where the log's clock or the user says it.
-    fn start(&self) -> Result<(Option<i64>, Vec<String>)> {
+    fn start(&self) -> Result<(Option<i64>, Vec<LogNote>)> {
         if self.start_ns.is_some() {
             return Ok((self.start_ns, Vec::new()));
         }
         let first = self.log.speeds.first().map_or(0, |s| s.ns);
         match (self.log.clock, &self.media) {
             (Clock::Video, _) | (Clock::Date, _) | (_, Media::Images(_)) => Ok((None, Vec::new())),
-            (Clock::LocalDate, Media::Video(_)) => Ok((
-                None,
-                vec![
-                    "the log's dates have no zone and are taken for UTC, as the video's are".into(),
-                ],
-            )),
-            (Clock::Free, Media::Video(_)) if (0..NEAR_START_NS).contains(&first) => Ok((
-                None,
-                vec![
-                    "the log counts from its own start, which is taken for the video's first frame"
-                        .into(),
-                ],
-            )),
+            (Clock::LocalDate, Media::Video(_)) => Ok((None, vec![ClockNote::NoZone.into()])),
+            (Clock::Free, Media::Video(_)) if (0..NEAR_START_NS).contains(&first) => {
+                Ok((None, vec![ClockNote::OwnStart.into()]))
+            }
             (Clock::Free | Clock::TimeOfDay, Media::Video(_)) => {
                 Err(Error::NoStart { first_ns: first })
             }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::log::{DriveLog, Format, ReadOptions};
+use crate::note::{LogNote, TurnsNote};
 use crate::problem::SpeedProblem;
 use crate::rows::text_of;
 use crate::table::Table;
@@ -49,12 +50,12 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    log.notes[0] = format!("{file}: {}", log.notes[0]);
+    if let Some(first) = log.notes.first_mut() {
+        let note = Box::new(first.clone());
+        *first = LogNote::OfFile { file, note };
+    }
     let (Some(gyroscope), Some(gravity)) = (table(&GYROSCOPES)?, table(&GRAVITIES)?) else {
-        log.notes.push(
-            "no gyroscope with an accelerometer beside it: how the vehicle turned is unknown"
-                .into(),
-        );
+        log.notes.push(TurnsNote::NoGyroscope.into());
         return Ok(log);
     };
     let rates = axes(&gyroscope, options)?;
@@ -62,7 +63,7 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
     let heading = headings(&location, options)?;
     let (turns, note) = yaw_rates(&rates, &accelerations, &heading);
     log.yaw_rates = turns;
-    log.notes.push(note);
+    log.notes.push(note.into());
     Ok(log)
 }
 

@@ -2,6 +2,7 @@
 
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
+use crate::note::{FixesNote, LogNote};
 use crate::numbers::{Cell, cell};
 use crate::problem::{LineField, SpeedProblem, TableProblem};
 use crate::rows::{enough, left_out};
@@ -97,14 +98,9 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
             sigma_mps: sigma.filter(|s| *s > 0.0),
         });
     }
-    let mut notes = vec![format!(
-        "speeds of the Fix rows of {}",
-        if satellites {
-            "satellites alone (GPS)"
-        } else {
-            "any provider: none is of satellites alone"
-        }
-    )];
+    let mut notes = vec![LogNote::from(FixesNote::FixRows {
+        of_satellites: satellites,
+    })];
     left_out(&mut notes, rows, absent, repeated);
     enough(path, &speeds)?;
     Ok(DriveLog {

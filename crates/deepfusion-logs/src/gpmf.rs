@@ -4,6 +4,7 @@
 use crate::error::{Error, NoGps, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::mp4::{Broken, Sample, samples};
+use crate::note::{GoproNote, LogNote, TurnsNote};
 use crate::problem::{GpmfProblem, SpeedProblem};
 use crate::turns::{Heading, Sensor, yaw_rates};
 use nalgebra::Vector3;
@@ -56,16 +57,15 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
             },
         });
     }
-    let mut notes = vec![format!(
-        "speeds of the camera's GPS, {} readings on the video's own clock",
-        found.speeds.len()
-    )];
+    let mut notes = vec![LogNote::from(GoproNote::Gps {
+        readings: found.speeds.len(),
+    })];
     if found.without_fix > 0 {
-        notes.push(format!(
-            "{} of {} stretches of the video have no GPS fix and no speed",
-            found.without_fix,
-            payloads.len()
-        ));
+        let no_fix = GoproNote::NoFix {
+            without: found.without_fix,
+            stretches: payloads.len(),
+        };
+        notes.push(no_fix.into());
     }
     let up = if found.accelerations.is_empty() {
         &found.gravity
@@ -73,14 +73,11 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
         &found.accelerations
     };
     let yaw_rates = if found.rates.is_empty() || up.is_empty() {
-        notes.push(
-            "no gyroscope with an accelerometer beside it: how the vehicle turned is unknown"
-                .into(),
-        );
+        notes.push(TurnsNote::NoGyroscope.into());
         Vec::new()
     } else {
         let (turns, note) = yaw_rates(&found.rates, up, &courses(&found.places, &found.speeds));
-        notes.push(note);
+        notes.push(note.into());
         turns
     };
     Ok(DriveLog {

@@ -29,6 +29,7 @@ mod gpmf;
 mod gpx;
 mod log;
 mod mp4;
+mod note;
 mod numbers;
 mod problem;
 mod read;
@@ -46,6 +47,7 @@ pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, NoGps, Result};
 pub use gopro_lens::GoproLens;
 pub use log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
+pub use note::{CanNote, ClockNote, FixesNote, GoproNote, LogNote, TableNote, TurnSign, TurnsNote};
 pub use problem::{
     BlfProblem, BytesProblem, FrameProblem, GpmfProblem, GpxProblem, LineField, LineProblem,
     Mp4Problem, NmeaProblem, SignalProblem, SpeedProblem, TableProblem,

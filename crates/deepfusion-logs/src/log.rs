@@ -1,4 +1,4 @@
-use crate::SpeedUnit;
+use crate::{LogNote, SpeedUnit};
 use std::fmt;
 use std::path::PathBuf;
 
@@ -16,8 +16,8 @@ pub struct DriveLog {
     /// How the course over ground turned, by positions, where the vehicle moved; in the order of their times, spread over a
     /// second or so. Enough to tell how far two clocks are apart, not how a camera turned from one image to the next.
     pub course_rates: Vec<YawRate>,
-    /// How the log was understood, and what of it was left out: sentences to be printed.
-    pub notes: Vec<String>,
+    /// How the log was understood, and what of it was left out.
+    pub notes: Vec<LogNote>,
 }
 
 impl DriveLog {

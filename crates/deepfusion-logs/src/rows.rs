@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::log::Speed;
+use crate::note::{LogNote, TableNote};
 use crate::problem::{LineProblem, SpeedProblem};
 use std::path::Path;
 
@@ -28,16 +29,12 @@ pub(crate) fn text_of(path: &Path) -> Result<String> {
 }
 
 /// Says what of the rows was not used.
-pub(crate) fn left_out(notes: &mut Vec<String>, rows: usize, absent: usize, repeated: usize) {
+pub(crate) fn left_out(notes: &mut Vec<LogNote>, rows: usize, absent: usize, repeated: usize) {
     if absent > 0 {
-        notes.push(format!(
-            "{absent} of {rows} rows hold no speed and are left out"
-        ));
+        notes.push(TableNote::NoSpeed { absent, rows }.into());
     }
     if repeated > 0 {
-        notes.push(format!(
-            "{repeated} of {rows} rows repeat the time of the row above and are left out"
-        ));
+        notes.push(TableNote::Repeated { repeated, rows }.into());
     }
 }
 

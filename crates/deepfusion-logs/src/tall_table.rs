@@ -3,6 +3,7 @@
 use crate::columns::{Column, speed_rank};
 use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{DriveLog, Format, ReadOptions, Speed};
+use crate::note::{LogNote, TableNote};
 use crate::problem::SpeedProblem;
 use crate::rows::{enough, left_out};
 use crate::table::Table;
@@ -31,10 +32,11 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         Some(unit) => unit,
         None => return Err(table.lacks(ColumnProblem::NoSpeedUnit(name))),
     };
-    let mut notes = vec![format!(
-        "time from column '{}', speed from the rows of '{name}' in {factor}",
-        times.column.header.trim()
-    )];
+    let mut notes = vec![LogNote::from(TableNote::Rows {
+        time: times.column.header.trim().to_owned(),
+        name: name.clone(),
+        unit: factor,
+    })];
     let (mut speeds, mut last, mut of_speed, mut absent, mut repeated) =
         (Vec::<Speed>::new(), None, 0, 0, 0);
     for row in 0..table.len() {

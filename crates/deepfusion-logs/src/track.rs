@@ -2,8 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
+use crate::note::FixesNote;
 use crate::problem::SpeedProblem;
-use deepfusion_hint::count_of;
 use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
 use std::path::Path;
 
@@ -34,23 +34,17 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
     let measured = fixes.iter().all(|f| f.speed_mps.is_some());
     let mut notes = Vec::new();
     if smoothed.len() < fixes.len() {
-        let lost = fixes.len() - smoothed.len();
-        notes.push(format!(
-            "left out, as they stand alone or go back in time: {lost} of {}",
-            count_of(fixes.len(), "fix")
-        ));
+        let (lost, fixes) = (fixes.len() - smoothed.len(), fixes.len());
+        notes.push(FixesNote::Alone { lost, fixes }.into());
     }
     let mut sigmas: Vec<f64> = smoothed.iter().map(|s| s.sigma_mps).collect();
     sigmas.sort_by(f64::total_cmp);
-    let from = if measured {
-        "as the receiver measured them"
-    } else {
-        "from its positions, smoothed"
+    let sigma_mps = sigmas[sigmas.len() / 2];
+    let of_speeds = FixesNote::Speeds {
+        measured,
+        sigma_mps,
     };
-    notes.push(format!(
-        "speeds {from}, sure to {:.2} m/s in the middle",
-        sigmas[sigmas.len() / 2]
-    ));
+    notes.push(of_speeds.into());
     let time = |s: f64| origin.saturating_add((s * 1e9).round() as i64);
     let course_rates = course_rates(&smoothed);
     let course_rates = course_rates.iter().map(|(time_s, radps)| YawRate {

@@ -3,6 +3,7 @@
 //! agrees with how the satellites saw the course change.
 
 use crate::log::YawRate;
+use crate::note::{TurnSign, TurnsNote};
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
@@ -28,43 +29,34 @@ const CHANGES: usize = 10;
 /// Courses farther apart are not compared, in nanoseconds.
 const APART_NS: i64 = 3_000_000_000;
 
-/// The rates about the axis that points up, positive to the left, and a sentence about them.
+/// The rates about the axis that points up, positive to the left, and how they were understood.
 ///
 /// `rates` are in rad/s, `accelerations` hold gravity, on average over the drive much more of it than of anything else.
 pub(crate) fn yaw_rates(
     rates: &[Sensor],
     accelerations: &[Sensor],
     course: &[Heading],
-) -> (Vec<YawRate>, String) {
+) -> (Vec<YawRate>, TurnsNote) {
     let mean = accelerations.iter().map(|a| a.value).sum::<Vector3<f64>>()
         / accelerations.len().max(1) as f64;
     // Without gravity in it, what is left of a drive's accelerations is a tenth of this.
     let Some(up) = mean.try_normalize(4.0) else {
-        return (Vec::new(), "the accelerations beside the gyroscope hold no gravity: which way is up, and so how the vehicle turned, is unknown".into());
+        return (Vec::new(), TurnsNote::NoGravity);
     };
     let about_up: Vec<(i64, f64)> = rates.iter().map(|r| (r.ns, r.value.dot(&up))).collect();
     let (agreement, changes) = agreement(&about_up, course);
-    let (sign, note) = if changes < CHANGES || agreement.abs() < DECIDED {
-        (
-            1.0,
-            "taken for positive to the left, as the course of the satellites does not decide it: check the turns against the images",
-        )
+    let (sign, by) = if changes < CHANGES || agreement.abs() < DECIDED {
+        (1.0, TurnSign::Assumed)
     } else if agreement > 0.0 {
-        (1.0, "its sign agrees with the course of the satellites")
+        (1.0, TurnSign::Agrees)
     } else {
-        (
-            -1.0,
-            "its sign is turned round, to agree with the course of the satellites",
-        )
+        (-1.0, TurnSign::TurnedRound)
     };
     let turns = about_up.iter().map(|(ns, radps)| YawRate {
         ns: *ns,
         radps: sign * radps,
     });
-    (
-        turns.collect(),
-        format!("yaw rate from the gyroscope about gravity's axis; {note}"),
-    )
+    (turns.collect(), TurnsNote::AboutGravity(by))
 }
 
 /// Correlation of the turns to the left that the gyroscope and the course saw between neighbouring courses, and of how many.
@@ -134,10 +126,10 @@ mod tests {
 
     #[test]
     fn the_sign_of_gravity_does_not_matter() {
-        for felt in [1.0, -1.0] {
+        for (felt, sign) in [(1.0, TurnSign::Agrees), (-1.0, TurnSign::TurnedRound)] {
             let (rates, accelerations, course, truth) = drive(felt);
             let (turns, note) = yaw_rates(&rates, &accelerations, &course);
-            assert!(note.contains("course"), "{note}");
+            assert_eq!(note, TurnsNote::AboutGravity(sign));
             for (turn, truth) in turns.iter().zip(&truth) {
                 assert!(
                     (turn.radps - truth).abs() < 0.01,
@@ -152,12 +144,11 @@ mod tests {
     fn what_cannot_be_known_is_said() {
         let (rates, accelerations, _, _) = drive(1.0);
         let (turns, note) = yaw_rates(&rates, &accelerations, &[]);
-        assert!(
-            !turns.is_empty() && note.contains("does not decide"),
-            "{note}"
-        );
+        assert!(!turns.is_empty());
+        assert_eq!(note, TurnsNote::AboutGravity(TurnSign::Assumed));
         let (rates, weightless, course, _) = drive(0.0);
         let (turns, note) = yaw_rates(&rates, &weightless, &course);
-        assert!(turns.is_empty() && note.contains("no gravity"), "{note}");
+        assert!(turns.is_empty());
+        assert_eq!(note, TurnsNote::NoGravity);
     }
 }

@@ -4,12 +4,12 @@ use crate::columns::{Column, TIMES};
 use crate::dates::{TimeStyle, clock_of, nanoseconds, style_of};
 use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
+use crate::note::{LogNote, TableNote};
 use crate::problem::{SpeedProblem, TableProblem};
 use crate::rows::{enough, left_out};
 use crate::table::{Table, short};
 use crate::track::{self, TimedFix};
 use crate::units::SpeedUnit;
-use deepfusion_hint::count_of;
 use deepfusion_motion::Fix;
 
 /// The times of a table's rows.
@@ -91,11 +91,8 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     };
     let mut notes = Vec::new();
     if table.repeated_headers > 0 {
-        let times = match table.repeated_headers {
-            1 => "once".to_owned(),
-            n => format!("{n} times"),
-        };
-        notes.push(format!("the header stands {times} more among the rows"));
+        let more = table.repeated_headers;
+        notes.push(LogNote::from(TableNote::HeaderAgain { more }));
     }
     let Some(column) = speed else {
         return positions(table, &times, notes);
@@ -107,14 +104,12 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         None if phone_export || column.name == "speedmps" => SpeedUnit::MetresPerSecond,
         None => return Err(table.lacks(ColumnProblem::NoSpeedUnit(column.header.clone()))),
     };
-    notes.insert(
-        0,
-        format!(
-            "time from column '{}', speed from column '{}' in {unit}",
-            times.column.header.trim(),
-            column.header.trim()
-        ),
-    );
+    let of_columns = TableNote::Column {
+        time: times.column.header.trim().to_owned(),
+        speed: column.header.trim().to_owned(),
+        unit,
+    };
+    notes.insert(0, of_columns.into());
     let accuracy = table.named(&["speedaccuracy", "speed accuracy"]);
     let (mut speeds, mut last, mut absent, mut repeated) = (Vec::<Speed>::new(), None, 0, 0);
     for row in 0..table.len() {
@@ -170,19 +165,17 @@ fn radps_of(unit: &str) -> Option<f64> {
 }
 
 /// The yaw rates of the rows that have one. Where nothing says their unit, none and a note.
-fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<String>) -> Result<Vec<YawRate>> {
+fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<Vec<YawRate>> {
     let Some(column) = table.named(&YAW_RATE) else {
         return Ok(Vec::new());
     };
-    let header = column.header.trim();
+    let header = || column.header.trim().to_owned();
     let Some(radps) = column.unit.as_deref().and_then(radps_of) else {
-        let why = match &column.unit {
-            Some(unit) => format!("its unit '{unit}' is not known"),
-            None => "nothing says its unit".into(),
+        let of_unknown = TableNote::YawRateUnit {
+            column: header(),
+            unit: column.unit.clone(),
         };
-        notes.push(format!(
-            "column '{header}' is left out, as {why}: name it yaw_rate_radps or yaw_rate_dps (positive to the left)"
-        ));
+        notes.push(of_unknown.into());
         return Ok(Vec::new());
     };
     let mut found: Vec<YawRate> = Vec::new();
@@ -201,9 +194,7 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<String>) -> Result<Ve
         }
     }
     if !found.is_empty() {
-        notes.push(format!(
-            "yaw rate from column '{header}', taken to be positive to the left: change its sign where it is not"
-        ));
+        notes.push(TableNote::YawRate { column: header() }.into());
     }
     Ok(found)
 }
@@ -229,7 +220,7 @@ fn best_speed(table: &Table, unit: Option<SpeedUnit>) -> Option<&Column> {
 }
 
 /// Speeds from a table's latitudes and longitudes.
-fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<DriveLog> {
+fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<DriveLog> {
     let degrees = (
         table.named(&["latitude", "lat", "latitudedegrees"]),
         table.named(&[
@@ -277,18 +268,15 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<Dri
         return Err(table.bad(row, latitude, problem));
     }
     if !beyond.is_empty() {
-        notes.push(format!(
-            "left out, as their degrees are none: {} of {}",
-            beyond.len(),
-            count_of(table.len(), "row")
-        ));
+        let (beyond, rows) = (beyond.len(), table.len());
+        notes.push(TableNote::NoDegrees { beyond, rows }.into());
     }
-    notes.push(format!(
-        "time from column '{}', positions from '{}' and '{}'",
-        times.column.header.trim(),
-        latitude.header.trim(),
-        longitude.header.trim()
-    ));
+    let of_columns = TableNote::Positions {
+        time: times.column.header.trim().to_owned(),
+        latitude: latitude.header.trim().to_owned(),
+        longitude: longitude.header.trim().to_owned(),
+    };
+    notes.push(of_columns.into());
     let yaw_rates = yaw_rates(table, times, &mut notes)?;
     let mut log = track::log_of_fixes(&table.path, Format::Table, &fixes)?;
     notes.append(&mut log.notes);

@@ -1,6 +1,9 @@
 //! One log of each kind, of one drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
 
-use deepfusion_logs::{Clock, DriveLog, Format, GoproLens, ReadOptions, SpeedUnit, read};
+use deepfusion_logs::{
+    Clock, DriveLog, Format, GoproLens, ReadOptions, SpeedUnit, TableNote, TurnSign, TurnsNote,
+    read,
+};
 use std::path::{Path, PathBuf};
 
 /// 2026-05-01 12:00:00 UTC.
@@ -90,9 +93,12 @@ fn a_tables_yaw_rate_is_read_where_its_unit_is_said() {
         }
     }
     let log = read_with("yaw_rate", 1.0);
-    let notes = log.notes.join("\n");
     assert!(log.yaw_rates.is_empty());
-    assert!(notes.contains("nothing says its unit"), "{notes}");
+    let left_out = TableNote::YawRateUnit {
+        column: "yaw_rate".into(),
+        unit: None,
+    };
+    assert!(log.notes.contains(&left_out.into()), "{:?}", log.notes);
 }
 
 #[test]
@@ -101,14 +107,20 @@ fn torque_has_the_vehicles_speed_and_a_receivers() {
     assert_eq!((log.format, log.clock), (Format::Table, Clock::LocalDate));
     // Five of the 25 rows have no answer of the vehicle; the receiver's speed, a metre a second more, is not taken.
     speeds_are_true(&log, NOON_NS, 20, 1e-3);
-    let notes = log.notes.join("\n");
-    for said in [
-        "'Device Time'",
-        "'Speed (OBD)(km/h)' in km/h",
-        "5 of 25 rows hold no speed",
-        "the header stands once more",
+    for note in [
+        TableNote::Column {
+            time: "Device Time".into(),
+            speed: "Speed (OBD)(km/h)".into(),
+            unit: SpeedUnit::KilometresPerHour,
+        },
+        TableNote::NoSpeed {
+            absent: 5,
+            rows: 25,
+        },
+        TableNote::HeaderAgain { more: 1 },
     ] {
-        assert!(notes.contains(said), "{said}: {notes}");
+        let notes = &log.notes;
+        assert!(notes.contains(&note.clone().into()), "{note}: {notes:?}");
     }
     let receiver = ReadOptions {
         speed: Some("GPS Speed (Meters/second)".into()),
@@ -123,11 +135,8 @@ fn car_scanner_has_a_value_a_row_and_decimal_commas() {
     let log = plain("car_scanner.csv");
     assert_eq!((log.format, log.clock), (Format::TallTable, Clock::Free));
     speeds_are_true(&log, 43_200_250_000_000, 49, 1e-4);
-    assert!(
-        log.notes[0].contains("'Vehicle speed' in mph"),
-        "{:?}",
-        log.notes
-    );
+    let said = log.notes[0].to_string();
+    assert!(said.contains("'Vehicle speed' in mph"), "{said}");
 }
 
 #[test]
@@ -144,8 +153,9 @@ fn sensor_logger_has_turns_too() {
             "{turn:?}, truly {expected}"
         );
     }
+    let turned = TurnsNote::AboutGravity(TurnSign::TurnedRound);
     assert!(
-        log.notes.iter().any(|n| n.contains("turned round")),
+        log.notes.contains(&turned.into()),
         "gravity points down there: {:?}",
         log.notes
     );
@@ -363,7 +373,8 @@ fn damaged_logs_are_named_by_line_and_column() {
             let path = folder.path().join(name);
             std::fs::write(&path, text).unwrap();
             let log = read(&path, &ReadOptions::default()).unwrap();
-            assert!(log.notes[0].contains(expected), "{:?}", log.notes);
+            let said = log.notes[0].to_string();
+            assert!(said.contains(expected), "{said}");
             continue;
         }
         let error = changed(name, |text| text.replace(from, to));

@@ -1,4 +1,4 @@
-use crate::{LossTerms, SamplePanel};
+use crate::{LossTerms, SamplePanel, TrainWarning};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_model::LearnedCamera;
 use std::path::PathBuf;
@@ -77,8 +77,8 @@ pub enum TrainEvent {
     Warning {
         /// After this step.
         step: usize,
-        /// The warning, with the figure.
-        message: String,
+        /// What, with its figures.
+        warning: TrainWarning,
     },
 }
 

@@ -5,7 +5,8 @@ use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::ops::is_cpu;
 
 use crate::{
-    AssumedCamera, Error, SampleProblem, SampleSet, SnippetBatch, TrainConfig, ViewMotion,
+    AssumedCamera, Error, SampleProblem, SampleSet, SnippetBatch, TrainConfig, TrainWarning,
+    ViewMotion,
 };
 
 /// How far the focal length is from the one that was assumed, ln(f/f₀): of both axes, since turns to the side say nothing about fy. All
@@ -124,7 +125,7 @@ pub(crate) fn check_camera(config: &TrainConfig, sets: [&SampleSet; 2]) -> Resul
 const LEAST_TURN_PX: f64 = 0.3;
 
 /// What should be known before a camera is learned: that the vehicle hardly turns, or that its turns are not used.
-pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<String> {
+pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<TrainWarning> {
     config.learned_camera()?;
     let k = samples.camera()?;
     let (width, height) = (config.size.width as u32, config.size.height as u32);
@@ -135,29 +136,17 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
         .filter_map(|s| Some(s.motion.source_from_target?.angle()))
         .collect();
     if turns.is_empty() {
-        return Some(
-            "the camera is learned without measured turns: only strong ones determine the focal length then; a yaw rate and view_motion \
-             auto determine it much better"
-                .into(),
-        );
+        return Some(TrainWarning::NoMeasuredTurns);
     }
-    let mean = turns.iter().sum::<f64>() / turns.len() as f64;
-    if mean * focal_px < LEAST_TURN_PX {
-        return Some(format!(
-            "the vehicle hardly turns, {:.2} degrees from image to image: these drives will not determine the camera's focal length; add \
-             some with bends",
-            mean.to_degrees()
-        ));
+    let mean_rad = turns.iter().sum::<f64>() / turns.len() as f64;
+    if mean_rad * focal_px < LEAST_TURN_PX {
+        return Some(TrainWarning::HardlyTurns { mean_rad });
     }
     let turns_unused = matches!(
         config.view_motion,
         ViewMotion::PoseNet | ViewMotion::Distance
     );
-    turns_unused.then(|| {
-        "the camera is learned with the turns that PoseNet finds, which determine it only where they are strong; the measured ones, \
-         view_motion auto, determine it much better"
-            .into()
-    })
+    turns_unused.then_some(TrainWarning::MeasuredTurnsUnused)
 }
 
 #[cfg(test)]

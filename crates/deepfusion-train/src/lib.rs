@@ -37,6 +37,7 @@ mod stereo;
 mod trainer;
 mod unread;
 mod view_synthesis;
+mod warning;
 mod window;
 mod workers;
 
@@ -75,4 +76,5 @@ pub use source::{Sample, SampleSet};
 pub use stereo::{NoStereo, StereoSource, recordings_with_stereo};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};
+pub use warning::TrainWarning;
 pub use workers::{SingleWorker, Workers};

@@ -6,7 +6,7 @@ use std::path::Path;
 use deepfusion_data::{Camera, Dataset};
 use deepfusion_geometry::{Intrinsics, Se3};
 
-use crate::{Error, SampleSet, TrainConfig};
+use crate::{Error, SampleSet, TrainConfig, TrainWarning};
 
 /// How far the two cameras' intrinsics may differ, in pixels: rectified ones are the same.
 const SAME_CAMERA_PX: f64 = 0.5;
@@ -148,22 +148,16 @@ impl OtherCamera {
 }
 
 /// Which drives learn without the other camera's view in a run that has stereo.
-pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<String> {
+pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<TrainWarning> {
     if !config.stereo {
         return None;
     }
     let alone = samples.samples.iter().filter(|s| s.stereo.is_none());
     let alone: BTreeSet<usize> = alone.map(|sample| sample.dataset).collect();
     let first = samples.datasets.get(*alone.first()?)?.name();
-    Some(match alone.len() {
-        1 => format!("{first} has one camera: it learns from its own frames alone"),
-        2 => format!(
-            "{first} and 1 other drive have one camera: they learn from their own frames alone"
-        ),
-        n => format!(
-            "{first} and {} other drives have one camera: they learn from their own frames alone",
-            n - 1
-        ),
+    Some(TrainWarning::OneCamera {
+        drive: first.to_owned(),
+        others: alone.len() - 1,
     })
 }
 

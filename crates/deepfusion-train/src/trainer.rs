@@ -16,7 +16,7 @@ use crate::stereo;
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
-    Sampler, StepOutcome, TrainConfig, TrainEvent, WorkersProblem,
+    Sampler, StepOutcome, TrainConfig, TrainEvent, TrainWarning, WorkersProblem,
 };
 use burn::tensor::Device;
 use deepfusion_model::{CheckpointLacks, Error as ModelError};
@@ -264,9 +264,9 @@ impl Trainer {
             turns_warning(&self.config, &self.train),
             stereo::warning(&self.config, &self.train),
         ];
-        for message in warnings.into_iter().flatten() {
+        for warning in warnings.into_iter().flatten() {
             let step = self.state.step;
-            listen(TrainEvent::Warning { step, message });
+            listen(TrainEvent::Warning { step, warning });
         }
         let start = Instant::now();
         let mut saved = start;
@@ -330,13 +330,9 @@ impl Trainer {
                             frames: names.join(", "),
                         });
                     }
-                    let message = format!(
-                        "step skipped: the gradient is not finite (frames {})",
-                        names.join(", ")
-                    );
                     listen(TrainEvent::Warning {
                         step: self.state.step,
-                        message,
+                        warning: TrainWarning::StepSkipped { frames: names },
                     });
                     f64::NAN
                 }

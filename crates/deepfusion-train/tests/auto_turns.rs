@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor};
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_train::{
     BatchLoader, Control, LossTerms, Model, RunFolder, SampleSet, Schedule, SnippetBatch,
-    TrainConfig, TrainEvent, Trainer, ViewMotion,
+    TrainConfig, TrainEvent, TrainWarning, Trainer, ViewMotion,
 };
 use std::fs;
 use std::path::Path;
@@ -122,14 +122,16 @@ fn drives_with_and_without_a_yaw_rate_are_learned_from_together() {
     let mut trainer = Trainer::create(config, run, (train, validation), &device, Ok).unwrap();
     let mut warnings = Vec::new();
     let summary = trainer.run(&mut |event| {
-        if let TrainEvent::Warning { message, .. } = event {
-            warnings.push(message);
+        if let TrainEvent::Warning { warning, .. } = event {
+            warnings.push(warning);
         }
         Control::Continue
     });
     assert_eq!(summary.unwrap().step, 2);
-    let named = warnings
-        .iter()
-        .filter(|w| w.starts_with("no turns are known of speeds-alone:"));
-    assert_eq!(named.count(), 1, "{warnings:?}");
+    let named = TrainWarning::NoTurns {
+        drive: "speeds-alone".into(),
+        others: 0,
+    };
+    let found = warnings.iter().filter(|warning| **warning == named);
+    assert_eq!(found.count(), 1, "{warnings:?}");
 }

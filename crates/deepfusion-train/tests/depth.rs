@@ -83,7 +83,7 @@ fn run(trainer: &mut Trainer, until: Option<usize>) -> (Vec<LossTerms>, Option<S
                 }
             }
             TrainEvent::Panel { panel, .. } => supervision = Some(panel.supervision),
-            TrainEvent::Warning { message, .. } => panic!("{message}"),
+            TrainEvent::Warning { warning, .. } => panic!("{warning}"),
             _ => {}
         }
         Control::Continue

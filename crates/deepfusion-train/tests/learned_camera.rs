@@ -12,7 +12,7 @@ use deepfusion_sim::{SimConfig, Simulation};
 use deepfusion_train::{
     Adam, AssumedCamera, CheckpointKind, Control, Error, LearnedCamera, LossTerms, Model, Motion,
     NamedGradients, RunFolder, SampleSet, SnippetBatch, StepOutcome, StoredNetwork, TrainConfig,
-    TrainEvent, Trainer, ViewMotion, synthesise,
+    TrainEvent, TrainWarning, Trainer, ViewMotion, synthesise,
 };
 use nalgebra::Vector3;
 
@@ -275,7 +275,7 @@ fn the_photometric_error_of_bends_finds_the_focal_length() {
 struct Outcome {
     losses: Vec<(usize, LossTerms)>,
     camera: Option<LearnedCamera>,
-    warnings: Vec<String>,
+    warnings: Vec<TrainWarning>,
 }
 
 fn run(trainer: &mut Trainer, stop: Option<usize>) -> Outcome {
@@ -295,7 +295,7 @@ fn run(trainer: &mut Trainer, stop: Option<usize>) -> Outcome {
                 }
                 TrainEvent::Validated { step, losses, .. } => outcome.losses.push((step, losses)),
                 TrainEvent::Camera { learned, .. } => outcome.camera = Some(learned),
-                TrainEvent::Warning { message, .. } => outcome.warnings.push(message),
+                TrainEvent::Warning { warning, .. } => outcome.warnings.push(warning),
                 _ => {}
             }
             Control::Continue
@@ -363,11 +363,11 @@ fn a_straight_drive_says_that_it_does_not_determine_the_focal_length() {
             !learned.is_reliable(),
             "{canonical_focal_px:?}: {learned:?}"
         );
-        let warned = outcome
-            .warnings
-            .iter()
-            .any(|w| w.contains("do not determine"));
-        assert!(warned, "{:?}", outcome.warnings);
+        let warnings = outcome.warnings;
+        assert!(
+            warnings.contains(&TrainWarning::CameraUndetermined),
+            "{warnings:?}"
+        );
     }
 }
 

@@ -100,7 +100,7 @@ fn a_network_learns_from_depth_images_without_a_speed() {
     let mut listen = |event| {
         match event {
             TrainEvent::Step { losses, .. } => steps.push(losses),
-            TrainEvent::Warning { message, .. } => panic!("{message}"),
+            TrainEvent::Warning { warning, .. } => panic!("{warning}"),
             _ => {}
         }
         Control::Continue

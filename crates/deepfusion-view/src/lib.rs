@@ -23,7 +23,7 @@ pub use depth::{DepthCode, DepthFile};
 #[cfg(feature = "rerun")]
 pub use error::EncodingProblem;
 pub use error::{ArrayProblem, ContentProblem, Error, FolderKind, Result};
-pub use folder::Folder;
+pub use folder::{Folder, FrameProblem};
 #[cfg(feature = "rerun")]
 pub use rerun::{RerunReport, rerun_version, write_rerun};
 pub use server::{Server, Settings};

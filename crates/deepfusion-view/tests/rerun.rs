@@ -282,12 +282,13 @@ fn bad_frames_are_named_and_show_nothing_of_the_frame_before() {
     let file = at("out.rrd");
     let report = write(folder.path(), &file);
     assert_eq!(report.frames, 3);
-    let of = |name: &str| -> Vec<&str> {
+    let of = |name: &str| -> Vec<String> {
         let named = report.problems.iter().filter(|(frame, _)| frame == name);
-        named.map(|(_, problem)| problem.as_str()).collect()
+        named.map(|(_, problem)| problem.to_string()).collect()
     };
     assert_eq!(of("000000"), [""; 0]);
-    let [picture, depth] = of("000001")[..] else {
+    let bad = of("000001");
+    let [picture, depth] = &bad[..] else {
         panic!("{:?}", report.problems)
     };
     assert!(

@@ -93,12 +93,18 @@
 //! | [`doctor`] | what is wrong with a recording |
 //! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
-//! | [`bags`] | ROS bags, read and written |
+//! | [`bags`] | bags of ROS 1, read and written |
+#![cfg_attr(
+    feature = "ros2",
+    doc = "| [`ros2_bags`] | bags of ROS 2, as the messages of [`bags`] |"
+)]
 //! | [`perception`] | a depth image to 3D targets, tracks, free space |
 //! | [`instances`] | the things in an image, by your ONNX model of segmentation |
 //! | [`geometry`] | cameras, motions, depth images; `cloud`: point clouds and their files |
 //! | [`sim`] | streets with exact depth, to learn from and to test on |
 //! | [`onnx`], [`render`] | networks as ONNX files; pictures, charts and reports |
+//! | [`view`] | results in the browser: the server and its page |
+//! | [`infer`] | a network as a graph, and the fused engine that runs it |
 #![cfg_attr(
     feature = "train",
     doc = "| [`train`], [`nn`] | learning from a drive: losses, trainer, checkpoints; the networks in Burn |"
@@ -111,6 +117,7 @@ pub use deepfusion_data as data;
 pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;
 pub use deepfusion_geometry as geometry;
+pub use deepfusion_infer as infer;
 pub use deepfusion_instances as instances;
 pub use deepfusion_jobs as jobs;
 pub use deepfusion_logs as logs;
@@ -122,12 +129,15 @@ pub use deepfusion_onnx as onnx;
 pub use deepfusion_perception as perception;
 pub use deepfusion_records as records;
 pub use deepfusion_render as render;
+#[cfg(feature = "ros2")]
+pub use deepfusion_ros2bag as ros2_bags;
 pub use deepfusion_rosbag as bags;
 pub use deepfusion_runtime as runtime;
 pub use deepfusion_sim as sim;
 #[cfg(feature = "train")]
 pub use deepfusion_train as train;
 pub use deepfusion_video as video;
+pub use deepfusion_view as view;
 pub use deepfusion_weights as weights;
 
 pub use deepfusion_hint::Hint;

@@ -2,7 +2,9 @@ use std::path::Path;
 
 use deepfusion_data::OpenOptions;
 use deepfusion_hint::count_of;
-use deepfusion_logs::{Camera, Clock, DriveFolder, Media, ReadOptions, read_all, time_on_clock};
+use deepfusion_logs::{
+    Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, read_all, time_on_clock,
+};
 
 use super::clocks;
 use crate::cli::{CameraIntrinsics, ClockOffset, ImportArgs};
@@ -66,7 +68,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
             "yaw_rates": log.yaw_rates.len(),
             "duration_s": duration_s,
             "fastest_mps": fastest_mps,
-            "notes": log.notes.iter().chain(&notes).collect::<Vec<_>>(),
+            "notes": log.notes.iter().chain(&notes).map(LogNote::to_string).collect::<Vec<_>>(),
             "written": args.out,
         }));
     }
@@ -92,7 +94,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
 }
 
 /// Writes the folder with the offset of the clocks that its pictures show. Ctrl-C leaves nothing that looks finished.
-fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<String>> {
+fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<LogNote>> {
     folder.check(out)?;
     interrupt::catch("stopping once the clocks are compared; nothing is written");
     folder.write_measured(out, |out| {

@@ -36,7 +36,6 @@ mod run_report;
 mod simulate;
 #[cfg(feature = "train")]
 mod train;
-mod used_checkpoint;
 mod view;
 mod view_rerun;
 mod warnings;

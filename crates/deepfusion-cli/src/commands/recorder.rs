@@ -142,8 +142,8 @@ impl Recorder {
                 ));
             }
             TrainEvent::Panel { .. } | TrainEvent::Saved { .. } => {}
-            TrainEvent::Warning { step, message } => {
-                tracing::warn!("step {step}: {message}");
+            TrainEvent::Warning { step, warning } => {
+                tracing::warn!("step {step}: {warning}");
             }
         }
     }

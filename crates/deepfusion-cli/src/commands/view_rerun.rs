@@ -50,7 +50,7 @@ pub(super) fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
 
 /// The problems of frames, as many as a person reads; the file has them all.
 #[cfg(feature = "rerun")]
-fn warn(problems: &[(String, String)]) {
+fn warn(problems: &[(String, deepfusion_view::FrameProblem)]) {
     const SHOWN: usize = 20;
     for (frame, problem) in problems.iter().take(SHOWN) {
         tracing::warn!("{frame}: {problem}");

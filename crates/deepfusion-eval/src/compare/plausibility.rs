@@ -16,6 +16,10 @@
 //! adds k²t², and 1 + 3 + … = k²). The root is concave, so means over images may fall below it when a few images hold
 //! the wrong pixels; a row that does is flagged as implausible, not impossible.
 
+mod reason;
+
+pub use self::reason::FlagReason;
+
 use crate::Metrics;
 
 /// The seven metrics as far as they are known, in the order of [`Metrics::NAMES`].
@@ -50,16 +54,16 @@ pub struct Flag {
     /// How sure it is.
     pub severity: Severity,
     /// Why.
-    pub what: String,
+    pub why: FlagReason,
 }
 
 impl Flag {
     /// Something a reader must know.
     #[must_use]
-    pub fn note(what: impl Into<String>) -> Self {
+    pub fn note(why: FlagReason) -> Self {
         Self {
             severity: Severity::Note,
-            what: what.into(),
+            why,
         }
     }
 }
@@ -72,17 +76,17 @@ pub const THREE_DECIMALS: f64 = 0.0005;
 #[must_use]
 pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
     let mut flags = Vec::new();
-    let mut flag = |severity, what: String| flags.push(Flag { severity, what });
-    for (value, name) in row.iter().zip(Metrics::NAMES) {
-        let Some(value) = value else { continue };
-        let share = name.starts_with('a') && name.len() == 2;
-        if !value.is_finite() || *value < 0.0 {
-            flag(Severity::Impossible, format!("{name} is {value}"));
-        } else if share && *value > 1.0 {
+    let mut flag = |severity, why| flags.push(Flag { severity, why });
+    for (value, metric) in row.iter().zip(Metrics::NAMES) {
+        let Some(value) = *value else { continue };
+        let share = metric.starts_with('a') && metric.len() == 2;
+        if !value.is_finite() || value < 0.0 {
             flag(
                 Severity::Impossible,
-                format!("{name} is {value}, and a share is at most 1"),
+                FlagReason::OutOfRange { metric, value },
             );
+        } else if share && value > 1.0 {
+            flag(Severity::Impossible, FlagReason::AboveOne { metric, value });
         }
     }
     let [abs_rel, sq_rel, rmse, rmse_log, a1, a2, a3] = *row;
@@ -96,12 +100,15 @@ pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
             // Said by the two before.
             && !(names == ("δ₁", "δ₃") && a2.is_some())
         {
-            let (first, second) = names;
+            let (narrow, wide) = names;
             flag(
                 Severity::Impossible,
-                format!(
-                    "{first} = {low} above {second} = {high}: whoever is within the narrower bound is within the wider"
-                ),
+                FlagReason::Order {
+                    narrow,
+                    within: low,
+                    wide,
+                    within_wide: high,
+                },
             );
         }
     }
@@ -111,41 +118,35 @@ pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
     let t = 1.25f64.ln();
     // f64 sums of a thousand images are off by less.
     let slack = rounding + 1e-9;
-    if let Some(log) = rmse_log {
+    if let Some(rmse_log) = rmse_log {
         let least = t * (b[0] + b[1] + b[2]);
         let alike = t * (b[0] + 3.0 * b[1] + 5.0 * b[2]).sqrt();
-        if log + slack < least {
+        if rmse_log + slack < least {
             flag(
                 Severity::Impossible,
-                format!("RMSE log = {log}, and these δ need at least {least:.3}"),
+                FlagReason::RmseLog { rmse_log, least },
             );
-        } else if log + slack < alike {
+        } else if rmse_log + slack < alike {
             flag(
                 Severity::Implausible,
-                format!(
-                    "RMSE log = {log}: images alike with these δ have at least {alike:.3} (and any at least {least:.3})"
-                ),
+                FlagReason::RmseLogOfAlike {
+                    rmse_log,
+                    alike,
+                    least,
+                },
             );
         }
     }
     if let Some(abs_rel) = abs_rel {
         let least = 0.2 * b[0] + 0.16 * b[1] + 0.128 * b[2];
         if abs_rel + slack < least {
-            flag(
-                Severity::Impossible,
-                format!("Abs Rel = {abs_rel}, and these δ need at least {least:.3}"),
-            );
+            flag(Severity::Impossible, FlagReason::AbsRel { abs_rel, least });
         }
     }
     if let (Some(rmse), Some(sq_rel)) = (rmse, sq_rel) {
         let most = (cap_m * (sq_rel + slack)).max(0.0).sqrt();
         if rmse - slack > most {
-            flag(
-                Severity::Impossible,
-                format!(
-                    "RMSE = {rmse} m, and this Sq Rel allows at most {most:.3} m up to {cap_m} m"
-                ),
-            );
+            flag(Severity::Impossible, FlagReason::Rmse { rmse, most, cap_m });
         }
     }
     if let (Some(abs_rel), Some(sq_rel)) = (abs_rel, sq_rel) {
@@ -153,9 +154,11 @@ pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
         if sq_rel - slack > most {
             flag(
                 Severity::Impossible,
-                format!(
-                    "Sq Rel = {sq_rel} m, and this Abs Rel allows at most {most:.3} m up to {cap_m} m"
-                ),
+                FlagReason::SqRel {
+                    sq_rel,
+                    most,
+                    cap_m,
+                },
             );
         }
     }
@@ -173,7 +176,9 @@ pub fn identical(rows: &[(&str, Seven)]) -> Vec<Option<Flag>> {
         let twin = (0..rows.len()).find(same)?;
         Some(Flag {
             severity: Severity::Implausible,
-            what: format!("every figure equals those of `{}`", rows[twin].0),
+            why: FlagReason::Twin {
+                row: rows[twin].0.to_owned(),
+            },
         })
     };
     (0..rows.len()).map(twin).collect()
@@ -204,7 +209,8 @@ mod tests {
         let flags = published([0.057, 0.716, 3.692, 0.175, 0.977, 0.968, 0.985]);
         assert_eq!(flags.len(), 1);
         assert_eq!(flags[0].severity, Severity::Impossible);
-        assert!(flags[0].what.starts_with("δ₁ = 0.977 above δ₂ = 0.968"));
+        let why = flags[0].why.to_string();
+        assert!(why.starts_with("δ₁ = 0.977 above δ₂ = 0.968"), "{why}");
     }
 
     #[test]
@@ -213,11 +219,8 @@ mod tests {
         assert_eq!(flags.len(), 1);
         assert_eq!(flags[0].severity, Severity::Implausible);
         // t·√(0.1125 + 3·0.0385 + 5·0.0195) = 0.2231·0.5705.
-        assert!(
-            flags[0].what.contains("at least 0.127"),
-            "{}",
-            flags[0].what
-        );
+        let why = flags[0].why.to_string();
+        assert!(why.contains("at least 0.127"), "{why}");
     }
 
     #[test]
@@ -233,7 +236,7 @@ mod tests {
         ] {
             let flags = published(row);
             assert!(
-                flags.iter().any(|f| f.what.contains(word)),
+                flags.iter().any(|f| f.why.to_string().contains(word)),
                 "{word}: {flags:?}"
             );
             assert!(
@@ -253,9 +256,14 @@ mod tests {
         let mut other = row;
         other[0] = Some(0.388);
         let flags = identical(&[("row 1", row), ("row 2", other), ("row 4", row)]);
-        assert!(flags[0].as_ref().unwrap().what.contains("`row 4`"));
-        assert!(flags[1].is_none());
-        assert!(flags[2].as_ref().unwrap().what.contains("`row 1`"));
+        let twin_of = |row: &str| {
+            let row = row.to_owned();
+            Some(Flag {
+                severity: Severity::Implausible,
+                why: FlagReason::Twin { row },
+            })
+        };
+        assert_eq!(flags, [twin_of("row 4"), None, twin_of("row 1")]);
         let few = [None, None, None, None, Some(0.9), None, None];
         assert_eq!(identical(&[("a", few), ("b", few)]), [None, None]);
     }

@@ -2,7 +2,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::plausibility::{Flag, Seven, THREE_DECIMALS, check, identical};
+use super::plausibility::{Flag, FlagReason, Seven, THREE_DECIMALS, check, identical};
 use super::table::{Column, Row, Table, Tables, Value};
 use super::{Error, PublishedProblem, Result};
 
@@ -160,7 +160,8 @@ impl Published {
         let figures = row.seven();
         let mut flags = check(&figures, THREE_DECIMALS, CAP_M);
         flags.extend(twin);
-        flags.extend(row.note.iter().map(Flag::note));
+        let note = row.note.clone().map(FlagReason::Published);
+        flags.extend(note.map(Flag::note));
         let source = self.source.iter().find(|s| s.id == row.source);
         let place = row
             .place

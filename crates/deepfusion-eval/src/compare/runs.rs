@@ -4,8 +4,8 @@ use std::path::Path;
 use crate::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
 use deepfusion_hint::count_of;
 
-use super::evaluation::{Evaluation, Origin, in_words};
-use super::plausibility::{Flag, Severity, check, identical};
+use super::evaluation::{Evaluation, Origin};
+use super::plausibility::{Flag, FlagReason, Severity, check, identical};
 use super::table::{Better, Column, Row, Table, Tables, Value};
 
 /// Tables of evaluations: unscaled, median-scaled, by range and of drawn points, for each ground on which was measured.
@@ -255,23 +255,14 @@ fn notes(member: &Evaluation) -> Vec<Flag> {
         ..
     } = &member.origin
     {
-        flags.push(Flag::note(format!(
-            "{} is another file by now than the one that was measured: evaluate again",
-            model.checkpoint
-        )));
+        let checkpoint = model.checkpoint.clone();
+        flags.push(Flag::note(FlagReason::Outdated { checkpoint }));
     }
     if let Some(how) = member.post_process() {
-        flags.push(Flag::note(format!(
-            "{}: {}",
-            in_words(how),
-            how.explained()
-        )));
+        flags.push(Flag::note(FlagReason::PostProcessed { how }));
     }
-    if let Some(rate) = member.report.missing_rate.filter(|r| *r > 0.0) {
-        flags.push(Flag::note(format!(
-            "{:.2} % of the ground truth has no prediction and is left out",
-            100.0 * rate
-        )));
+    if let Some(share) = member.report.missing_rate.filter(|r| *r > 0.0) {
+        flags.push(Flag::note(FlagReason::NoPrediction { share }));
     }
     flags
 }
@@ -362,7 +353,7 @@ fn point_table(ground: &str, members: &[&Evaluation]) -> Option<Table> {
             flags: if points.in_space {
                 Vec::new()
             } else {
-                vec![Flag::note("distances along z: the camera was not known")]
+                vec![Flag::note(FlagReason::AlongZ)]
             },
             source: None,
         })

@@ -222,7 +222,7 @@ impl Table {
         };
         let of_row = |row: &Row| {
             let flags = row.flags.iter();
-            let texts = flags.map(|f| format!("{}: {}", f.severity.word(), f.what));
+            let texts = flags.map(|f| format!("{}: {}", f.severity.word(), f.why));
             let source = row.source.iter().map(|s| format!("from {s}"));
             texts.chain(source).map(&mut number).collect()
         };
@@ -252,6 +252,7 @@ impl Tables {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plausibility::FlagReason;
     use super::*;
 
     fn table(values: &[(f64, bool)]) -> Table {
@@ -297,7 +298,7 @@ mod tests {
         let mut doubtful = table(&[(0.05, true), (0.1, true), (0.2, true)]);
         doubtful.rows[0].flags.push(Flag {
             severity: Severity::Impossible,
-            what: "δ".into(),
+            why: FlagReason::AlongZ,
         });
         assert_eq!(column(&doubtful), [Rank::None, Rank::Best, Rank::Second]);
         doubtful.rows[0].flags[0].severity = Severity::Implausible;
@@ -317,7 +318,9 @@ mod tests {
         for row in &mut table.rows {
             row.source = Some("a paper".into());
         }
-        table.rows[1].flags.push(Flag::note("x"));
+        table.rows[1]
+            .flags
+            .push(Flag::note(FlagReason::Published("x".into())));
         let (notes, numbers) = table.footnotes();
         assert_eq!(notes, ["from a paper", "note: x"]);
         assert_eq!(numbers, [vec![1], vec![2, 1]]);

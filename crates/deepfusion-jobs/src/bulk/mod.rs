@@ -39,7 +39,7 @@ pub use manifest::{Entry, Lock, Manifest, State};
 pub use progress::{BulkProgress, Summary};
 pub use records::{RecordLines, record_line, record_lines_path, record_path, write_record};
 pub use resume::{BulkJob, StartedJob};
-pub use shard::Shard;
+pub use shard::{NoShard, Shard};
 pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};
 pub use target_run::{TargetSummary, WrittenTargets, perceive};
 pub use video::{VIDEO_ENDING, write_one_video, write_videos};

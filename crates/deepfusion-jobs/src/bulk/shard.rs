@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use deepfusion_hint::Hint;
+
 /// One part of a work shared among several runs, written `2/8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
@@ -29,22 +31,52 @@ impl fmt::Display for Shard {
     }
 }
 
-impl FromStr for Shard {
-    type Err = String;
+/// Why a text names no shard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoShard {
+    /// It is not written as one.
+    #[error("expected I/N, the I-th of N parts, such as 2/8")]
+    Shape,
+    /// It is counted from 0.
+    #[error("shards are counted from 1: the first of {count} is 1/{count}")]
+    Zero {
+        /// How many there are.
+        count: usize,
+    },
+    /// There are fewer.
+    #[error("there is no part {index} of {count}")]
+    Beyond {
+        /// Which was named.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl Hint for NoShard {
+    fn hint(&self) -> Option<String> {
+        match self {
+            // These messages say what is expected.
+            Self::Shape | Self::Zero { .. } => None,
+            Self::Beyond { count: 0, .. } => Some("N is at least 1".into()),
+            Self::Beyond { count, .. } => Some(format!("the last shard is {count}/{count}")),
+        }
+    }
+}
+
+impl FromStr for Shard {
+    type Err = NoShard;
+
+    fn from_str(text: &str) -> Result<Self, NoShard> {
         let numbers = text.split_once('/').and_then(|(index, count)| {
             Some((index.trim().parse().ok()?, count.trim().parse().ok()?))
         });
         match numbers {
-            Some((0, count)) if count > 0 => Err(format!(
-                "shards are counted from 1: the first of {count} is 1/{count}"
-            )),
-            Some((index, count)) if index > count => {
-                Err(format!("there is no part {index} of {count}"))
-            }
+            Some((0, count)) if count > 0 => Err(NoShard::Zero { count }),
+            Some((index, count)) if index > count => Err(NoShard::Beyond { index, count }),
             Some((index, count)) if index > 0 => Ok(Self { index, count }),
-            _ => Err("expected I/N, the I-th of N parts, such as 2/8".into()),
+            _ => Err(NoShard::Shape),
         }
     }
 }
@@ -62,6 +94,21 @@ mod tests {
         ] {
             assert!(bad.parse::<Shard>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_text_that_names_none_says_why() {
+        for (text, why) in [
+            ("1", "expected I/N, the I-th of N parts, such as 2/8"),
+            ("0/0", "expected I/N, the I-th of N parts, such as 2/8"),
+            ("0/8", "shards are counted from 1: the first of 8 is 1/8"),
+            ("9/8", "there is no part 9 of 8"),
+            ("1/0", "there is no part 1 of 0"),
+        ] {
+            assert_eq!(text.parse::<Shard>().unwrap_err().to_string(), why);
+        }
+        let beyond = "9/8".parse::<Shard>().unwrap_err();
+        assert_eq!(beyond.hint().as_deref(), Some("the last shard is 8/8"));
     }
 
     proptest! {

@@ -9,6 +9,7 @@ mod model_sheet;
 mod saved;
 mod shown_images;
 mod truth;
+mod used_checkpoint;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -34,6 +35,7 @@ pub use self::truth::{
     Truth, array_places, baseline_from_arrays, baseline_from_datasets, baseline_from_training,
     depth_map, has_truth, known_pixels,
 };
+pub use self::used_checkpoint::UsedCheckpoint;
 
 /// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
 #[must_use]

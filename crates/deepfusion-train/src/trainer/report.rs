@@ -5,12 +5,9 @@ use super::step::PanelInput;
 use super::validation::validation_loss;
 use crate::focal_spread::focal_spread;
 use crate::selection::selection;
-use crate::{CheckpointKind, Checkpoints, Control, Error, TrainEvent};
+use crate::{CheckpointKind, Checkpoints, Control, Error, TrainEvent, TrainWarning};
 use deepfusion_model::LearnedCamera;
 
-/// Said where the spread is large.
-const CAMERA_UNRELIABLE: &str = "the drives do not determine the camera's focal length: without turns (and, with the turns of a network, without strong ones) \
-     another focal length explains the images as well; depth of what is not straight ahead is not to be relied on, nor its metres";
 /// Below this share of pixels in view the geometry has diverged: a warning.
 const MIN_VALID_SHARE: f64 = 0.2;
 /// Above this share of dynamic pixels the masks remove too much of what depth should learn from: a warning.
@@ -32,19 +29,14 @@ impl Trainer {
         }
         // Without video both are NaN, and are no reason to warn.
         if valid_share < MIN_VALID_SHARE {
-            let message = format!(
-                "only {:.0} % of the pixels are in view of the other frame: depth or motion has come apart",
-                100.0 * valid_share
-            );
-            listen(TrainEvent::Warning { step, message });
+            let warning = TrainWarning::FewInView { share: valid_share };
+            listen(TrainEvent::Warning { step, warning });
         }
         if moving_share > MAX_MOVING_SHARE {
-            let message = format!(
-                "{:.0} % of the pixels are taken to move by themselves: the flow explains more than depth and motion do; \
-                 a longer warm-up (`loss.moving.warmup_share`) lets depth learn first",
-                100.0 * moving_share
-            );
-            listen(TrainEvent::Warning { step, message });
+            let warning = TrainWarning::ManyDynamic {
+                share: moving_share,
+            };
+            listen(TrainEvent::Warning { step, warning });
         }
         if !self.workers.leads() {
             return Ok(());
@@ -102,8 +94,8 @@ impl Trainer {
             .write_config(&self.folder.read_settings()?, &findings)?;
         listen(TrainEvent::Camera { camera, learned });
         if !learned.is_reliable() {
-            let message = CAMERA_UNRELIABLE.to_owned();
-            listen(TrainEvent::Warning { step, message });
+            let warning = TrainWarning::CameraUndetermined;
+            listen(TrainEvent::Warning { step, warning });
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! What must hold before a run begins, and what its samples say.
 
 use super::validation::no_samples;
-use crate::{Error, SampleSet, TrainConfig, ViewMotion};
+use crate::{Error, SampleSet, TrainConfig, TrainWarning, ViewMotion};
 use burn::tensor::Device;
 use deepfusion_model::{SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, supports};
@@ -83,18 +83,14 @@ impl SampleSet {
 }
 
 /// With `auto`: which drives are warped by PoseNet's turns.
-pub(super) fn turns_warning(config: &TrainConfig, samples: &SampleSet) -> Option<String> {
+pub(super) fn turns_warning(config: &TrainConfig, samples: &SampleSet) -> Option<TrainWarning> {
     if config.view_motion != ViewMotion::Auto {
         return None;
     }
     let drives = samples.without_turns();
-    let first = drives.first()?;
-    let others = match drives.len() {
-        1 => String::new(),
-        2 => " and 1 other drive".into(),
-        n => format!(" and {} other drives", n - 1),
-    };
-    Some(format!(
-        "no turns are known of {first}{others}: warped by PoseNet's at the measured distance"
-    ))
+    let (first, others) = drives.split_first()?;
+    Some(TrainWarning::NoTurns {
+        drive: (*first).to_owned(),
+        others: others.len(),
+    })
 }

@@ -10,6 +10,7 @@ use deepfusion_records::PredictionRecord;
 use serde_json::{Value, json};
 
 use super::entry::Entry;
+use super::problem::FrameProblem;
 use super::small_files::SmallFiles;
 use crate::{Error, Result};
 
@@ -33,6 +34,14 @@ const PASSED_ON: [&str; 12] = [
 /// A frame as the page gets it: the camera, which parts there are, the targets, and what is wrong with any of them. Everything but
 /// `name` may be missing.
 pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
+    let (mut frame, problems) = frame_and_problems(folder, entry);
+    let said: Vec<String> = problems.iter().map(FrameProblem::to_string).collect();
+    frame["problems"] = json!(said);
+    frame
+}
+
+/// The same, with what is wrong apart.
+pub(crate) fn frame_and_problems(folder: &Path, entry: &Entry) -> (Value, Vec<FrameProblem>) {
     let SmallFiles {
         sidecar,
         targets,
@@ -57,15 +66,14 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
             let camera = Intrinsics::from_numbers(k, (width, height));
             match camera.implausible() {
                 None => frame["intrinsics"] = json!(camera),
-                Some(why) => problems.push(format!("the sidecar's camera cannot be: {why}")),
+                Some(why) => problems.push(FrameProblem::Camera(why)),
             }
         }
-        Some((None, _)) => {
-            problems.push("the camera is unknown: no cloud, no boxes on the picture".into())
-        }
-        Some((_, None)) => problems.push("the sidecar does not say the image's size".into()),
+        Some((None, _)) => problems.push(FrameProblem::NoCamera),
+        Some((_, None)) => problems.push(FrameProblem::NoSize),
         None if entry.sidecar.is_none() => {
-            problems.push(format!("no {}.json: the camera is unknown", entry.name));
+            let frame = entry.name.clone();
+            problems.push(FrameProblem::NoSidecar { frame });
         }
         None => {}
     }
@@ -73,34 +81,31 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
         Ok(picture) => {
             frame["picture"] =
                 json!({ "size": picture.size, "path": picture.path.display().to_string() });
-            if said_size.is_some_and(|said| said != picture.size) {
-                let ((w, h), (said_w, said_h)) = (picture.size, said_size.unwrap_or_default());
-                problems.push(format!(
-                    "the picture is {w}x{h}, the sidecar says {said_w}x{said_h}"
-                ));
-            } else if picture.changed {
-                problems.push("the picture has changed since its depth was made".into());
+            match said_size.filter(|said| *said != picture.size) {
+                Some(expected) => problems.push(FrameProblem::PictureSize {
+                    found: picture.size,
+                    expected,
+                }),
+                None if picture.changed => problems.push(FrameProblem::PictureChanged),
+                None => {}
             }
         }
-        Err(none) => problems.push(none.to_string()),
+        Err(none) => problems.push(none),
     }
     match entry.depth.as_ref().map(|d| folder.join(&d.file)) {
         // An array's header is read with its numbers; the page compares the sizes once more.
         Some(path) if path.extension().is_some_and(|e| e == "png") => match image_size(&path) {
-            Ok((w, h)) => {
-                if let Some((said_w, said_h)) = said_size.filter(|said| *said != (w, h)) {
-                    problems.push(format!(
-                        "depth is {w}x{h}, the sidecar says {said_w}x{said_h}"
-                    ));
+            Ok(found) => {
+                if let Some(expected) = said_size.filter(|said| *said != found) {
+                    problems.push(FrameProblem::DepthSize { found, expected });
                 }
             }
-            Err(e) => problems.push(e.to_string()),
+            Err(e) => problems.push(FrameProblem::Unreadable(e.to_string())),
         },
         Some(_) => {}
-        None => problems.push("no depth was saved, neither as depth-png nor as npy".into()),
+        None => problems.push(FrameProblem::NoDepth),
     }
-    frame["problems"] = json!(problems);
-    frame
+    (frame, problems)
 }
 
 /// A frame's tracks, short: camera, and id, centre and state of each target; `None` where there are none.
@@ -126,25 +131,8 @@ pub(crate) struct Picture {
     pub changed: bool,
 }
 
-/// Why a frame has no picture.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum NoPicture {
-    /// It cannot be read.
-    #[error(transparent)]
-    Unreadable(Error),
-    /// A video or a bag, which holds it, is named.
-    #[error("{}: one picture among others, and none is kept beside the results", .0.display())]
-    AmongOthers(PathBuf),
-    /// It was there when depth was made from it.
-    #[error("{}: the picture is not there any more", .0.display())]
-    Gone(PathBuf),
-    /// Nothing says which it was.
-    #[error("no picture is known")]
-    Unknown,
-}
-
 /// The picture of a frame: the one its sidecar names, or `NAME_image.*` beside it.
-pub(crate) fn picture_of(folder: &Path, entry: &Entry) -> Result<Picture, NoPicture> {
+pub(crate) fn picture_of(folder: &Path, entry: &Entry) -> Result<Picture, FrameProblem> {
     let sidecar = SmallFiles::read(folder, entry).sidecar;
     picture(folder, entry, sidecar.as_ref().map(|s| &s.record))
 }
@@ -153,7 +141,7 @@ fn picture(
     folder: &Path,
     entry: &Entry,
     sidecar: Option<&PredictionRecord>,
-) -> Result<Picture, NoPicture> {
+) -> Result<Picture, FrameProblem> {
     let named = sidecar.and_then(|s| s.image.clone());
     // As it was given to `predict`, whose folder this may still be; or beside the results, which were moved together.
     let mut places: Vec<PathBuf> = named
@@ -188,12 +176,12 @@ fn picture(
         }
     }
     Err(match (problem, named) {
-        (Some(problem), _) => NoPicture::Unreadable(problem),
+        (Some(problem), _) => FrameProblem::Unreadable(problem.to_string()),
         (None, Some(named)) if places.iter().any(|path| path.is_file()) => {
-            NoPicture::AmongOthers(named)
+            FrameProblem::PictureAmongOthers(named)
         }
-        (None, Some(named)) => NoPicture::Gone(named),
-        (None, None) => NoPicture::Unknown,
+        (None, Some(named)) => FrameProblem::PictureGone(named),
+        (None, None) => FrameProblem::NoPicture,
     })
 }
 

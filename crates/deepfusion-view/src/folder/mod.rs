@@ -4,6 +4,7 @@ mod entry;
 mod frame;
 mod listing;
 mod order;
+mod problem;
 mod small_files;
 mod summary;
 
@@ -11,7 +12,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) use entry::{Entry, FrameFile};
+#[cfg(feature = "rerun")]
+pub(crate) use frame::frame_and_problems;
 pub(crate) use frame::{frame_json, picture_of, targets_of};
+pub use problem::FrameProblem;
 #[cfg(feature = "rerun")]
 pub(crate) use small_files::SmallFiles;
 #[cfg(feature = "rerun")]

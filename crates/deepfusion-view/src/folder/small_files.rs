@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::entry::{Entry, FrameFile};
+use super::problem::FrameProblem;
 use crate::{ContentProblem, Error, Result};
 
 /// No sidecar or list of targets is as large; what is, is another program's file.
@@ -18,7 +19,7 @@ pub(crate) struct SmallFiles {
     pub sidecar: Option<Small<PredictionRecord>>,
     /// Without the targets that cannot be drawn.
     pub targets: Option<Small<FrameRecord>>,
-    pub problems: Vec<String>,
+    pub problems: Vec<FrameProblem>,
     /// Whether a file is not whole: a frame that comes.
     pub unfinished: bool,
 }
@@ -49,7 +50,7 @@ impl SmallFiles {
         let outcome = read_json(&folder.join(&file?.file));
         outcome
             .map_err(|e| {
-                self.problems.push(e.to_string());
+                self.problems.push(FrameProblem::Unreadable(e.to_string()));
                 self.unfinished = true;
             })
             .ok()
@@ -62,9 +63,9 @@ impl SmallFiles {
         json: &'de Value,
     ) -> T {
         T::deserialize(json).unwrap_or_else(|e| {
-            let name = file.map_or("", |f| f.file.as_str());
-            self.problems
-                .push(format!("{name}: not as this program writes it: {e}"));
+            let file = file.map_or_else(String::new, |f| f.file.clone());
+            let why = e.to_string();
+            self.problems.push(FrameProblem::Foreign { file, why });
             T::default()
         })
     }
@@ -72,19 +73,19 @@ impl SmallFiles {
     /// Takes out the targets that have no place or size: nothing of them can be drawn.
     fn without_undrawable(&mut self, frame: &mut Value) {
         let Some(list) = frame.get_mut("targets").and_then(Value::as_array_mut) else {
-            self.problems
-                .push("the targets' file has no list of targets".into());
+            self.problems.push(FrameProblem::NoTargets);
             return;
         };
-        let all = list.len();
+        let targets = list.len();
         list.retain(|target| {
             Target::deserialize(target).is_ok_and(|t| t.size_m.iter().all(|side| *side > 0.0))
         });
-        if list.len() < all {
-            self.problems.push(format!(
-                "{} of {all} targets have no place or size",
-                all - list.len()
-            ));
+        let undrawable = targets - list.len();
+        if undrawable > 0 {
+            self.problems.push(FrameProblem::Undrawable {
+                undrawable,
+                targets,
+            });
         }
     }
 }
@@ -114,6 +115,7 @@ mod tests {
         entry.sidecar = Some(FrameFile::new("a.json".into(), &meta));
         let files = SmallFiles::read(folder.path(), &entry);
         assert!(files.sidecar.unwrap().record.size.is_none() && !files.unfinished);
-        assert!(files.problems[0].starts_with("a.json: not as this program writes it"));
+        let named = |problem: &FrameProblem| matches!(problem, FrameProblem::Foreign { file, .. } if file == "a.json");
+        assert!(named(&files.problems[0]), "{:?}", files.problems);
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use deepfusion_records::{FrameRecord, ScaleRecord, ScaleState};
 
 use super::entry::Entry;
+use super::problem::FrameProblem;
 use super::small_files::SmallFiles;
 
 /// What the time line says about a frame. Numbers are `None` where they are absent.
@@ -43,7 +44,8 @@ impl Summary {
         if let Some(frame) = &files.targets {
             summary.add_targets(&frame.record);
         }
-        summary.problem = (!files.problems.is_empty()).then(|| files.problems.join("; "));
+        let problems: Vec<String> = files.problems.iter().map(FrameProblem::to_string).collect();
+        summary.problem = (!problems.is_empty()).then(|| problems.join("; "));
         summary
     }
 

@@ -14,8 +14,8 @@ use re_sdk_types::datatypes::ChannelDatatype;
 use super::recording::Recording;
 use super::targets::{SeenTarget, boxes, ground, velocities};
 use super::tracks::Tracks;
-use crate::folder::{Entry, SmallFiles, Summary, frame_json, picture_of};
-use crate::{DepthCode, DepthFile, EncodingProblem};
+use crate::folder::{Entry, SmallFiles, Summary, frame_and_problems, picture_of};
+use crate::{DepthCode, DepthFile, EncodingProblem, FrameProblem};
 
 /// Logs frames in their order.
 #[derive(Default)]
@@ -31,16 +31,10 @@ impl FrameLogger {
         folder: &Path,
         entry: &Entry,
         place: usize,
-    ) -> Result<Vec<String>, EncodingProblem> {
-        let frame = frame_json(folder, entry);
+    ) -> Result<Vec<FrameProblem>, EncodingProblem> {
+        let (frame, mut problems) = frame_and_problems(folder, entry);
         let summary = Summary::read(folder, entry);
         let time = time_of(place, summary.time_s);
-        let mut problems: Vec<String> = frame["problems"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(|p| p.as_str().map(str::to_owned))
-            .collect();
 
         let camera: Option<Intrinsics> = serde_json::from_value(frame["intrinsics"].clone()).ok();
         let targets = SmallFiles::read(folder, entry).targets;
@@ -124,7 +118,7 @@ fn picture(
     folder: &Path,
     entry: &Entry,
     size: Option<(u32, u32)>,
-    problems: &mut Vec<String>,
+    problems: &mut Vec<FrameProblem>,
 ) -> Option<EncodedImage> {
     // A missing file has been reported with the frame, as has a size that contradicts the sidecar.
     let picture = picture_of(folder, entry).ok()?;
@@ -134,7 +128,8 @@ fn picture(
     match std::fs::read(&picture.path) {
         Ok(bytes) => Some(EncodedImage::new(bytes).with_media_type(picture.content_type)),
         Err(e) => {
-            add(problems, format!("{}: {e}", picture.path.display()));
+            let why = format!("{}: {e}", picture.path.display());
+            add(problems, FrameProblem::Unreadable(why));
             None
         }
     }
@@ -145,24 +140,22 @@ fn depth(
     folder: &Path,
     entry: &Entry,
     size: Option<(u32, u32)>,
-    problems: &mut Vec<String>,
+    problems: &mut Vec<FrameProblem>,
 ) -> Option<DepthImage> {
     let path = folder.join(&entry.depth.as_ref()?.file);
     let file = match DepthFile::read(&path) {
         Ok(file) => file,
         Err(e) => {
-            add(problems, e.to_string());
+            add(problems, FrameProblem::Unreadable(e.to_string()));
             return None;
         }
     };
     let (width, height) = (file.width, file.height);
-    if let Some((w, h)) = size.filter(|size| *size != (width, height)) {
+    let found = (width, height);
+    if let Some(expected) = size.filter(|size| *size != found) {
         // A PNG's size has been compared with the sidecar's already.
         if file.code == DepthCode::Metres {
-            add(
-                problems,
-                format!("depth is {width}x{height}, the sidecar says {w}x{h}"),
-            );
+            add(problems, FrameProblem::DepthSize { found, expected });
         }
         return None;
     }
@@ -175,7 +168,7 @@ fn depth(
 }
 
 /// Some things are noticed twice.
-fn add(problems: &mut Vec<String>, problem: String) {
+fn add(problems: &mut Vec<FrameProblem>, problem: FrameProblem) {
     if !problems.contains(&problem) {
         problems.push(problem);
     }
@@ -186,7 +179,7 @@ fn log_name<W: Write>(
     recording: &mut Recording<W>,
     time: &TimePoint,
     name: &str,
-    problems: &[String],
+    problems: &[FrameProblem],
 ) -> Result<(), EncodingProblem> {
     if problems.is_empty() {
         let line = TextLog::new(name).with_level(TextLogLevel::INFO);

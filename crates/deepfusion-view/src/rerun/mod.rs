@@ -21,7 +21,7 @@ mod tracks;
 
 use std::path::Path;
 
-use crate::{Error, Folder, FolderKind, Result};
+use crate::{Error, Folder, FolderKind, FrameProblem, Result};
 
 use self::frame::FrameLogger;
 use self::recording::Recording;
@@ -33,12 +33,12 @@ pub fn rerun_version() -> String {
 }
 
 /// What [`write_rerun`] wrote.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RerunReport {
     /// How many frames the file holds.
     pub frames: usize,
     /// What is wrong with which frames, in their order: name and problem. The rest of such a frame is in the file.
-    pub problems: Vec<(String, String)>,
+    pub problems: Vec<(String, FrameProblem)>,
 }
 
 /// Writes all frames of a folder to a file for the rerun viewer, beside its name first. What is wrong with a frame is reported,

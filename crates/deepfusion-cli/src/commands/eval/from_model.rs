@@ -7,8 +7,9 @@ use deepfusion_eval::{ArraySet, Prediction, Protocol};
 use deepfusion_hint::count_of;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
 use deepfusion_jobs::evaluation::{
-    Evaluated, EvaluationRequest, Truth, baseline_from_arrays, baseline_from_training, check_used,
-    default_crop, evaluate_datasets, expected_frames, has_truth, predict_frame, shown_of_datasets,
+    Evaluated, EvaluationRequest, Truth, UsedCheckpoint, baseline_from_arrays,
+    baseline_from_training, check_used, default_crop, evaluate_datasets, expected_frames,
+    has_truth, predict_frame, shown_of_datasets,
 };
 use deepfusion_jobs::intervals;
 use deepfusion_jobs::recordings::read_split;
@@ -18,7 +19,6 @@ use deepfusion_runtime::{DepthEstimator, ModelSource};
 use super::{Found, page, verdict, write_points};
 use crate::cli::{CameraIntrinsics, EvalArgs};
 use crate::commands::recordings::{open_recordings, open_with_yaw};
-use crate::commands::used_checkpoint::UsedCheckpoint;
 use crate::commands::{clocks, run_report, warnings};
 use crate::engine;
 use crate::error::CliError;

@@ -10,11 +10,10 @@ use std::path::Path;
 use deepfusion_eval::verdict::{ScaleCertificate, Verdict};
 use deepfusion_eval::{ArraySet, Crop, Prediction, Report};
 use deepfusion_jobs::evaluation::{
-    Evaluated, baseline_from_arrays, evaluate_arrays, shown_of_arrays,
+    Evaluated, UsedCheckpoint, baseline_from_arrays, evaluate_arrays, shown_of_arrays,
 };
 use serde::Serialize;
 
-use super::used_checkpoint::UsedCheckpoint;
 use crate::cli::{EvalArgs, PredKind};
 use crate::failure::Result;
 use crate::output;

@@ -2,6 +2,7 @@
 
 use deepfusion_data::Dataset;
 use deepfusion_eval::verdict::{NoCertificate, Verdict};
+use deepfusion_jobs::evaluation::UsedCheckpoint;
 use deepfusion_jobs::held_out::unseen_by;
 use deepfusion_jobs::scene::motion_known;
 use deepfusion_jobs::verdict::{Unseen, VerdictOptions, verdict};
@@ -11,7 +12,6 @@ use deepfusion_runtime::{DepthEstimator, ModelSource};
 
 use super::Found;
 use crate::cli::EvalArgs;
-use crate::commands::used_checkpoint::UsedCheckpoint;
 use crate::commands::{run_report, warnings};
 use crate::failure::Result;
 use crate::model::ModelFacts;

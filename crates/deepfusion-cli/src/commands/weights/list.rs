@@ -1,49 +1,18 @@
 use deepfusion_hint::count_of;
+use deepfusion_jobs::importing::{KNOWN, KnownWeights};
 use deepfusion_weights::{Card, DEFAULT, Figure};
 use serde::Serialize;
 
 use crate::failure::Result;
 use crate::output;
 
-/// What can be imported: name, files, what it gives, terms.
-const KNOWN: [[&str; 4]; 6] = [
-    [
-        "torchvision ResNet-18, 34, 50, 101",
-        "resnet*.pth or .safetensors",
-        "encoders of both networks, trained on ImageNet",
-        "BSD-3-Clause (torchvision); ImageNet's own terms for the data",
-    ],
-    [
-        "Monodepth2",
-        "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
-        "the whole networks; depth up to an unknown factor",
-        "non-commercial (Niantic)",
-    ],
-    [
-        "Lite-Mono, -small, -tiny, -8m",
-        "encoder.pth, depth.pth",
-        "the depth network; depth up to an unknown factor",
-        "MIT (its authors)",
-    ],
-    [
-        "R-MSFM3, R-MSFM6",
-        "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
-        "the whole networks; depth up to an unknown factor",
-        "its authors' own; see their repository",
-    ],
-    [
-        "SfMLearner's DispNet",
-        "dispnet_model_best.pth.tar",
-        "the depth network; depth up to an unknown factor",
-        "its authors' own; see their repository",
-    ],
-    [
-        "a run of this program",
-        "its folder, last.safetensors or best.safetensors",
-        "with --init: training starts from its networks",
-        "yours",
-    ],
-];
+/// What training starts from without an import, in the same list.
+const RUN: KnownWeights = KnownWeights {
+    name: "a run of this program",
+    files: "its folder, last.safetensors or best.safetensors",
+    gives: "with --init: training starts from its networks",
+    terms: "yours",
+};
 
 /// What `--json` prints of a packed network: its card without the configuration, and what of that one asks for first.
 #[derive(Debug, Serialize)]
@@ -104,7 +73,14 @@ pub(crate) fn run(json: bool) -> Result<()> {
             networks.iter().map(|n| WeightsRow::from(&n.card)).collect();
         let importable: Vec<_> = KNOWN
             .iter()
-            .map(|[name, files, gives, terms]| {
+            .chain([&RUN])
+            .map(|known| {
+                let KnownWeights {
+                    name,
+                    files,
+                    gives,
+                    terms,
+                } = known;
                 serde_json::json!({"name": name, "files": files, "gives": gives, "terms": terms})
             })
             .collect();
@@ -120,7 +96,13 @@ pub(crate) fn run(json: bool) -> Result<()> {
         text += &network_text(&network.card);
     }
     text += "\nTo be imported, with `weights import`:\n";
-    for [name, files, gives, terms] in KNOWN {
+    for known in KNOWN.iter().chain([&RUN]) {
+        let KnownWeights {
+            name,
+            files,
+            gives,
+            terms,
+        } = known;
         text += &format!("  {name}\n    files  {files}\n    gives  {gives}\n    terms  {terms}\n");
     }
     output::print(&text)

@@ -1,6 +1,7 @@
 //! What is unsure about how the vehicle moved.
 
 use deepfusion_hint::count_of;
+use deepfusion_logs::LogNote;
 use deepfusion_motion::can::CanId;
 
 /// What is unsure about how the vehicle moved.
@@ -29,8 +30,8 @@ pub enum MotionWarning {
     Understood {
         /// The log's name.
         log: String,
-        /// How, in a sentence.
-        note: String,
+        /// How.
+        note: LogNote,
     },
     /// `course.csv` is not what this program writes under that name.
     #[error("course.csv: not read, as it has no column course_rate_radps")]
@@ -155,6 +156,7 @@ fn number(id: CanId) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_logs::TableNote;
 
     #[test]
     fn what_is_said_of_speeds() {
@@ -168,9 +170,9 @@ mod tests {
             (
                 MotionWarning::Understood {
                     log: "trip.csv".into(),
-                    note: "speeds are those of 'Vehicle speed' in mph".into(),
+                    note: TableNote::HeaderAgain { more: 1 }.into(),
                 },
-                "trip.csv: speeds are those of 'Vehicle speed' in mph",
+                "trip.csv: the header stands once more among the rows",
             ),
             (
                 MotionWarning::Bridged {

@@ -29,7 +29,7 @@ impl Tables {
                 };
                 let flags = row.flags.iter();
                 let flags: Vec<_> = flags
-                    .map(|f| format!("{}: {}", f.severity.word(), f.what))
+                    .map(|f| format!("{}: {}", f.severity.word(), f.why))
                     .collect();
                 let mut record = vec![table.title.clone()];
                 record.extend(keys.iter().map(cell));

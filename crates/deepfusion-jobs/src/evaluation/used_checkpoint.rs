@@ -1,33 +1,37 @@
+//! Which checkpoint was measured.
+
+use std::fmt;
 use std::path::PathBuf;
 
 use deepfusion_model::LearnedCamera;
-use deepfusion_runtime::DepthEstimator;
-use deepfusion_runtime::ModelSource;
+use deepfusion_runtime::{DepthEstimator, ModelSource};
 use serde::Serialize;
 
 /// The checkpoint that was measured: a run's folder alone does not say which of its two.
-#[derive(Serialize)]
-pub(super) struct UsedCheckpoint {
+#[derive(Debug, Clone, Serialize)]
+pub struct UsedCheckpoint {
     /// `best` or `last` of a run; a packed network's own name.
-    name: String,
+    pub name: String,
     /// Of a run.
     #[serde(skip_serializing_if = "Option::is_none")]
-    path: Option<PathBuf>,
+    pub path: Option<PathBuf>,
     /// Of a packed network.
     #[serde(skip_serializing_if = "Option::is_none")]
-    sha256: Option<String>,
-    step: usize,
+    pub sha256: Option<String>,
+    /// Steps that were trained.
+    pub step: usize,
     /// The camera that a run learned, and how well.
     #[serde(skip_serializing_if = "Option::is_none")]
-    learned_camera: Option<LearnedCamera>,
+    pub learned_camera: Option<LearnedCamera>,
     /// Whether a run's folder was given, and the choice is the program's.
     #[serde(skip)]
-    chosen: bool,
+    pub chosen: bool,
 }
 
 impl UsedCheckpoint {
     /// That of an estimator's network.
-    pub(super) fn of(estimator: &DepthEstimator, model: &ModelSource) -> Self {
+    #[must_use]
+    pub fn of(estimator: &DepthEstimator, model: &ModelSource) -> Self {
         let step = estimator.step;
         match model {
             ModelSource::Run {
@@ -59,8 +63,8 @@ impl UsedCheckpoint {
     }
 }
 
-impl std::fmt::Display for UsedCheckpoint {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for UsedCheckpoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, step, .. } = self;
         match &self.path {
             Some(path) => write!(f, "checkpoint  {}, step {step}", path.display())?,
@@ -71,5 +75,54 @@ impl std::fmt::Display for UsedCheckpoint {
             (true, _) => write!(f, " (there is no best)"),
             (false, _) => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_run_the_choice_is_explained() {
+        let of_run = |name: &str, chosen| {
+            let checkpoint = UsedCheckpoint {
+                name: name.into(),
+                path: Some(format!("runs/a/{name}.safetensors").into()),
+                sha256: None,
+                step: 400,
+                learned_camera: None,
+                chosen,
+            };
+            checkpoint.to_string()
+        };
+        assert_eq!(
+            of_run("best", true),
+            "checkpoint  runs/a/best.safetensors, step 400 (the lowest held-out loss; last is beside it)"
+        );
+        assert_eq!(
+            of_run("last", true),
+            "checkpoint  runs/a/last.safetensors, step 400 (there is no best)"
+        );
+        assert_eq!(
+            of_run("last", false),
+            "checkpoint  runs/a/last.safetensors, step 400"
+        );
+    }
+
+    #[test]
+    fn a_packed_network_is_named_by_its_sum() {
+        let packed = UsedCheckpoint {
+            name: "street".into(),
+            path: None,
+            sha256: Some("ab12".into()),
+            step: 9000,
+            learned_camera: None,
+            chosen: false,
+        };
+        assert_eq!(packed.to_string(), "network  street, step 9000");
+        assert_eq!(
+            serde_json::to_value(&packed).unwrap(),
+            serde_json::json!({"name": "street", "sha256": "ab12", "step": 9000})
+        );
     }
 }

@@ -1,0 +1,154 @@
+//! Other projects' weights as a run: torchvision's ResNet, Monodepth2, Lite-Mono, R-MSFM, SfMLearner.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_model::{Preset, RunFolder, TrainConfig, TrainFindings};
+use deepfusion_nn::weights::{
+    Imported, Monodepth2Files, detect_resnet, load_networks, load_torchvision_resnet, load_whole,
+    read,
+};
+use deepfusion_nn::{DepthNet, DepthNetConfig, PoseNet, PoseNetConfig};
+use deepfusion_train::{Checkpoint, CheckpointKind, Checkpoints, Device, Model};
+
+use crate::Result;
+
+/// Other projects' weights, as a run has them.
+#[derive(Debug)]
+pub struct ForeignNetwork {
+    config: TrainConfig,
+    model: Model,
+    /// A ResNet's alone: the depth network has never learned.
+    encoders_only: bool,
+}
+
+impl ForeignNetwork {
+    /// Reads one file of a ResNet or of SfMLearner's DispNet, the folder of another network's files, or those files.
+    ///
+    /// # Errors
+    /// Weights that cannot be read, or that fit no known network.
+    pub fn read(files: &[PathBuf]) -> Result<Self> {
+        let device = Device::flex();
+        let whole = match files {
+            [file] if !file.is_dir() => load_whole(file, &device)?,
+            _ => None,
+        };
+        let encoders_only = whole.is_none() && matches!(files, [file] if !file.is_dir());
+        let (config, model) = match (whole, files) {
+            (Some(network), _) => of_networks(network, &device)?,
+            (None, [file]) if encoders_only => from_resnet(file, &device)?,
+            (None, [folder]) => from_files(&Monodepth2Files::in_folder(folder), &device)?,
+            (None, files) => from_files(&named(files), &device)?,
+        };
+        Ok(Self {
+            config,
+            model,
+            encoders_only,
+        })
+    }
+
+    /// Writes it as a run into an empty folder, and gives its checkpoint. Its scale is not metric until it is trained with speeds.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf> {
+        let folder = RunFolder::create(folder)?;
+        folder.write_config(&self.config, &TrainFindings::default())?;
+        let state = Checkpoint {
+            step: 0,
+            best_validation: None,
+            skipped: 0,
+            encoders_only: self.encoders_only,
+            focal_ratio: None,
+        };
+        Ok(folder.save(CheckpointKind::Last, &self.model, None, &state)?)
+    }
+}
+
+/// Files in Monodepth2's layout, which Lite-Mono and R-MSFM share, among those given, by their names.
+fn named(files: &[PathBuf]) -> Monodepth2Files {
+    let find = |name: &str| {
+        let is = |p: &&PathBuf| p.file_stem().is_some_and(|stem| stem == name);
+        files.iter().find(is).cloned()
+    };
+    Monodepth2Files {
+        encoder: find("encoder").unwrap_or_else(|| PathBuf::from("encoder.pth")),
+        depth: find("depth").unwrap_or_else(|| PathBuf::from("depth.pth")),
+        pose: find("pose_encoder").zip(find("pose")),
+    }
+}
+
+/// The preset whose settings a network goes on with: of those that learn as Monodepth2 does the one with its layers.
+fn preset_of(net: &DepthNetConfig) -> Preset {
+    let layers = |net: &DepthNetConfig| {
+        let lite_mono = net.lite_mono.as_ref();
+        let stages = lite_mono.map(|own| (own.widths, own.dilations.each_ref().map(Vec::len)));
+        let (r_msfm, disp_net) = (net.r_msfm.clone(), net.disp_net.clone());
+        (stages, r_msfm, disp_net, net.encoder.depth)
+    };
+    let family = Preset::ALL
+        .into_iter()
+        .skip_while(|preset| *preset != Preset::Monodepth2);
+    let mut alike = family.filter(|preset| layers(&preset.config().depth_net) == layers(net));
+    alike.next().unwrap_or(Preset::Monodepth2)
+}
+
+fn from_files(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
+    of_networks(load_networks(files, device)?, device)
+}
+
+/// A run of networks as files held them.
+fn of_networks(imported: Imported, device: &Device) -> Result<(TrainConfig, Model)> {
+    let mut config = preset_of(&imported.depth_config).config();
+    config.depth_net = imported.depth_config;
+    if let Some(size) = imported.input_size {
+        config.size = size;
+    }
+    let pose_net = match imported.pose {
+        Some((pose_config, pose_net)) => {
+            config.pose_net = pose_config;
+            pose_net
+        }
+        None => {
+            config.pose_net = PoseNetConfig {
+                explainability: config.pose_net.explainability,
+                ..PoseNetConfig::monodepth2(config.depth_net.encoder.depth)
+            };
+            PoseNet::new(&config.pose_net, device)?
+        }
+    };
+    let model = Model::with_networks(&config, imported.depth_net, pose_net, device);
+    Ok((config, model))
+}
+
+fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
+    let depth = detect_resnet(&read(file)?)?;
+    let mut config = Preset::Light.config();
+    config.depth_net = DepthNetConfig::new(depth);
+    config.pose_net = PoseNetConfig::new(depth);
+    let mut depth_net = DepthNet::new(&config.depth_net, device)?;
+    let mut pose_net = PoseNet::new(&config.pose_net, device)?;
+    depth_net = depth_net.with_torchvision_encoder(file)?;
+    pose_net.encoder = load_torchvision_resnet(pose_net.encoder, file)?;
+    let model = Model::with_networks(&config, depth_net, pose_net, device);
+    Ok((config, model))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_networks_layers_say_its_preset() {
+        let all = Preset::ALL.into_iter();
+        let family: Vec<Preset> = all.skip_while(|p| *p != Preset::Monodepth2).collect();
+        assert_eq!(family.len(), 9);
+        for preset in family {
+            // As an import leaves it.
+            let mut net = preset.config().depth_net;
+            net.initial_depth_m = None;
+            assert_eq!(preset_of(&net), preset);
+        }
+        let net = DepthNetConfig::monodepth2(deepfusion_nn::ResNetDepth::ResNet34);
+        assert_eq!(preset_of(&net), Preset::Monodepth2);
+    }
+}

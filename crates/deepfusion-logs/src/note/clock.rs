@@ -1,0 +1,30 @@
+//! How a log's clock is connected with its video's.
+
+/// How a log's clock is connected with its video's, where neither says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClockNote {
+    /// The log has dates without a zone.
+    #[error("the log's dates have no zone and are taken for UTC, as the video's are")]
+    NoZone,
+    /// The log counts from about its own beginning.
+    #[error("the log counts from its own start, which is taken for the video's first frame")]
+    OwnStart,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_taken_for_granted_is_said() {
+        assert_eq!(
+            ClockNote::NoZone.to_string(),
+            "the log's dates have no zone and are taken for UTC, as the video's are"
+        );
+        assert_eq!(
+            ClockNote::OwnStart.to_string(),
+            "the log counts from its own start, which is taken for the video's first frame"
+        );
+    }
+}

@@ -1,0 +1,39 @@
+//! How a GoPro's metadata was understood.
+
+/// How a GoPro's metadata was understood, or what of it has no speed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GoproNote {
+    /// The speeds are those of its receiver.
+    #[error("speeds of the camera's GPS, {readings} readings on the video's own clock")]
+    Gps {
+        /// How many.
+        readings: usize,
+    },
+    /// The receiver had no position for a while.
+    #[error("{without} of {stretches} stretches of the video have no GPS fix and no speed")]
+    NoFix {
+        /// In how many stretches.
+        without: usize,
+        /// How many there are, of about a second each.
+        stretches: usize,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_said_of_its_receiver() {
+        let (without, stretches) = (2, 60);
+        assert_eq!(
+            GoproNote::Gps { readings: 1080 }.to_string(),
+            "speeds of the camera's GPS, 1080 readings on the video's own clock"
+        );
+        assert_eq!(
+            GoproNote::NoFix { without, stretches }.to_string(),
+            "2 of 60 stretches of the video have no GPS fix and no speed"
+        );
+    }
+}

@@ -1,0 +1,191 @@
+//! How a table was understood.
+
+use crate::units::SpeedUnit;
+use deepfusion_hint::count_of;
+
+/// How a table was understood, or what of it was left out.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableNote {
+    /// A column holds the speeds.
+    #[error("time from column '{time}', speed from column '{speed}' in {unit}")]
+    Column {
+        /// The header of the column of times.
+        time: String,
+        /// That of the column of speeds.
+        speed: String,
+        /// The speeds' unit.
+        unit: SpeedUnit,
+    },
+    /// Rows of one name hold the speeds.
+    #[error("time from column '{time}', speed from the rows of '{name}' in {unit}")]
+    Rows {
+        /// The header of the column of times.
+        time: String,
+        /// What the rows measured.
+        name: String,
+        /// The speeds' unit.
+        unit: SpeedUnit,
+    },
+    /// The speeds follow from positions.
+    #[error("time from column '{time}', positions from '{latitude}' and '{longitude}'")]
+    Positions {
+        /// The header of the column of times.
+        time: String,
+        /// That of the latitudes.
+        latitude: String,
+        /// That of the longitudes.
+        longitude: String,
+    },
+    /// The header is repeated among the rows.
+    #[error("the header stands {} more among the rows", times(*more))]
+    HeaderAgain {
+        /// How many times.
+        more: usize,
+    },
+    /// Rows without a speed.
+    #[error("{absent} of {rows} rows hold no speed and are left out")]
+    NoSpeed {
+        /// How many.
+        absent: usize,
+        /// Of so many that could have one.
+        rows: usize,
+    },
+    /// Rows of the same time as the one above.
+    #[error("{repeated} of {rows} rows repeat the time of the row above and are left out")]
+    Repeated {
+        /// How many.
+        repeated: usize,
+        /// Of so many that could have a speed.
+        rows: usize,
+    },
+    /// Rows whose latitude or longitude is none.
+    #[error(
+        "left out, as their degrees are none: {beyond} of {}",
+        count_of(*rows, "row")
+    )]
+    NoDegrees {
+        /// How many.
+        beyond: usize,
+        /// How many rows the table has.
+        rows: usize,
+    },
+    /// A column of yaw rates whose unit is not known.
+    #[error(
+        "column '{column}' is left out, as {}: name it yaw_rate_radps or yaw_rate_dps (positive to the left)",
+        not_known(unit.as_deref())
+    )]
+    YawRateUnit {
+        /// Its header.
+        column: String,
+        /// The unit, where the header says one.
+        unit: Option<String>,
+    },
+    /// A column holds the yaw rates.
+    #[error(
+        "yaw rate from column '{column}', taken to be positive to the left: change its sign where it is not"
+    )]
+    YawRate {
+        /// Its header.
+        column: String,
+    },
+}
+
+fn times(count: usize) -> String {
+    match count {
+        1 => "once".to_owned(),
+        n => format!("{n} times"),
+    }
+}
+
+fn not_known(unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) => format!("its unit '{unit}' is not known"),
+        None => "nothing says its unit".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_columns_are_named() {
+        let time = || "Time (s)".to_owned();
+        let unit = SpeedUnit::MilesPerHour;
+        for (note, said) in [
+            (
+                TableNote::Column {
+                    time: time(),
+                    speed: "Vehicle speed".into(),
+                    unit,
+                },
+                "time from column 'Time (s)', speed from column 'Vehicle speed' in mph",
+            ),
+            (
+                TableNote::Rows {
+                    time: time(),
+                    name: "Vehicle speed".into(),
+                    unit,
+                },
+                "time from column 'Time (s)', speed from the rows of 'Vehicle speed' in mph",
+            ),
+            (
+                TableNote::Positions {
+                    time: time(),
+                    latitude: "lat".into(),
+                    longitude: "lon".into(),
+                },
+                "time from column 'Time (s)', positions from 'lat' and 'lon'",
+            ),
+            (
+                TableNote::YawRateUnit {
+                    column: "yaw rate".into(),
+                    unit: None,
+                },
+                "column 'yaw rate' is left out, as nothing says its unit: name it yaw_rate_radps or yaw_rate_dps (positive to the left)",
+            ),
+            (
+                TableNote::YawRateUnit {
+                    column: "yaw rate (rpm)".into(),
+                    unit: Some("rpm".into()),
+                },
+                "column 'yaw rate (rpm)' is left out, as its unit 'rpm' is not known: name it yaw_rate_radps or yaw_rate_dps (positive to \
+                 the left)",
+            ),
+            (
+                TableNote::YawRate {
+                    column: "yaw_rate_dps".into(),
+                },
+                "yaw rate from column 'yaw_rate_dps', taken to be positive to the left: change its sign where it is not",
+            ),
+        ] {
+            assert_eq!(note.to_string(), said);
+        }
+    }
+
+    #[test]
+    fn rows_are_counted() {
+        let rows = 20;
+        for (note, said) in [
+            (
+                TableNote::HeaderAgain { more: 3 },
+                "the header stands 3 times more among the rows",
+            ),
+            (
+                TableNote::NoSpeed { absent: 2, rows },
+                "2 of 20 rows hold no speed and are left out",
+            ),
+            (
+                TableNote::Repeated { repeated: 4, rows },
+                "4 of 20 rows repeat the time of the row above and are left out",
+            ),
+            (
+                TableNote::NoDegrees { beyond: 1, rows: 1 },
+                "left out, as their degrees are none: 1 of 1 row",
+            ),
+        ] {
+            assert_eq!(note.to_string(), said);
+        }
+    }
+}
