@@ -1,5 +1,6 @@
 //! Ctrl-C in long calls: Python's handler runs on its main thread alone, and only when that asks for it.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
@@ -21,6 +22,15 @@ struct Stopped;
 impl Stop {
     pub(crate) fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// The answer of a listener that is asked whether to go on.
+    pub(crate) fn flow(&self) -> ControlFlow<()> {
+        if self.asked() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 
     /// For a listener: unwinds to [`interruptible`] where the work should end. No panic: nothing is printed.

@@ -106,7 +106,7 @@ pub(crate) fn simulate(
     };
     let write = |stop: &Stop| {
         let simulation = Simulation::new(&config)?;
-        write_kitti(&simulation, &out, &mut |_, _| stop.unwind_if_asked())
+        write_kitti(&simulation, &out, &mut |_, _| stop.flow())
     };
     interruptible(py, write)?.map_err(raise)
 }

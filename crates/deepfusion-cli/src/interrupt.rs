@@ -2,6 +2,7 @@
 //! lost, a second one ends the program at once.
 
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -32,6 +33,15 @@ pub(crate) fn catch(notice: &'static str) {
 /// Whether the work was asked to stop.
 pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
+}
+
+/// [`asked`], for work that hears of it from its listener.
+pub(crate) fn flow() -> ControlFlow<()> {
+    if asked() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
 }
 
 /// Ends what cannot be gone on with, where the work was asked to stop.

@@ -11,6 +11,7 @@ mod camera;
 mod clock_and_scale;
 mod comma;
 mod common;
+mod conversion;
 mod drives;
 mod folders;
 mod ground_truth;

@@ -3,12 +3,10 @@ use std::path::PathBuf;
 
 mod arrays;
 mod intervals;
-mod protocol;
 
 pub use self::arrays::{ArrayName, ArrayProblem, ExpectedShape};
 pub(crate) use self::intervals::ENDS_M;
 pub use self::intervals::{IntervalsProblem, LEVELS};
-pub use self::protocol::ExpectedProtocolSetting;
 
 /// What can go wrong while arrays are read and compared.
 #[derive(Debug, thiserror::Error)]
@@ -123,6 +121,21 @@ pub enum Error {
 
 /// A result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What a field of a protocol must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExpectedProtocolSetting {
+    /// A depth, in metres.
+    #[error("metres above 0")]
+    Metres,
+    /// A depth beyond the smallest that is compared, in metres.
+    #[error("metres above the minimum depth")]
+    MetresAboveMinimum,
+    /// A factor of all depths.
+    #[error("a factor above 0")]
+    Factor,
+}
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {

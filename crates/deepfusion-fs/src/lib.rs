@@ -1,11 +1,13 @@
-//! Atomic file writes: a file is complete or absent, even after a crash or a power cut.
+//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut.
 
 mod content;
+mod names;
 mod partial;
+mod partial_folder;
 mod sync;
-mod unused;
 
 pub use content::Content;
+pub use names::unused;
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
-pub use sync::{publish, publish_folder, sync_files, sync_folder, sync_tree};
-pub use unused::unused;
+pub use partial_folder::PartialFolder;
+pub use sync::{publish, publish_folder, sync_files, sync_folder};

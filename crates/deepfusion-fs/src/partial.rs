@@ -1,12 +1,10 @@
 use std::collections::BTreeSet;
-use std::collections::hash_map::RandomState;
-use std::ffi::OsString;
 use std::fs::File;
-use std::hash::{BuildHasher, Hasher};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::names::temporary_name;
 use crate::sync::{folder_of, publish, sync_files, sync_folder};
 
 /// A temporary file beside its target, on the same file system, until the file is complete. It is removed on drop unless
@@ -25,14 +23,8 @@ impl Partial {
     /// A temporary name for the file at `target`. Nothing is created yet.
     #[must_use]
     pub fn beside(target: &Path) -> Self {
-        // Threads, processes, and machines that share the folder may write the same target: the last rename wins, whole. A
-        // process's number alone would come again after a kill, in a container every time.
-        let chance = RandomState::new().build_hasher().finish();
-        let mut name = OsString::from(".");
-        name.push(target.file_name().unwrap_or_default());
-        name.push(format!(".{}-{chance:016x}.partial", std::process::id()));
         Self {
-            temporary: target.with_file_name(name),
+            temporary: temporary_name(target),
             target: target.to_owned(),
             watched: false,
             ours: AtomicBool::new(true),
@@ -97,7 +89,7 @@ impl Partial {
         std::fs::rename(&self.temporary, &self.target)
     }
 
-    /// The target's name, if `path` is a temporary file that a killed program left behind.
+    /// The target's name, if `path` is a temporary file or folder that a killed program left behind.
     #[must_use]
     pub fn target_of(path: &Path) -> Option<&str> {
         let name = path.file_name()?.to_str()?;

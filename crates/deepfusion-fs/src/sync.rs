@@ -20,6 +20,8 @@ pub fn publish(file: &Path, target: &Path) -> io::Result<()> {
 /// What the system says.
 pub fn publish_folder(folder: &Path, target: &Path) -> io::Result<()> {
     sync_tree(folder)?;
+    // Elsewhere than on Unix an empty folder would be in the way; one that is not empty stays.
+    let _ = std::fs::remove_dir(target);
     std::fs::rename(folder, target)?;
     sync_folder(folder_of(target))
 }
@@ -81,7 +83,7 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// The system's error for the first that failed.
-pub fn sync_tree(folder: &Path) -> io::Result<()> {
+pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;

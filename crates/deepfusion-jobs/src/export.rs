@@ -5,7 +5,7 @@ use std::path::Path;
 
 use burn::tensor::{Tensor, TensorData};
 use deepfusion_data::Error as DataError;
-use deepfusion_fs::Partial;
+use deepfusion_fs::write_aside;
 use deepfusion_model::{InputSize, StoredNetwork, depth_graph};
 use deepfusion_nn::{DepthNet, weights};
 use deepfusion_onnx::check::{deviation, pictures};
@@ -54,9 +54,10 @@ pub fn export(
     let net = depth_net(&network.config, &network.weights, &device)?;
     let model = model_of(network, &net, size)?;
     let bytes = write(&model)?;
-    let partial = partial_file(out, &bytes)?;
+    let failed = |e| DataError::file(out, e);
+    let partial = write_aside(out, failed, |file| file.write_all(&bytes).map_err(failed))?;
     let (checks, no_runtime) = check((out, partial.path()), &model, &net, library, &device)?;
-    partial.publish().map_err(|e| DataError::file(out, e))?;
+    partial.publish().map_err(failed)?;
     let bytes = bytes.len();
     Ok(Exported {
         model,
@@ -94,14 +95,6 @@ fn model_of(
             None => camera.map(|k| FocalLength { fx: k.fx, fy: k.fy }),
         },
     })
-}
-
-/// The bytes in a file beside `out` that is gone unless it is published.
-fn partial_file(out: &Path, bytes: &[u8]) -> Result<Partial> {
-    let partial = Partial::beside(out);
-    let written = partial.create().and_then(|mut file| file.write_all(bytes));
-    written.map_err(|e| DataError::file(out, e))?;
-    Ok(partial)
 }
 
 /// Reads the file back and compares it with the network, in every engine there is.

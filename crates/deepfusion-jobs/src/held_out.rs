@@ -101,6 +101,7 @@ mod tests {
     use super::*;
     use deepfusion_data::{OpenOptions, convert_to_bag, convert_to_kitti};
     use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag};
+    use std::ops::ControlFlow;
 
     /// What became of a simulated bag may be what a network of simulated drives saw: only without the mark nothing tells it from a real drive.
     #[test]
@@ -120,7 +121,10 @@ mod tests {
             ..BagSettings::default()
         };
         let simulation = Simulation::new(&config).unwrap();
-        let bag = write_bag(&simulation, &at.join("sim"), &settings, &mut |_, _| ()).unwrap();
+        let bag = write_bag(&simulation, &at.join("sim"), &settings, &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         let open = |path: &Path| Dataset::open(path, &OpenOptions::default()).unwrap();
         let kitti = at.join("kitti");
         convert_to_kitti(&open(&bag), &kitti, &mut |_, _| ()).unwrap();

@@ -290,6 +290,7 @@ mod tests {
     use std::error::Error;
     use std::fmt::Write as _;
     use std::fs;
+    use std::ops::ControlFlow;
 
     /// Pixels by which the folder's principal point is lower than the camera's: its way ahead is then so much above it, as if it looked
     /// down by some degrees.
@@ -305,7 +306,9 @@ mod tests {
             scan_every: 0,
             ..SimConfig::default()
         })?;
-        let kitti = write_kitti(&simulation, &at.join("kitti"), &mut |_, _| ())?;
+        let kitti = write_kitti(&simulation, &at.join("kitti"), &mut |_, _| {
+            ControlFlow::Continue(())
+        })?;
         let drive = &Dataset::open(&kitti, &OpenOptions::default())?[0];
         let track = drive.track().ok_or("no speeds")?;
         let times: Vec<f64> = drive.frames().iter().filter_map(|f| f.time_s).collect();

@@ -4,7 +4,7 @@ mod varied_conflict;
 pub use expected::ExpectedSetting;
 pub use varied_conflict::VariedConflict;
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 /// What can go wrong while a drive is made or written.
@@ -34,6 +34,14 @@ pub enum Error {
     OutputNotEmpty {
         /// The folder.
         path: PathBuf,
+    },
+    /// Writing ended before the last frame, as its caller wanted: nothing of it is left.
+    #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
+    Stopped {
+        /// Frames done.
+        done: usize,
+        /// Frames in all.
+        total: usize,
     },
     /// A folder or file cannot be written.
     #[error("{}: cannot {action}: {source}", path.display())]
@@ -91,6 +99,7 @@ impl Hint for Error {
             ),
             Self::Bag(error) => error.hint(),
             Self::Message { problem, .. } => problem.hint(),
+            Self::Stopped { .. } => Some("start it again: nothing is in the way".to_owned()),
             Self::Encode { .. } => None,
         }
     }

@@ -3,6 +3,7 @@
 use crate::oxts::DATA_FORMAT;
 use crate::rig::CAM2_FROM_CAM0_X;
 use crate::{Error, Result, SimFrame, Simulation, tracklets};
+use deepfusion_fs::PartialFolder;
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Se3};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -10,6 +11,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 use std::fs;
 use std::io::{BufWriter, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// The date every simulated drive carries.
@@ -29,59 +31,38 @@ const BATCH: usize = 8;
 /// its pictures are in `image_03`. A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
 /// ([`Simulation::drawn`]). Its boxes also hold what of an object was cut away over the camera's lane, as of a tree's crown.
 ///
-/// `progress` is called with the frames done and their number. Everything is written to a folder
-/// beside its final place and renamed at the end: after an error `out` is as it was.
+/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`]. Everything is written to
+/// a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a writer that was
+/// killed left there is removed, and is not in the way.
 ///
 /// # Errors
-/// [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Io`] and [`Error::Encode`], with the
+/// [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Stopped`]; [`Error::Io`] and [`Error::Encode`], with the
 /// path, if something cannot be written.
 pub fn write_kitti(
     simulation: &Simulation,
     out: &Path,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<PathBuf> {
-    let existed = prepare(out)?;
-    let staging = Staging {
-        folder: out.join(format!(".{DATE}.partial")),
-        made: (!existed).then_some(out),
-    };
-    let drive = write_all(simulation, &staging.folder, progress)?;
+    require_empty(out)?;
     let date = out.join(DATE);
-    let moved = deepfusion_fs::publish_folder(&staging.folder, &date);
+    let partial = PartialFolder::beside(&date).map_err(io(out, "make this folder"))?;
+    let drive = write_all(simulation, partial.path(), progress)?;
+    let moved = partial.commit();
     moved.map_err(io(&date, "move the finished drive here"))?;
     Ok(date.join(drive))
 }
 
-/// Where a drive is written before it is whole. What is left of it goes with it, also when `progress` unwinds.
-struct Staging<'a> {
-    folder: PathBuf,
-    /// The folder around it, where it was made for this drive.
-    made: Option<&'a Path>,
-}
-
-impl Drop for Staging<'_> {
-    fn drop(&mut self) {
-        // Best effort: what went wrong is in the error; after a success there is nothing here, and `made` is not empty.
-        let _ = fs::remove_dir_all(&self.folder);
-        if let Some(made) = self.made {
-            let _ = fs::remove_dir(made);
-        }
-    }
-}
-
-/// Makes the output folder; whether it was there before.
-pub(crate) fn prepare(out: &Path) -> Result<bool> {
+/// Refuses an output folder that holds something; there may be none.
+pub(crate) fn require_empty(out: &Path) -> Result<()> {
+    PartialFolder::remove_leftovers(out);
     match fs::read_dir(out) {
         Ok(mut entries) => match entries.next() {
-            None => Ok(true),
+            None => Ok(()),
             Some(_) => Err(Error::OutputNotEmpty {
                 path: out.to_owned(),
             }),
         },
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            make_folder(out)?;
-            Ok(false)
-        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(io(out, "use this as the output folder")(error)),
     }
 }
@@ -90,7 +71,7 @@ pub(crate) fn prepare(out: &Path) -> Result<bool> {
 fn write_all(
     simulation: &Simulation,
     date: &Path,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<String> {
     let name = format!("{DATE}_drive_{:04}_sync", simulation.config().seed);
     let drive = date.join(&name);
@@ -132,7 +113,12 @@ fn write_all(
             }
             Ok::<(), Error>(())
         })?;
-        progress(last, frames);
+        if progress(last, frames).is_break() {
+            return Err(Error::Stopped {
+                done: last,
+                total: frames,
+            });
+        }
     }
     let stamps = |shift: f64| -> String {
         (0..frames)
@@ -178,7 +164,7 @@ fn io<'a>(path: &'a Path, action: &'static str) -> impl Fn(std::io::Error) -> Er
     }
 }
 
-fn make_folder(path: &Path) -> Result<()> {
+pub(crate) fn make_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(io(path, "make this folder"))
 }
 

@@ -1,7 +1,7 @@
 //! Writes a drive as a bag with UMAD's sensors.
 
 use crate::fmcw::{self, SCAN_RATE_HZ};
-use crate::kitti::{encode_depth, encode_rgb};
+use crate::kitti::{encode_depth, encode_rgb, make_folder, require_empty};
 use crate::rig::Rig;
 use crate::{Error, ExpectedSetting, Result, Simulation};
 use deepfusion_rosbag::msg::{
@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Noon of the first of January 2026, UTC, in nanoseconds since 1970: time 0 of every drive.
@@ -77,14 +78,17 @@ impl Default for BagSettings {
 ///
 /// The camera's stamps and those of the LiDAR carry the clock's offset; IMU, speed, steering and truth do not.
 ///
+/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`]: after an error, or stopped,
+/// `out` is as it was.
+///
 /// # Errors
-/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Io`],
-/// [`Error::Encode`], [`Error::Bag`].
+/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` holds anything;
+/// [`Error::Stopped`]; [`Error::Io`], [`Error::Encode`], [`Error::Bag`].
 pub fn write_bag(
     simulation: &Simulation,
     out: &Path,
     settings: &BagSettings,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<PathBuf> {
     let config = simulation.config();
     if config.stereo_baseline_m > 0.0 {
@@ -111,7 +115,9 @@ pub fn write_bag(
     if let Some(drawn) = simulation.drawn() {
         beside.push((path.with_extension("varied.json"), drawn.to_json()));
     }
-    let existed = crate::kitti::prepare(out)?;
+    require_empty(out)?;
+    let existed = out.is_dir();
+    make_folder(out)?;
     let written = beside
         .iter()
         .try_for_each(|(file, text)| write_beside(file, text))
@@ -154,7 +160,7 @@ fn write_messages(
     simulation: &Simulation,
     path: &Path,
     settings: &BagSettings,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<()> {
     let options = WriterOptions {
         compression: settings.compression,
@@ -201,7 +207,12 @@ fn write_messages(
             write_scan(simulation, &mut bag, &topics, (time_s, scans), settings)?;
             scans += 1;
         }
-        progress(last, frames);
+        if progress(last, frames).is_break() {
+            return Err(Error::Stopped {
+                done: last,
+                total: frames,
+            });
+        }
     }
     bag.finish()?;
     Ok(())

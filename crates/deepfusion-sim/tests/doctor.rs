@@ -5,6 +5,7 @@ use deepfusion_data::OpenOptions;
 use deepfusion_doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use nalgebra::{Rotation3, Vector3};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// What disturbs: errors and warnings.
@@ -73,7 +74,10 @@ fn bag_of(folder: &Path, config: &SimConfig, settings: BagSettings) -> PathBuf {
         lidar_step_deg: 0.4,
         ..settings
     };
-    write_bag(&simulation, &folder.join("bag"), &settings, &mut |_, _| {}).unwrap()
+    write_bag(&simulation, &folder.join("bag"), &settings, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
 }
 
 #[test]
@@ -81,7 +85,10 @@ fn every_place_is_clean() {
     for scene in Scene::ALL {
         let folder = tempfile::tempdir().unwrap();
         let simulation = Simulation::new(&config(scene, 100)).unwrap();
-        write_kitti(&simulation, &folder.path().join("kitti"), &mut |_, _| {}).unwrap();
+        write_kitti(&simulation, &folder.path().join("kitti"), &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         let diagnosis = doctor(&folder.path().join("kitti"), None);
         assert!(
             complaints(&diagnosis).is_empty(),
@@ -496,7 +503,7 @@ fn what_lies_beside_the_drives_is_given_by_its_own_path() {
     let folder = tempfile::tempdir().unwrap();
     let simulation = Simulation::new(&config(Scene::Urban, 12)).unwrap();
     let root = folder.path().join("kitti");
-    write_kitti(&simulation, &root, &mut |_, _| {}).unwrap();
+    write_kitti(&simulation, &root, &mut |_, _| ControlFlow::Continue(())).unwrap();
     std::fs::write(root.join("drive.mp4"), "").unwrap();
     let diagnosis = doctor(&root, None);
     let all = diagnosis.findings();

@@ -4,6 +4,7 @@ use deepfusion_data::{Dataset, GtKind, OpenOptions, load_rgb, read_depth_png};
 use deepfusion_hint::Hint;
 use deepfusion_sim::{Error, SimConfig, Simulation, write_kitti};
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 fn small(frames: usize) -> Simulation {
@@ -25,8 +26,11 @@ fn the_reader_finds_what_the_simulator_knows() {
     let out = folder.path().join("new/drive");
     let simulation = small(6);
     let mut calls = Vec::new();
-    let drive = write_kitti(&simulation, &out, &mut |done, all| calls.push((done, all)))
-        .expect("the drive is written");
+    let drive = write_kitti(&simulation, &out, &mut |done, all| {
+        calls.push((done, all));
+        ControlFlow::Continue(())
+    })
+    .expect("the drive is written");
     assert_eq!(drive, out.join("2026_01_01/2026_01_01_drive_0012_sync"));
     assert_eq!(calls.last(), Some(&(6, 6)));
 
@@ -114,7 +118,10 @@ fn leftovers(folder: &Path) -> usize {
 fn equal_configurations_write_equal_bytes() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str| {
-        write_kitti(&small(2), &folder.path().join(name), &mut |_, _| ()).expect("written")
+        write_kitti(&small(2), &folder.path().join(name), &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .expect("written")
     };
     let (a, b) = (write("a"), write("b"));
     for file in [
@@ -133,7 +140,10 @@ fn equal_configurations_write_equal_bytes() {
 fn a_folder_with_something_in_it_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     fs::write(folder.path().join("mine.txt"), "keep").expect("a file");
-    let error = write_kitti(&small(1), folder.path(), &mut |_, _| ()).expect_err("refused");
+    let error = write_kitti(&small(1), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .expect_err("refused");
     assert!(matches!(&error, Error::OutputNotEmpty { path } if path == folder.path()));
     assert!(error.hint().is_some());
     let kept = fs::read_dir(folder.path()).expect("the folder").count();
@@ -143,7 +153,10 @@ fn a_folder_with_something_in_it_is_refused() {
 #[test]
 fn an_empty_folder_is_used() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    assert!(write_kitti(&small(1), folder.path(), &mut |_, _| ()).is_ok());
+    let written = write_kitti(&small(1), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    });
+    written.expect("written");
 }
 
 #[test]
@@ -152,7 +165,8 @@ fn where_nothing_can_be_written_the_path_is_named() {
     let file = folder.path().join("a-file");
     fs::write(&file, "not a folder").expect("a file");
     for out in [file.clone(), file.join("below")] {
-        let error = write_kitti(&small(1), &out, &mut |_, _| ()).expect_err("no folder");
+        let error = write_kitti(&small(1), &out, &mut |_, _| ControlFlow::Continue(()))
+            .expect_err("no folder");
         assert!(error.to_string().contains("a-file"), "{error}");
         assert!(error.hint().is_some());
     }
@@ -168,8 +182,39 @@ fn a_failure_half_way_leaves_nothing_behind() {
     let blocked = out.join("2026_01_01/taken");
     let error = write_kitti(&small(1), &out, &mut |_, _| {
         fs::create_dir_all(&blocked).expect("a folder");
+        ControlFlow::Continue(())
     })
     .expect_err("the name is taken");
     assert!(error.to_string().contains("2026_01_01"), "{error}");
+    assert_eq!(leftovers(folder.path()), 0);
+}
+
+#[test]
+fn a_drive_that_is_stopped_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let entries = || fs::read_dir(folder.path()).expect("the folder").count();
+    for out in [folder.path().join("new"), folder.path().to_owned()] {
+        let error = write_kitti(&small(9), &out, &mut |_, _| ControlFlow::Break(()))
+            .expect_err("it is stopped");
+        assert!(
+            matches!(error, Error::Stopped { done: 8, total: 9 }),
+            "{error}"
+        );
+        assert!(error.hint().is_some());
+        assert_eq!(entries(), 0);
+    }
+}
+
+/// What a process left that was killed while it wrote is not in the way of the next one.
+#[test]
+fn what_a_killed_writer_left_is_removed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let left = folder.path().join(".2026_01_01.17-00ab.partial");
+    fs::create_dir_all(left.join("2026_01_01_drive_0012_sync/image_02")).expect("a folder");
+    fs::write(folder.path().join(".2026_01_01.17-00ab.partial.lock"), "").expect("a file");
+    write_kitti(&small(1), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .expect("written");
     assert_eq!(leftovers(folder.path()), 0);
 }

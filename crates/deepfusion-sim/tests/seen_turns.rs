@@ -1,5 +1,6 @@
 //! How the vehicle turned, by its images, against how it did.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use deepfusion_data::{Dataset, OpenOptions};
@@ -19,7 +20,7 @@ fn drive(folder: &Path, scene: Scene) -> Dataset {
         ..SimConfig::default()
     })
     .unwrap();
-    let drive = write_kitti(&simulation, folder, &mut |_, _| ()).unwrap();
+    let drive = write_kitti(&simulation, folder, &mut |_, _| ControlFlow::Continue(())).unwrap();
     Dataset::open(&drive, &OpenOptions::default())
         .unwrap()
         .remove(0)

@@ -2,7 +2,8 @@
 
 use deepfusion_rosbag::msg::{CameraInfo, CompressedImage, Imu, PointCloud2, TwistStamped};
 use deepfusion_rosbag::{Bag, Selection};
-use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, topic, write_bag};
+use deepfusion_sim::{BagSettings, Error, Scene, Sensors, SimConfig, Simulation, topic, write_bag};
+use std::ops::ControlFlow;
 
 fn simulation() -> Simulation {
     let config = SimConfig {
@@ -30,6 +31,7 @@ fn the_bag_holds_the_drive() {
     let mut calls = Vec::new();
     let path = write_bag(&simulation, folder.path(), &settings, &mut |done, of| {
         calls.push((done, of));
+        ControlFlow::Continue(())
     })
     .unwrap();
     assert_eq!(calls.last(), Some(&(30, 30)));
@@ -85,10 +87,31 @@ fn equal_drives_make_equal_bags_and_nothing_is_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str| {
         let out = folder.path().join(name);
-        write_bag(&simulation, &out, &BagSettings::default(), &mut |_, _| {})
+        write_bag(&simulation, &out, &BagSettings::default(), &mut |_, _| {
+            ControlFlow::Continue(())
+        })
     };
     let [a, b] = ["a", "b"].map(|name| std::fs::read(write(name).unwrap()).unwrap());
     assert!(a == b, "the bytes differ");
     let error = write("a").unwrap_err();
     assert!(error.to_string().contains("not empty"), "{error}");
+}
+
+#[test]
+fn a_bag_that_is_stopped_leaves_nothing() {
+    let simulation = simulation();
+    let folder = tempfile::tempdir().unwrap();
+    let entries = || std::fs::read_dir(folder.path()).unwrap().count();
+    for out in [folder.path().join("new"), folder.path().to_owned()] {
+        let mut calls = 0;
+        let stopped = write_bag(&simulation, &out, &BagSettings::default(), &mut |_, _| {
+            calls += 1;
+            ControlFlow::Break(())
+        });
+        assert!(
+            matches!(stopped, Err(Error::Stopped { done: 8, total: 30 })),
+            "{stopped:?}"
+        );
+        assert_eq!((calls, entries()), (1, 0));
+    }
 }

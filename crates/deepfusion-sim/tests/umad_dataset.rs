@@ -7,6 +7,7 @@ use deepfusion_data::{
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use std::fmt::Write as _;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 fn simulation(scene: Scene, frames: usize, moving_cars: usize) -> Simulation {
@@ -32,7 +33,10 @@ fn open(path: &Path) -> Dataset {
 }
 
 fn bag(simulation: &Simulation, folder: &Path, settings: &BagSettings) -> PathBuf {
-    write_bag(simulation, &folder.join("bag"), settings, &mut |_, _| {}).unwrap()
+    write_bag(simulation, &folder.join("bag"), settings, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
 }
 
 /// Images, a table of CAN speeds and one of the inertial unit, and four numbers for the camera.
@@ -76,7 +80,10 @@ fn bag_kitti_and_folder_give_the_same_snippets() {
     let simulation = simulation(Scene::Urban, 50, 0);
     let folder = tempfile::tempdir().unwrap();
     let path = bag(&simulation, folder.path(), &BagSettings::default());
-    write_kitti(&simulation, &folder.path().join("kitti"), &mut |_, _| {}).unwrap();
+    write_kitti(&simulation, &folder.path().join("kitti"), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     write_folder(&simulation, &folder.path().join("folder"));
     let sets = [
         open(&path),

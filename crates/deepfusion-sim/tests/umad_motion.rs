@@ -3,6 +3,7 @@
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_geometry::Se3;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag};
+use std::ops::ControlFlow;
 
 /// Ten seconds; pictures and scans do not matter here.
 fn drive(scene: Scene, seed: u64) -> (tempfile::TempDir, Dataset) {
@@ -28,7 +29,7 @@ fn drive(scene: Scene, seed: u64) -> (tempfile::TempDir, Dataset) {
         &simulation,
         &folder.path().join("bag"),
         &settings,
-        &mut |_, _| {},
+        &mut |_, _| ControlFlow::Continue(()),
     )
     .unwrap();
     let dataset = Dataset::open(&path, &OpenOptions::default())

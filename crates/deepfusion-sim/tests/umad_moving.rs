@@ -5,6 +5,7 @@ use deepfusion_hint::Hint;
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, topic, write_bag};
 use nalgebra::Vector3;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 const FRAMES: usize = 60;
@@ -32,7 +33,10 @@ fn bag(simulation: &Simulation, folder: &Path) -> PathBuf {
         compression: Compression::None,
         ..BagSettings::default()
     };
-    write_bag(simulation, &folder.join("bag"), &settings, &mut |_, _| {}).unwrap()
+    write_bag(simulation, &folder.join("bag"), &settings, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
 }
 
 fn try_open(path: &Path) -> deepfusion_data::Result<Dataset> {

@@ -10,6 +10,7 @@ use deepfusion_sim::{
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// The height of the unit that stands for the car above the road, metres.
@@ -62,7 +63,7 @@ fn one_seed_gives_the_same_bytes_and_another_another_camera() {
     let write = |name: &str, seed| {
         let simulation = drive(&config(Scene::Urban, seed));
         let out = folder.path().join(name);
-        write_kitti(&simulation, &out, &mut |_, _| ()).expect("written");
+        write_kitti(&simulation, &out, &mut |_, _| ControlFlow::Continue(())).expect("written");
         (simulation.drawn().expect("varied").clone(), files(&out))
     };
     let (first, again, other) = (write("first", 3), write("again", 3), write("other", 4));
@@ -89,7 +90,10 @@ fn a_plain_drive_draws_nothing() {
     let simulation = drive(&plain);
     assert!(simulation.drawn().is_none());
     assert_eq!(simulation.moving_cars(), 5);
-    write_kitti(&simulation, folder.path(), &mut |_, _| ()).expect("written");
+    write_kitti(&simulation, folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .expect("written");
     let written = files(folder.path());
     assert!(written.keys().all(|name| !name.ends_with("varied.json")));
 }
@@ -124,7 +128,10 @@ fn the_road_lies_where_the_written_camera_sees_it() {
     for (scene, seed) in [(Scene::Urban, 1), (Scene::Country, 2), (Scene::Garage, 3)] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let simulation = drive(&config(scene, seed));
-        let path = write_kitti(&simulation, folder.path(), &mut |_, _| ()).expect("written");
+        let path = write_kitti(&simulation, folder.path(), &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .expect("written");
         let said = fs::read(path.join("varied.json")).expect("what was drawn");
         let said: serde_json::Value = serde_json::from_slice(&said).expect("JSON");
         let of = |key: &str| said["camera"][key].as_f64().expect("a number");
@@ -187,7 +194,10 @@ fn the_reader_s_motion_is_the_drawn_camera_s() {
         fps: 10.0,
         ..config(Scene::Urban, 5)
     });
-    write_kitti(&simulation, folder.path(), &mut |_, _| ()).expect("written");
+    write_kitti(&simulation, folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .expect("written");
     let snippets = open(folder.path()).snippets(&[1], 0.5).expect("pairs");
     assert!(!snippets.is_empty());
     for snippet in &snippets {
@@ -218,7 +228,7 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
         &simulation,
         &folder.path().join("bag"),
         &BagSettings::default(),
-        &mut |_, _| (),
+        &mut |_, _| ControlFlow::Continue(()),
     )
     .expect("written");
     let said = fs::read_to_string(path.with_extension("varied.json")).expect("what was drawn");

@@ -11,6 +11,7 @@ use deepfusion_train::{
     Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, LossTerms, Preset, RunFolder,
     SampleSet, SimulatedConfig, Supervision, TrainConfig, TrainEvent, Trainer, validation_loss,
 };
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// A small network that learns from simulated views.
@@ -231,7 +232,10 @@ fn a_drive_is_learned_from_as_its_set_says() {
         ..SimConfig::default()
     });
     let scanned = folder.path().join("scanned");
-    let scanned = write_kitti(&simulation.unwrap(), &scanned, &mut |_, _| {}).unwrap();
+    let scanned = write_kitti(&simulation.unwrap(), &scanned, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     for (learn, motion, depth) in [
         (Learn::OwnMotion, true, false),
         (Learn::Depth, false, true),

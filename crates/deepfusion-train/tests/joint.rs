@@ -9,6 +9,7 @@ use deepfusion_train::{
     TrainConfig, TrainEvent, Trainer,
 };
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 const GARAGE: DepthRange = DepthRange {
@@ -26,7 +27,10 @@ fn drive(folder: &Path, seed: u64, fps: f64) -> PathBuf {
         scan_every: 0,
         ..SimConfig::default()
     };
-    write_kitti(&Simulation::new(&config).unwrap(), folder, &mut |_, _| {}).unwrap()
+    write_kitti(&Simulation::new(&config).unwrap(), folder, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
 }
 
 /// Cuts a drive's images to their middle, half as wide and half as high: a camera with twice the focal length.

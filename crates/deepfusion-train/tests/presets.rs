@@ -8,6 +8,7 @@ use deepfusion_train::{
     Control, DataSetConfig, Learn, LossTerms, Preset, RunFolder, SampleSet, TrainConfig,
     TrainEvent, Trainer,
 };
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// The preset's losses, views and architecture, with few channels and small images.
@@ -78,7 +79,10 @@ fn every_preset_learns_from_depth_from_motion_and_from_both() {
         ..SimConfig::default()
     });
     let drive = folder.path().join("drive");
-    let drive = write_kitti(&simulation.unwrap(), &drive, &mut |_, _| {}).unwrap();
+    let drive = write_kitti(&simulation.unwrap(), &drive, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     for preset in Preset::ALL {
         for (learn, motion, depth) in [
             (Learn::Depth, false, true),

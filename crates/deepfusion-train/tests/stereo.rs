@@ -1,5 +1,6 @@
 //! The other camera's view: where it is, what it shows, and what is refused.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
@@ -52,7 +53,12 @@ fn samples(config: &TrainConfig, drive: &Path, camera: Cameras) -> Result<Sample
 fn the_other_cameras_view_is_where_the_depth_says() {
     let folder = tempfile::tempdir().unwrap();
     let street = street();
-    let drive = write_kitti(&street, folder.path(), &mut |_, _| ()).unwrap();
+    let drive = write_kitti(
+        &street,
+        folder.path(),
+        &mut |_, _| ControlFlow::Continue(()),
+    )
+    .unwrap();
     let config = settings();
     let set = samples(&config, &drive, Cameras::Both).unwrap();
     assert_eq!(set.samples.len(), 8, "four pairs of each camera");
@@ -147,7 +153,10 @@ fn depth_of(street: &Simulation, name: &str, image: &[f32]) -> (Vec<f32>, bool) 
 #[test]
 fn posenet_is_not_asked_for_the_other_camera() {
     let folder = tempfile::tempdir().unwrap();
-    let drive = write_kitti(&street(), folder.path(), &mut |_, _| ()).unwrap();
+    let drive = write_kitti(&street(), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let device = Device::flex();
     let mut config = settings();
     config.pose_net.metres_per_unit = 1.0;
@@ -186,9 +195,12 @@ fn posenet_is_not_asked_for_the_other_camera() {
 #[test]
 fn a_drive_with_one_camera_learns_beside_one_with_two() {
     let folder = tempfile::tempdir().unwrap();
-    let two = write_kitti(&street(), folder.path(), &mut |_, _| ()).unwrap();
+    let two = write_kitti(&street(), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let alone = folder.path().join("alone");
-    let one = write_kitti(&street(), &alone, &mut |_, _| ()).unwrap();
+    let one = write_kitti(&street(), &alone, &mut |_, _| ControlFlow::Continue(())).unwrap();
     std::fs::remove_dir_all(one.join("image_03")).unwrap();
     let mut config = settings();
     (config.batch, config.loss.automask) = (12, true);
@@ -246,7 +258,10 @@ fn a_drive_with_one_camera_learns_beside_one_with_two() {
 #[test]
 fn one_camera_is_no_stereo() {
     let folder = tempfile::tempdir().unwrap();
-    let drive = write_kitti(&street(), folder.path(), &mut |_, _| ()).unwrap();
+    let drive = write_kitti(&street(), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let why = |camera| match samples(&settings(), &drive, camera) {
         Err(Error::NoStereo { why, .. }) => why,
         other => panic!("{other:?}"),

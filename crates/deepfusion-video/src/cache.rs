@@ -1,9 +1,9 @@
 //! A folder of decoded frames: whole, and of what it says, or not there.
 
 use crate::{Error, Result};
+use deepfusion_fs::PartialFolder;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::UNIX_EPOCH;
 
 /// What a folder of frames was made from.
@@ -20,7 +20,7 @@ pub(crate) struct Origin {
 const ORIGIN: &str = "origin.json";
 
 impl Origin {
-    /// Of a file as it is now; of a folder, of all files in it but settings (`.toml`), which say nothing of the frames.
+    /// Of a file as it is now; of a folder, of all files in it but settings (`.toml`) and hidden ones, which say nothing of the frames.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -34,8 +34,10 @@ impl Origin {
         };
         if place.is_dir() {
             for entry in std::fs::read_dir(place).map_err(failed)? {
-                let path = entry.map_err(failed)?.path();
-                if path.is_file() && path.extension().is_none_or(|e| e != "toml") {
+                let entry = entry.map_err(failed)?;
+                let path = entry.path();
+                let hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
+                if !hidden && path.is_file() && path.extension().is_none_or(|e| e != "toml") {
                     origin.add(&path)?;
                 }
             }
@@ -86,12 +88,6 @@ pub(crate) fn keep<E: From<Error>>(
     if Origin::read(cache).as_ref() == Some(origin) {
         return Ok(());
     }
-    // Two threads of a process may decode the same, each for itself.
-    static COUNT: AtomicU64 = AtomicU64::new(0);
-    let mut name = cache.file_name().unwrap_or_default().to_owned();
-    let count = COUNT.fetch_add(1, Ordering::Relaxed);
-    name.push(format!(".part-{}-{count}", std::process::id()));
-    let part = cache.with_file_name(name);
     // What cannot be replaced in the end is said before hours of decoding.
     let is_in_the_way = Origin::read(cache).is_none()
         && std::fs::read_dir(cache).is_ok_and(|mut files| files.next().is_some());
@@ -100,30 +96,85 @@ pub(crate) fn keep<E: From<Error>>(
         let why = std::io::Error::new(std::io::ErrorKind::AlreadyExists, why);
         return Err(Error::file(cache, why).into());
     }
-    let filled = || -> std::result::Result<(), E> {
-        // Of a process that had this number and was killed.
-        if part.exists() {
-            std::fs::remove_dir_all(&part).map_err(|e| Error::file(&part, e))?;
-        }
-        std::fs::create_dir_all(&part).map_err(|e| Error::file(&part, e))?;
-        make(&part)?;
-        origin.write(&part)?;
-        // Of another video, or of this one before it changed.
-        if Origin::read(cache).is_some_and(|old| old != *origin) {
-            std::fs::remove_dir_all(cache).map_err(|e| Error::file(cache, e))?;
-        }
-        deepfusion_fs::publish_folder(&part, cache).map_err(|e| Error::file(cache, e))?;
-        Ok(())
-    };
-    let made = filled();
-    if made.is_err() {
-        // Best effort: the error that counts is returned.
-        let _ = std::fs::remove_dir_all(&part);
-    }
-    // Another process may have been quicker.
+    let made = fill(cache, origin, make);
+    // Another process or thread may have been quicker.
     if Origin::read(cache).as_ref() == Some(origin) {
         Ok(())
     } else {
         made
+    }
+}
+
+fn fill<E: From<Error>>(
+    cache: &Path,
+    origin: &Origin,
+    make: impl FnOnce(&Path) -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
+    let failed = |e| Error::file(cache, e);
+    let part = PartialFolder::beside(cache).map_err(failed)?;
+    make(part.path())?;
+    origin.write(part.path())?;
+    // Of another video, or of this one before it changed.
+    let is_old = Origin::read(cache).is_some_and(|old| old != *origin);
+    let committed = if is_old {
+        part.commit_replacing()
+    } else {
+        part.commit()
+    };
+    Ok(committed.map_err(failed)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A video that is so long, and its cache.
+    fn video(folder: &Path, bytes: usize) -> (PathBuf, Origin) {
+        let video = folder.join("drive.mp4");
+        std::fs::write(&video, vec![0_u8; bytes]).unwrap();
+        let origin = Origin::of(&video, 1, None).unwrap();
+        (folder.join("cache/drive.mp4.frames"), origin)
+    }
+
+    fn frame(text: &str) -> impl FnOnce(&Path) -> Result<()> {
+        move |part| std::fs::write(frame_path(part, 0), text).map_err(|e| Error::file(part, e))
+    }
+
+    fn names(cache: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(cache.parent().unwrap()).unwrap();
+        entries
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn frames_are_made_once_and_anew_for_another_video() {
+        let folder = tempfile::tempdir().unwrap();
+        let (cache, origin) = video(folder.path(), 3);
+        let never = |_: &Path| -> Result<()> { panic!("they are there") };
+        keep(&cache, &origin, frame("first")).unwrap();
+        keep(&cache, &origin, never).unwrap();
+        let (cache, origin) = video(folder.path(), 4);
+        keep(&cache, &origin, frame("second")).unwrap();
+        let kept = std::fs::read_to_string(frame_path(&cache, 0)).unwrap();
+        assert_eq!(kept, "second");
+        assert_eq!(names(&cache), ["drive.mp4.frames"]);
+    }
+
+    #[test]
+    fn what_fails_leaves_nothing_and_other_files_are_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (cache, origin) = video(folder.path(), 3);
+        let fails = |part: &Path| -> Result<()> {
+            std::fs::write(frame_path(part, 0), "half").unwrap();
+            Err(Error::file(part, std::io::ErrorKind::StorageFull.into()))
+        };
+        keep(&cache, &origin, fails).unwrap_err();
+        assert!(!cache.parent().unwrap().exists());
+        std::fs::create_dir_all(&cache).unwrap();
+        std::fs::write(cache.join("mine"), "x").unwrap();
+        let refused = keep(&cache, &origin, frame("new")).unwrap_err();
+        assert!(refused.to_string().contains("other files"), "{refused}");
+        assert!(cache.join("mine").exists());
     }
 }

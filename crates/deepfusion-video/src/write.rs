@@ -2,9 +2,10 @@
 
 use crate::program::{in_either_words, outcome, run};
 use crate::{Error, ProgramProblem, ProgramTask, Result};
+use deepfusion_fs::PartialFolder;
 use image::ImageReader;
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A picture of a video, and for how long it is shown.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,15 +31,17 @@ pub fn write_video(folder: &Path, pictures: &[VideoPicture], name: &str) -> Resu
         return Ok(());
     };
     let size = picture_size(&folder.join(&first.file))?;
-    // Whatever a run left here that was killed is replaced.
-    let aside = ScratchFolder::new(folder.join(format!(".{name}.partial")))?;
-    let list = concat_list(pictures, |i, picture| {
-        aside.take(&folder.join(&picture.file), i)
-    })?;
-    aside.write(LIST, &list)?;
     let path = folder.join(name);
-    encode(&aside.0, size, &path)?;
-    deepfusion_fs::publish(&aside.0.join(PART), &path).map_err(|e| Error::file(&path, e))
+    let failed = |e| Error::file(&path, e);
+    // ffmpeg takes colons and percent signs in names for something else. What it reads and writes is in a folder of its own, of
+    // which the video alone stays.
+    let aside = PartialFolder::beside(&path).map_err(failed)?;
+    let list = concat_list(pictures, |i, picture| {
+        take(&folder.join(&picture.file), aside.path(), i)
+    })?;
+    std::fs::write(aside.path().join(LIST), list).map_err(failed)?;
+    encode(aside.path(), size, &path)?;
+    deepfusion_fs::publish(&aside.path().join(PART), &path).map_err(failed)
 }
 
 /// Width and height of a picture, whatever its name ends in.
@@ -69,41 +72,15 @@ pub fn can_write_video(path: &Path) -> Result<()> {
 const LIST: &str = "list";
 const PART: &str = "part";
 
-/// A folder of its own for what ffmpeg reads and writes: it takes colons and percent signs in names for something else. Goes
-/// away with this.
-struct ScratchFolder(PathBuf);
-
-impl ScratchFolder {
-    fn new(path: PathBuf) -> Result<Self> {
-        if path.exists() {
-            std::fs::remove_dir_all(&path).map_err(|e| Error::file(&path, e))?;
-        }
-        std::fs::create_dir(&path).map_err(|e| Error::file(&path, e))?;
-        Ok(Self(path))
-    }
-
-    /// Takes a picture in, and gives the name that it has here.
-    fn take(&self, picture: &Path, number: usize) -> Result<String> {
-        let name = format!("{number:08}.png");
-        let path = self.0.join(&name);
-        // Not every file system has links.
-        std::fs::hard_link(picture, &path)
-            .or_else(|_| std::fs::copy(picture, &path).map(|_| ()))
-            .map_err(|e| Error::file(picture, e))?;
-        Ok(name)
-    }
-
-    fn write(&self, name: &str, text: &str) -> Result<()> {
-        let path = self.0.join(name);
-        std::fs::write(&path, text).map_err(|e| Error::file(&path, e))
-    }
-}
-
-impl Drop for ScratchFolder {
-    fn drop(&mut self) {
-        // Best effort: what counts is whether the video was made.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
+/// Takes a picture into a folder, and gives the name that it has there.
+fn take(picture: &Path, folder: &Path, number: usize) -> Result<String> {
+    let name = format!("{number:08}.png");
+    let path = folder.join(&name);
+    // Not every file system has links.
+    std::fs::hard_link(picture, &path)
+        .or_else(|_| std::fs::copy(picture, &path).map(|_| ()))
+        .map_err(|e| Error::file(picture, e))?;
+    Ok(name)
 }
 
 fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {

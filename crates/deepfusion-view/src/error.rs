@@ -1,10 +1,8 @@
 //! What can go wrong with showing results.
 
 mod content;
-mod folder_kind;
 
-pub use self::content::{ArrayProblem, ContentProblem};
-pub use self::folder_kind::FolderKind;
+pub use self::content::{ArrayProblem, ContentProblem, FolderKind};
 
 use deepfusion_hint::Hint;
 use std::net::SocketAddr;

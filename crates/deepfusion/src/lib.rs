@@ -40,7 +40,8 @@
 //! # use deepfusion::sim::{SimConfig, Simulation, write_kitti};
 //! # let temporary = tempfile::tempdir()?;
 //! # let small = SimConfig { frames: 12, width: 320, height: 96, ..Default::default() };
-//! # let drive = write_kitti(&Simulation::new(&small)?, temporary.path(), &mut |_, _| ())?;
+//! # let go_on = std::ops::ControlFlow::Continue(());
+//! # let drive = write_kitti(&Simulation::new(&small)?, temporary.path(), &mut |_, _| go_on)?;
 //! # let run = temporary.path().join("run");
 //! # let mut config = config;
 //! # (config.batch, config.size.width, config.validation_share) = (2, 64, 0.2);
@@ -66,7 +67,8 @@
 //! # let temporary = tempfile::tempdir()?;
 //! # let small = SimConfig { frames: 4, width: 160, height: 96, ..Default::default() };
 //! # let street = Simulation::new(&small)?;
-//! # let path = write_bag(&street, temporary.path(), &BagSettings::default(), &mut |_, _| ())?;
+//! # let go_on = std::ops::ControlFlow::Continue(());
+//! # let path = write_bag(&street, temporary.path(), &BagSettings::default(), &mut |_, _| go_on)?;
 //! let bag = Bag::open(path)?;
 //! for topic in bag.topics()? {
 //!     println!("{}  {}  {} messages", topic.name, topic.type_name, topic.count);

@@ -2,6 +2,7 @@
 //! this says so.
 
 use std::error::Error;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -40,7 +41,9 @@ fn street(frames: usize) -> Result<Simulation> {
 }
 
 fn drive(at: &Path, frames: usize) -> Result<PathBuf> {
-    Ok(write_kitti(&street(frames)?, at, &mut |_, _| ())?)
+    Ok(write_kitti(&street(frames)?, at, &mut |_, _| {
+        ControlFlow::Continue(())
+    })?)
 }
 
 #[test]
@@ -71,7 +74,9 @@ fn a_drive_becomes_a_run() -> Result {
 fn a_bag_says_its_streams() -> Result {
     let folder = tempfile::tempdir()?;
     let settings = BagSettings::default();
-    let bag = write_bag(&street(3)?, folder.path(), &settings, &mut |_, _| ())?;
+    let bag = write_bag(&street(3)?, folder.path(), &settings, &mut |_, _| {
+        ControlFlow::Continue(())
+    })?;
     if let Some(text) = run("bag_streams", &[&bag])? {
         assert!(text.contains("CompressedImage"), "{text}");
         assert!(text.contains("begins at"), "{text}");

@@ -1,6 +1,7 @@
 use crate::cli::{SimulateArgs, SimulateFormat, Size};
 use crate::error::CliError;
 use crate::failure::Result;
+use crate::interrupt;
 use crate::output;
 use crate::progress::{Progress, say};
 use deepfusion_hint::count_of;
@@ -19,8 +20,12 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     if let Some(warning) = fewer_cars(config.moving_cars, simulation.moving_cars()) {
         tracing::warn!("{warning}");
     }
+    interrupt::catch("stopping after the frames at work; nothing is written");
     let mut progress = Progress::new("simulating");
-    let mut report = |done, total| progress.set(done, total);
+    let mut report = |done, total| {
+        progress.set(done, total);
+        interrupt::flow()
+    };
     let drive = match args.format {
         SimulateFormat::Kitti => write_kitti(&simulation, &args.out, &mut report)?,
         SimulateFormat::Bag => {

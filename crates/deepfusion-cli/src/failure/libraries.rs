@@ -28,8 +28,20 @@ as_the_library_says!(
     deepfusion_model::NetworkError,
     deepfusion_motion::Error,
     deepfusion_perception::Error,
-    deepfusion_sim::Error,
 );
+
+impl Reportable for deepfusion_sim::Error {
+    fn remedy(&self) -> Option<String> {
+        self.hint()
+    }
+
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Stopped { .. } => Exit::Stopped,
+            _ => Exit::Failed,
+        }
+    }
+}
 
 impl Reportable for deepfusion_rosbag::Error {
     fn remedy(&self) -> Option<String> {

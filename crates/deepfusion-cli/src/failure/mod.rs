@@ -254,6 +254,8 @@ mod tests {
         let view = deepfusion_view::Error::Stopped { path, done, total };
         let view = Failure::from(view).context("view");
         assert_eq!(view.error.exit(), Exit::Stopped);
+        let simulated = deepfusion_sim::Error::Stopped { done, total };
+        assert_eq!(simulated.exit(), Exit::Stopped);
         assert_eq!(CliError::NoMedia.exit(), Exit::Failed);
         assert_eq!(CliError::NoModelGiven.exit(), Exit::WrongArguments);
     }

@@ -124,7 +124,11 @@ pub fn convert_to_bag(
         progress(done, times.len());
     }
     super::parts::write_text(&sidecar, &describe(dataset))?;
-    bag.finish()?;
+    if let Err(error) = bag.finish() {
+        // Best effort: without its bag it would be in the way of the next try.
+        let _ = std::fs::remove_file(&sidecar);
+        return Err(error.into());
+    }
     Ok(Converted {
         paths: vec![out.to_owned()],
         moved_s,

@@ -4,6 +4,7 @@ use super::parts::{
 };
 use crate::dataset_toml::FolderConfig;
 use crate::{Dataset, Error, Result, save_png};
+use deepfusion_fs::PartialFolder;
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
 use rayon::prelude::*;
@@ -18,6 +19,9 @@ use std::path::{Path, PathBuf};
 /// frame's time), not the scanner's own; `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
 /// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in the drive's `dataset.toml`, which goes
 /// with the drive wherever it is moved.
+///
+/// Everything is written to a folder beside its final place and renamed at the end: after an error `out` is as it was. What a
+/// conversion that was killed left there is removed, and is not in the way.
 ///
 /// # Errors
 /// [`Error::Exists`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
@@ -39,17 +43,23 @@ pub fn convert_to_kitti(
             other: other.name().to_owned(),
         });
     }
-    super::parts::prepare(out)?;
+    super::parts::require_empty(out)?;
     let moved_s = seconds_to_move(datasets);
     let start_ns = at_ns(first, 0.0, moved_s);
     let (year, month, day) = date(start_ns.div_euclid(86_400_000_000_000));
     let date_name = format!("{year:04}_{month:02}_{day:02}");
     let date_folder = out.join(&date_name);
-    write_calibration(&date_folder, &first.intrinsics(0), first.cam_from_vehicle())?;
+    let partial = PartialFolder::beside(&date_folder).map_err(|e| Error::file(out, e))?;
+    write_calibration(
+        partial.path(),
+        &first.intrinsics(0),
+        first.cam_from_vehicle(),
+    )?;
     let total: usize = datasets.iter().map(|d| d.frames().len()).sum();
     let (mut done, mut folders) = (0, Vec::new());
     for (number, dataset) in datasets.iter().enumerate() {
-        let folder = date_folder.join(format!("{date_name}_drive_{:04}_sync", number + 1));
+        let name = format!("{date_name}_drive_{:04}_sync", number + 1);
+        let folder = partial.path().join(&name);
         write_drive(dataset, &folder, moved_s, &mut |frames| {
             done += frames;
             progress(done, total);
@@ -57,10 +67,11 @@ pub fn convert_to_kitti(
         if dataset.is_simulated() {
             mark_simulated(&folder)?;
         }
-        folders.push(folder);
+        folders.push(date_folder.join(name));
     }
-    // All at once: a wait for each of its thousands of files would take longer than writing them.
-    deepfusion_fs::sync_tree(out).map_err(|e| Error::file(out, e))?;
+    // Waits for the disk once: a wait for each of its thousands of files would take longer than writing them.
+    let committed = partial.commit();
+    committed.map_err(|e| Error::file(&date_folder, e))?;
     Ok(Converted {
         paths: folders,
         moved_s,
@@ -168,7 +179,6 @@ fn numbers(values: impl IntoIterator<Item = f64>) -> String {
 }
 
 fn write_calibration(folder: &Path, k: &Intrinsics, cam_from_vehicle: Option<Se3>) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     let projection = [
         k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,

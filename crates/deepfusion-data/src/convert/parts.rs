@@ -1,9 +1,10 @@
 //! What both layouts are written from: points, times, how the vehicle moves.
 
 use crate::{Dataset, Error, GtKind, MotionModel, Result};
+use deepfusion_fs::PartialFolder;
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
@@ -70,15 +71,18 @@ pub struct Converted {
 /// The line of the file beside a recording that says that nobody drove it.
 pub(super) const SIMULATED: &str = "simulated = true\n";
 
-/// Makes the output folder, which must be new or empty.
-pub(super) fn prepare(out: &Path) -> Result<()> {
-    std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
-    let mut entries = std::fs::read_dir(out).map_err(|e| Error::file(out, e))?;
-    match entries.next() {
-        None => Ok(()),
-        Some(_) => Err(Error::Exists {
-            path: out.to_owned(),
-        }),
+/// Refuses an output folder that holds something; there may be none.
+pub(super) fn require_empty(out: &Path) -> Result<()> {
+    PartialFolder::remove_leftovers(out);
+    match std::fs::read_dir(out) {
+        Ok(mut entries) => match entries.next() {
+            None => Ok(()),
+            Some(_) => Err(Error::Exists {
+                path: out.to_owned(),
+            }),
+        },
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(Error::file(out, error)),
     }
 }
 

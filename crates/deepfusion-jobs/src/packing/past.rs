@@ -184,6 +184,7 @@ mod tests {
     use deepfusion_model::Preset;
     use deepfusion_sim::{SimConfig, Simulation, write_kitti};
     use std::fs;
+    use std::ops::ControlFlow;
 
     /// A simulated drive's folder.
     fn drive(at: &Path) -> PathBuf {
@@ -195,7 +196,7 @@ mod tests {
             ..SimConfig::default()
         };
         let simulation = Simulation::new(&config).unwrap();
-        let root = write_kitti(&simulation, at, &mut |_, _| ()).unwrap();
+        let root = write_kitti(&simulation, at, &mut |_, _| ControlFlow::Continue(())).unwrap();
         let drive = &Dataset::open(&root, &OpenOptions::default()).unwrap()[0];
         drive.folder().to_owned()
     }

@@ -25,7 +25,6 @@ mod photometric;
 pub(super) mod pointwise;
 mod project;
 mod smoothness;
-mod sum;
 mod upsample;
 mod warp;
 

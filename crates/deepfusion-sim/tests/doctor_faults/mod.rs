@@ -3,6 +3,7 @@
 use deepfusion_doctor::{Diagnosis, doctor};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use image::RgbImage;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -32,7 +33,10 @@ impl Drive {
                 ..SimConfig::default()
             };
             let simulation = Simulation::new(&config).unwrap();
-            write_kitti(&simulation, &folder.path().join("kitti"), &mut |_, _| {}).unwrap();
+            write_kitti(&simulation, &folder.path().join("kitti"), &mut |_, _| {
+                ControlFlow::Continue(())
+            })
+            .unwrap();
             folder
         });
         let folder = tempfile::tempdir().unwrap();

@@ -7,6 +7,7 @@ use crate::{NamedGradients, Preset};
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use std::error::Error as StdError;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 fn drive(folder: &Path) -> PathBuf {
@@ -16,7 +17,10 @@ fn drive(folder: &Path) -> PathBuf {
         scan_every: 0,
         ..SimConfig::default()
     });
-    write_kitti(&street.unwrap(), &folder.join("street"), &mut |_, _| {}).unwrap()
+    write_kitti(&street.unwrap(), &folder.join("street"), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
 }
 
 /// A run of a small network with two batches a step.

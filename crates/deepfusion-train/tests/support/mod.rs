@@ -3,6 +3,7 @@
 use deepfusion_data::{Dataset, OpenOptions, save_png};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{Preset, SampleSet, TrainConfig};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// A street without scans.
@@ -40,7 +41,10 @@ pub(crate) fn small_without_data(steps: usize) -> TrainConfig {
 
 /// A KITTI drive along the street.
 pub(crate) fn drive(folder: &Path, frames: usize) -> PathBuf {
-    write_kitti(&street(frames), folder, &mut |_, _| {}).unwrap()
+    write_kitti(&street(frames), folder, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap()
 }
 
 /// The same drive as a folder of images with speeds and yaw rates, of which nothing says the camera.

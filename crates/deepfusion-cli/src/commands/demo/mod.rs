@@ -6,7 +6,6 @@ mod adapt;
 mod from_scratch;
 mod page;
 
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -19,7 +18,7 @@ use deepfusion_jobs::evaluation::{
 use deepfusion_model::{InputSize, RunFolder, TrainConfig};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
-use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+use deepfusion_sim::{Error as SimError, SimConfig, Simulation, write_kitti};
 use deepfusion_train::{Model, Trainer};
 use deepfusion_weights::DEFAULT;
 
@@ -60,9 +59,6 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     }
 }
 
-/// What unwinds out of a simulation that is to end.
-struct Stopped;
-
 /// What both ways have in common.
 struct Demo<'a> {
     args: &'a DemoArgs,
@@ -80,21 +76,16 @@ impl Demo<'_> {
         let out = self.out.join(name);
         let mut listen = |done, total| {
             progress.set(done, total);
-            // The writer cannot be stopped in another way, and takes away what it has written. No panic: nothing is printed.
-            if interrupt::asked() {
-                resume_unwind(Box::new(Stopped));
-            }
+            interrupt::flow()
         };
-        let write = AssertUnwindSafe(|| write_kitti(&simulation, &out, &mut listen));
-        match catch_unwind(write) {
-            Ok(drive) => {
-                let drive = drive?;
+        match write_kitti(&simulation, &out, &mut listen) {
+            Err(SimError::Stopped { .. }) => Err(CliError::Ended { what: DEMO }.into()),
+            written => {
+                let drive = written?;
                 // Labels and the disk take a while after the last frame.
                 interrupt::check(DEMO)?;
                 Ok(drive)
             }
-            Err(stopped) if stopped.is::<Stopped>() => Err(CliError::Ended { what: DEMO }.into()),
-            Err(panic) => resume_unwind(panic),
         }
     }
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Error as DataError;
-use deepfusion_fs::unused;
+use deepfusion_fs::{publish_folder, unused};
 use deepfusion_model::weights::{read_bytes, write_safetensors};
 use deepfusion_model::{Checkpoint, CheckpointKind, RunFolder, TrainConfig};
 use deepfusion_runtime::ModelSource;
@@ -21,6 +21,7 @@ const ADAPTED: &str = "adapted-";
 /// The folders of one adaptation.
 pub(super) struct Folders {
     out: PathBuf,
+    /// Not a [`deepfusion_fs::PartialFolder`]: its name is known, and what an interrupted process left there is gone on with.
     work: PathBuf,
 }
 
@@ -108,18 +109,18 @@ impl Folders {
 
     /// The work becomes the result.
     pub(super) fn keep(&self) -> Result<PathBuf> {
-        // An empty folder of this name may be there.
-        let _ = fs::remove_dir(&self.out);
-        deepfusion_fs::publish_folder(&self.work, &self.out)
-            .map_err(|e| DataError::file(&self.out, e))?;
-        Ok(self.out.clone())
+        self.rename_work(self.out.clone())
     }
 
     /// The work is laid aside, under a name that says so.
     pub(super) fn refuse(&self) -> Result<PathBuf> {
-        let aside = unused(&beside(&self.out, ".refused"));
-        rename(&self.work, &aside)?;
-        Ok(aside)
+        self.rename_work(unused(&beside(&self.out, ".refused")))
+    }
+
+    /// Gives the work another name, under which all of it is on the disk.
+    fn rename_work(&self, to: PathBuf) -> Result<PathBuf> {
+        publish_folder(&self.work, &to).map_err(|e| DataError::file(&to, e))?;
+        Ok(to)
     }
 }
 
@@ -158,10 +159,6 @@ fn beside(out: &Path, end: &str) -> PathBuf {
     let mut name = out.as_os_str().to_owned();
     name.push(end);
     name.into()
-}
-
-fn rename(from: &Path, to: &Path) -> Result<()> {
-    Ok(fs::rename(from, to).map_err(|e| DataError::file(from, e))?)
 }
 
 /// Renames a file; its content and its new name are on the disk once this returns.

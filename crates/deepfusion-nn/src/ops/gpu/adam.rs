@@ -1,6 +1,6 @@
 //! Adam's step of one parameter, and the norm of a gradient.
 
-use super::sum::over_group;
+use super::grid::over_group;
 use super::{SUM_THREADS, input, output, room, summing, values};
 use burn::backend::Dispatch;
 use burn::backend::{Backend, TensorMetadata, backend_extension, tensor::FloatTensor};

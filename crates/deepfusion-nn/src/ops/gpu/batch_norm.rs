@@ -1,7 +1,6 @@
 //! Batch normalisation with the batch's own statistics, and the ReLU after it.
 
-use super::grid::plane_of_group;
-use super::sum::over_group;
+use super::grid::{over_group, plane_of_group};
 use super::{SUM_THREADS, along_pixels, dims, input, output, room, summing, values};
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;

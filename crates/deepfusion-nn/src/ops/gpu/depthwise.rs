@@ -1,7 +1,6 @@
 //! Depthwise convolution at stride 1 that keeps the size, with a border of zeros.
 
-use super::grid::plane_of_group;
-use super::sum::over_group;
+use super::grid::{over_group, plane_of_group};
 use super::{SUM_THREADS, along_pixels, dims, input, output, room, summing};
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;

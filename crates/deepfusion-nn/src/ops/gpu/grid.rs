@@ -1,4 +1,4 @@
-//! How threads are laid out.
+//! How threads are laid out, and how a group of them sums.
 
 use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl;
@@ -45,4 +45,22 @@ pub(super) fn values(tensor: &CubeTensor) -> (CubeCount, CubeDim) {
 pub(super) fn summing(groups: u32, planes: usize) -> (CubeCount, CubeDim) {
     let count = CubeCount::Static(groups, planes as u32, 1);
     (count, CubeDim::new_1d(SUM_THREADS))
+}
+
+/// The sum of every thread's value, for all of them. A tree: the order of a sum does not depend on which thread is first.
+#[cube]
+pub(super) fn over_group(value: f32, #[comptime] threads: u32) -> f32 {
+    let mut shared = Shared::<[f32]>::new_slice(comptime!(threads as usize));
+    shared[UNIT_POS as usize] = value;
+    sync_cube();
+    let mut half = comptime!(threads / 2).runtime();
+    while half > 0 {
+        if UNIT_POS < half {
+            let other = shared[(UNIT_POS + half) as usize];
+            shared[UNIT_POS as usize] += other;
+        }
+        sync_cube();
+        half /= 2;
+    }
+    shared[0]
 }

@@ -1,7 +1,6 @@
 //! The pixels of one view in another (the paper's Eq. 3–5).
 
-use super::grid::plane_of_group;
-use super::sum::over_group;
+use super::grid::{over_group, plane_of_group};
 use super::{SUM_GROUPS, SUM_THREADS, along_pixels, dims, input, output, room, summing};
 use burn::backend::ops::FloatTensorOps;
 use burn_cubecl::CubeBackend;

@@ -19,7 +19,7 @@ pub(in super::super) mod tensor_cores;
 mod tile;
 
 use super::super::kernel::ConvOptions;
-use super::sum::over_group;
+use super::grid::over_group;
 use super::{SUM_GROUPS, SUM_THREADS, dims, input, mirror, output, room, summing, values};
 use burn::backend::ops::FloatTensorOps;
 use burn_cubecl::CubeBackend;
