@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::log::Speed;
 use crate::problem::{LineProblem, SpeedProblem};
+use deepfusion_hint::count_of;
 use std::path::Path;
 
 /// A file's text: UTF-8, with a byte order mark or without.
@@ -30,13 +31,23 @@ pub(crate) fn text_of(path: &Path) -> Result<String> {
 /// Says what of the rows was not used.
 pub(crate) fn left_out(notes: &mut Vec<String>, rows: usize, absent: usize, repeated: usize) {
     if absent > 0 {
+        let hold = match absent {
+            1 => "holds no speed and is",
+            _ => "hold no speed and are",
+        };
         notes.push(format!(
-            "{absent} of {rows} rows hold no speed and are left out"
+            "{absent} of {} {hold} left out",
+            count_of(rows, "row")
         ));
     }
     if repeated > 0 {
+        let repeat = match repeated {
+            1 => "repeats the time of the row above and is",
+            _ => "repeat the time of the row above and are",
+        };
         notes.push(format!(
-            "{repeated} of {rows} rows repeat the time of the row above and are left out"
+            "{repeated} of {} {repeat} left out",
+            count_of(rows, "row")
         ));
     }
 }

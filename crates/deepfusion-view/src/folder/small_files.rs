@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use deepfusion_hint::count_of;
 use deepfusion_records::{FrameRecord, PredictionRecord, Target};
 use serde::Deserialize;
 use serde_json::Value;
@@ -80,10 +81,12 @@ impl SmallFiles {
         list.retain(|target| {
             Target::deserialize(target).is_ok_and(|t| t.size_m.iter().all(|side| *side > 0.0))
         });
-        if list.len() < all {
+        let undrawable = all - list.len();
+        if undrawable > 0 {
+            let have = if undrawable == 1 { "has" } else { "have" };
             self.problems.push(format!(
-                "{} of {all} targets have no place or size",
-                all - list.len()
+                "{undrawable} of {} {have} no place or size",
+                count_of(all, "target")
             ));
         }
     }
