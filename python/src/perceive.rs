@@ -26,14 +26,14 @@ pub(crate) struct Perception {
 
 /// What was found, for Python's dataclasses.
 #[derive(Serialize)]
-struct Found<'a> {
-    targets: Vec<FoundTarget<'a>>,
+struct Detections<'a> {
+    targets: Vec<DetectedTarget<'a>>,
     ground: Option<Ground>,
     collision: Option<Collision>,
 }
 
 #[derive(Serialize)]
-struct FoundTarget<'a> {
+struct DetectedTarget<'a> {
     #[serde(flatten)]
     target: &'a Target,
     corners_m: [[f64; 3]; 8],
@@ -116,9 +116,9 @@ impl Perception {
 
 fn to_json(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyResult<String> {
     let targets = found.targets.iter();
-    let found = Found {
+    let found = Detections {
         targets: targets
-            .map(|target| FoundTarget {
+            .map(|target| DetectedTarget {
                 target,
                 corners_m: target.corners(),
             })

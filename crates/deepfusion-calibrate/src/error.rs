@@ -67,7 +67,7 @@ pub enum Error {
         first_turned: &'static str,
     },
     /// A view whose corners are not those of the board.
-    #[error("{name}: {corners} corners, the board has {expected}")]
+    #[error("{name}: {}, the board has {expected}", count_of(*corners, "corner"))]
     Corners {
         /// The view.
         name: String,

@@ -20,7 +20,11 @@ pub(crate) enum CliError {
     },
     /// A device that computes something else than the processor.
     #[cfg(feature = "train")]
-    #[error("{wrong} of {of} operations on `{device}` are not what the processor computes")]
+    #[error(
+        "{wrong} of {} on `{device}` {} not what the processor computes",
+        count_of(*of, "operation"),
+        if *wrong == 1 { "is" } else { "are" }
+    )]
     DeviceDiffers {
         /// The device.
         device: String,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use deepfusion_hint::Hint;
 #[cfg(feature = "train")]
-use deepfusion_jobs::training::resume::{Asked, Contradiction, Setting};
+use deepfusion_jobs::training::resume::{Contradiction, RequestedValue, Setting};
 use deepfusion_jobs::{Error, OtherJob, StaleReason};
 use deepfusion_records::Difference;
 
@@ -188,10 +188,10 @@ fn options_of(what: Difference) -> &'static str {
 
 /// What is typed to ask for it.
 #[cfg(feature = "train")]
-fn typed(asked: &Asked) -> String {
+fn typed(asked: &RequestedValue) -> String {
     match asked {
-        Asked::Learned => "learn".into(),
-        Asked::Measured => "auto".into(),
+        RequestedValue::Learned => "learn".into(),
+        RequestedValue::Measured => "auto".into(),
         other => other.to_string(),
     }
 }
@@ -240,7 +240,8 @@ mod tests {
             "setting `--val-split`: expected none beside [[data.sets]] in the config file: each set has its own, found both"
         );
         let off = deepfusion_jobs::training::resume::RunHas::Off;
-        let contradiction = Contradiction::new(Setting::LearnedCamera, Asked::Learned, off);
+        let contradiction =
+            Contradiction::new(Setting::LearnedCamera, RequestedValue::Learned, off);
         let error = Failure::from(Error::Contradiction(contradiction));
         assert_eq!(
             error.to_string(),

@@ -187,7 +187,7 @@ fn poses_that_cannot_be_compared_are_errors() {
     for (file, expected) in [
         ("five.txt", "5 predicted poses, 6 true ones"),
         ("short.txt", "short.txt:3: 3 columns"),
-        ("nan.txt", "nan.txt:3: NaN is no finite number"),
+        ("nan.txt", "nan.txt:3: NaN is not a finite number"),
         (
             "skew.txt",
             "skew.txt:1: its first three columns are no rotation",

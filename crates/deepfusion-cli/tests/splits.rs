@@ -135,7 +135,7 @@ fn validation_frames_that_are_learned_from_are_refused() {
     let next = ok(at, &train("--split train.txt --val-split next.txt --out d"));
     assert!(
         next.stderr
-            .contains("drive_0003_sync: 1 of its validation frames are neighbours"),
+            .contains("drive_0003_sync: 1 of its validation frames is a neighbour"),
         "{}",
         next.stderr
     );

@@ -37,9 +37,10 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let figure = Figure::new("blurred frames", share, "%", Limit::AtMost(MOST));
     let first = blurred.first().copied();
     outcome.judge_at(Severity::Warning, first, figure, || {
+        let have = if blurred.len() == 1 { "has" } else { "have" };
         (
             format!(
-                "{} of {} have less than half the drive's usual sharpness, the first of them frame {}",
+                "{} of {} {have} less than half the drive's usual sharpness, the first of them frame {}",
                 blurred.len(),
                 count_of(seen.len(), "frame"),
                 blurred[0]

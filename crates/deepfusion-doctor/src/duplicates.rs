@@ -4,6 +4,7 @@
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
 use deepfusion_data::Frame;
+use deepfusion_hint::count_of;
 
 /// The vehicle certainly moves above this, m/s.
 const MOVING_MPS: f64 = 1.0;
@@ -40,11 +41,16 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let figure = Figure::new("repeated frames", share, "%", Limit::AtMost(MOST));
     let first = repeated.first().copied();
     outcome.judge_at(Severity::Error, first, figure, || {
+        let (are, each) = match repeated.as_slice() {
+            [_] => ("is", "it"),
+            _ => ("are", "each of them"),
+        };
         (
             format!(
-                "{} of {compared} frames are the frame before once more while the vehicle moves, the first of them \
-                 frame {}: each of them teaches that everything is infinitely far",
+                "{} of {} {are} the frame before once more while the vehicle moves, the first of them \
+                 frame {}: {each} teaches that everything is infinitely far",
                 repeated.len(),
+                count_of(compared, "frame"),
                 repeated[0]
             ),
             "record at the camera's own rate, and remove the repeated frames (time stamps and all)".into(),

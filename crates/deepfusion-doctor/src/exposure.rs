@@ -2,6 +2,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::survey::Survey;
+use deepfusion_hint::count_of;
 
 /// A change of the mean grey level by more than this share is a jump of the exposure, not of the scene.
 const JUMP: f64 = 0.12;
@@ -37,10 +38,12 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         let first = jumps.first().map(|jump| jump.0);
         outcome.judge_at(Severity::Warning, first, figure, || {
             let (number, ratio) = jumps[0];
+            let differ = if jumps.len() == 1 { "differs" } else { "differ" };
             (
                 format!(
-                    "{} of {neighbours} neighbours differ by more than {:.0} % in brightness, the first at frame {number} ({:+.0} %): the photometric error then measures the exposure",
+                    "{} of {} {differ} by more than {:.0} % in brightness, the first at frame {number} ({:+.0} %): the photometric error then measures the exposure",
                     jumps.len(),
+                    count_of(neighbours, "neighbour"),
                     100.0 * JUMP,
                     100.0 * (ratio - 1.0)
                 ),

@@ -3,6 +3,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use deepfusion_data::Dataset;
+use deepfusion_hint::count_of;
 
 /// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
 const MOST_LOST: f64 = 1.0;
@@ -103,8 +104,9 @@ fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
         let at = first.unwrap_or(0);
         (
             format!(
-                "the vehicle's motion is unknown for {unknown:.1} s in {stretches} stretches, the first from frame {at}: \
-                 its speed has gaps there, and no pair of these frames can train"
+                "the vehicle's motion is unknown for {unknown:.1} s in {}, the first from frame {at}: \
+                 its speed has gaps there, and no pair of these frames can train",
+                count_of(stretches, "stretch")
             ),
             "find out where the recorder drops messages of the speed, or cut the recording there".into(),
         )

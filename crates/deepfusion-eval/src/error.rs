@@ -1,4 +1,4 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 mod arrays;
@@ -14,8 +14,11 @@ pub use self::intervals::{IntervalsProblem, LEVELS};
 pub enum Error {
     /// A prediction holds values that cannot be a depth or disparity.
     #[error(
-        "prediction `{name}` has {count} of {total} values that are no {kind}: the first is {value} at column {x}, row {y} \
-         (expected finite and above 0)"
+        "prediction `{name}` has {count} of {} that {} no {kind}: {} {value} at column {x}, row {y} \
+         (expected finite and above 0)",
+        count_of(*total, "value"),
+        if *count == 1 { "is" } else { "are" },
+        if *count == 1 { "it is" } else { "the first is" }
     )]
     InvalidPrediction {
         /// Name of the array.
@@ -34,7 +37,7 @@ pub enum Error {
         total: usize,
     },
     /// Width × height and the number of values differ, or one of them is zero.
-    #[error("`{name}` is {width}×{height} but has {len} values")]
+    #[error("`{name}` is {width}×{height} but has {}", count_of(*len, "value"))]
     Shape {
         /// What the array is.
         name: String,
@@ -105,7 +108,8 @@ pub enum Error {
     },
     /// A stack of arrays in split order that is longer or shorter than its counterpart.
     #[error(
-        "{path} has {count} arrays, {other} has {expected}: arrays in split order need the same number"
+        "{path} has {}, {other} has {expected}: arrays in split order need the same number",
+        count_of(*count, "array")
     )]
     Count {
         /// The prediction file.

@@ -1,6 +1,6 @@
 //! Recognises the kind of a model from the shapes of its outputs.
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use deepfusion_onnx::runtime::TensorInfo;
 
 /// Pixels of the input that a cell of each of the three grids covers.
@@ -13,7 +13,7 @@ const MOST_FINAL_ROWS: usize = 1000;
 #[non_exhaustive]
 pub enum ShapeProblem {
     /// Several inputs, or none.
-    #[error("{found} inputs, expected one picture")]
+    #[error("{}, expected one picture", count_of(*found, "input"))]
     Inputs {
         /// How many.
         found: usize,

@@ -310,7 +310,7 @@ impl BoardViews {
                         rows: r,
                     }
                 } else {
-                    LeftOutReason::Part {
+                    LeftOutReason::Incomplete {
                         corners: *corners,
                         of: board.corners(),
                     }

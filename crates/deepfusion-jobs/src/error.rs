@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use deepfusion_data::{DatasetKind, NoNamedTopic};
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use deepfusion_records::Difference;
 use deepfusion_runtime::Precision;
 
@@ -13,7 +13,7 @@ mod contradiction;
 
 pub use self::camera::UnfitCamera;
 #[cfg(feature = "train")]
-pub use self::contradiction::{Asked, Contradiction, RunHas, Setting};
+pub use self::contradiction::{Contradiction, RequestedValue, RunHas, Setting};
 
 /// What can go wrong with work over recordings and folders.
 #[derive(Debug, thiserror::Error)]
@@ -57,7 +57,7 @@ pub enum Error {
         problem: NoNamedTopic,
     },
     /// A split of which not everything could be used, where everything has to be.
-    #[error("{}: {found} of its {expected} frames {what}", split.display())]
+    #[error("{}: {found} of its {} {what}", split.display(), count_of(*expected, "frame"))]
     Incomplete {
         /// The split file.
         split: PathBuf,
@@ -184,7 +184,10 @@ pub enum Error {
         path: PathBuf,
     },
     /// Shares of a mean that are none.
-    #[error("{found} shares for {networks} networks: one positive number for each is needed")]
+    #[error(
+        "{} for {}: one positive number for each is needed",
+        count_of(*found, "share"), count_of(*networks, "network")
+    )]
     Shares {
         /// How many there are.
         found: usize,

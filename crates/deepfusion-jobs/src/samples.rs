@@ -27,6 +27,12 @@ impl fmt::Display for SampleWarning {
         match self {
             Self::Speed(drive, warning) => write!(f, "{drive}: {warning}"),
             Self::Skipped(reason) => write!(f, "skipped: {reason}"),
+            Self::Neighbours(SharedFrames {
+                drive, sources: 1, ..
+            }) => write!(
+                f,
+                "{drive}: 1 of its validation frames is a neighbour of training frames, and was seen as such"
+            ),
             Self::Neighbours(shared) => write!(
                 f,
                 "{}: {} of its validation frames are neighbours of training frames, and were seen as such",

@@ -37,9 +37,9 @@ impl GoproLens {
         let Some(range) = udta(file, b"GPMF")? else {
             return Ok(None);
         };
-        let mut said = Said::default();
-        said.add(&entries(&file[range.clone()], range.start)?, DEEPEST)?;
-        Ok(said.whole())
+        let mut fields = LensFields::default();
+        fields.add(&entries(&file[range.clone()], range.start)?, DEEPEST)?;
+        Ok(fields.whole())
     }
 
     /// Whether its pictures are those of a pinhole: straight lines stay straight.
@@ -71,7 +71,7 @@ const DEEPEST: usize = 3;
 
 /// What was found so far.
 #[derive(Default)]
-struct Said {
+struct LensFields {
     model: Option<String>,
     digital: Option<char>,
     diagonal_deg: Option<f64>,
@@ -79,7 +79,7 @@ struct Said {
     zoomed: bool,
 }
 
-impl Said {
+impl LensFields {
     /// Whatever is in the entries, and in those within them, `deep` levels down.
     fn add(&mut self, all: &[Entry<'_>], deep: usize) -> std::result::Result<(), Broken> {
         for entry in all {

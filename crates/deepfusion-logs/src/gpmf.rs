@@ -23,7 +23,7 @@ pub(crate) struct Entry<'a> {
 
 /// What all payloads hold.
 #[derive(Default)]
-struct Found {
+struct Readings {
     speeds: Vec<Speed>,
     places: Vec<(i64, f64, f64)>,
     rates: Vec<Sensor>,
@@ -44,7 +44,7 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
             problem: SpeedProblem::NoTrack,
         });
     };
-    let mut found = Found::default();
+    let mut found = Readings::default();
     for payload in &payloads {
         found.payload(&bytes, payload).map_err(broken)?;
     }
@@ -90,7 +90,7 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     })
 }
 
-impl Found {
+impl Readings {
     fn payload(&mut self, file: &[u8], sample: &Sample) -> std::result::Result<(), Broken> {
         let base = sample.bytes.start;
         let bytes = file.get(sample.bytes.clone()).unwrap_or(&[]);

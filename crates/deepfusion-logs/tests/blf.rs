@@ -104,7 +104,7 @@ fn a_damaged_file_is_an_error_with_its_byte_and_never_a_panic() {
         (4, &[3, 0, 0, 0], "byte 4: LOGG: a header of 3 bytes"),
         (42, &[13, 0], "byte 40: measurement start"),
         (144, b"LOBX", "byte 144: LOBJ: no object begins here"),
-        (152, &[1, 0, 0, 0], "byte 144: LOBJ: an object of 1 bytes"),
+        (152, &[1, 0, 0, 0], "byte 144: LOBJ: an object of 1 byte"),
         (160, &[7, 0], "byte 144: LOG_CONTAINER: compression 7"),
         (
             168,

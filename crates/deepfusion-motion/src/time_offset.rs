@@ -18,7 +18,7 @@ mod correlation;
 
 use crate::{FusedTrack, ImageMotion, MotionModel, Signal, VehicleTrack};
 use correlation::Channel;
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 
 /// The vehicle's rates, on its own clock, as far as they are measured.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -110,7 +110,8 @@ pub struct TimeOffset {
 pub enum NoTimeOffset {
     /// Too few pairs of frames whose times the vehicle's track covers at every offset searched.
     #[error(
-        "time offset: {pairs} pairs of frames inside the vehicle's track, expected at least {needed}"
+        "time offset: {} of frames inside the vehicle's track, expected at least {needed}",
+        count_of(*pairs, "pair")
     )]
     TooFewPairs {
         /// How many there are.

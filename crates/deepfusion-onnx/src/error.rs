@@ -1,4 +1,4 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 use crate::{LibraryProblem, ModelProblem, NodeProblem};
@@ -63,7 +63,7 @@ pub enum Error {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// An image or a buffer of another size than the model's.
-    #[error("{what} of {found} values, expected {expected}")]
+    #[error("{what} of {}, expected {expected}", count_of(*found, "value"))]
     Length {
         /// Which one.
         what: &'static str,

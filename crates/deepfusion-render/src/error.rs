@@ -1,11 +1,11 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 
 /// What can go wrong while a picture or a report is made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// Two things that belong together are of different sizes.
-    #[error("{what} has {found} values, expected {}×{}", expected.0, expected.1)]
+    #[error("{what} has {}, expected {}×{}", count_of(*found, "value"), expected.0, expected.1)]
     Size {
         /// What does not fit.
         what: &'static str,

@@ -1,7 +1,7 @@
 //! Decompresses chunks ahead of need, on its own threads.
 
 use crate::buffer::Pool;
-use crate::content::{self, Opened};
+use crate::content::{self, ReadableChunk};
 use crate::index::ChunkInfo;
 use crate::problem::Fault;
 use crate::source::Source;
@@ -9,7 +9,7 @@ use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-type Outcome = Result<Opened, Fault>;
+type Outcome = Result<ReadableChunk, Fault>;
 
 /// A chunk that is being opened, or will be.
 pub(crate) enum Ticket {

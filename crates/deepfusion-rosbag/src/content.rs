@@ -29,7 +29,7 @@ impl Content {
 }
 
 /// A chunk made readable, and where its index data begins.
-pub(crate) struct Opened {
+pub(crate) struct ReadableChunk {
     pub content: Content,
     pub end: usize,
     /// What is wrong with a chunk of a scanned bag, whose content goes up to that.
@@ -42,7 +42,7 @@ pub(crate) fn open(
     info: &ChunkInfo,
     limit: usize,
     pool: &Arc<Pool>,
-) -> Result<Opened, Fault> {
+) -> Result<ReadableChunk, Fault> {
     let chunk = if info.scanned {
         Chunk::read_to_break(source, info.position)?
     } else {
@@ -77,7 +77,7 @@ pub(crate) fn open(
             Content::Unpacked(Arc::new(buffer))
         }
     };
-    Ok(Opened {
+    Ok(ReadableChunk {
         content,
         end: chunk.end,
         broken,

@@ -23,7 +23,7 @@ pub enum BagProblem {
     /// A chunk cannot be read.
     #[error(transparent)]
     Chunk(#[from] ChunkProblem),
-    /// It lies at another byte of the file than what it spoils.
+    /// It lies at another byte of the file than what it makes unreadable.
     #[error("byte {byte}: {problem}")]
     At {
         /// The byte of the file.

@@ -92,7 +92,7 @@ pub(crate) fn scan(source: &Source, start: usize, limit: usize) -> Scan {
     let chunks: Vec<_> = frames
         .chunks
         .into_par_iter()
-        .map(|position| Found::read(source, position, limit, &pool))
+        .map(|position| ScannedChunk::read(source, position, limit, &pool))
         .collect();
     let mut index = Index::default();
     // Definitions in the chunks first: that is the order in which the recorder met the topics.
@@ -188,13 +188,13 @@ impl Frames {
 }
 
 /// A chunk looked through; its counts are by connection number, as in the file.
-struct Found {
+struct ScannedChunk {
     info: ChunkInfo,
     connections: Vec<Connection>,
     broken: Option<Fault>,
 }
 
-impl Found {
+impl ScannedChunk {
     fn read(source: &Source, position: u64, limit: usize, pool: &Arc<Pool>) -> Self {
         let mut info = ChunkInfo {
             position,

@@ -352,7 +352,7 @@ fn a_message_that_is_cut_names_its_field() {
         PointCloud2::decode(&bytes)
             .unwrap_err()
             .to_string()
-            .contains("1 bytes left")
+            .contains("1 byte left")
     );
     assert!(
         Imu::decode(&[0; 20])

@@ -1,11 +1,11 @@
-/// In how many ways a network looks at one image: at several input sizes, mirrored or not. The mean of their disparities usually errs less
-/// on images unlike those learned from, and takes the time of all (test-time augmentation; what it is worth, and where it is worse:
-/// docs/BENCHMARKS.md, "Test-time augmentation").
+/// Test-time augmentation: several predictions of one image, at several input sizes, mirrored or not. The mean of their disparities usually
+/// errs less on images unlike those learned from, and takes the time of all (what it is worth, and where it is worse: docs/BENCHMARKS.md,
+/// "Test-time augmentation").
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmentation {
     /// Input sizes, as multiples of the one that fits the image; each is rounded to one that the network takes.
     pub scales: &'static [f64],
-    /// Whether the network also looks at the mirrored image, at each size. The two are blended as Godard et al. do (CVPR 2017, section 3.4;
+    /// Whether the mirrored image is predicted, too, at each size. The two are blended as Godard et al. do (CVPR 2017, section 3.4;
     /// Monodepth2's evaluation as well).
     pub flip: bool,
 }

@@ -1,4 +1,4 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 /// Why an engine cannot run a network.
@@ -44,7 +44,7 @@ pub enum Error {
     #[error(transparent)]
     Calibration(#[from] deepfusion_model::UnreadableCalibration),
     /// An image's values are not as many as the network takes.
-    #[error("an image of {found} values, where the network takes {expected}")]
+    #[error("an image of {}, where the network takes {expected}", count_of(*found, "value"))]
     ImageSize {
         /// As many as the network takes.
         expected: usize,

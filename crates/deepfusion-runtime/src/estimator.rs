@@ -199,7 +199,8 @@ impl DepthEstimator {
         })
     }
 
-    /// An estimator for another thread: it shares the packed weights, those of input sizes yet to come as well, and has its own buffers.
+    /// An estimator for another thread: it shares the weights, those of input sizes yet to come as well, and has its own buffers. The fused engine's
+    /// weights are shared as they are packed; each session of ONNX Runtime packs its own.
     ///
     /// # Errors
     /// As [`DepthRunner::another`].
@@ -348,7 +349,7 @@ impl DepthEstimator {
     fn mean_over_views(
         &mut self,
         image: &PreparedImage,
-        look: impl Fn(&mut Self, &View) -> Result<NetworkOutput, Error>,
+        run: impl Fn(&mut Self, &View) -> Result<NetworkOutput, Error>,
     ) -> Result<Prediction, Error> {
         let Some(&View {
             size, focal_factor, ..
@@ -361,7 +362,7 @@ impl DepthEstimator {
         };
         let mut predictions = Vec::with_capacity(image.views.len());
         for view in &image.views {
-            predictions.push((view.size, look(self, view)?));
+            predictions.push((view.size, run(self, view)?));
         }
         let NetworkOutput {
             disparity,

@@ -14,8 +14,8 @@
 //!
 //! [`ModelSource`] finds a network, [`DepthEstimator`] runs it on a [`DepthRunner`]: the fused engine ([`FusedRunner`]),
 //! ONNX Runtime ([`OrtRunner`]), or any other that yields disparities. Every thread has its own estimator
-//! ([`DepthEstimator::another`]); they share one copy of the packed weights, and nothing is locked while a network runs. With time to spare, a network
-//! may look at an image more than once ([`Augmentation`]).
+//! ([`DepthEstimator::another`]). Those of the fused engine share one copy of the packed weights (each session of ONNX Runtime packs its own), and nothing is
+//! locked while a network runs. With time to spare, a prediction may be the mean of several of one image: test-time augmentation ([`Augmentation`]).
 
 mod augmentation;
 mod error;

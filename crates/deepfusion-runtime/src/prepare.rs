@@ -30,7 +30,7 @@ pub struct Preparer {
 pub struct PreparedImage {
     /// One for each input size; at least one.
     pub views: Vec<View>,
-    /// Whether the network looks at the mirror image of each as well.
+    /// Whether the mirror image of each is predicted, too.
     pub flip: bool,
     /// The part of the image that the network sees: x, y, width, height.
     pub window: [u32; 4],

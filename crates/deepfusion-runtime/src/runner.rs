@@ -22,7 +22,7 @@ pub trait DepthRunner: Debug + Send + Sync {
     /// [`Error::ImageSize`] for an image of another size; [`Error::Engine`] or [`Error::Onnx`] if the network fails to run.
     fn run(&mut self, image: &[f32], output: &mut NetworkOutput) -> Result<(), Error>;
 
-    /// What it shares with its like: the packed weights, without its buffers.
+    /// What it shares with its like: the weights, which the fused engine has packed, without its buffers.
     fn plan(&self) -> Arc<dyn RunnerPlan>;
 
     /// A second runner on the same weights, with its own buffers.

@@ -215,7 +215,7 @@ fn several_looks_give_their_mean() -> Result {
     Ok(())
 }
 
-/// What looks both ways sees a mirrored image as the mirrored prediction.
+/// With the mirrored image among the predictions, a mirrored image gives the mirrored depth.
 #[test]
 fn a_mirrored_image_is_seen_mirrored() -> Result {
     let mut estimator = DepthEstimator::load("street")?;

@@ -21,9 +21,9 @@ const VELOCITY_STEP_S: f64 = 1e-3;
 /// Someone steps down from a pavement and up to it over this length on the carriageway, metres.
 const STEP_DOWN_M: f64 = 0.3;
 
-/// A way at a constant speed: along the street, and at most once straight across it.
+/// A route at a constant speed: along the street, and at most once straight across it.
 #[derive(Debug, Clone, Copy)]
-struct Way {
+struct Route {
     /// Metres along the street at time 0, as if nothing had been crossed before.
     s: f64,
     /// Metres left of the centreline, until something is crossed.
@@ -45,7 +45,7 @@ struct Crossing {
     to: f64,
 }
 
-impl Way {
+impl Route {
     /// Metres along the street and left of its centreline at a time.
     fn at(&self, time_s: f64) -> (f64, f64) {
         let Some(crossing) = self.crossing else {
@@ -71,7 +71,7 @@ impl Way {
 struct Person {
     model: CarModel,
     seed: u32,
-    way: Way,
+    route: Route,
     /// From when to when they are on the street, seconds.
     during: (f64, f64),
 }
@@ -96,11 +96,11 @@ impl Person {
 
     fn stance(&self, road: &Road, time_s: f64) -> Stance {
         let place = |time_s: f64| {
-            let (s, lateral) = self.way.at(time_s);
+            let (s, lateral) = self.route.at(time_s);
             let (x, y, _) = road.world(s, lateral);
             (x, y)
         };
-        let (s, lateral) = self.way.at(time_s);
+        let (s, lateral) = self.route.at(time_s);
         let (x, y) = place(time_s);
         let (before, after) = (place(time_s - TURN_S), place(time_s + TURN_S));
         Stance {

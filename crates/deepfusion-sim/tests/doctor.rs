@@ -556,7 +556,7 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
     let finding = found(&diagnosis, "timing", "time without a motion");
     // From the last packet before the gap to the first after it, less what a track is held on at both ends.
     assert!((14.0..18.0).contains(&value(finding)), "{finding:?}");
-    assert!(finding.what.contains("in 1 stretches"), "{finding:?}");
+    assert!(finding.what.contains("in 1 stretch,"), "{finding:?}");
     assert!(
         finding.frame.is_some_and(|f| (39..=41).contains(&f)),
         "{finding:?}"

@@ -48,8 +48,11 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
             "the given network may have learned from the frames that are held out here: the figures before may be optimistic",
         );
     }
-    let mut trainer =
-        adaptation.trainer(&mut print_warnings, &mut warn_of_sample, &mut train::began)?;
+    let mut trainer = adaptation.trainer(
+        &mut print_warnings,
+        &mut warn_of_sample,
+        &mut train::print_start,
+    )?;
     let pace = Pace::of(trainer.config().clone(), args.device.compute());
     let summary = train::train(&mut trainer, Some(pace))?;
     drop(trainer);

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use deepfusion_jobs::training::{
-    AskedRecordings, Began, Pace, SettingsOfMean, Start, StartRequest, TrainingPlan,
+    AskedRecordings, Pace, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
     leaves_turns_unused,
 };
 use deepfusion_model::{InputSize, RunFolder, TrainConfig};
@@ -54,7 +54,7 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
             Trainer::create(config, folder, sets, &device, |model| {
-                start.initialise(model, &device, &mut began_by_default)
+                start.initialise(model, &device, &mut print_default_start)
             })?
         }
     };
@@ -81,19 +81,19 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
 }
 
 /// Prints what a run starts from.
-pub(super) fn began(began: Began) {
-    say(&began.to_string());
+pub(super) fn print_start(start: StartReport) {
+    say(&start.to_string());
 }
 
-/// As [`began`], where an option chooses otherwise.
-fn began_by_default(began: Began) {
-    let embedded = matches!(began, Began::Packed { path: None, .. });
+/// As [`print_start`], where an option chooses otherwise.
+fn print_default_start(start: StartReport) {
+    let embedded = matches!(start, StartReport::Packed { path: None, .. });
     let hint = if embedded {
         " (--init none starts from nothing)"
     } else {
         ""
     };
-    say(&format!("{began}{hint}"));
+    say(&format!("{start}{hint}"));
 }
 
 /// A preset takes PoseNet's pose because that is how its network was published, and the recordings know better.

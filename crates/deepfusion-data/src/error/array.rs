@@ -1,5 +1,6 @@
 //! Why an array file cannot be used, or not be written.
 
+use deepfusion_hint::count_of;
 use deepfusion_motion::comma;
 use ndarray::ShapeError;
 use ndarray_npy::WriteNpzError;
@@ -24,7 +25,7 @@ pub enum SegmentProblem {
     #[error("{0}")]
     Array(#[source] comma::ArrayProblem),
     /// It has not as many values as times.
-    #[error("{values} values, but t has {times}")]
+    #[error("{}, but t has {times}", count_of(*values, "value"))]
     Length {
         /// How many values it has.
         values: usize,

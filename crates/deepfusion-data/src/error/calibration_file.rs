@@ -1,6 +1,7 @@
 //! Why a calibration file's text is no camera.
 
 use deepfusion_geometry::NoDistortion;
+use deepfusion_hint::count_of;
 
 /// Why a calibration file's text is no camera.
 #[derive(Debug, thiserror::Error)]
@@ -19,7 +20,7 @@ pub enum CalibrationFileProblem {
     #[error("nine numbers, but no camera matrix fx 0 cx 0 fy cy 0 0 1")]
     NotAMatrix,
     /// It has neither four nor nine numbers.
-    #[error("{found} numbers, expected four (fx, fy, cx, cy) or a matrix of nine")]
+    #[error("{}, expected four (fx, fy, cx, cy) or a matrix of nine", count_of(*found, "number"))]
     Numbers {
         /// How many it has.
         found: usize,
@@ -44,13 +45,13 @@ pub enum CalibrationFileProblem {
     #[error("camera_matrix: a skew is not supported")]
     Skew,
     /// Kalibr's intrinsics are not four.
-    #[error("intrinsics: {found} numbers, expected fx, fy, cx, cy")]
+    #[error("intrinsics: {}, expected fx, fy, cx, cy", count_of(*found, "number"))]
     Intrinsics {
         /// How many there are.
         found: usize,
     },
     /// A matrix has not the size that it says.
-    #[error("{field}: {found} numbers, but its rows and cols make {said}")]
+    #[error("{field}: {}, but its rows and cols make {said}", count_of(*found, "number"))]
     MatrixSize {
         /// The matrix.
         field: &'static str,

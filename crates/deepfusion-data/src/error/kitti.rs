@@ -1,6 +1,7 @@
 //! What is wrong with KITTI's calibration and OXTS files.
 
 use deepfusion_geometry::ImplausibleCamera;
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// What is wrong with a field of one of KITTI's calibration files.
@@ -23,7 +24,7 @@ pub enum CalibrationProblem {
         text: String,
     },
     /// It has too many numbers, or too few.
-    #[error("{found} numbers, expected {expected}")]
+    #[error("{}, expected {expected}", count_of(*found, "number"))]
     Length {
         /// How many it has.
         found: usize,
@@ -88,7 +89,7 @@ pub enum OxtsProblem {
         value: f64,
     },
     /// It has too many values, or too few.
-    #[error("{found} values, expected 30")]
+    #[error("{}, expected 30", count_of(*found, "value"))]
     Length {
         /// How many it has.
         found: usize,

@@ -1,5 +1,7 @@
 //! Why a line of a list cannot be used: of times, or of the frames of a split.
 
+use deepfusion_hint::count_of;
+
 /// Why a line of a file of times cannot be used. Of a long line that is no time it holds the beginning alone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -35,7 +37,7 @@ pub enum TimeStampProblem {
 #[non_exhaustive]
 pub enum SplitProblem {
     /// It has more words than a frame's name, or one alone.
-    #[error("{found} words, expected folder, index and side")]
+    #[error("{}, expected folder, index and side", count_of(*found, "word"))]
     Words {
         /// How many.
         found: usize,

@@ -1,5 +1,6 @@
 //! Why a file of poses cannot be used, and where in it.
 
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// Where in a line of a file of poses something is wrong.
@@ -40,7 +41,7 @@ pub enum PoseProblem {
         text: String,
     },
     /// It has too many numbers, or too few.
-    #[error("{found} numbers, expected {expected}")]
+    #[error("{}, expected {expected}", count_of(*found, "number"))]
     Length {
         /// How many it has.
         found: usize,
@@ -69,7 +70,7 @@ pub enum PoseFileProblem {
     #[error("a word is not a number")]
     NotANumber,
     /// Its matrix is not whole.
-    #[error("{found} numbers, expected 16")]
+    #[error("{}, expected 16", count_of(*found, "number"))]
     Length {
         /// How many numbers it has.
         found: usize,

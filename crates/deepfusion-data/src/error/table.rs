@@ -1,5 +1,6 @@
 //! Why a table cannot be used: of comma-separated values, or of JSON.
 
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// Why a value of a table cannot be used.
@@ -29,7 +30,7 @@ pub enum TableProblem {
         seconds: f64,
     },
     /// The row has another number of values than the header.
-    #[error("{found} values, the header has {header}")]
+    #[error("{}, the header has {header}", count_of(*found, "value"))]
     Length {
         /// How many the row has.
         found: u64,
@@ -114,7 +115,7 @@ pub enum JsonProblem {
         length: f64,
     },
     /// A matrix that is no camera's.
-    #[error("{rows} rows, expected the 3 of a camera matrix")]
+    #[error("{}, expected the 3 of a camera matrix", count_of(*rows, "row"))]
     NotAMatrix {
         /// How many rows it has.
         rows: usize,

@@ -1,5 +1,6 @@
 //! What is wrong with a file of tracklets, and where.
 
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// Where in a file of tracklets something is wrong; all but bytes are counted from 0.
@@ -62,10 +63,11 @@ pub enum TrackletPart {
 }
 
 impl fmt::Display for TrackletPart {
+    /// One of them.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Tracklets => "tracklets",
-            Self::Poses => "poses",
+            Self::Tracklets => "tracklet",
+            Self::Poses => "pose",
         })
     }
 }
@@ -111,7 +113,7 @@ pub enum TrackletsProblem {
         value: f64,
     },
     /// There are more, or fewer, than is said.
-    #[error("{found} {of}, its count says {announced}")]
+    #[error("{}, its count says {announced}", count_of(*found, &of.to_string()))]
     Count {
         /// Of what.
         of: TrackletPart,

@@ -23,7 +23,7 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
     inspect_with(path, &OpenOptions::default(), |_| None)
 }
 
-/// [`inspect`] with a camera or a clock offset given; camera and split of the options are not looked at. `time_offset` measures
+/// [`inspect`] with a camera or a clock offset given; camera and split of the options are not taken. `time_offset` measures
 /// [`DriveInspection::time_offset`]: it is asked where there is one drive, and may take long (`deepfusion_doctor::inspect`
 /// has one that reads a few hundred pictures).
 ///
@@ -62,16 +62,16 @@ fn inspect_layout(
         return Ok(inspection);
     }
     let kind = layout.kind();
-    let Found {
-        mut seen,
+    let InspectedDrives {
+        mut drives,
         unreadable,
         without_images,
-    } = look_into_all(path, layout, options).or_one_reason()?;
+    } = inspect_all(path, layout, options).or_one_reason()?;
     // Measuring reads many pictures: of many drives the doctor reports it one by one.
-    if let [only] = seen.as_mut_slice() {
+    if let [only] = drives.as_mut_slice() {
         only.drive.time_offset = time_offset(&only.dataset);
     }
-    if let Some(first) = seen.first_mut()
+    if let Some(first) = drives.first_mut()
         && !without_images.is_empty()
     {
         let names = without_images.iter().map(|one| name_of(&one.path));
@@ -81,9 +81,9 @@ fn inspect_layout(
         };
         first.drive.warnings.push(left_out.into());
     }
-    let several = seen.len() > 1;
+    let several = drives.len() > 1;
     let mut streams = Vec::new();
-    for one in &mut seen {
+    for one in &mut drives {
         for mut stream in std::mem::take(&mut one.streams) {
             if several {
                 stream.name = format!("{}/{}", one.dataset.name(), stream.name);
@@ -91,36 +91,36 @@ fn inspect_layout(
             streams.push(stream);
         }
     }
-    let k = seen.first().map(|first| first.dataset.intrinsics(0));
+    let k = drives.first().map(|first| first.dataset.intrinsics(0));
     Ok(Inspection {
         kind,
-        frames: seen.iter().map(|one| one.drive.frames).sum(),
+        frames: drives.iter().map(|one| one.drive.frames).sum(),
         size: k.map(|k| [k.width, k.height]),
         intrinsics: k.map(IntrinsicsSummary::from),
         streams,
-        speed_mps: SpeedRange::of(seen.iter().flat_map(|one| speeds(&one.dataset))),
-        distance_m: sum(seen.iter().map(|one| one.drive.distance_m)),
-        duration_s: sum(seen.iter().map(|one| one.drive.duration_s)),
-        drives: seen.into_iter().map(|one| one.drive).collect(),
+        speed_mps: SpeedRange::of(drives.iter().flat_map(|one| speeds(&one.dataset))),
+        distance_m: sum(drives.iter().map(|one| one.drive.distance_m)),
+        duration_s: sum(drives.iter().map(|one| one.drive.duration_s)),
+        drives: drives.into_iter().map(|one| one.drive).collect(),
         unreadable: unreadable.into_iter().map(Unread::listed).collect(),
     })
 }
 
 /// What several recordings hold.
 #[derive(Default)]
-struct Found {
-    seen: Vec<Seen>,
+struct InspectedDrives {
+    drives: Vec<InspectedDrive>,
     unreadable: Vec<Unread>,
     /// Those with which nothing is wrong but that they have no images.
     without_images: Vec<Unread>,
 }
 
-impl Found {
-    /// A recording, and what was seen of it.
-    fn add(&mut self, path: PathBuf, recording: Layout, looked: Result<Vec<Seen>>) {
-        let error = match looked {
-            Ok(seen) => {
-                self.seen.extend(seen);
+impl InspectedDrives {
+    /// A recording, and what is in it.
+    fn add(&mut self, path: PathBuf, recording: Layout, inspected: Result<Vec<InspectedDrive>>) {
+        let error = match inspected {
+            Ok(drives) => {
+                self.drives.extend(drives);
                 return;
             }
             Err(error) => error,
@@ -137,12 +137,12 @@ impl Found {
         }
     }
 
-    /// What was found. Where nothing was seen, those without images are among what cannot be read.
+    /// What was found. Where no drive was opened, those without images are among what cannot be read.
     ///
     /// # Errors
-    /// The first where nothing was seen and one reason says why.
+    /// The first where no drive was opened and one reason says why.
     fn or_one_reason(mut self) -> Result<Self> {
-        if !self.seen.is_empty() {
+        if !self.drives.is_empty() {
             return Ok(self);
         }
         let lack_images = self.unreadable.is_empty();
@@ -160,7 +160,7 @@ impl Found {
     }
 }
 
-/// A recording that was not seen.
+/// A recording that was not opened.
 struct Unread {
     path: PathBuf,
     recording: Layout,
@@ -192,64 +192,64 @@ impl Unread {
 }
 
 /// A drive that was opened, and what is in it.
-struct Seen {
+struct InspectedDrive {
     dataset: Dataset,
     streams: Vec<Stream>,
     drive: DriveInspection,
 }
 
-/// Looks into each recording by itself. The left camera is the one that is trained on: the right one is looked at only where no recording
+/// Inspects each recording by itself. The left camera is the one that is trained on: the right one is opened only where no recording
 /// has images of the left one.
-fn look_into_all(path: &Path, layout: Layout, options: &OpenOptions) -> Found {
-    let mut found = Found::default();
+fn inspect_all(path: &Path, layout: Layout, options: &OpenOptions) -> InspectedDrives {
+    let mut found = InspectedDrives::default();
     for (path, recording) in layout.apart(path) {
-        let looked = look_into(&path, &recording, Cameras::Left, options);
-        found.add(path, recording, looked);
+        let inspected = inspect_one(&path, &recording, Cameras::Left, options);
+        found.add(path, recording, inspected);
     }
-    if found.seen.is_empty() && found.unreadable.is_empty() {
+    if found.drives.is_empty() && found.unreadable.is_empty() {
         for unread in std::mem::take(&mut found.without_images) {
             let Unread {
                 path,
                 recording,
                 error,
             } = unread;
-            let looked = match error {
-                Error::NoImages { .. } => look_into(&path, &recording, Cameras::Right, options),
+            let inspected = match error {
+                Error::NoImages { .. } => inspect_one(&path, &recording, Cameras::Right, options),
                 other => Err(other),
             };
-            found.add(path, recording, looked);
+            found.add(path, recording, inspected);
         }
     }
     found
 }
 
-fn look_into(
+fn inspect_one(
     path: &Path,
     recording: &Layout,
     camera: Cameras,
     options: &OpenOptions,
-) -> Result<Vec<Seen>> {
+) -> Result<Vec<InspectedDrive>> {
     let options = OpenOptions {
         camera,
         split: None,
         ..options.clone()
     };
-    let look = |dataset: Dataset| -> Result<Seen> {
-        let (streams, drive) = (dataset.streams()?, look_at(&dataset)?);
-        Ok(Seen {
+    let inspect = |dataset: Dataset| -> Result<InspectedDrive> {
+        let (streams, drive) = (dataset.streams()?, inspect_dataset(&dataset)?);
+        Ok(InspectedDrive {
             dataset,
             streams,
             drive,
         })
     };
     let datasets = recording.open(path, &options)?;
-    datasets.into_iter().map(look).collect()
+    datasets.into_iter().map(inspect).collect()
 }
 
 /// Pairs slower than this are counted as unusable, as in training.
 const MIN_SPEED_MPS: f64 = 0.5;
 
-fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
+fn inspect_dataset(dataset: &Dataset) -> Result<DriveInspection> {
     let frames = dataset.frames();
     let (usable_pairs, why_no_pairs) = match dataset.snippets(&[1], MIN_SPEED_MPS) {
         Ok(snippets) => (snippets.len(), None),

@@ -223,7 +223,7 @@ mod tests {
         );
         let error = read("a,b\n1,2\n1\n").map(|_| ()).unwrap_err().to_string();
         assert!(
-            error.contains(":3:") && error.contains("1 values, the header has 2"),
+            error.contains(":3:") && error.contains("1 value, the header has 2"),
             "{error}"
         );
     }

@@ -1,5 +1,6 @@
 //! Why a file does not hold the arrays that it should.
 
+use deepfusion_hint::count_of;
 use ndarray_npy::{ReadNpyError, ReadNpzError};
 
 /// Why a file does not hold the arrays that it should.
@@ -13,7 +14,7 @@ pub enum ArrayProblem {
     #[error("has no arrays")]
     Empty,
     /// It has fewer arrays than that.
-    #[error("has {count} arrays, number {index} was asked for")]
+    #[error("has {}, number {index} was asked for", count_of(*count, "array"))]
     NoSuchArray {
         /// How many it has.
         count: usize,

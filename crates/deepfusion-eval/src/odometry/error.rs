@@ -1,6 +1,6 @@
 //! What can go wrong with paths that are compared, and with their files.
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 /// Two paths that cannot be compared.
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum TrackError {
     /// They have different numbers of poses.
-    #[error("{name}: {predicted} predicted poses, {truth} true ones")]
+    #[error("{name}: {}, {}", count_of(*predicted, "predicted pose"), count_of(*truth, "true one"))]
     Lengths {
         /// The drive.
         name: String,
@@ -18,7 +18,7 @@ pub enum TrackError {
         truth: usize,
     },
     /// There is no motion to compare.
-    #[error("{name}: {poses} pose{}, and a motion takes two", if *poses == 1 { "" } else { "s" })]
+    #[error("{name}: {}, and a motion takes two", count_of(*poses, "pose"))]
     TooShort {
         /// The drive.
         name: String,
@@ -111,13 +111,13 @@ impl Hint for PoseFileError {
 #[non_exhaustive]
 pub enum PoseLineProblem {
     /// As many columns as neither format has.
-    #[error("{found} columns, expected 12 (KITTI) or 8 (TUM)")]
+    #[error("{}, expected 12 (KITTI) or 8 (TUM)", count_of(*found, "column"))]
     Columns {
         /// How many.
         found: usize,
     },
     /// Other columns than those of the lines before.
-    #[error("{found} columns, the lines before have {before}")]
+    #[error("{}, the lines before have {before}", count_of(*found, "column"))]
     OtherColumns {
         /// How many.
         found: usize,
@@ -131,7 +131,7 @@ pub enum PoseLineProblem {
         text: String,
     },
     /// A number that no pose has.
-    #[error("{value} is no finite number")]
+    #[error("{value} is not a finite number")]
     NotFinite {
         /// The number.
         value: f64,

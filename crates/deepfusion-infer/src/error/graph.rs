@@ -1,6 +1,7 @@
 //! Why an operation does not fit into a graph.
 
 use crate::ValueShape;
+use deepfusion_hint::count_of;
 
 /// Why an operation does not fit into a graph.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -46,7 +47,7 @@ pub enum GraphProblem {
         dilation: usize,
     },
     /// Another number of channels than its weights are for.
-    #[error("{expected} channels expected, its input has {found}")]
+    #[error("{} expected, its input has {found}", count_of(*expected, "channel"))]
     Channels {
         /// Those the weights are for.
         expected: usize,
@@ -57,7 +58,10 @@ pub enum GraphProblem {
     #[error("more weights than any memory holds")]
     TooManyWeights,
     /// Weights or biases that are not as many as its channels and its kernel take.
-    #[error("{} weights and {} biases expected, {} and {} given", expected[0], expected[1], found[0], found[1])]
+    #[error(
+        "{} and {} expected, {} and {} given",
+        count_of(expected[0], "weight"), count_of(expected[1], "bias"), found[0], found[1]
+    )]
     Weights {
         /// Weights and biases that it takes.
         expected: [usize; 2],
@@ -71,7 +75,7 @@ pub enum GraphProblem {
         epsilon: f32,
     },
     /// Channels that are not queries, keys and values of as many heads.
-    #[error("{channels} channels for 3 times {heads} heads")]
+    #[error("{} for 3 times {}", count_of(*channels, "channel"), count_of(*heads, "head"))]
     Heads {
         /// Channels of the input.
         channels: usize,
@@ -79,13 +83,13 @@ pub enum GraphProblem {
         heads: usize,
     },
     /// A code of positions in no channel, or in more than any network's.
-    #[error("{per_axis} channels an axis, expected 1 to 1024")]
+    #[error("{} an axis, expected 1 to 1024", count_of(*per_axis, "channel"))]
     PositionChannels {
         /// Channels for each axis.
         per_axis: usize,
     },
     /// Channels that are not four for each pixel.
-    #[error("{channels} channels for 2×2 pixels")]
+    #[error("{} for 2×2 pixels", count_of(*channels, "channel"))]
     ChannelsForPixels {
         /// Channels of the input.
         channels: usize,
@@ -97,7 +101,7 @@ pub enum GraphProblem {
         halvings: u32,
     },
     /// A convex enlargement of more than a map.
-    #[error("{channels} channels enlarged, expected one")]
+    #[error("{} enlarged, expected one", count_of(*channels, "channel"))]
     EnlargedChannels {
         /// Channels of the input.
         channels: usize,

@@ -9,7 +9,7 @@ use crate::{Activation, Border, Depthwise, Engine, Graph, Op, Precision, ValueId
 
 /// What a small network has.
 #[derive(Debug, Clone)]
-struct Parts {
+struct LiteSettings {
     heads: usize,
     /// Channels of a head.
     each: usize,
@@ -65,7 +65,7 @@ fn point(
 }
 
 /// A stage of the encoder.
-fn stage(b: &mut Builder<impl FnMut() -> f32>, mut x: ValueId, p: &Parts) -> ValueId {
+fn stage(b: &mut Builder<impl FnMut() -> f32>, mut x: ValueId, p: &LiteSettings) -> ValueId {
     for rate in &p.rates {
         let seen = depthwise(b, x, p.kernel, [1, *rate]);
         x = bottleneck(b, seen, x, p.expansion);
@@ -91,7 +91,7 @@ fn stage(b: &mut Builder<impl FnMut() -> f32>, mut x: ValueId, p: &Parts) -> Val
     bottleneck(b, normed, x, p.expansion)
 }
 
-fn network(seed: u64, p: &Parts) -> Graph {
+fn network(seed: u64, p: &LiteSettings) -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.45; 3], [0.225; 3]),
         noise: noise(seed),
@@ -138,14 +138,14 @@ fn network(seed: u64, p: &Parts) -> Graph {
 
 /// Of all of them, small.
 pub(super) fn small_network() -> Graph {
-    let parts = Parts {
+    let settings = LiteSettings {
         heads: 2,
         each: 9,
         expansion: 2,
         kernel: 3,
         rates: vec![1, 4],
     };
-    network(11, &parts)
+    network(11, &settings)
 }
 
 proptest! {
@@ -160,8 +160,8 @@ proptest! {
         rates in prop::collection::vec(1_usize..9, 0..3),
         (across, down) in (2_usize..7, 2_usize..7),
     ) {
-        let parts = Parts { heads, each, expansion, kernel, rates };
-        let graph = network(seed, &parts);
+        let settings = LiteSettings { heads, each, expansion, kernel, rates };
+        let graph = network(seed, &settings);
         let (width, height) = (8 * across, 8 * down);
         let image = noise_image(seed ^ 1, width, height);
         let values = run(&graph, &image, height, width);

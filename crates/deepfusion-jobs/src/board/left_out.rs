@@ -27,7 +27,7 @@ pub enum LeftOutReason {
         rows: usize,
     },
     /// A part of the board.
-    Part {
+    Incomplete {
         /// Corners that were found.
         corners: usize,
         /// Corners of the board.
@@ -40,7 +40,7 @@ impl fmt::Display for LeftOutReason {
         match self {
             Self::NoBoard => f.write_str("no board"),
             Self::OtherGrid { columns, rows } => write!(f, "a grid of {columns}x{rows}"),
-            Self::Part { corners, of } => write!(f, "{corners} of {of} corners"),
+            Self::Incomplete { corners, of } => write!(f, "{corners} of {of} corners"),
         }
     }
 }
@@ -63,7 +63,7 @@ mod tests {
             (LeftOutReason::NoBoard, "no board"),
             (LeftOutReason::OtherGrid { columns, rows }, "a grid of 11x6"),
             (
-                LeftOutReason::Part {
+                LeftOutReason::Incomplete {
                     corners: 40,
                     of: 54,
                 },

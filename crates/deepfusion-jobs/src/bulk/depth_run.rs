@@ -1,4 +1,4 @@
-//! Depth of many images: while the network looks at one, the next are read and the last are written.
+//! Depth of many images: while the network runs on one, the next are read and the last are written.
 
 use deepfusion_runtime::{DepthEstimator, PreparedImage};
 

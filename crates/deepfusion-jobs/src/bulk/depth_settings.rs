@@ -19,7 +19,7 @@ pub struct DepthSettings {
     pub focal_correction: bool,
     /// Whether images of another aspect ratio are stretched, and not cut.
     pub stretch: bool,
-    /// In how many ways the network looks at each image; `None`: in one.
+    /// Of which predictions of an image the mean is taken (test-time augmentation); `None`: of one alone.
     pub post_process: Option<PostProcess>,
     /// How the scale is watched, where a recording's motion is known.
     pub scale: ScaleMonitorConfig,

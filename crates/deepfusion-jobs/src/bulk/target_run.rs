@@ -1,4 +1,4 @@
-//! Targets of many images, in their order: while the network looks at one, the next is read and the last is written.
+//! Targets of many images, in their order: while the network runs on one, the next is read and the last is written.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -58,7 +58,7 @@ impl<E> TargetSummary<E> {
 }
 
 /// Finds the targets of frame after frame and writes them; `written` sees each frame whose files are there. A frame that cannot be read is
-/// left out. The run ends where nothing can be found, written or told any more, and with what is at work where `stop` says so. The file
+/// left out. The run ends where nothing can be found, written or reported any more, and with what is at work where `stop` says so. The file
 /// of all targets is then in its place, of the frames that are done.
 ///
 /// # Errors
@@ -86,7 +86,7 @@ where
     };
     let load = |index: usize| run.load(index);
     let mut motions = MotionTracker::default();
-    let look = |started: StartedFrame| -> Result<PerceivedFrame> {
+    let find = |started: StartedFrame| -> Result<PerceivedFrame> {
         let motion = motions.next(&started.input);
         let found = finder.next(started, motion)?;
         job.warn_of_drift(&found.input.name, found.drift);
@@ -99,7 +99,7 @@ where
         before: 1,
         after: 1,
     };
-    pipeline::run(inputs.len(), threads, &stop, &load, look, &write);
+    pipeline::run(inputs.len(), threads, &stop, &load, find, &write);
     run.finish()
 }
 
@@ -143,7 +143,7 @@ where
     fn write(&self, found: Result<PerceivedFrame>) -> Result<(), E> {
         let found = found?;
         let line = self.writer.write(&found)?;
-        self.tell(&line)?;
+        self.report(&line)?;
         let mut summary = self.summary();
         summary.done += 1;
         summary.targets += found.record.targets.len();
@@ -151,8 +151,8 @@ where
         Ok(())
     }
 
-    /// Without the summary's lock: who is told may take its time.
-    fn tell(&self, line: &str) -> Result<(), E> {
+    /// Without the summary's lock: `written` may take its time.
+    fn report(&self, line: &str) -> Result<(), E> {
         let summary = self.summary();
         let done = summary.done + 1 + summary.unreadable.len();
         drop(summary);

@@ -137,10 +137,10 @@ fn pictures_of_layers_need_what_shows_them() {
     assert!(!out.join("a_features.png").exists());
 }
 
-/// Targets of two images and one that is not there; `told` hears of each frame that is written.
+/// Targets of two images and one that is not there; `report` is called with each frame that is written.
 fn targets_of(
     folder: &Path,
-    told: impl FnMut(WrittenTargets<'_>) -> Result<()> + Send,
+    report: impl FnMut(WrittenTargets<'_>) -> Result<()> + Send,
 ) -> TargetSummary<Error> {
     let (model, mut estimator) = network();
     let out = folder_for_outputs(folder);
@@ -156,16 +156,16 @@ fn targets_of(
     };
     let finder = TargetFinder::open(&model, &mut estimator, settings).unwrap();
     let all = inputs(folder, &["a", "missing", "b"]);
-    perceive(&job, finder, &all, &|| false, told).unwrap()
+    perceive(&job, finder, &all, &|| false, report).unwrap()
 }
 
 #[test]
-fn targets_are_written_and_told_in_order() {
+fn targets_are_written_and_reported_in_order() {
     let folder = tempfile::tempdir().unwrap();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let mut lines = String::new();
     let summary = targets_of(folder.path(), |frame| {
-        told.push((frame.done, frame.total));
+        reported.push((frame.done, frame.total));
         lines += frame.line;
         Ok(())
     });
@@ -173,7 +173,7 @@ fn targets_are_written_and_told_in_order() {
     assert_eq!(summary.unreadable.len(), 1);
     assert!(summary.stopped_by.is_none() && summary.median_latency_ms().is_some());
     // The one that is missing was found so at some time before the last.
-    assert_eq!(told.last(), Some(&(3, 3)));
+    assert_eq!(reported.last(), Some(&(3, 3)));
     let names: Vec<bool> = lines.lines().map(|line| line.contains("\"a\"")).collect();
     assert_eq!(names, [true, false]);
     let out = folder.path().join("out");
@@ -185,7 +185,7 @@ fn targets_are_written_and_told_in_order() {
 }
 
 #[test]
-fn a_run_ends_where_nobody_can_be_told() {
+fn a_run_ends_where_nothing_can_be_reported() {
     let folder = tempfile::tempdir().unwrap();
     let summary = targets_of(folder.path(), |_| Err(Error::NoCamera));
     assert!(matches!(summary.stopped_by, Some(Error::NoCamera)));

@@ -87,7 +87,7 @@ pub struct Contradiction {
     /// What was to be set.
     pub setting: Setting,
     /// To what.
-    pub asked: Asked,
+    pub asked: RequestedValue,
     /// What the run has.
     pub run: RunHas,
 }
@@ -95,7 +95,7 @@ pub struct Contradiction {
 impl Contradiction {
     /// What is asked of a run, and what it has.
     #[must_use]
-    pub fn new(setting: Setting, asked: impl Into<Asked>, run: RunHas) -> Self {
+    pub fn new(setting: Setting, asked: impl Into<RequestedValue>, run: RunHas) -> Self {
         Self {
             setting,
             asked: asked.into(),
@@ -104,10 +104,10 @@ impl Contradiction {
     }
 }
 
-/// What is asked for.
+/// The value that is asked for.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Asked {
+pub enum RequestedValue {
     /// This.
     #[error("{0}")]
     Value(String),
@@ -122,7 +122,7 @@ pub enum Asked {
     Measured,
 }
 
-impl From<String> for Asked {
+impl From<String> for RequestedValue {
     fn from(value: String) -> Self {
         Self::Value(value)
     }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use deepfusion_data::{Dataset, OpenOptions, SplitCoverage};
+use deepfusion_hint::count_of;
 
 use crate::{Error, Result};
 
@@ -34,14 +35,18 @@ impl fmt::Display for Shortfall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { used, expected, .. } = self;
         let (split, percent) = (self.split.display(), percent(*used, *expected));
+        let frames = count_of(*expected, "frame");
         match &self.why {
             MissingReason::NotThere(first) => write!(
                 f,
-                "{split}: {used} of its {expected} frames are there ({percent:.1} %), the first that is not: {first}"
+                "{split}: {used} of its {frames} {} there ({percent:.1} %), the first that is not: {first}",
+                if *used == 1 { "is" } else { "are" }
             ),
             MissingReason::NoTruth(without) => write!(
                 f,
-                "{split}: {used} of its {expected} frames have ground truth ({percent:.1} %), {without} more are there without"
+                "{split}: {used} of its {frames} {} ground truth ({percent:.1} %), {without} more {} there without",
+                if *used == 1 { "has" } else { "have" },
+                if *without == 1 { "is" } else { "are" }
             ),
         }
     }
@@ -79,7 +84,11 @@ pub fn expected_frames(
             split: split.path.clone(),
             found: coverage.found,
             expected: coverage.expected,
-            what: "are in the recordings given",
+            what: if coverage.found == 1 {
+                "is in the recordings given"
+            } else {
+                "are in the recordings given"
+            },
         })
     } else {
         Ok(Some(coverage.expected))
@@ -110,7 +119,11 @@ pub fn check_used(
             split: split.path.clone(),
             found: used,
             expected,
-            what: "have ground truth",
+            what: if used == 1 {
+                "has ground truth"
+            } else {
+                "have ground truth"
+            },
         });
     }
     Ok(Some(Shortfall {

@@ -29,7 +29,7 @@ pub struct EvaluationRequest<'a> {
     pub set: Option<&'a str>,
     /// Whether depth is corrected for another focal length than the one trained on.
     pub focal_correction: bool,
-    /// In how many ways the network looks at each image.
+    /// Of which predictions of an image the mean was taken (test-time augmentation).
     pub post_process: Option<PostProcess>,
     /// The program that evaluates, with its version.
     pub program: String,

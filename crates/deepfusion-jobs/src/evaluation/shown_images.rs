@@ -11,7 +11,7 @@ use super::{ChosenImage, Evaluated, ImageRef, Truth, array_places, chosen_images
 use crate::Result;
 
 /// What there is to show of an image.
-struct Seen {
+struct ImageToShow {
     image: Option<RgbImage>,
     prediction: Prediction,
     truth: Grid,
@@ -40,7 +40,7 @@ pub fn shown_of_datasets(
         let array = name.and_then(|n| arrays.get(n)).copied();
         let (image, prediction) = see(dataset, frame)?;
         let depth = truth.of(dataset, frame, array)?;
-        Ok(depth.map(|depth| Seen {
+        Ok(depth.map(|depth| ImageToShow {
             image: Some(image),
             prediction,
             truth: depth,
@@ -59,7 +59,7 @@ pub fn shown_of_arrays(
     evaluated: &Evaluated,
 ) -> Result<Vec<(ChosenImage, ShownFrame)>> {
     shown(evaluated, |ImageRef(prediction, depth)| {
-        Ok(Some(Seen {
+        Ok(Some(ImageToShow {
             image: None,
             prediction: of_kind(predicted.read(prediction)?),
             truth: known.read(depth)?,
@@ -70,14 +70,14 @@ pub fn shown_of_arrays(
 
 fn shown(
     evaluated: &Evaluated,
-    mut see: impl FnMut(ImageRef) -> Result<Option<Seen>>,
+    mut see: impl FnMut(ImageRef) -> Result<Option<ImageToShow>>,
 ) -> Result<Vec<(ChosenImage, ShownFrame)>> {
     let mut frames = Vec::new();
     for chosen in chosen_images(&evaluated.images) {
-        let Some(seen) = see(evaluated.places[chosen.image])? else {
+        let Some(to_show) = see(evaluated.places[chosen.image])? else {
             continue;
         };
-        let truth = depth_map(&seen.truth);
+        let truth = depth_map(&to_show.truth);
         let score = &evaluated.images[chosen.image];
         let frame = ShownFrame {
             title: format!(
@@ -88,10 +88,10 @@ fn shown(
                 score.median_scaled.abs_rel,
                 score.ratio
             ),
-            image: seen.image,
-            prediction: seen.prediction.depth_at(truth.width, truth.height),
+            image: to_show.image,
+            prediction: to_show.prediction.depth_at(truth.width, truth.height),
             truth,
-            camera: seen.camera,
+            camera: to_show.camera,
         };
         frames.push((chosen, frame));
     }

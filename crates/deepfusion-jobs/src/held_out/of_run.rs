@@ -15,7 +15,7 @@ use crate::recordings::{training_recordings, validates};
 use crate::verdict::Unseen;
 
 /// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
-type Seen = (String, u64, u64);
+type FrameKey = (String, u64, u64);
 
 /// Whether none of the frames measured was a target or a source in training, of this run, of those it began from and of those that it is
 /// the mean of (`averaged`, of its findings). `None` where that cannot be known: recordings that are not there any more, or a network that
@@ -63,7 +63,7 @@ fn seen_by(
     averaged: &[AveragedNetwork],
     datasets: &[Dataset],
     runs: &mut HashSet<PathBuf>,
-) -> Option<HashSet<Seen>> {
+) -> Option<HashSet<FrameKey>> {
     let mut config = config.clone();
     if validates(&config) {
         // Nothing of the training recordings was left out.
@@ -97,7 +97,7 @@ fn seen_before(
     sha256: Option<&str>,
     datasets: &[Dataset],
     runs: &mut HashSet<PathBuf>,
-) -> Option<HashSet<Seen>> {
+) -> Option<HashSet<FrameKey>> {
     let packed = match sha256 {
         Some(sha256) => {
             let network = embedded(init).ok()??;
@@ -125,7 +125,7 @@ fn seen_before(
     seen_by(&config, &findings.averaged, datasets, runs)
 }
 
-fn key(frame: &Frame) -> Seen {
+fn key(frame: &Frame) -> FrameKey {
     let size = std::fs::metadata(frame.image.path()).map_or(0, |meta| meta.len());
     (frame.drive.clone(), frame.number, size)
 }

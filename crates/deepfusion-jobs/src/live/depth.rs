@@ -20,7 +20,7 @@ pub struct LiveDepth<E> {
     pub ending: Result<Ending, E>,
 }
 
-/// A frame that was looked at.
+/// A frame and its depth.
 struct SeenFrame {
     input: Input,
     loaded: LoadedImage,
@@ -40,8 +40,8 @@ pub fn predict<E: From<Error> + Send>(
     written: impl Fn(&Sidecar) -> Result<(), E> + Sync,
     say: impl Fn(&str),
 ) -> LiveDepth<E> {
-    let look_at = |frame: LiveFrame| -> Result<(SeenFrame, f64), E> {
-        Ok(look(job, estimator, address, frame)?)
+    let process = |frame: LiveFrame| -> Result<(SeenFrame, f64), E> {
+        Ok(predict_frame(job, estimator, address, frame)?)
     };
     let done = Mutex::new(Vec::new());
     let write = |frame: SeenFrame| -> Result<(), E> {
@@ -57,13 +57,13 @@ pub fn predict<E: From<Error> + Send>(
         drop(done);
         written(&sidecar)
     };
-    let ending = run(feed, look_at, write, say);
+    let ending = run(feed, process, write, say);
     let written = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     LiveDepth { written, ending }
 }
 
 /// What the network says of a frame, and the milliseconds from its arrival to that.
-fn look(
+fn predict_frame(
     job: &DepthJob<'_>,
     estimator: &mut DepthEstimator,
     address: &Address,

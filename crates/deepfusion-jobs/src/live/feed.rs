@@ -1,4 +1,4 @@
-//! The loop over a live source: take the newest, look, hand over, until it is enough.
+//! The loop over a live source: take the newest, process it, hand over, until it is enough.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use super::figures::Figures;
 use crate::Result;
 
 /// Whether it is to stop is asked this often while nothing comes.
-const LOOK_UP: Duration = Duration::from_millis(100);
+const ASK_EVERY: Duration = Duration::from_millis(100);
 
 /// Why a run over a live source came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,7 +100,7 @@ impl Feed {
             if self.frames == 0 || self.first.is_some_and(late) {
                 return Ok(Err(Ending::Enough));
             }
-            match self.source.take(LOOK_UP)? {
+            match self.source.take(ASK_EVERY)? {
                 NextFrame::Frame(frame) => {
                     self.frames -= 1;
                     self.first.get_or_insert(frame.arrived);
@@ -121,18 +121,18 @@ fn seconds(s: f64) -> Duration {
     Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX)
 }
 
-/// Looks at frame after frame, always the newest, and writes what comes of it on a thread of its own. `look` also returns the
+/// Processes frame after frame, always the newest, and writes what comes of it on a thread of its own. `process` also returns the
 /// latency, in milliseconds; `say` gets a line on how it goes, now and then. One result may wait for the writer: beyond that the network
 /// waits, the source's frames are skipped, and none is late.
 ///
-/// What was looked at is written, also where the source is lost: its error comes after that. A connection that the other side closed in good
+/// What was processed is written, also where the source is lost: its error comes after that. A connection that the other side closed in good
 /// order is a warning ([`tracing::warn`]).
 ///
 /// # Errors
-/// Those of the source, of `look` and of `write`.
+/// Those of the source, of `process` and of `write`.
 pub fn run<O: Send, E: From<crate::Error> + Send>(
     feed: &mut Feed,
-    mut look: impl FnMut(LiveFrame) -> Result<(O, f64), E>,
+    mut process: impl FnMut(LiveFrame) -> Result<(O, f64), E>,
     write: impl Fn(O) -> Result<(), E> + Sync,
     say: impl Fn(&str),
 ) -> Result<Ending, E> {
@@ -140,14 +140,14 @@ pub fn run<O: Send, E: From<crate::Error> + Send>(
         let (to_writer, results) = bounded(1);
         let write = &write;
         let writer = scope.spawn(move || results.into_iter().try_for_each(write));
-        let looked = loop {
+        let outcome = loop {
             let frame = match feed.next() {
                 Ok(Ok(frame)) => frame,
                 Ok(Err(ending)) => break Ok(ending),
                 Err(lost) => break Err(lost.into()),
             };
             let dropped = frame.dropped;
-            match look(frame) {
+            match process(frame) {
                 Ok((result, latency_ms)) => {
                     if let Some(line) = feed.figures.add(latency_ms, dropped) {
                         say(&line);
@@ -162,7 +162,7 @@ pub fn run<O: Send, E: From<crate::Error> + Send>(
         };
         drop(to_writer);
         match writer.join() {
-            Ok(written) => written.and(looked),
+            Ok(written) => written.and(outcome),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     })

@@ -38,8 +38,8 @@ pub fn perceive<E: From<Error> + Send>(
     found: impl Fn(&FrameRecord) -> Result<(), E>,
     say: impl Fn(&str),
 ) -> Result<LiveTargets<E>> {
-    let look_at = |frame: LiveFrame| -> Result<(PerceivedFrame, f64), E> {
-        let frame = look(job, &mut finder, &mut way, address, frame)?;
+    let process = |frame: LiveFrame| -> Result<(PerceivedFrame, f64), E> {
+        let frame = find_targets(job, &mut finder, &mut way, address, frame)?;
         found(&frame.record)?;
         let latency_ms = frame.latency_ms;
         Ok((frame, latency_ms))
@@ -53,7 +53,7 @@ pub fn perceive<E: From<Error> + Send>(
         counts.1 += frame.record.targets.len();
         Ok(())
     };
-    let ending = run(feed, look_at, write, say);
+    let ending = run(feed, process, write, say);
     let (frames, targets) = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
     writer.finish(frames)?;
     Ok(LiveTargets {
@@ -64,7 +64,7 @@ pub fn perceive<E: From<Error> + Send>(
 }
 
 /// What was found in a frame.
-fn look(
+fn find_targets(
     job: &DepthJob<'_>,
     finder: &mut TargetFinder<'_>,
     way: &mut StraightWay,

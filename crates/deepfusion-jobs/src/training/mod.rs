@@ -14,6 +14,6 @@ mod time_estimate;
 pub use asked_recordings::AskedRecordings;
 pub use plan::{RunLength, TrainingPlan, leaves_turns_unused};
 pub use run_log::RunLog;
-pub use start::{Began, SettingsOfMean, Start};
+pub use start::{SettingsOfMean, Start, StartReport};
 pub use start_request::StartRequest;
 pub use time_estimate::{Choice, Pace, TimeEstimate};

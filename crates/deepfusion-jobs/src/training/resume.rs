@@ -10,7 +10,7 @@ use super::Start;
 use crate::recordings::camera_word;
 use crate::{Error, Result};
 
-pub use crate::error::{Asked, Contradiction, RunHas, Setting};
+pub use crate::error::{Contradiction, RequestedValue, RunHas, Setting};
 
 /// What is asked of a run that goes on. It may be made longer, and its recordings may have moved; all else must be as the run has it, so
 /// that nothing is asked for in vain.
@@ -132,11 +132,11 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
         same(Setting::Camera, camera_word(*camera).into(), found)?;
     }
     if *stereo && !run.stereo {
-        return contradicts(Setting::Stereo, Asked::OtherCamera, RunHas::Off);
+        return contradicts(Setting::Stereo, RequestedValue::OtherCamera, RunHas::Off);
     }
     if *learned_camera && run.learned_camera().is_none() {
         let none = RunHas::Value("none".into());
-        return contradicts(Setting::LearnedCamera, Asked::Learned, none);
+        return contradicts(Setting::LearnedCamera, RequestedValue::Learned, none);
     }
     if let Some(motion) = view_motion {
         let found = run.view_motion.name();
@@ -204,7 +204,7 @@ fn same_clock(run: &TrainConfig, asked: ClockAhead) -> Result<()> {
         ClockAhead::Measured if found.is_some() => Ok(()),
         ClockAhead::Measured => {
             let none = RunHas::Value("none".into());
-            contradicts(Setting::Clock, Asked::Measured, none)
+            contradicts(Setting::Clock, RequestedValue::Measured, none)
         }
         ClockAhead::Seconds(ahead_s) => {
             let found = found.unwrap_or("none".into());
@@ -350,7 +350,7 @@ fn same(setting: Setting, asked: String, found: String) -> Result<()> {
     }
 }
 
-fn contradicts<T>(setting: Setting, asked: impl Into<Asked>, run: RunHas) -> Result<T> {
+fn contradicts<T>(setting: Setting, asked: impl Into<RequestedValue>, run: RunHas) -> Result<T> {
     let contradiction = Contradiction::new(setting, asked, run);
     Err(Error::Contradiction(contradiction))
 }

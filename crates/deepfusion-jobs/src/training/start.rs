@@ -37,10 +37,10 @@ pub enum Start {
     },
 }
 
-/// What a new run began from.
+/// What a new run begins from, as it is reported.
 #[derive(Debug)]
 #[non_exhaustive]
-pub enum Began<'a> {
+pub enum StartReport<'a> {
     /// An embedded network was wanted, and none is built as the configuration's.
     NoneFits,
     /// A packed network.
@@ -61,7 +61,7 @@ pub enum Began<'a> {
     },
 }
 
-impl fmt::Display for Began<'_> {
+impl fmt::Display for StartReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let new = match self {
             Self::NoneFits => {
@@ -333,12 +333,12 @@ impl Start {
         &self,
         mut model: Model,
         device: &Device,
-        report: &mut dyn FnMut(Began),
+        report: &mut dyn FnMut(StartReport),
     ) -> Result<Model, TrainError> {
         match self {
             Self::Nothing => Ok(model),
             Self::NoneFits => {
-                report(Began::NoneFits);
+                report(StartReport::NoneFits);
                 Ok(model)
             }
             Self::Packed { network, path } => {
@@ -350,7 +350,7 @@ impl Start {
                 let mut new: Vec<_> = pose_net.into_iter().collect();
                 new.extend(new_head.then_some("the head for uncertainty"));
                 let path = path.as_deref();
-                report(Began::Packed { network, path, new });
+                report(StartReport::Packed { network, path, new });
                 Ok(model)
             }
             Self::Path(path) => {
@@ -367,7 +367,7 @@ impl Start {
                 let device = device.clone().autodiff();
                 let (model, new) = folder.load_networks(kind, model.config(), &device)?;
                 let checkpoint = folder.checkpoint_path(kind);
-                report(Began::Run { checkpoint, new });
+                report(StartReport::Run { checkpoint, new });
                 Ok(model)
             }
         }

@@ -34,8 +34,8 @@ pub(super) struct FrameEvidence {
     pub flip: Option<f64>,
 }
 
-/// A frame as the network sees it.
-struct Seen {
+/// A frame and what the network predicts of it.
+struct PredictedFrame {
     prepared: PreparedImage,
     grey: GreyPyramid,
     depth: DepthMap,
@@ -44,7 +44,7 @@ struct Seen {
     window: [u32; 4],
 }
 
-impl Seen {
+impl PredictedFrame {
     fn size(&self) -> (u32, u32) {
         (self.depth.width as u32, self.depth.height as u32)
     }
@@ -59,7 +59,7 @@ impl Seen {
     }
 }
 
-/// Looks at a frame; `closely` also at what needs further runs of the network.
+/// Measures a frame; `closely`: also what needs further runs of the network.
 pub(super) fn evidence_of_frame(
     estimator: &mut DepthEstimator,
     dataset: &Dataset,
@@ -68,21 +68,21 @@ pub(super) fn evidence_of_frame(
     focal_correction: bool,
 ) -> Result<FrameEvidence> {
     let image = dataset.load_image(target.frame)?;
-    let seen = see(estimator, dataset, target.frame, &image, focal_correction)?;
-    let mut looked = FrameEvidence::default();
+    let predicted = predict(estimator, dataset, target.frame, &image, focal_correction)?;
+    let mut evidence = FrameEvidence::default();
     let mut views: Vec<(GreyPyramid, Se3)> = Vec::new();
     // How much longer the way is through the depth, from the nearest frame on.
     let mut factor = 1.0;
     for (place, (frame, measured)) in target.sources.iter().enumerate() {
         let before = dataset.load_image(*frame)?;
-        let grey = GreyPyramid::new(grey_like(&before, seen.window, seen.size()));
-        let found = aligned(&seen, &grey, measured, factor);
+        let grey = GreyPyramid::new(grey_like(&before, predicted.window, predicted.size()));
+        let found = aligned(&predicted, &grey, measured, factor);
         if place == 0 {
-            looked.reprojection = reprojection(&seen, grey.full(), measured);
+            evidence.reprojection = reprojection(&predicted, grey.full(), measured);
             if closely {
                 let motion = found.map_or(*measured, |f| f.source_from_target);
-                let other = see(estimator, dataset, *frame, &before, focal_correction)?;
-                looked.consistency = consistency(&seen, &other.depth, &motion);
+                let other = predict(estimator, dataset, *frame, &before, focal_correction)?;
+                evidence.consistency = consistency(&predicted, &other.depth, &motion);
             }
         }
         let Some(found) = found else { continue };
@@ -92,7 +92,7 @@ pub(super) fn evidence_of_frame(
         );
         factor = way.norm() / measured_way;
         // The shortest way is the least sure one; a longer one replaces it.
-        looked.log_way = Some(factor.ln());
+        evidence.log_way = Some(factor.ln());
         let metric = Se3::from_parts(&found.source_from_target.rotation(), way / factor);
         views.push((grey, metric));
     }
@@ -103,26 +103,26 @@ pub(super) fn evidence_of_frame(
             source_from_target: *motion,
         })
         .collect();
-    let points = scene_points(seen.grey.full(), &seen.depth(), &views);
-    looked.points = points
+    let points = scene_points(predicted.grey.full(), &predicted.depth(), &views);
+    evidence.points = points
         .iter()
         .map(|p| (f64::from(p.depth_m), p.log_factor))
         .collect();
     if closely {
         let camera = dataset.intrinsics(target.frame);
-        let other = estimator.infer_mirrored(&seen.prepared)?;
-        looked.flip = flip(&seen.depth, &other.network_depth(&camera).0);
+        let other = estimator.infer_mirrored(&predicted.prepared)?;
+        evidence.flip = flip(&predicted.depth, &other.network_depth(&camera).0);
     }
-    Ok(looked)
+    Ok(evidence)
 }
 
-fn see(
+fn predict(
     estimator: &mut DepthEstimator,
     dataset: &Dataset,
     frame: usize,
     image: &RgbImage,
     focal_correction: bool,
-) -> Result<Seen> {
+) -> Result<PredictedFrame> {
     let camera = dataset.intrinsics(frame);
     let preparer = estimator.preparer();
     let prepared = preparer.prepare(image, Some(&camera), focal_correction, false);
@@ -130,7 +130,7 @@ fn see(
     let window = prediction.window;
     let (depth, camera) = prediction.network_depth(&camera);
     let grey = grey_like(image, window, (depth.width as u32, depth.height as u32));
-    Ok(Seen {
+    Ok(PredictedFrame {
         prepared,
         grey: GreyPyramid::new(grey),
         depth,
@@ -139,7 +139,7 @@ fn see(
     })
 }
 
-/// Another frame's image, as [`see`] makes it, without its depth.
+/// Another frame's image, as [`predict`] makes it, without its depth.
 fn grey_like(image: &RgbImage, window: [u32; 4], (width, height): (u32, u32)) -> GreyImage {
     let [x, y, w, h] = window;
     if [0, 0, image.width(), image.height()] == window {
@@ -150,9 +150,14 @@ fn grey_like(image: &RgbImage, window: [u32; 4], (width, height): (u32, u32)) ->
 }
 
 /// The motion to the frame before by the depth, from what was measured on; `None` where it goes astray.
-fn aligned(seen: &Seen, before: &GreyPyramid, measured: &Se3, factor: f64) -> Option<Alignment> {
+fn aligned(
+    predicted: &PredictedFrame,
+    before: &GreyPyramid,
+    measured: &Se3,
+    factor: f64,
+) -> Option<Alignment> {
     let guess = Se3::from_parts(&measured.rotation(), measured.translation() * factor);
-    let found = align(&seen.grey, &seen.depth(), before, &guess)?;
+    let found = align(&predicted.grey, &predicted.depth(), before, &guess)?;
     let turned = (found.source_from_target * measured.inverse()).angle();
     let (way, expected) = (
         found.source_from_target.translation(),
@@ -163,8 +168,12 @@ fn aligned(seen: &Seen, before: &GreyPyramid, measured: &Se3, factor: f64) -> Op
 }
 
 /// Photometric errors of the frame before, carried over by depth and measured motion, and as it is, over the pixels that are seen.
-fn reprojection(seen: &Seen, before: &GreyImage, source_from_target: &Se3) -> Option<(f64, f64)> {
-    let here = seen.grey.full();
+fn reprojection(
+    predicted: &PredictedFrame,
+    before: &GreyImage,
+    source_from_target: &Se3,
+) -> Option<(f64, f64)> {
+    let here = predicted.grey.full();
     let (width, height) = (here.width, here.height);
     let share = |v: &f32| v / 255.0;
     let target: Vec<f32> = here.data.iter().map(share).collect();
@@ -173,7 +182,7 @@ fn reprojection(seen: &Seen, before: &GreyImage, source_from_target: &Se3) -> Op
     let mut inside = vec![false; target.len()];
     for i in 0..target.len() {
         let (x, y) = (i % width, i / width);
-        if let Some((u, v, _)) = carried(seen, source_from_target, x, y)
+        if let Some((u, v, _)) = carried(predicted, source_from_target, x, y)
             && u >= 0.0
             && v >= 0.0
             && u <= (width - 1) as f64
@@ -203,22 +212,31 @@ fn reprojection(seen: &Seen, before: &GreyImage, source_from_target: &Se3) -> Op
 }
 
 /// Where a pixel is seen in the other frame, and its depth there.
-fn carried(seen: &Seen, source_from_target: &Se3, x: usize, y: usize) -> Option<(f64, f64, f64)> {
-    let depth = seen.depth.get(x, y)?;
-    let here = seen
+fn carried(
+    predicted: &PredictedFrame,
+    source_from_target: &Se3,
+    x: usize,
+    y: usize,
+) -> Option<(f64, f64, f64)> {
+    let depth = predicted.depth.get(x, y)?;
+    let here = predicted
         .camera
         .back_project(x as f64, y as f64, f64::from(depth));
     let there: Vector3<f64> = source_from_target.transform(&here);
-    let pixel = seen.camera.project(&there)?;
+    let pixel = predicted.camera.project(&there)?;
     Some((pixel.x, pixel.y, there.z))
 }
 
 /// By how much depth carried over to the other frame differs from its own, the median of pixels.
-fn consistency(seen: &Seen, other: &DepthMap, source_from_target: &Se3) -> Option<f64> {
+fn consistency(
+    predicted: &PredictedFrame,
+    other: &DepthMap,
+    source_from_target: &Se3,
+) -> Option<f64> {
     let mut differences = Vec::new();
-    for y in (0..seen.depth.height).step_by(2) {
-        for x in (0..seen.depth.width).step_by(2) {
-            if let Some((u, v, z)) = carried(seen, source_from_target, x, y)
+    for y in (0..predicted.depth.height).step_by(2) {
+        for x in (0..predicted.depth.width).step_by(2) {
+            if let Some((u, v, z)) = carried(predicted, source_from_target, x, y)
                 && u >= 0.0
                 && v >= 0.0
                 && let Some(depth) = other.get(u.round() as usize, v.round() as usize)

@@ -1,7 +1,7 @@
 //! What a drive with speeds says of a network's depth, without ground truth.
 //!
 //! Frames that training did not see are taken in blocks along each drive ([`plan`]). Each is predicted, and compared with frames
-//! before it (`look`): how the scene moved tells depth in metres, how well one frame explains the other tells whether depth and
+//! before it (`evidence_of_frame`): how the scene moved tells depth in metres, how well one frame explains the other tells whether depth and
 //! motion fit, and what the mirrored image gives tells how much of it is chance. [`verdict`] puts it together.
 
 mod evidence;

@@ -1,17 +1,26 @@
 //! How a GoPro's metadata was understood.
 
+use deepfusion_hint::count_of;
+
 /// How a GoPro's metadata was understood, or what of it has no speed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GoproNote {
     /// The speeds are those of its receiver.
-    #[error("speeds of the camera's GPS, {readings} readings on the video's own clock")]
+    #[error(
+        "speeds of the camera's GPS, {} on the video's own clock",
+        count_of(*readings, "reading")
+    )]
     Gps {
         /// How many.
         readings: usize,
     },
     /// The receiver had no position for a while.
-    #[error("{without} of {stretches} stretches of the video have no GPS fix and no speed")]
+    #[error(
+        "{without} of {} of the video {} no GPS fix and no speed",
+        count_of(*stretches, "stretch"),
+        if *without == 1 { "has" } else { "have" }
+    )]
     NoFix {
         /// In how many stretches.
         without: usize,

@@ -44,7 +44,11 @@ pub enum TableNote {
         more: usize,
     },
     /// Rows without a speed.
-    #[error("{absent} of {rows} rows hold no speed and are left out")]
+    #[error(
+        "{absent} of {} {} left out",
+        count_of(*rows, "row"),
+        if *absent == 1 { "holds no speed and is" } else { "hold no speed and are" }
+    )]
     NoSpeed {
         /// How many.
         absent: usize,
@@ -52,7 +56,11 @@ pub enum TableNote {
         rows: usize,
     },
     /// Rows of the same time as the one above.
-    #[error("{repeated} of {rows} rows repeat the time of the row above and are left out")]
+    #[error(
+        "{repeated} of {} {} left out",
+        count_of(*rows, "row"),
+        if *repeated == 1 { "repeats the time of the row above and is" } else { "repeat the time of the row above and are" }
+    )]
     Repeated {
         /// How many.
         repeated: usize,
@@ -179,6 +187,17 @@ mod tests {
             (
                 TableNote::Repeated { repeated: 4, rows },
                 "4 of 20 rows repeat the time of the row above and are left out",
+            ),
+            (
+                TableNote::NoSpeed { absent: 1, rows },
+                "1 of 20 rows holds no speed and is left out",
+            ),
+            (
+                TableNote::Repeated {
+                    repeated: 1,
+                    rows: 1,
+                },
+                "1 of 1 row repeats the time of the row above and is left out",
             ),
             (
                 TableNote::NoDegrees { beyond: 1, rows: 1 },

@@ -1,5 +1,7 @@
 //! What is wrong with a binary log of Vector's.
 
+use deepfusion_hint::count_of;
+
 /// What is wrong with a binary log of Vector's.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -8,10 +10,10 @@ pub enum BlfProblem {
     #[error("no binary log of Vector's begins so")]
     NoLog,
     /// Its header has a size that no header has.
-    #[error("a header of {0} bytes")]
+    #[error("a header of {}", count_of(*.0, "byte"))]
     Header(usize),
     /// It is shorter than its header says.
-    #[error("the header says {stated} bytes, the file has {bytes}")]
+    #[error("the header says {}, the file has {bytes}", count_of(*stated, "byte"))]
     Length {
         /// The length in its header.
         stated: u64,
@@ -24,7 +26,7 @@ pub enum BlfProblem {
     )]
     Date([u16; 8]),
     /// It ends before what is being read.
-    #[error("the file ends after {left} of {count} bytes")]
+    #[error("the file ends after {left} of {}", count_of(*count, "byte"))]
     Cut {
         /// How many bytes are left.
         left: u64,
@@ -38,10 +40,10 @@ pub enum BlfProblem {
     #[error("no object begins here")]
     NoObject,
     /// An object has a size that no object has.
-    #[error("an object of {0} bytes")]
+    #[error("an object of {}", count_of(*.0, "byte"))]
     Object(usize),
     /// A container is too short for its own header.
-    #[error("{0} bytes")]
+    #[error("{}", count_of(*.0, "byte"))]
     Container(usize),
     /// A container says that it holds more than is believed.
     #[error("it says that it holds {0} bytes")]
@@ -53,7 +55,7 @@ pub enum BlfProblem {
     #[error("compression {0}; 0 (none) and 2 (zlib) are known")]
     Compression(u16),
     /// A container's content has another size than it says.
-    #[error("it holds {bytes} bytes and says {stated}")]
+    #[error("it holds {} and says {stated}", count_of(*bytes, "byte"))]
     ContainerSize {
         /// How many bytes came out.
         bytes: usize,
@@ -69,7 +71,7 @@ pub enum BlfProblem {
         problem: Box<BlfProblem>,
     },
     /// A CAN frame is too short.
-    #[error("a CAN frame of {0} bytes")]
+    #[error("a CAN frame of {}", count_of(*.0, "byte"))]
     Frame(usize),
     /// A time is counted in an unknown unit.
     #[error("a time in unit {0}; 1 (10 µs) and 2 (1 ns) are known")]

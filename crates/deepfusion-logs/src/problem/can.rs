@@ -1,5 +1,7 @@
 //! What is wrong with a CAN trace.
 
+use deepfusion_hint::count_of;
+
 /// Why a CAN trace has no signal to decode.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -45,7 +47,7 @@ pub enum FrameProblem {
     #[error("identifier {0:X} has more than 11 bits")]
     LongIdentifier(u32),
     /// It has fewer bytes than it says.
-    #[error("{bytes} bytes, its length says {length}")]
+    #[error("{}, its length says {length}", count_of(*bytes, "byte"))]
     Length {
         /// How many it has.
         bytes: usize,

@@ -1,5 +1,7 @@
 //! What is wrong with a GoPro's video.
 
+use deepfusion_hint::count_of;
+
 /// How an MP4 file's boxes contradict each other.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -14,7 +16,7 @@ pub enum Mp4Problem {
     #[error("it ends early")]
     Cut,
     /// A box is longer than the one it lies in.
-    #[error("{name}: {size} bytes, where {left} are left")]
+    #[error("{name}: {}, where {left} are left", count_of(*size, "byte"))]
     Size {
         /// The box's name.
         name: String,
@@ -42,7 +44,7 @@ pub enum Mp4Problem {
 #[non_exhaustive]
 pub enum GpmfProblem {
     /// It is longer than what it lies in.
-    #[error("{key}: {length} bytes, where {left} are left")]
+    #[error("{key}: {}, where {left} are left", count_of(*length, "byte"))]
     Length {
         /// Its key.
         key: String,

@@ -1,5 +1,7 @@
 //! What is wrong with a row of a table.
 
+use deepfusion_hint::count_of;
+
 /// Why a row of a table cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -8,7 +10,7 @@ pub enum TableProblem {
     #[error(transparent)]
     Csv(#[from] csv::Error),
     /// It has another number of values than the header.
-    #[error("{values} values, the header has {named}")]
+    #[error("{}, the header has {named}", count_of(*values, "value"))]
     Values {
         /// How many it has.
         values: usize,

@@ -28,7 +28,7 @@ impl Builder {
         for index in 0..r_msfm.iterations {
             if index > 0 {
                 let seen = match r_msfm.taken_up(index) {
-                    RefinementInput::Again(level) => self.second_look(level, state)?,
+                    RefinementInput::Again(level) => self.feature_again(level, state)?,
                     RefinementInput::Middle => self.feature("middle", f1, R_MSFM_STATE, 2)?,
                     RefinementInput::Fine => self.fine(f0)?,
                 };
@@ -74,8 +74,8 @@ impl Builder {
         self.feature("fine", small, R_MSFM_STATE, 2)
     }
 
-    /// R-MSFM6's second look at a feature: 1×3 and 3×1, tanh after each.
-    fn second_look(&mut self, index: usize, input: ValueId) -> Result<ValueId, NetworkError> {
+    /// How R-MSFM6 takes a feature up again: 1×3 and 3×1, tanh after each.
+    fn feature_again(&mut self, index: usize, input: ValueId) -> Result<ValueId, NetworkError> {
         let mut x = input;
         for strip in ["across", "down"] {
             let path = format!("r_msfm.features.context.{index}.{strip}");

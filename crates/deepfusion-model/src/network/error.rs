@@ -1,4 +1,4 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 use crate::weights::FormatProblem;
@@ -101,7 +101,11 @@ pub enum NetworkError {
     Graph(#[from] deepfusion_infer::Error),
 
     /// A NaN or an infinity among the weights.
-    #[error("{origin}: tensor `{name}` holds {count} values that are not finite")]
+    #[error(
+        "{origin}: tensor `{name}` holds {} that {} not finite",
+        count_of(*count, "value"),
+        if *count == 1 { "is" } else { "are" }
+    )]
     NotFinite {
         /// Where the weights come from, usually a file.
         origin: String,

@@ -52,8 +52,8 @@ impl RMsfmConfig {
     /// refinement has the coarsest feature as its state.
     #[must_use]
     pub fn taken_up(&self, index: usize) -> RefinementInput {
-        let looks = if self.twice() { 2 } else { 1 };
-        match (index % looks, index / looks) {
+        let times = if self.twice() { 2 } else { 1 };
+        match (index % times, index / times) {
             (1, level) => RefinementInput::Again(level),
             (_, 1) => RefinementInput::Middle,
             _ => RefinementInput::Fine,

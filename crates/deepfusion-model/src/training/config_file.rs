@@ -42,7 +42,7 @@ impl TrainConfig {
     }
 
     /// Sets one key, as `loss.smoothness=0.01` says it: dots between tables, a TOML value or a bare word, and `none` to take
-    /// an optional one away. What comes out is not validated.
+    /// an optional one away. A list, of tables, too, is set as a whole. What comes out is not validated.
     ///
     /// # Errors
     /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have; [`Error::PresetAsKey`].

@@ -1,5 +1,6 @@
 //! Why an array file of a recording is of no use.
 
+use deepfusion_hint::count_of;
 use ndarray_npy::ReadNpyError;
 use std::fmt;
 
@@ -25,7 +26,7 @@ pub enum ArrayProblem {
         columns: usize,
     },
     /// It has another number of rows than its times.
-    #[error("{rows} rows, but {times} has {expected}")]
+    #[error("{}, but {times} has {expected}", count_of(*rows, "row"))]
     Rows {
         /// How many it has.
         rows: usize,

@@ -22,7 +22,7 @@ pub(super) fn reflected(
     config.init(rng, device)
 }
 
-/// R-MSFM6's second look at a feature: tanh(3×1(tanh(1×3(x)))).
+/// How R-MSFM6 takes a feature up again: tanh(3×1(tanh(1×3(x)))).
 #[derive(Module, Debug)]
 pub struct Context {
     /// 1×3.
@@ -58,7 +58,7 @@ pub struct Features {
     pub fine_reduce: Conv2d,
     /// After it: 3×3 at stride 2.
     pub fine: Conv2d,
-    /// R-MSFM6's second looks, from the coarsest feature to the finest; empty in R-MSFM3.
+    /// How R-MSFM6 takes each feature up again, from the coarsest to the finest; empty in R-MSFM3.
     pub context: Vec<Context>,
 }
 

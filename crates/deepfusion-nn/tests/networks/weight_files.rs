@@ -162,7 +162,7 @@ fn values_that_are_not_finite_are_refused() {
     });
     assert_eq!(
         error.to_string(),
-        "some.safetensors: tensor `encoder.bn1.weight` holds 1 values that are not finite"
+        "some.safetensors: tensor `encoder.bn1.weight` holds 1 value that is not finite"
     );
 }
 

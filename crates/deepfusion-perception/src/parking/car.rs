@@ -1,6 +1,6 @@
 //! A car of a row: a box of usual size, square to it.
 
-use super::segments::Seen;
+use super::segments::RowPoint;
 use super::{Row, View};
 use crate::box_fit::CAR;
 use crate::clusters::Cluster;
@@ -18,7 +18,7 @@ const LOWEST_M: f32 = 1.3;
 /// The car at a position along a row, from its points, and whether its front is visible, which fixes its position.
 pub(super) fn car(
     along: f32,
-    points: &[&Seen],
+    points: &[&RowPoint],
     row: &Row,
     view: &View,
 ) -> Option<(Detection, bool)> {

@@ -108,7 +108,7 @@ impl Standing {
                 taken[place] = true;
                 there.push((
                     place,
-                    Seen {
+                    RowPoint {
                         along,
                         off,
                         height: point.height,
@@ -151,7 +151,7 @@ fn cell([right, forward]: [f32; 2]) -> Option<usize> {
 }
 
 /// A point in its row's coordinates, metres.
-pub(super) struct Seen {
+pub(super) struct RowPoint {
     /// Along the line.
     pub along: f32,
     /// To the right of the row's line.
@@ -166,12 +166,12 @@ pub(super) struct Seen {
 pub(super) struct Segment {
     /// Start and end along the row, metres.
     pub along: [f32; 2],
-    points: Vec<Seen>,
+    points: Vec<RowPoint>,
 }
 
 impl Segment {
     /// Its cars: the position of each one's middle along the row, and its points.
-    pub(super) fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
+    pub(super) fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&RowPoint>)> {
         let [from, to] = self.along;
         let width = to - from;
         let count = if width > WIDEST_M {
@@ -186,7 +186,7 @@ impl Segment {
             return vec![(self.middle(row, view), self.points.iter().collect())];
         }
         let (piece, step) = (width / count as f32, (width - CAR[1]) / (count - 1) as f32);
-        let which = |p: &Seen| (((p.along - from) / piece) as usize).min(count - 1);
+        let which = |p: &RowPoint| (((p.along - from) / piece) as usize).min(count - 1);
         (0..count)
             .map(|i| {
                 let own = self.points.iter().filter(|p| which(p) == i).collect();

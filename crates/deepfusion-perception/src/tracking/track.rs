@@ -34,13 +34,13 @@ impl Mean {
 
 /// How a track was seen in a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct Sighting {
     pixels: usize,
     bounds: [u32; 4],
     detection: usize,
 }
 
-impl Seen {
+impl Sighting {
     fn of(measurement: &Measurement) -> Self {
         Self {
             pixels: measurement.detection.pixels,
@@ -74,7 +74,7 @@ pub(super) struct Track {
     /// Standard deviation of its depth over itself when it was last seen, if known.
     relative_error: Option<f32>,
     /// How it was seen in the last frame, if it was.
-    pub seen: Option<Seen>,
+    pub seen: Option<Sighting>,
 }
 
 impl Track {
@@ -102,7 +102,7 @@ impl Track {
             confidence: f64::from(measurement.detection.confidence),
             kind: measurement.detection.kind.clone(),
             relative_error: measurement.detection.relative_error,
-            seen: Some(Seen::of(measurement)),
+            seen: Some(Sighting::of(measurement)),
         }
     }
 
@@ -178,7 +178,7 @@ impl Track {
         self.unseen_s = 0.0;
         self.confidence += 0.3 * (f64::from(measurement.detection.confidence) - self.confidence);
         self.relative_error = measurement.detection.relative_error;
-        self.seen = Some(Seen::of(measurement));
+        self.seen = Some(Sighting::of(measurement));
         self.vote(measurement.detection.kind.as_ref());
         self.judge_motion();
     }

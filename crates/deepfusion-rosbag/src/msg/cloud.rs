@@ -326,7 +326,7 @@ mod tests {
                 .column_at("x", 1)
                 .unwrap_err()
                 .to_string()
-                .contains("1 numbers")
+                .contains("1 number,")
         );
     }
 

@@ -1,4 +1,4 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::borrow::Cow;
 use std::fmt;
 
@@ -7,7 +7,7 @@ use std::fmt;
 #[non_exhaustive]
 pub enum MessageError {
     /// The message ends within a field.
-    #[error("field {field}: {needed} bytes needed, {left} left")]
+    #[error("field {field}: {} needed, {left} left", count_of(*needed, "byte"))]
     Short {
         /// The field, with those it lies in: `fields.name`.
         field: String,
@@ -17,7 +17,7 @@ pub enum MessageError {
         left: usize,
     },
     /// Bytes are left after the last field.
-    #[error("{left} bytes left after the last field")]
+    #[error("{} left after the last field", count_of(*left, "byte"))]
     Long {
         /// How many.
         left: usize,
@@ -152,7 +152,7 @@ pub enum LayoutProblem {
         left: usize,
     },
     /// A field has fewer numbers than were asked for.
-    #[error("{count} numbers, number {element} was asked for")]
+    #[error("{}, number {element} was asked for", count_of(*count, "number"))]
     Element {
         /// How many it has.
         count: u32,
@@ -170,7 +170,7 @@ pub enum LayoutProblem {
         point_step: u32,
     },
     /// Columns have different lengths.
-    #[error("{numbers} numbers, {first} has {points}")]
+    #[error("{}, {first} has {points}", count_of(*numbers, "number"))]
     Columns {
         /// How many numbers the column has.
         numbers: usize,

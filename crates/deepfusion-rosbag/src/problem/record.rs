@@ -1,6 +1,7 @@
 //! What is wrong with a record.
 
 use crate::op::name_of;
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// What is wrong with a record.
@@ -8,7 +9,7 @@ use std::fmt;
 #[non_exhaustive]
 pub enum RecordProblem {
     /// A part of it goes beyond the end of the file, or of its chunk.
-    #[error("{part} goes beyond the end ({bytes} bytes)")]
+    #[error("{part} goes beyond the end ({})", count_of(*bytes, "byte"))]
     BeyondEnd {
         /// The part.
         part: RecordPart,
@@ -16,7 +17,11 @@ pub enum RecordProblem {
         bytes: usize,
     },
     /// Its data is cut off.
-    #[error("a record's data should have {stated} bytes, {left} are left")]
+    #[error(
+        "a record's data should have {}, {left} {} left",
+        count_of(*stated, "byte"),
+        if *left == 1 { "is" } else { "are" }
+    )]
     DataCut {
         /// How many bytes it should have.
         stated: usize,
@@ -50,7 +55,7 @@ pub enum RecordProblem {
         field: &'static str,
     },
     /// A field has another length than the format says.
-    #[error("field {field} has {bytes} bytes, expected {expected}")]
+    #[error("field {field} has {}, expected {expected}", count_of(*bytes, "byte"))]
     FieldLength {
         /// The field's name.
         field: &'static str,

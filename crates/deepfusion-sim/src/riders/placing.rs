@@ -1,7 +1,7 @@
 //! Who rides and walks where: along a drive, and before the camera of a view.
 
-use super::room::{Moment, Taken, has_room};
-use super::{Crossing, Person, Riders, Way};
+use super::room::{Footprint, Moment, has_room};
+use super::{Crossing, Person, Riders, Route};
 use crate::motion::Drive;
 use crate::road::RoadSample;
 use crate::scene::cars::CarModel;
@@ -108,13 +108,13 @@ impl Riders {
         let (along_x, along_y) = world.road.tangent(place.index);
         let looks = world_from_cam.rotate(&Vector3::z());
         let along = looks.x * f64::from(along_x) + looks.y * f64::from(along_y);
-        let mut taken: Vec<Taken> = vehicles.iter().map(Taken::by).collect();
-        taken.push(Taken::new([eye.x, eye.y], 0.0, [ARM, ARM]));
+        let mut occupied: Vec<Footprint> = vehicles.iter().map(Footprint::by).collect();
+        occupied.push(Footprint::new([eye.x, eye.y], 0.0, [ARM, ARM]));
         let mut moments = [Moment {
             time_s: 0.0,
             camera_s: f64::from(place.s),
             looks: if along < 0.0 { -1.0 } else { 1.0 },
-            taken,
+            occupied,
         }];
         let mut riders = Self::default();
         for _ in 0..rng.random_range(2..=8) {
@@ -156,7 +156,7 @@ impl Riders {
             .unwrap_or(met);
         let is_seen = |number: usize| {
             let moment = &moments[number];
-            let ahead = (person.way.at(moment.time_s).0 - moment.camera_s) * moment.looks;
+            let ahead = (person.route.at(moment.time_s).0 - moment.camera_s) * moment.looks;
             (SEEN.0..SEEN.1).contains(&ahead)
         };
         let (comes, goes) = (first > 0, last + 1 < moments.len());
@@ -176,8 +176,8 @@ impl Riders {
             },
         );
         for moment in &mut moments[first..=last] {
-            let taken = Taken::by_person(&person, &world.road, moment.time_s);
-            moment.taken.push(taken);
+            let footprint = Footprint::by_person(&person, &world.road, moment.time_s);
+            moment.occupied.push(footprint);
         }
         self.people.push(person);
         true
@@ -192,17 +192,17 @@ fn moments(world: &World, drive: &Drive, duration_s: f64, traffic: &Traffic) -> 
             let time_s = (number as f64 * STEP_S).min(duration_s);
             let (camera_s, speed, _) = drive.progress(time_s);
             let vehicles = traffic.objects(world, time_s);
-            let mut taken: Vec<Taken> = vehicles.iter().map(Taken::by).collect();
+            let mut occupied: Vec<Footprint> = vehicles.iter().map(Footprint::by).collect();
             // From 3 m behind the camera to 4 m and 0.6 s before it.
             let free = 0.6 * speed;
             let (x, y, heading) = world.road.world(camera_s + 0.5 * (1.0 + free), LANE);
             let half = [0.5 * (7.0 + free), HALF_LANE];
-            taken.push(Taken::new([x, y], heading, half));
+            occupied.push(Footprint::new([x, y], heading, half));
             Moment {
                 time_s,
                 camera_s,
                 looks: 1.0,
-                taken,
+                occupied,
             }
         })
         .collect()
@@ -222,7 +222,7 @@ fn draw(
     }
     let model = those[rng.random_range(0..those.len())].clone();
     let sample = world.road.sample(world.road.index_at(s));
-    let way = match does {
+    let route = match does {
         Does::RideAlong | Does::RideAgainst => {
             // On the right, near the edge of the road or in the lane.
             let edge = f64::from(sample.half_width) - rng.random_range(0.5..0.9);
@@ -237,7 +237,7 @@ fn draw(
             } else {
                 (-speed, out)
             };
-            Way {
+            Route {
                 s: s - rate * time_s,
                 lateral,
                 rate,
@@ -248,7 +248,7 @@ fn draw(
             let side = usize::from(rng.random_bool(0.5));
             let lateral = pavement(rng, sample, side)?;
             let rate = pace(rng);
-            Way {
+            Route {
                 s: s - rate * time_s,
                 lateral,
                 rate,
@@ -264,7 +264,7 @@ fn draw(
             let rate = pace(rng);
             let lasts_s = (to - lateral).abs() / rate.abs();
             let begins_s = time_s - lasts_s * rng.random_range(0.1..0.9);
-            Way {
+            Route {
                 s: s - rate * begins_s,
                 lateral,
                 rate,
@@ -279,7 +279,7 @@ fn draw(
     Some(Person {
         model,
         seed: rng.random(),
-        way,
+        route,
         during: (f64::NEG_INFINITY, f64::INFINITY),
     })
 }

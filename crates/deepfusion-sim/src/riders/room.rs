@@ -29,19 +29,19 @@ pub(super) struct Moment {
     pub(super) camera_s: f64,
     /// 1 where the camera looks along the street, −1 where it looks back.
     pub(super) looks: f64,
-    /// What people keep out of: vehicles, the camera's way, and each other.
-    pub(super) taken: Vec<Taken>,
+    /// What people keep out of: vehicles, the lane before the camera, and each other.
+    pub(super) occupied: Vec<Footprint>,
 }
 
-/// A rectangle of the ground.
+/// A rectangle of the ground that something occupies.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Taken {
+pub(super) struct Footprint {
     middle: [f64; 2],
     heading: f64,
     half: [f64; 2],
 }
 
-impl Taken {
+impl Footprint {
     /// A rectangle by its middle, the heading of its first side and half its sides, in metres and radians.
     pub(super) fn new(middle: [f64; 2], heading: f64, half: [f64; 2]) -> Self {
         Self {
@@ -51,7 +51,7 @@ impl Taken {
         }
     }
 
-    /// What an object takes, and a little around it.
+    /// What an object occupies, and a little around it.
     pub(super) fn by(object: &SceneObject) -> Self {
         let middle = object.world_from_object.translation();
         let forward = object.world_from_object.rotate(&Vector3::x());
@@ -62,7 +62,7 @@ impl Taken {
         }
     }
 
-    /// What someone takes at a time.
+    /// What someone occupies at a time.
     pub(super) fn by_person(person: &Person, road: &Road, time_s: f64) -> Self {
         let stance = person.stance(road, time_s);
         let [long, wide, _] = person.model.size.map(f64::from);
@@ -94,10 +94,13 @@ pub(super) fn has_room(world: &World, person: &Person, moment: &Moment) -> bool 
     let on_ground = if person.model.class == ObjectClass::Cyclist {
         middles.iter().all(|middle| is_on_road(road, *middle))
     } else {
-        person.way.crosses_at(moment.time_s) || is_on_pavement(road, &stance)
+        person.route.crosses_at(moment.time_s) || is_on_pavement(road, &stance)
     };
-    let taken = |middle: &[f64; 2]| moment.taken.iter().any(|t| t.holds(*middle, RADIUS));
-    on_ground && !middles.iter().any(taken) && is_free(world, &stance, &middles)
+    let is_occupied = |middle: &[f64; 2]| {
+        let mut footprints = moment.occupied.iter();
+        footprints.any(|f| f.holds(*middle, RADIUS))
+    };
+    on_ground && !middles.iter().any(is_occupied) && is_free(world, &stance, &middles)
 }
 
 /// Whether a wheel there is on the carriageway.
@@ -152,7 +155,7 @@ fn is_free(world: &World, stance: &Stance, middles: &[[f64; 2]; 3]) -> bool {
         })
     });
     let in_house = |object: &SceneObject| {
-        object.class == ObjectClass::Building && Taken::by(object).holds([x, y], 0.0)
+        object.class == ObjectClass::Building && Footprint::by(object).holds([x, y], 0.0)
     };
     !meets_solid && !world.objects.iter().any(in_house)
 }

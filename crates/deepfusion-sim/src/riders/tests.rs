@@ -22,8 +22,8 @@ fn street(seed: u64) -> (World, Riders) {
 }
 
 #[test]
-fn a_way_goes_on_at_one_speed() {
-    let way = Way {
+fn a_route_goes_on_at_one_speed() {
+    let route = Route {
         s: 20.0,
         lateral: -6.0,
         rate: -1.25,
@@ -34,7 +34,7 @@ fn a_way_goes_on_at_one_speed() {
         }),
     };
     let moved = |from: f64, to: f64| {
-        let ((s, lateral), (next_s, next_lateral)) = (way.at(from), way.at(to));
+        let ((s, lateral), (next_s, next_lateral)) = (route.at(from), route.at(to));
         (next_s - s).hypot(next_lateral - lateral) / (to - from)
     };
     for (from, to) in [
@@ -46,10 +46,10 @@ fn a_way_goes_on_at_one_speed() {
     ] {
         assert!((moved(from, to) - 1.25).abs() < 1e-12, "{from} {to}");
     }
-    assert_eq!(way.at(0.0), (20.0, -6.0));
-    assert_eq!(way.at(4.0), (15.0, -6.0));
-    assert!((way.at(12.8).0 - 15.0).abs() < 1e-12 && (way.at(12.8).1 - 5.0).abs() < 1e-12);
-    assert!(way.crosses_at(8.0) && !way.crosses_at(3.9) && !way.crosses_at(12.9));
+    assert_eq!(route.at(0.0), (20.0, -6.0));
+    assert_eq!(route.at(4.0), (15.0, -6.0));
+    assert!((route.at(12.8).0 - 15.0).abs() < 1e-12 && (route.at(12.8).1 - 5.0).abs() < 1e-12);
+    assert!(route.crosses_at(8.0) && !route.crosses_at(3.9) && !route.crosses_at(12.9));
 }
 
 /// Wheels and feet are on the ground, on the road or on the pavement, and everyone looks where they go.
@@ -62,8 +62,8 @@ fn people_stand_on_the_ground_and_face_forward() {
         for person in &riders.people {
             let rides = person.model.class == ObjectClass::Cyclist;
             riding += usize::from(rides);
-            walking += usize::from(!rides && person.way.crossing.is_none());
-            crossing += usize::from(person.way.crossing.is_some());
+            walking += usize::from(!rides && person.route.crossing.is_none());
+            crossing += usize::from(person.route.crossing.is_some());
             for step in 0..=50 {
                 let time_s = 0.2 * f64::from(step);
                 if !person.is_there(time_s) {

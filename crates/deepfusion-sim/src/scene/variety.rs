@@ -115,11 +115,11 @@ pub(super) fn crowd(world: &mut World) -> Vec<CarModel> {
 
 /// Takes away what hangs lower than `headroom` metres over the camera's lane.
 pub(super) fn clear_lane(world: &mut World, headroom: f64) {
-    let way = sweep::Way {
+    let free = sweep::FreeLane {
         headroom,
         ..sweep::ROAD
     };
-    sweep::clear(world, &way);
+    sweep::clear(world, &free);
 }
 
 /// Fills a varied world.

@@ -1,5 +1,6 @@
 //! Why there is nothing to learn from.
 
+use deepfusion_hint::count_of;
 use std::sync::Arc;
 
 /// Standard deviation of a distance, as a share of it, above which its sample is left out: metres that unsure teach no scale.
@@ -29,7 +30,9 @@ pub enum SampleProblem {
 pub enum Skipped {
     /// Distances that teach no scale.
     #[error(
-        "{drive}: {unsure} of {of} samples have a distance that is known to no better than {:.0} %",
+        "{drive}: {unsure} of {} {} a distance that is known to no better than {:.0} %",
+        count_of(*of, "sample"),
+        if *unsure == 1 { "has" } else { "have" },
         100.0 * MOST_SIGMA_SHARE
     )]
     UnsureDistances {

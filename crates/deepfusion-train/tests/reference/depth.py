@@ -4,7 +4,7 @@
     python crates/deepfusion-train/tests/reference/depth.py
 
 writes `depth.safetensors` beside this file: the inputs (float32), and the loss, its parts and the gradient with respect to
-the inverse depth of every scale, computed in double precision from those inputs. Errors are drawn until each, and each
+the disparity of every scale, computed in double precision from those inputs. Errors are drawn until each, and each
 difference between neighbours, is clear of 0, so that rounding cannot decide the sign of a gradient.
 
 `uncertainty/` has the scale ln b of the error at the finest scale, the negative log-likelihood of the known pixels by PyTorch's own

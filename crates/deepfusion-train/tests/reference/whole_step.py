@@ -296,7 +296,7 @@ class Networks:
         }
 
     def motions(self, target, sources, together):
-        """The views' motions, and, where there are masks, the logits of the target's, N×views×H×W."""
+        """The poses used for warping, and, where there are masks, the logits of the target's, N×views×H×W."""
         pairs = [torch.cat([s, target] if o < 0 else [target, s], 1) for o, s in zip(OFFSETS, sources)]
         run = self.pose(torch.cat(pairs)) if together else map(torch.cat, zip(*map(self.pose, pairs)))
         poses, *logits = (output.split(N) for output in run)

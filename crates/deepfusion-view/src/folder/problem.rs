@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use deepfusion_geometry::ImplausibleCamera;
+use deepfusion_hint::count_of;
 
 /// What is wrong with a frame, of which the rest is shown all the same.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -23,7 +24,11 @@ pub enum FrameProblem {
     #[error("the targets' file has no list of targets")]
     NoTargets,
     /// Targets of which nothing can be drawn.
-    #[error("{undrawable} of {targets} targets have no place or size")]
+    #[error(
+        "{undrawable} of {} {} no place or size",
+        count_of(*targets, "target"),
+        if *undrawable == 1 { "has" } else { "have" }
+    )]
     Undrawable {
         /// How many.
         undrawable: usize,
@@ -102,6 +107,13 @@ mod tests {
                     targets: 5,
                 },
                 "2 of 5 targets have no place or size",
+            ),
+            (
+                FrameProblem::Undrawable {
+                    undrawable: 1,
+                    targets: 1,
+                },
+                "1 of 1 target has no place or size",
             ),
             (
                 FrameProblem::NoSidecar {

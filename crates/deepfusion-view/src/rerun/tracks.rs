@@ -9,15 +9,15 @@ use super::targets::SeenTarget;
 /// So many frames back a path is drawn.
 const FRAMES: usize = 50;
 
-/// The ways of the tracks seen so far.
+/// The paths of the tracks seen so far.
 #[derive(Default)]
 pub(super) struct Tracks {
-    ways: HashMap<u64, Way>,
+    paths: HashMap<u64, TrackPath>,
     frame: usize,
 }
 
 /// Centres in the world, metres, each with the frame it was seen in.
-type Way = VecDeque<(usize, [f32; 3])>;
+type TrackPath = VecDeque<(usize, [f32; 3])>;
 
 impl Tracks {
     /// Adds a frame and returns the paths of its targets, if there are any. Without the camera's pose there is no world to draw
@@ -30,22 +30,22 @@ impl Tracks {
         let world_from_cam = world_from_cam?;
         self.frame += 1;
         for target in targets {
-            let way = self.ways.entry(target.id).or_default();
-            way.push_back((self.frame, moved(&world_from_cam, target.centre)));
+            let path = self.paths.entry(target.id).or_default();
+            path.push_back((self.frame, moved(&world_from_cam, target.centre)));
         }
         let oldest = self.frame.saturating_sub(FRAMES);
-        self.ways.retain(|_, way| {
-            way.retain(|(seen, _)| *seen > oldest);
-            !way.is_empty()
+        self.paths.retain(|_, path| {
+            path.retain(|(seen, _)| *seen > oldest);
+            !path.is_empty()
         });
-        let ways: Vec<_> = targets
+        let paths: Vec<_> = targets
             .iter()
-            .filter_map(|t| Some((t, self.ways.get(&t.id).filter(|way| way.len() > 1)?)))
+            .filter_map(|t| Some((t, self.paths.get(&t.id).filter(|path| path.len() > 1)?)))
             .collect();
-        let points = |way: &Way| -> Vec<[f32; 3]> { way.iter().map(|(_, p)| *p).collect() };
-        (!ways.is_empty()).then(|| {
-            LineStrips3D::new(ways.iter().map(|(_, way)| points(way)))
-                .with_colors(ways.iter().map(|(t, _)| t.colour()))
+        let points = |path: &TrackPath| -> Vec<[f32; 3]> { path.iter().map(|(_, p)| *p).collect() };
+        (!paths.is_empty()).then(|| {
+            LineStrips3D::new(paths.iter().map(|(_, path)| points(path)))
+                .with_colors(paths.iter().map(|(t, _)| t.colour()))
         })
     }
 }

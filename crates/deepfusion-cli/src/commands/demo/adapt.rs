@@ -65,7 +65,7 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
         ..usual
     };
     let drive = demo.simulate("street", &street)?;
-    let parts = Parts::of(demo, &drive)?;
+    let parts = SplitDrive::of(demo, &drive)?;
 
     say(&format!(
         "2/4 depth in metres, a point cloud and 3D targets, from the embedded network `{}` of {}",
@@ -131,7 +131,7 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     config.data.split = Some(parts.learn.clone());
     start.record_in(&mut config)?;
     let adapted = demo.learn(config, |model| {
-        start.initialise(model, &demo.device, &mut train::began)
+        start.initialise(model, &demo.device, &mut train::print_start)
     })?;
 
     say("4/4 measuring again on the part that was not learned from; pictures and the report");
@@ -166,7 +166,7 @@ fn measured_of(frames: usize) -> Range<usize> {
 }
 
 /// The drive's first part, to learn from, and its last, to be measured on.
-struct Parts {
+struct SplitDrive {
     all: Dataset,
     learned: Vec<Dataset>,
     measured: Vec<Dataset>,
@@ -174,7 +174,7 @@ struct Parts {
     learn: PathBuf,
 }
 
-impl Parts {
+impl SplitDrive {
     fn of(demo: &Demo, drive: &Path) -> Result<Self> {
         let open = |split: Option<&Path>| -> Result<Vec<Dataset>> {
             let split = split.map(Split::read).transpose()?;

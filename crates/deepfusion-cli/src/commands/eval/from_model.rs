@@ -16,7 +16,7 @@ use deepfusion_jobs::recordings::read_split;
 use deepfusion_perception::Reliability;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
-use super::{Found, page, verdict, write_points};
+use super::{EvalOutcome, page, verdict, write_points};
 use crate::cli::{CameraIntrinsics, EvalArgs};
 use crate::commands::recordings::{open_recordings, open_with_yaw};
 use crate::commands::{clocks, run_report, warnings};
@@ -27,7 +27,7 @@ use crate::model::{self, ModelFacts};
 use crate::progress::{Progress, say};
 
 /// A network, and the recordings that it is measured on.
-struct Opened {
+struct EvalInputs {
     model: ModelSource,
     estimator: DepthEstimator,
     options: OpenOptions,
@@ -43,29 +43,29 @@ struct Measured {
 
 /// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
 /// all of its ground truth counts.
-pub(super) fn found(args: &EvalArgs) -> Result<Found> {
-    let mut opened = open(args)?;
-    let verdict = verdict::of_model(args, &opened.model, &mut opened.estimator, &opened.datasets)?;
-    if verdict.is_some() && !with_truth(args, &opened.datasets) {
-        let checkpoint = UsedCheckpoint::of(&opened.estimator, &opened.model);
-        return verdict::alone(args, &opened.model, verdict, checkpoint);
+pub(super) fn outcome(args: &EvalArgs) -> Result<EvalOutcome> {
+    let mut inputs = open(args)?;
+    let verdict = verdict::of_model(args, &inputs.model, &mut inputs.estimator, &inputs.datasets)?;
+    if verdict.is_some() && !with_truth(args, &inputs.datasets) {
+        let checkpoint = UsedCheckpoint::of(&inputs.estimator, &inputs.model);
+        return verdict::alone(args, &inputs.model, verdict, checkpoint);
     }
-    let mut measured = measure(args, &mut opened)?;
-    measure_intervals(args, &mut opened, &mut measured)?;
+    let mut measured = measure(args, &mut inputs)?;
+    measure_intervals(args, &mut inputs, &mut measured)?;
     write_points(args, &measured.evaluated)?;
-    let saved = keep(args, &opened, &measured.evaluated)?;
-    let reliability = calibrate_confidence(args, &mut opened, &mut measured)?;
+    let saved = keep(args, &inputs, &measured.evaluated)?;
+    let reliability = calibrate_confidence(args, &mut inputs, &mut measured)?;
     let without_truth = (reliability.as_deref(), verdict.as_ref());
-    write_page(args, &mut opened, &mut measured, &saved, without_truth)?;
-    Ok(Found {
-        checkpoint: Some(UsedCheckpoint::of(&opened.estimator, &opened.model)),
+    write_page(args, &mut inputs, &mut measured, &saved, without_truth)?;
+    Ok(EvalOutcome {
+        checkpoint: Some(UsedCheckpoint::of(&inputs.estimator, &inputs.model)),
         report: Some(measured.evaluated.report),
         verdict,
     })
 }
 
 /// Opens the network and the recordings; what cannot be kept afterwards is refused before anything is measured.
-fn open(args: &EvalArgs) -> Result<Opened> {
+fn open(args: &EvalArgs) -> Result<EvalInputs> {
     let model = model::chosen(args.model.as_deref())?;
     if args.calibrate_confidence && model.folder().is_none() {
         let (option, model) = ("--calibrate-confidence", model.name());
@@ -91,7 +91,7 @@ fn open(args: &EvalArgs) -> Result<Opened> {
     } else {
         open_with_yaw(&args.data, &options)?
     };
-    Ok(Opened {
+    Ok(EvalInputs {
         model,
         estimator,
         options,
@@ -132,13 +132,13 @@ fn see(
 }
 
 /// Compares depth with ground truth, beside the mean-depth baseline.
-fn measure(args: &EvalArgs, opened: &mut Opened) -> Result<Measured> {
-    let Opened {
+fn measure(args: &EvalArgs, inputs: &mut EvalInputs) -> Result<Measured> {
+    let EvalInputs {
         estimator,
         options,
         datasets,
         ..
-    } = opened;
+    } = inputs;
     let expected = expected_frames(options, datasets, args.strict)?;
     let mut truth = match &args.gt {
         Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
@@ -172,14 +172,18 @@ fn measure(args: &EvalArgs, opened: &mut Opened) -> Result<Measured> {
 }
 
 /// Adds whether the network's intervals hold, and calibrates them where that is asked for. They are those of its own prediction alone.
-fn measure_intervals(args: &EvalArgs, opened: &mut Opened, measured: &mut Measured) -> Result<()> {
-    let knows = opened.estimator.knows_uncertainty();
+fn measure_intervals(
+    args: &EvalArgs,
+    inputs: &mut EvalInputs,
+    measured: &mut Measured,
+) -> Result<()> {
+    let knows = inputs.estimator.knows_uncertainty();
     if !knows || args.gt.is_some() || args.post_process.is_some() {
         return Ok(());
     }
     let kept = intervals::measure(
-        (&opened.model, &mut opened.estimator),
-        &opened.datasets,
+        (&inputs.model, &mut inputs.estimator),
+        &inputs.datasets,
         &mut measured.truth,
         &mut measured.evaluated,
         (&measured.protocol, !args.no_focal_correction),
@@ -197,13 +201,13 @@ fn measure_intervals(args: &EvalArgs, opened: &mut Opened, measured: &mut Measur
 }
 
 /// Keeps what was found beside the run.
-fn keep(args: &EvalArgs, opened: &Opened, evaluated: &Evaluated) -> Result<SavedEvaluation> {
-    let Opened {
+fn keep(args: &EvalArgs, inputs: &EvalInputs, evaluated: &Evaluated) -> Result<SavedEvaluation> {
+    let EvalInputs {
         model,
         estimator,
         datasets,
         ..
-    } = opened;
+    } = inputs;
     let saved = request(args).saved(model, estimator, datasets, evaluated)?;
     match model.folder().map(|folder| saved.write(folder)) {
         Some(Ok(path)) => say(&format!("kept as {}", path.display())),
@@ -236,15 +240,15 @@ fn request(args: &EvalArgs) -> EvaluationRequest<'_> {
 /// Learns a pixel's confidence where that is asked for; gives how it holds.
 fn calibrate_confidence(
     args: &EvalArgs,
-    opened: &mut Opened,
+    inputs: &mut EvalInputs,
     measured: &mut Measured,
 ) -> Result<Option<Vec<Reliability>>> {
-    let (true, Some(folder)) = (args.calibrate_confidence, opened.model.folder()) else {
+    let (true, Some(folder)) = (args.calibrate_confidence, inputs.model.folder()) else {
         return Ok(None);
     };
     let calibrated = confidence::calibrate(
-        &mut opened.estimator,
-        &opened.datasets,
+        &mut inputs.estimator,
+        &inputs.datasets,
         &mut measured.truth,
         &measured.evaluated,
         !args.no_focal_correction,
@@ -277,7 +281,7 @@ fn print_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
 /// Writes the page where `--report` asks for it.
 fn write_page(
     args: &EvalArgs,
-    opened: &mut Opened,
+    inputs: &mut EvalInputs,
     measured: &mut Measured,
     saved: &SavedEvaluation,
     (reliability, verdict): (Option<&[Reliability]>, Option<&Verdict>),
@@ -285,12 +289,12 @@ fn write_page(
     let Some(path) = &args.report else {
         return Ok(());
     };
-    let Opened {
+    let EvalInputs {
         model,
         estimator,
         datasets,
         ..
-    } = opened;
+    } = inputs;
     let Measured {
         protocol,
         truth,

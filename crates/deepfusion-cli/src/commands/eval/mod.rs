@@ -25,11 +25,11 @@ pub(super) fn run(args: &EvalArgs) -> Result<()> {
         output::require_folder_of(file)?;
     }
     let found = match (&args.pred, args.pred_kind, &args.gt) {
-        (Some(predictions), Some(kind), Some(truth)) => Found {
+        (Some(predictions), Some(kind), Some(truth)) => EvalOutcome {
             report: Some(from_arrays(args, predictions, kind, truth)?),
-            ..Found::default()
+            ..EvalOutcome::default()
         },
-        _ => from_model::found(args)?,
+        _ => from_model::outcome(args)?,
     };
     if args.json {
         return output::print_json(&found.printed());
@@ -39,7 +39,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<()> {
 
 /// What was found, as far as the data show it.
 #[derive(Default)]
-struct Found {
+struct EvalOutcome {
     checkpoint: Option<UsedCheckpoint>,
     /// With ground truth.
     report: Option<Report>,
@@ -47,7 +47,7 @@ struct Found {
     verdict: Option<Verdict>,
 }
 
-impl Found {
+impl EvalOutcome {
     fn printed(&self) -> Printed<'_> {
         let certificate = self
             .verdict
@@ -62,7 +62,7 @@ impl Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for EvalOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(checkpoint) = &self.checkpoint {
             write!(f, "{checkpoint}\n\n")?;

@@ -10,7 +10,7 @@ use deepfusion_model::TrainConfig;
 use deepfusion_render::HtmlReport;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
-use super::Found;
+use super::EvalOutcome;
 use crate::cli::EvalArgs;
 use crate::commands::{run_report, warnings};
 use crate::failure::Result;
@@ -116,7 +116,7 @@ pub(super) fn alone(
     model: &ModelSource,
     verdict: Option<Verdict>,
     checkpoint: UsedCheckpoint,
-) -> Result<Found> {
+) -> Result<EvalOutcome> {
     if let (Some(path), Some(verdict)) = (&args.report, &verdict) {
         let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
         let title = format!("Depth judged without ground truth on {}", names.join(", "));
@@ -130,7 +130,7 @@ pub(super) fn alone(
         page.write(path)?;
         say(&format!("report  {}", path.display()));
     }
-    Ok(Found {
+    Ok(EvalOutcome {
         checkpoint: Some(checkpoint),
         report: None,
         verdict,

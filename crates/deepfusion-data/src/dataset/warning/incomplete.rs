@@ -1,6 +1,7 @@
 //! What of a recording is left out, is not there or cannot be read.
 
 use crate::DatasetKind;
+use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 
 /// What of a recording, or of the folder in which it lies, is left out, is not there or cannot be read.
@@ -26,7 +27,12 @@ pub enum IncompleteWarning {
         recordings: Vec<String>,
     },
     /// Tables name images that are not there.
-    #[error("{missing} of {of} images are not there, such as {such_as}")]
+    #[error(
+        "{missing} of {} {} not there{} {such_as}",
+        count_of(*of, "image"),
+        if *missing == 1 { "is" } else { "are" },
+        if *missing == 1 { ":" } else { ", such as" }
+    )]
     ImagesMissing {
         /// How many are not.
         missing: usize,
@@ -166,6 +172,14 @@ mod tests {
                     such_as: "sweeps/CAM_FRONT/1.jpg".into(),
                 },
                 "6 of 8 images are not there, such as sweeps/CAM_FRONT/1.jpg",
+            ),
+            (
+                IncompleteWarning::ImagesMissing {
+                    missing: 1,
+                    of: 8,
+                    such_as: "sweeps/CAM_FRONT/1.jpg".into(),
+                },
+                "1 of 8 images is not there: sweeps/CAM_FRONT/1.jpg",
             ),
             (
                 IncompleteWarning::ImagesUnlisted {

@@ -82,12 +82,12 @@ impl std::fmt::Display for Chain {
 
 /// What the frames say of where one is in another.
 #[derive(Debug, Clone)]
-pub(super) enum Way {
+pub(super) enum Lookup {
     /// It stays there.
     Fixed(Chain),
-    /// Two ways that say different things.
+    /// Two chains that say different things.
     Several(Box<[Chain; 2]>),
-    /// It moves on the way: the link that does, and by how much.
+    /// It moves: the link of the chain that does, and by how much.
     Moves([String; 2], Change),
     /// Nothing.
     Unknown,
@@ -139,10 +139,10 @@ impl Frames {
     }
 
     /// Where the source's frame is in the target's.
-    pub(super) fn way(&self, target: &str, source: &str) -> Way {
+    pub(super) fn lookup(&self, target: &str, source: &str) -> Lookup {
         let (target, source) = (plain(target), plain(source));
         if !(self.has(target) && self.has(source)) {
-            return Way::Unknown;
+            return Lookup::Unknown;
         }
         let mut fixed = self.ways(target, source, true);
         fixed.sort_by_key(|chain| chain.names.len());
@@ -151,8 +151,8 @@ impl Frames {
                 !Change::between(&first.target_from_source, &other.target_from_source).is_small()
             });
             return match other {
-                Some(other) => Way::Several(Box::new([first.clone(), other.clone()])),
-                None => Way::Fixed(first.clone()),
+                Some(other) => Lookup::Several(Box::new([first.clone(), other.clone()])),
+                None => Lookup::Fixed(first.clone()),
             };
         }
         let moving = self.ways(target, source, false);
@@ -164,8 +164,8 @@ impl Frames {
         });
         let size = |change: &Change| change.metres + change.radians;
         let worst = links.max_by(|a, b| size(&a.1).total_cmp(&size(&b.1)));
-        worst.map_or(Way::Unknown, |(pair, change)| {
-            Way::Moves([pair[0].clone(), pair[1].clone()], change)
+        worst.map_or(Lookup::Unknown, |(pair, change)| {
+            Lookup::Moves([pair[0].clone(), pair[1].clone()], change)
         })
     }
 
@@ -260,9 +260,9 @@ mod tests {
         frames
     }
 
-    fn fixed(way: Way) -> Chain {
-        match way {
-            Way::Fixed(chain) => chain,
+    fn fixed(found: Lookup) -> Chain {
+        match found {
+            Lookup::Fixed(chain) => chain,
             other => panic!("{other:?}"),
         }
     }
@@ -276,21 +276,21 @@ mod tests {
             link("base", "lidar", 5.0, 0.0),
         ]);
         // The camera is 2 m along the mast's x, which points along the base's y.
-        let chain = fixed(tree.way("base", "camera"));
+        let chain = fixed(tree.lookup("base", "camera"));
         assert_eq!(chain.to_string(), "camera → mast → base");
         let place = chain.target_from_source.translation();
         assert!((place - Vector3::new(1.0, 2.0, 0.0)).norm() < 1e-12);
         // The LiDAR in the camera's axes: 4 m ahead of the base's x = 1, the camera looks to the left.
-        let place = fixed(tree.way("camera", "lidar"))
+        let place = fixed(tree.lookup("camera", "lidar"))
             .target_from_source
             .translation();
         assert!(
             (place - Vector3::new(-2.0, -4.0, 0.0)).norm() < 1e-12,
             "{place}"
         );
-        assert!(matches!(tree.way("base", "radar"), Way::Unknown));
+        assert!(matches!(tree.lookup("base", "radar"), Lookup::Unknown));
         assert!(
-            fixed(tree.way("base", "base"))
+            fixed(tree.lookup("base", "base"))
                 .target_from_source
                 .translation()
                 .norm()
@@ -308,8 +308,11 @@ mod tests {
                 link("b", "camera", x, 0.0),
             ])
         };
-        assert!(matches!(with(2.0).way("base", "camera"), Way::Fixed(_)));
-        let Way::Several(both) = with(2.1).way("base", "camera") else {
+        assert!(matches!(
+            with(2.0).lookup("base", "camera"),
+            Lookup::Fixed(_)
+        ));
+        let Lookup::Several(both) = with(2.1).lookup("base", "camera") else {
             panic!("4.0 and 4.1 m");
         };
         let found = both.map(|chain| chain.target_from_source.translation().x);
@@ -325,8 +328,8 @@ mod tests {
             link("odom", "base", 7.0, 1.0),
             link("base", "pan", 1.0, 0.3),
         ]);
-        assert!(matches!(tree.way("pan", "camera"), Way::Fixed(_)));
-        let Way::Moves(names, change) = tree.way("base", "camera") else {
+        assert!(matches!(tree.lookup("pan", "camera"), Lookup::Fixed(_)));
+        let Lookup::Moves(names, change) = tree.lookup("base", "camera") else {
             panic!("it pans");
         };
         assert_eq!(names, ["pan", "base"]);

@@ -2,7 +2,7 @@
 //! the profile.
 
 use super::config::BagConfig;
-use super::frames::{Chain, Change, Way};
+use super::frames::{Chain, Change, Lookup};
 use super::index::Index;
 use crate::{
     ConfigProblem, DataWarning, Error, FramesProblem, Mount, MountWarning, NotByFrames, Result,
@@ -50,7 +50,7 @@ impl Mounts {
         let mut search = Search {
             config,
             warnings,
-            said: Vec::new(),
+            mounts: Vec::new(),
         };
         let transforms = index.frames.broken;
         if transforms > 0 {
@@ -74,7 +74,7 @@ impl Mounts {
             || by_frames.vehicle_from_imu(),
         )?;
         let by_tf = search
-            .said
+            .mounts
             .iter()
             .any(|m| m.source.starts_with(BY_FRAMES) && m.name.starts_with("cam"));
         if let Some(name) = by_frames
@@ -93,7 +93,7 @@ impl Mounts {
             cam_from_vehicle: cam_from_vehicle.unwrap_or_else(looking_ahead),
             cam_from_lidar,
             vehicle_from_imu,
-            said: search.said,
+            said: search.mounts,
         })
     }
 }
@@ -105,7 +105,7 @@ const BY_FRAMES: &str = "frames ";
 struct Search<'a> {
     config: &'a BagConfig,
     warnings: &'a mut Vec<DataWarning>,
-    said: Vec<Mount>,
+    mounts: Vec<Mount>,
 }
 
 impl Search<'_> {
@@ -114,24 +114,24 @@ impl Search<'_> {
         &mut self,
         name: &'static str,
         [own, profile]: [Option<Se3>; 2],
-        by_frames: impl FnOnce() -> Result<Said>,
+        by_frames: impl FnOnce() -> Result<MountByFrames>,
     ) -> Result<Option<Se3>> {
         let found = match by_frames() {
             Ok(found) => found,
             // What the file says settles it.
-            Err(_) if own.is_some() => Said::Nothing,
+            Err(_) if own.is_some() => MountByFrames::NotExpected,
             Err(error) => return Err(error),
         };
         let in_file = self.config.path.display().to_string();
         let of_profile = self.config.profile.clone().unwrap_or_default();
         let (transform, source) = match (own, found) {
             (Some(own), found) => {
-                if let Said::Here(by_frames, chain) = found {
+                if let MountByFrames::Known(by_frames, chain) = found {
                     self.compare(name, (&own, &in_file), (&by_frames, &chain));
                 }
                 (own, in_file)
             }
-            (None, Said::Here(by_frames, chain)) => {
+            (None, MountByFrames::Known(by_frames, chain)) => {
                 if let Some(profile) = profile {
                     let who = format!("the profile {of_profile}");
                     self.compare(name, (&by_frames, &chain), (&profile, &who));
@@ -139,7 +139,7 @@ impl Search<'_> {
                 (by_frames, chain)
             }
             (None, other) => {
-                if let Said::No(why) = other {
+                if let MountByFrames::Unknown(why) = other {
                     self.warn(MountWarning::NotByFrames { mount: name, why });
                 }
                 match profile {
@@ -148,7 +148,7 @@ impl Search<'_> {
                 }
             }
         };
-        self.said.push(Mount {
+        self.mounts.push(Mount {
             name,
             source,
             translation: transform.translation().into(),
@@ -177,13 +177,13 @@ impl Search<'_> {
 }
 
 /// What the frames say of a mount.
-enum Said {
-    /// It, and by which way.
-    Here(Se3, String),
+enum MountByFrames {
+    /// It, and by which chain of frames.
+    Known(Se3, String),
     /// Why nothing, where something could be expected.
-    No(NotByFrames),
+    Unknown(NotByFrames),
     /// Nothing, and nothing was to be expected.
-    Nothing,
+    NotExpected,
 }
 
 /// The frames with the sensors' names in them.
@@ -239,34 +239,34 @@ impl<'a> ByFrames<'a> {
         Ok(all)
     }
 
-    fn cam_from_vehicle(&self) -> Result<Said> {
+    fn cam_from_vehicle(&self) -> Result<MountByFrames> {
         let Some(camera) = &self.camera else {
             let of_images = &self.index.image_frame;
             return Ok(self.absent(of_images, "the images", "camera"));
         };
         let Some(vehicle) = self.vehicle(camera)? else {
             let frames = self.index.frames.names().into_iter();
-            return Ok(Said::No(NotByFrames::NoVehicle {
+            return Ok(MountByFrames::Unknown(NotByFrames::NoVehicle {
                 frames: frames.map(str::to_owned).collect(),
                 known: VEHICLES.concat(),
                 config: self.config.path.clone(),
             }));
         };
-        Ok(self.upright(self.said("cam_from_vehicle", camera, &vehicle)?))
+        Ok(self.upright(self.between("cam_from_vehicle", camera, &vehicle)?))
     }
 
-    fn cam_from_lidar(&self) -> Result<Said> {
+    fn cam_from_lidar(&self) -> Result<MountByFrames> {
         let Some(camera) = &self.camera else {
-            return Ok(Said::Nothing);
+            return Ok(MountByFrames::NotExpected);
         };
         let Some(lidar) = &self.lidar else {
             let of_scans = &self.index.lidar_frame;
             return Ok(self.absent(of_scans, "the scans", "lidar"));
         };
-        Ok(self.upright(self.said("cam_from_lidar", camera, lidar)?))
+        Ok(self.upright(self.between("cam_from_lidar", camera, lidar)?))
     }
 
-    fn vehicle_from_imu(&self) -> Result<Said> {
+    fn vehicle_from_imu(&self) -> Result<MountByFrames> {
         let Some(imu) = &self.imu else {
             let of_imu = &self.index.imu_frame;
             return Ok(self.absent(of_imu, "the inertial unit", "imu"));
@@ -274,21 +274,26 @@ impl<'a> ByFrames<'a> {
         // One vehicle for all sensors.
         let anchor = self.camera.as_ref().unwrap_or(imu);
         match self.vehicle(anchor)? {
-            Some(vehicle) => self.said("vehicle_from_imu", &vehicle, imu),
-            None => Ok(Said::Nothing),
+            Some(vehicle) => self.between("vehicle_from_imu", &vehicle, imu),
+            None => Ok(MountByFrames::NotExpected),
         }
     }
 
     /// A sensor's frame that no transform has.
-    fn absent(&self, frame: &Option<String>, whose: &'static str, key: &'static str) -> Said {
+    fn absent(
+        &self,
+        frame: &Option<String>,
+        whose: &'static str,
+        key: &'static str,
+    ) -> MountByFrames {
         if self.index.frames.is_empty() {
-            return Said::Nothing;
+            return MountByFrames::NotExpected;
         }
         // A sensor that was not recorded has no messages, and none is missed.
         let Some(frame) = frame else {
-            return Said::Nothing;
+            return MountByFrames::NotExpected;
         };
-        Said::No(NotByFrames::Absent {
+        MountByFrames::Unknown(NotByFrames::Absent {
             whose,
             frame: frame.clone(),
             key,
@@ -322,8 +327,8 @@ impl<'a> ByFrames<'a> {
         for tier in tiers {
             let mut found: Option<(&str, Chain)> = None;
             for name in tier {
-                match frames.way(anchor, name) {
-                    Way::Fixed(chain) => match &found {
+                match frames.lookup(anchor, name) {
+                    Lookup::Fixed(chain) => match &found {
                         Some((first, other)) if !same(other, &chain) => {
                             return Err(self.error(FramesProblem::TwoVehicles {
                                 first: (*first).to_owned(),
@@ -335,9 +340,9 @@ impl<'a> ByFrames<'a> {
                         None => found = Some((name, chain)),
                     },
                     // Reported as what it is by the caller, who asks for this way again.
-                    Way::Several(_) => return Ok(Some(name.to_owned())),
-                    Way::Moves(..) => moving = moving.or(Some(name)),
-                    Way::Unknown => {}
+                    Lookup::Several(_) => return Ok(Some(name.to_owned())),
+                    Lookup::Moves(..) => moving = moving.or(Some(name)),
+                    Lookup::Unknown => {}
                 }
             }
             if let Some((name, _)) = found {
@@ -348,13 +353,13 @@ impl<'a> ByFrames<'a> {
     }
 
     /// Where the source's frame is in the target's.
-    fn said(&self, mount: &'static str, target: &str, source: &str) -> Result<Said> {
-        Ok(match self.index.frames.way(target, source) {
-            Way::Fixed(chain) => {
+    fn between(&self, mount: &'static str, target: &str, source: &str) -> Result<MountByFrames> {
+        Ok(match self.index.frames.lookup(target, source) {
+            Lookup::Fixed(chain) => {
                 let source = format!("{BY_FRAMES}{chain}");
-                Said::Here(chain.target_from_source, source)
+                MountByFrames::Known(chain.target_from_source, source)
             }
-            Way::Several(both) => {
+            Lookup::Several(both) => {
                 let [a, b] = *both;
                 let apart = Change::between(&a.target_from_source, &b.target_from_source);
                 return Err(self.error(FramesProblem::TwoWays {
@@ -365,14 +370,14 @@ impl<'a> ByFrames<'a> {
                     config: self.config.path.clone(),
                 }));
             }
-            Way::Moves(moving, change) => Said::No(NotByFrames::Moves {
+            Lookup::Moves(moving, change) => MountByFrames::Unknown(NotByFrames::Moves {
                 from: source.to_owned(),
                 to: target.to_owned(),
                 moving,
                 metres: change.metres,
                 radians: change.radians,
             }),
-            Way::Unknown => Said::No(NotByFrames::NoWay {
+            Lookup::Unknown => MountByFrames::Unknown(NotByFrames::NoWay {
                 from: source.to_owned(),
                 to: target.to_owned(),
             }),
@@ -387,18 +392,18 @@ impl<'a> ByFrames<'a> {
         };
         let vehicle = self.vehicle(camera).ok().flatten();
         let upright = vehicle.iter().chain(&self.lidar);
-        let mut ups = upright.filter_map(|name| match self.index.frames.way(camera, name) {
-            Way::Fixed(chain) => Some(chain.target_from_source.rotate(&Vector3::z())),
+        let mut ups = upright.filter_map(|name| match self.index.frames.lookup(camera, name) {
+            Lookup::Fixed(chain) => Some(chain.target_from_source.rotate(&Vector3::z())),
             _ => None,
         });
         ups.next().is_some_and(|up| up.z > BODY_AXES)
     }
 
     /// A transform into the images' frame as one into the camera's axes.
-    fn upright(&self, said: Said) -> Said {
-        match said {
-            Said::Here(body_from, source) if self.body_axes => {
-                Said::Here(looking_ahead() * body_from, source)
+    fn upright(&self, mount: MountByFrames) -> MountByFrames {
+        match mount {
+            MountByFrames::Known(body_from, source) if self.body_axes => {
+                MountByFrames::Known(looking_ahead() * body_from, source)
             }
             other => other,
         }

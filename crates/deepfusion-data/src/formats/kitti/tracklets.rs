@@ -332,7 +332,7 @@ mod tests {
                 "tracklet 0, pose 0",
                 "has no <tz>",
             ),
-            (file(POSE, 3), "tracklet 0", "1 poses, its count says 3"),
+            (file(POSE, 3), "tracklet 0", "1 pose, its count says 3"),
             (
                 file(POSE, 1).replace("<l>4.5</l>", "<l>-4.5</l>"),
                 "tracklet 0, l",
@@ -341,7 +341,7 @@ mod tests {
             (
                 file(POSE, 1).replacen("<count>1</count>", "<count>2</count>", 1),
                 "byte",
-                "1 tracklets, its count says 2",
+                "1 tracklet, its count says 2",
             ),
             (file(POSE, 1).replace("</tx>", "</ty>"), "byte", "tx"),
             (cut_at("</item>"), "byte", "ends within"),

@@ -1,11 +1,13 @@
 //! What does not fit the points of a cloud, or the depth map that they are made of.
 
+use deepfusion_hint::count_of;
+
 /// What does not fit the points of a cloud, or the depth map that they are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SizeProblem {
     /// A column has not one entry for each point.
-    #[error("{column}: {entries} entries, expected one a point, {points}")]
+    #[error("{column}: {}, expected one a point, {points}", entries_of(*entries))]
     Column {
         /// The column.
         column: &'static str,
@@ -26,7 +28,10 @@ pub enum SizeProblem {
         map: (usize, usize),
     },
     /// A map has not one value for each pixel.
-    #[error("depth or disparity: {values} values, expected {} ({}x{})", map.0 * map.1, map.0, map.1)]
+    #[error(
+        "depth or disparity: {}, expected {} ({}x{})",
+        count_of(*values, "value"), map.0 * map.1, map.0, map.1
+    )]
     Values {
         /// How many it has.
         values: usize,
@@ -34,11 +39,22 @@ pub enum SizeProblem {
         map: (usize, usize),
     },
     /// An image has not three bytes for each pixel.
-    #[error("colour image: {bytes} bytes, expected {} ({}x{}x3)", map.0 * map.1 * 3, map.0, map.1)]
+    #[error(
+        "colour image: {}, expected {} ({}x{}x3)",
+        count_of(*bytes, "byte"), map.0 * map.1 * 3, map.0, map.1
+    )]
     Colours {
         /// How many it has.
         bytes: usize,
         /// Width and height of the depth map.
         map: (usize, usize),
     },
+}
+
+/// "Entry" has no regular plural.
+fn entries_of(count: usize) -> String {
+    match count {
+        1 => "1 entry".to_owned(),
+        n => format!("{n} entries"),
+    }
 }

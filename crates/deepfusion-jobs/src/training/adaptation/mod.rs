@@ -22,7 +22,7 @@ pub use self::outcome::Outcome;
 pub use self::recipe::assumed_camera;
 
 use self::folders::Folders;
-use super::{Began, Start};
+use super::{Start, StartReport};
 use crate::held_out::unseen_frames;
 use crate::model_facts::ModelFacts as _;
 use crate::recordings::{open_aimed, open_with_turns};
@@ -114,8 +114,8 @@ pub fn require_new(out: &Path) -> Result<()> {
     Folders::of(out).map(|_| ())
 }
 
-/// Who hears of recordings while they are opened: as [`open_samples`] has it.
-pub type Opened<'a> = &'a mut dyn FnMut(&OpenOptions, &[Dataset]);
+/// Called with the recordings of a set when they are open, and with how they were opened, as by [`open_samples`].
+pub type OpenedCallback<'a> = &'a mut dyn FnMut(&OpenOptions, &[Dataset]);
 
 /// An adaptation that was begun: the given network is judged.
 pub struct Adaptation {
@@ -140,7 +140,7 @@ impl Adaptation {
         settings: AdaptSettings,
         estimator: &mut DepthEstimator,
         device: &Device,
-        opened: Opened,
+        opened: OpenedCallback,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Self> {
         let folders = Folders::of(&settings.out)?;
@@ -196,9 +196,9 @@ impl Adaptation {
     /// [`Error::OtherSettings`] where one with other settings was; as [`open_samples`], and the trainer's.
     pub fn trainer(
         &self,
-        opened: Opened,
+        opened: OpenedCallback,
         warn: &mut dyn FnMut(SampleWarning),
-        report: &mut dyn FnMut(Began),
+        report: &mut dyn FnMut(StartReport),
     ) -> Result<Trainer> {
         let sets = open_samples(&self.config, opened, warn)?;
         let config = self.config.clone();

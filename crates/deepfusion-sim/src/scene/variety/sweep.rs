@@ -4,9 +4,9 @@ use super::site::Spot;
 use crate::primitive::{Primitive, Shape};
 use crate::scene::World;
 
-/// A way that must be free.
+/// A lane that must be free.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Way {
+pub(super) struct FreeLane {
     /// Metres left of the centreline, from and to.
     pub lane: [f64; 2],
     /// Nothing hangs lower over it, metres.
@@ -14,22 +14,22 @@ pub(super) struct Way {
 }
 
 /// The lane of a car.
-pub(super) const ROAD: Way = Way {
+pub(super) const ROAD: FreeLane = FreeLane {
     lane: [-2.7, -0.6],
     headroom: 2.3,
 };
 
 /// The way through rooms and their doors.
-pub(super) const ROOMS: Way = Way {
+pub(super) const ROOMS: FreeLane = FreeLane {
     lane: [-2.19, -1.11],
     headroom: 1.95,
 };
 
-/// Whether a solid reaches into a way.
-fn intrudes(world: &World, way: &Way, solid: &Primitive) -> bool {
-    let lane = way.lane;
+/// Whether a solid reaches into a lane that must be free.
+fn intrudes(world: &World, free: &FreeLane, solid: &Primitive) -> bool {
+    let lane = free.lane;
     let (half_x, half_y, low, _) = solid.bounds(&world.hulls);
-    if solid.position[2] + f64::from(low) > way.headroom {
+    if solid.position[2] + f64::from(low) > free.headroom {
         return false;
     }
     let p = world.road.locate(solid.position[0], solid.position[1]);
@@ -67,12 +67,12 @@ fn intrudes(world: &World, way: &Way, solid: &Primitive) -> bool {
     })
 }
 
-/// Removes everything that reaches into a way.
-pub(super) fn clear(world: &mut World, way: &Way) {
+/// Removes everything that reaches into a lane.
+pub(super) fn clear(world: &mut World, free: &FreeLane) {
     let kept: Vec<Primitive> = world
         .primitives
         .iter()
-        .filter(|solid| !intrudes(world, way, solid))
+        .filter(|solid| !intrudes(world, free, solid))
         .copied()
         .collect();
     world.primitives = kept;
