@@ -128,7 +128,7 @@ def simulate(
     `moving_cars` drive along or towards the camera; `riders` are people who ride bicycles, walk and cross the road (streets, parks and country roads only),
     fewer where there is no room. `varied=True` draws the camera (lens, height, pitch, roll, softness, noise, exposure, JPEG), the light, the weather and what
     the street looks like from the seed, once for the drive: `varied.json` in the drive's folder says what was drawn, `scene` may be "motorway" or "country",
-    too, and only those cars drive that nothing on the street stops. `size` is width and height in pixels; `scan_every` says which frames have a LiDAR scan, 0 none. Ctrl-C leaves `out` as it was.
+    too, and only those cars drive that nothing on the street stops. `size` is width and height in pixels; `scan_every` says which frames have a LiDAR scan, 0 none. Ctrl-C leaves `out` as it was, unless all frames are done.
     """
     width, height = size
     return _native.simulate(out, frames, seed, scene, moving_cars, riders, varied, width, height, scan_every)

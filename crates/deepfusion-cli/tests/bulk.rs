@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{fails, ok};
+use crate::support::{fails, is_lock, ok};
 use serde_json::Value;
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data";
@@ -40,7 +40,7 @@ fn outputs(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .unwrap()
         .map(|entry| entry.unwrap())
         .map(|e| (e.file_name().into_string().unwrap(), e.path()))
-        .filter(|(name, _)| !name.ends_with(".manifest.json") && !name.ends_with(".lock"))
+        .filter(|(name, _)| !name.ends_with(".manifest.json") && !is_lock(name))
         .map(|(name, path)| (name, fs::read(path).unwrap()))
         .collect()
 }

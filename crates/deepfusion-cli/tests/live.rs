@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::support::streams::{brightness, piped, serve, stream, stream_of, with_path};
-use crate::support::{Run, run};
+use crate::support::{Run, is_lock, run};
 use serde_json::Value;
 
 const CAMERA: &str = "--intrinsics 186,186,157,44";
@@ -40,8 +40,7 @@ fn files(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries
         .map(|e| e.unwrap().file_name().into_string().unwrap())
-        // The lock's file stays for good.
-        .filter(|name| !name.ends_with(".lock"))
+        .filter(|name| !is_lock(name))
         .collect();
     names.sort();
     names

@@ -33,6 +33,7 @@ mod rgbd;
 mod scale;
 mod shipped;
 mod splits;
+mod stopped;
 mod support;
 mod texts;
 mod train;

@@ -1,6 +1,7 @@
 //! What can go wrong with a recording.
 
 use crate::{CalibrationSource, DatasetKind, GtKind, NamedTopic};
+use deepfusion_fs::moved_path;
 use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 
@@ -327,6 +328,20 @@ pub enum Error {
         /// The file, or the folder that is not empty.
         path: PathBuf,
     },
+    /// The folder to be written looks empty, and another writer is at work there, or died and what it left cannot be removed.
+    #[error("{}: the output folder is not empty: a writer left this in it, or is still writing it", path.display())]
+    Unfinished {
+        /// The hidden file or folder.
+        path: PathBuf,
+    },
+    /// Writing ended before the last frame, as its caller wanted: nothing of it is left.
+    #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
+    Stopped {
+        /// Frames done.
+        done: usize,
+        /// Frames in all.
+        total: usize,
+    },
     /// Recordings of different cameras cannot be drives of one date.
     #[error("{first} and {other} have different cameras, and a KITTI date has one calibration")]
     Cameras {
@@ -560,6 +575,20 @@ impl Error {
         match source.kind() {
             std::io::ErrorKind::NotFound => Self::NoSuchPath { path },
             _ => Self::File { path, source },
+        }
+    }
+
+    /// The same error with `to` in place of `from` in the path that it names: what was written aside is gone when it is read.
+    pub(crate) fn moved(self, from: &Path, to: &Path) -> Self {
+        match self {
+            Self::NoSuchPath { path } => Self::NoSuchPath {
+                path: moved_path(path, from, to),
+            },
+            Self::File { path, source } => Self::File {
+                path: moved_path(path, from, to),
+                source,
+            },
+            other => other,
         }
     }
 

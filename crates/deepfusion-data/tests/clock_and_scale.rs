@@ -7,6 +7,7 @@ use deepfusion_data::{Dataset, OpenOptions, convert_to_bag, convert_to_kitti, in
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::Compression;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -154,9 +155,12 @@ fn what_was_taken_out_is_not_taken_out_again_after_a_conversion() {
         let out = tempfile::tempdir().unwrap();
         let kitti = out.path().join("kitti");
         let one = std::slice::from_ref(&first);
-        let folders = convert_to_kitti(one, &kitti, &mut |_, _| {}).unwrap();
+        let folders = convert_to_kitti(one, &kitti, &mut |_, _| ControlFlow::Continue(())).unwrap();
         let bag = out.path().join("again.bag");
-        convert_to_bag(&first, &bag, Compression::None, &mut |_, _| {}).unwrap();
+        convert_to_bag(&first, &bag, Compression::None, &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         for path in [&folders.paths[0], &bag] {
             let again = open(path, &OpenOptions::default());
             near(again.camera_ahead_s(), 0.0, drive.layout);
@@ -241,10 +245,16 @@ fn times_before_1970_are_moved_and_not_cut_off() {
     let first = open(root.path(), &OpenOptions::default());
     let out = tempfile::tempdir().unwrap();
     let bag = out.path().join("drive.bag");
-    let written = convert_to_bag(&first, &bag, Compression::None, &mut |_, _| {}).unwrap();
+    let written = convert_to_bag(&first, &bag, Compression::None, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     assert_eq!(written.moved_s, 2, "the first speed is 1.5 s before 0");
     let kitti = out.path().join("kitti");
-    let written = convert_to_kitti(std::slice::from_ref(&first), &kitti, &mut |_, _| {}).unwrap();
+    let written = convert_to_kitti(std::slice::from_ref(&first), &kitti, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     assert_eq!(written.moved_s, 2);
     for path in [&bag, &written.paths[0]] {
         let again = open(path, &OpenOptions::default());

@@ -1,9 +1,12 @@
 //! A conversion that does not come to its end, and the one after it.
 
 use crate::common::{DRIVE, TinyDrive};
-use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_kitti};
+use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_bag, convert_to_kitti};
 use deepfusion_fs::PartialFolder;
+use deepfusion_hint::Hint;
+use deepfusion_rosbag::Compression;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// More frames than are read and written together.
@@ -29,7 +32,7 @@ fn names(folder: &Path) -> Vec<String> {
 
 /// Converts a whole drive.
 fn convert(dataset: Dataset, out: &Path) {
-    let written = convert_to_kitti(&[dataset], out, &mut |_, _| {}).unwrap();
+    let written = convert_to_kitti(&[dataset], out, &mut |_, _| ControlFlow::Continue(())).unwrap();
     assert_eq!(names(out).len(), 1, "{:?}", names(out));
     let again = Dataset::open(out, &OpenOptions::default()).unwrap();
     assert_eq!(again[0].frames().len(), 12);
@@ -50,6 +53,7 @@ fn one_that_fails_in_the_middle_leaves_nothing() {
         let mut done = Vec::new();
         let failed = convert_to_kitti(std::slice::from_ref(&dataset), out, &mut |frames, _| {
             done.push(frames);
+            ControlFlow::Continue(())
         });
         let said = failed.unwrap_err().to_string();
         assert!(said.contains("0000000010.png"), "{said}");
@@ -65,14 +69,75 @@ fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
     let root = tempfile::tempdir().unwrap();
     let dataset = drive(&root.path().join("drive"));
     let out = root.path().join("kitti");
-    // Of another date: whatever is half a folder goes.
-    let left = out.join(".2011_09_26.17-00ab.partial");
-    fs::create_dir_all(left.join("2011_09_26_drive_0001_sync")).unwrap();
-    fs::write(out.join(".2011_09_26.17-00ab.partial.lock"), "").unwrap();
     let another = PartialFolder::beside(&out.join("2030_01_02")).unwrap();
-    let refused = convert_to_kitti(std::slice::from_ref(&dataset), &out, &mut |_, _| {});
-    assert!(matches!(refused, Err(Error::Exists { path }) if path == out));
-    assert!(another.path().exists() && !left.exists());
+    // Of another date: whatever is half a folder goes.
+    let left = PartialFolder::beside(&out.join("2011_09_27")).unwrap();
+    let folder = left.path().to_owned();
+    fs::create_dir(folder.join("2011_09_27_drive_0001_sync")).unwrap();
+    left.abandon();
+    let refused = convert_to_kitti(std::slice::from_ref(&dataset), &out, &mut |_, _| {
+        ControlFlow::Continue(())
+    });
+    let refused = refused.unwrap_err();
+    assert!(refused.hint().unwrap().contains(".lock"), "{refused}");
+    assert!(matches!(refused, Error::Unfinished { path } if path == another.path()));
+    assert!(another.path().exists() && !folder.exists());
     drop(another);
     convert(dataset, &out);
+}
+
+#[test]
+fn one_that_is_stopped_leaves_nothing_unless_it_is_done() {
+    let root = tempfile::tempdir().unwrap();
+    let root = root.path();
+    let dataset = drive(root);
+    let (kitti, bag) = (root.join("new/kitti"), root.join("drive.bag"));
+    // Asked after the first frames, or after the last.
+    for (frames, is_done) in [(8, false), (12, true)] {
+        let mut stop_at = |done: usize, total: usize| {
+            assert_eq!(total, 12);
+            if done >= frames {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let of_kitti = convert_to_kitti(std::slice::from_ref(&dataset), &kitti, &mut stop_at);
+        let of_bag = convert_to_bag(&dataset, &bag, Compression::None, &mut stop_at);
+        for written in [of_kitti, of_bag] {
+            if is_done {
+                written.unwrap();
+                continue;
+            }
+            let stopped = written.unwrap_err();
+            assert!(stopped.hint().is_some());
+            assert!(
+                matches!(stopped, Error::Stopped { done: 8, total: 12 }),
+                "{stopped}"
+            );
+        }
+        assert_eq!(root.join("new").exists(), is_done);
+        let beside = names(root).iter().filter(|n| n.contains("drive.")).count();
+        assert_eq!(beside, if is_done { 2 } else { 0 }, "{:?}", names(root));
+    }
+    let options = OpenOptions::default();
+    for path in [&kitti, &bag] {
+        assert_eq!(Dataset::open(path, &options).unwrap()[0].frames().len(), 12);
+    }
+}
+
+/// The folder that was written aside is gone when its error is read.
+#[test]
+fn what_cannot_be_written_is_named_by_its_place() {
+    let root = tempfile::tempdir().unwrap();
+    let dataset = drive(&root.path().join("drive"));
+    let out = root.path().join("kitti");
+    let failed = convert_to_kitti(std::slice::from_ref(&dataset), &out, &mut |_, _| {
+        let aside = names(&out).into_iter().find(|n| n.ends_with(".partial"));
+        fs::remove_dir_all(out.join(aside.unwrap())).unwrap();
+        ControlFlow::Continue(())
+    });
+    let said = failed.unwrap_err().to_string();
+    assert!(said.contains("_drive_0001_sync"), "{said}");
+    assert!(!said.contains("partial"), "{said}");
 }

@@ -121,6 +121,9 @@ fn nothing_there_is_said() {
         "{text}"
     );
     let empty = tempfile::tempdir().unwrap();
+    for hidden in [".DS_Store", ".drive.17-2.partial.lock"] {
+        fs::write(empty.path().join(hidden), "x").unwrap();
+    }
     let text = refusal(empty.path());
     assert!(text.contains("it is empty"), "{text}");
     // What was looked for, layout by layout.

@@ -5,6 +5,7 @@ use crate::common::folder;
 use deepfusion_data::{Dataset, DatasetKind, OpenOptions, convert_to_bag, convert_to_kitti};
 use deepfusion_rosbag::Compression;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 fn open(path: &Path) -> Vec<Dataset> {
@@ -37,10 +38,13 @@ fn the_mark_goes_from_layout_to_layout() {
             mark(&bag);
         }
         let kitti = root.join(format!("kitti-{marked}"));
-        convert_to_kitti(&open(&bag), &kitti, &mut |_, _| {}).unwrap();
+        convert_to_kitti(&open(&bag), &kitti, &mut |_, _| ControlFlow::Continue(())).unwrap();
         let again = root.join(format!("again-{marked}.bag"));
         let drive = open(&kitti).remove(0);
-        convert_to_bag(&drive, &again, Compression::None, &mut |_, _| {}).unwrap();
+        convert_to_bag(&drive, &again, Compression::None, &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         for path in [&bag, &kitti, &again] {
             let said = (
                 open(path)[0].is_simulated(),
@@ -62,7 +66,10 @@ fn drives_of_one_date_are_told_apart() {
     mark(&bag);
     let simulated = open(&bag).remove(0);
     let kitti = root.join("kitti");
-    let converted = convert_to_kitti(&[real, simulated], &kitti, &mut |_, _| {}).unwrap();
+    let converted = convert_to_kitti(&[real, simulated], &kitti, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let [of_real, of_simulated] = converted.paths.as_slice() else {
         panic!("{:?}", converted.paths)
     };

@@ -1,13 +1,17 @@
 //! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut.
 
 mod content;
+mod in_the_way;
+mod machine;
+mod made_folders;
 mod names;
 mod partial;
 mod partial_folder;
 mod sync;
 
 pub use content::Content;
-pub use names::unused;
+pub use in_the_way::{InTheWay, in_the_way};
+pub use names::{moved_path, unused};
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
 pub use partial_folder::PartialFolder;
 pub use sync::{publish, publish_folder, sync_files, sync_folder};

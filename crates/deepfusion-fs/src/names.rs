@@ -1,19 +1,49 @@
 //! Names that nobody has yet.
 
+use std::borrow::Cow;
 use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
 use std::hash::{BuildHasher, Hasher};
 use std::path::{Path, PathBuf};
+
+/// The longest part of a temporary name that stands for the target, in bytes. File systems have names of up to 255 bytes, of which the dots, a
+/// process's number, the chance, `.partial` and `.lock` take 42.
+const LONGEST: usize = 213;
 
 /// A hidden name beside `target` that nobody else has.
 pub(crate) fn temporary_name(target: &Path) -> PathBuf {
     // Threads, processes, and machines that share the folder may write the same target: the last rename wins, whole. A
     // process's number alone would come again after a kill, in a container every time.
     let chance = RandomState::new().build_hasher().finish();
+    let target_name = target.file_name().unwrap_or_default();
     let mut name = OsString::from(".");
-    name.push(target.file_name().unwrap_or_default());
+    if target_name.len() <= LONGEST {
+        name.push(target_name);
+    } else {
+        name.push(&*shortened(&target_name.to_string_lossy()));
+    }
     name.push(format!(".{}-{chance:016x}.partial", std::process::id()));
     target.with_file_name(name)
+}
+
+/// How a target's name stands in a temporary one: a name that leaves too little room is cut, and ends in a checksum of all of it.
+pub(crate) fn shortened(name: &str) -> Cow<'_, str> {
+    if name.len() <= LONGEST {
+        return Cow::Borrowed(name);
+    }
+    let checksum = format!("~{:08x}", crc32fast::hash(name.as_bytes()));
+    let mut end = LONGEST - checksum.len();
+    while !name.is_char_boundary(end) {
+        end -= 1;
+    }
+    Cow::Owned(format!("{}{checksum}", &name[..end]))
+}
+
+/// `path` with `to` in place of `from`, where it begins with that. For errors: they outlive the file that was written aside, and name its place.
+#[must_use]
+pub fn moved_path(path: PathBuf, from: &Path, to: &Path) -> PathBuf {
+    let moved = path.strip_prefix(from).map(|rest| to.join(rest));
+    moved.unwrap_or(path)
 }
 
 /// `path`, or `path-2`, `path-3` … where that is taken.
@@ -45,5 +75,29 @@ mod tests {
         assert_eq!(unused(&path), second);
         std::fs::create_dir(&second).unwrap();
         assert_eq!(unused(&path), dir.path().join("run-3"));
+    }
+
+    #[test]
+    fn a_long_name_is_cut_and_stays_its_own() {
+        assert_eq!(shortened("a_depth.png"), "a_depth.png");
+        let fits = "x".repeat(LONGEST);
+        assert_eq!(shortened(&fits), fits);
+        let (a, b) = (format!("{fits}a"), format!("{fits}b"));
+        assert_ne!(shortened(&a), shortened(&b));
+        for name in [a.as_str(), &"\u{e4}".repeat(120), &"x\u{1F600}".repeat(50)] {
+            assert!(shortened(name).len() <= LONGEST, "{}", shortened(name));
+            let temporary = temporary_name(&Path::new("out").join(name));
+            assert_eq!(temporary.parent(), Some(Path::new("out")));
+            let longest = temporary.file_name().unwrap().len() + ".lock".len();
+            assert!(longest <= 255, "{longest}");
+        }
+    }
+
+    #[test]
+    fn what_was_aside_is_named_by_its_place() {
+        let (from, to) = (Path::new("out/.a.partial"), Path::new("out/a"));
+        let moved = |path: &str| moved_path(path.into(), from, to);
+        assert_eq!(moved("out/.a.partial/b/c"), Path::new("out/a/b/c"));
+        assert_eq!(moved("in/b"), Path::new("in/b"));
     }
 }

@@ -1,10 +1,11 @@
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::names::temporary_name;
+use crate::names::{shortened, temporary_name};
 use crate::sync::{folder_of, publish, sync_files, sync_folder};
 
 /// A temporary file beside its target, on the same file system, until the file is complete. It is removed on drop unless
@@ -89,13 +90,19 @@ impl Partial {
         std::fs::rename(&self.temporary, &self.target)
     }
 
-    /// The target's name, if `path` is a temporary file or folder that a killed program left behind.
+    /// The target's name ([as it stands there](Self::name_of)), if `path` is a temporary file or folder that a killed program left behind.
     #[must_use]
     pub fn target_of(path: &Path) -> Option<&str> {
         let name = path.file_name()?.to_str()?;
         let inner = name.strip_prefix('.')?.strip_suffix(".partial")?;
         let (file, process) = inner.rsplit_once('.')?;
         process.contains('-').then_some(file)
+    }
+
+    /// What [`Self::target_of`] gives of a target of this name: a long one is cut, so that the temporary name is not longer than names can be.
+    #[must_use]
+    pub fn name_of(target: &str) -> Cow<'_, str> {
+        shortened(target)
     }
 }
 
@@ -279,6 +286,12 @@ mod tests {
         let older = Path::new("out/.a_depth.png.17-3.partial");
         assert_eq!(Partial::target_of(older), Some("a_depth.png"));
         assert_eq!(Partial::target_of(Path::new("out/.a.partial")), None);
+        let long = "a".repeat(255);
+        let a = Partial::beside(&Path::new("out").join(&long));
+        assert_eq!(
+            Partial::target_of(a.path()),
+            Some(&*Partial::name_of(&long))
+        );
     }
 
     #[test]

@@ -1,7 +1,9 @@
 use std::fs::{self, File, TryLockError};
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
+use crate::machine::Machine;
+use crate::made_folders::MadeFolders;
 use crate::names::temporary_name;
 use crate::partial::Partial;
 use crate::sync::{folder_of, publish_folder, sync_folder, sync_tree};
@@ -13,29 +15,30 @@ const LOCK: &str = "lock";
 /// [`Self::commit`]. Dropped without that, it removes itself, so it also serves as a scratch folder.
 ///
 /// Its name is hidden, and no other writer's. As long as it is there a file beside it is locked, of the same name with
-/// `.lock` behind it. A process that dies leaves both, without the lock, which is how [`Self::remove_leftovers`] knows them.
+/// `.lock` behind it, that says on which machine its writer runs. A process that dies leaves both, without the lock, which is how
+/// [`Self::remove_leftovers`] knows them.
 #[derive(Debug)]
 pub struct PartialFolder {
     folder: PathBuf,
     destination: PathBuf,
-    /// The folder around it, where it was made for this one.
-    made: Option<PathBuf>,
-    _lock: File,
+    /// Held as long as the folder is to be removed on drop.
+    lock: Option<File>,
+    /// The folders around it that were made for it.
+    made: MadeFolders,
 }
 
 impl PartialFolder {
-    /// An empty folder beside `destination`, in a folder that is made where there is none, and is removed again if nothing
-    /// comes of it. What writers that died left there is removed first.
+    /// An empty folder beside `destination`, in a folder that is made where there is none, with those around it, and is removed again if
+    /// nothing comes of it. What writers that died left there is removed first.
     ///
     /// # Errors
     /// The system's error, for instance if that folder cannot be written to.
     pub fn beside(destination: &Path) -> io::Result<Self> {
         let around = folder_of(destination);
-        let existed = around.is_dir();
-        fs::create_dir_all(around)?;
+        let made = MadeFolders::make(around)?;
         Self::remove_leftovers(around);
         let mut partial = Self::reserve(destination)?;
-        partial.made = (!existed).then(|| around.to_owned());
+        partial.made = made;
         fs::create_dir(&partial.folder)?;
         Ok(partial)
     }
@@ -45,18 +48,25 @@ impl PartialFolder {
         loop {
             let folder = temporary_name(destination);
             let path = lock_of(&folder);
-            let lock = File::create_new(&path)?;
+            let mut lock = File::create_new(&path)?;
             // A file system without locks is no reason to stop: there nobody can lock a leftover's, either, and all stay.
             let is_taken = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
             // Between making and locking it, another process may have taken it for a leftover's: then it is, or will be, gone.
-            if !is_taken && path.exists() {
-                return Ok(Self {
-                    folder,
-                    destination: destination.to_owned(),
-                    made: None,
-                    _lock: lock,
-                });
+            if is_taken || !path.exists() {
+                let _ = fs::remove_file(&path);
+                continue;
             }
+            let written = lock.write_all(Machine::this().to_text().as_bytes());
+            // After a power cut it is to say whose it was; where that cannot be waited for, it may not.
+            let _ = lock.sync_all();
+            let partial = Self {
+                folder,
+                destination: destination.to_owned(),
+                lock: Some(lock),
+                made: MadeFolders::default(),
+            };
+            // From here on its drop removes the lock's file.
+            return written.map(|()| partial);
         }
     }
 
@@ -66,22 +76,23 @@ impl PartialFolder {
         &self.folder
     }
 
-    /// Syncs the folder with all its content, renames it to its destination and syncs the folder around it. A destination that
+    /// Syncs the folder with all its content, renames it to its destination and syncs the folders around it. A destination that
     /// exists and is not an empty folder stays as it is.
     ///
     /// # Errors
     /// The system's error, for instance [`ErrorKind::DirectoryNotEmpty`]. The destination is then unchanged; only the last step,
-    /// syncing the folder around it, may fail with the new folder in place.
-    pub fn commit(self) -> io::Result<()> {
-        publish_folder(&self.folder, &self.destination)
+    /// syncing the folders around it, may fail with the new folder in place.
+    pub fn commit(mut self) -> io::Result<()> {
+        publish_folder(&self.folder, &self.destination)?;
+        self.made.keep()
     }
 
     /// As [`Self::commit`], in place of a folder that is at the destination: that is renamed out of the way and removed once
     /// the new one has its name. A process that dies between the two leaves nothing at the destination, never half a folder.
     ///
     /// # Errors
-    /// As [`Self::commit`].
-    pub fn commit_replacing(self) -> io::Result<()> {
+    /// As [`Self::commit`]. Where the old folder cannot get its name back, it stays beside the destination, and the error names it.
+    pub fn commit_replacing(mut self) -> io::Result<()> {
         sync_tree(&self.folder)?;
         // Its drop removes what is moved there.
         let old = Self::reserve(&self.destination)?;
@@ -91,49 +102,105 @@ impl PartialFolder {
             return Err(error);
         }
         if let Err(error) = fs::rename(&self.folder, &self.destination) {
-            // Best effort: another process may have been quicker.
-            let _ = fs::rename(&old.folder, &self.destination);
-            return Err(error);
+            return Err(old.put_back(error));
         }
-        sync_folder(folder_of(&self.destination))
+        sync_folder(folder_of(&self.destination))?;
+        self.made.keep()
+    }
+
+    /// Renames a folder that was moved away to its destination again, as nothing took its place; gives the error that says why not.
+    fn put_back(self, error: io::Error) -> io::Error {
+        let is_back = fs::rename(&self.folder, &self.destination).is_ok();
+        // Where another process was quicker, its folder replaces this one.
+        if is_back || !self.folder.exists() || self.destination.is_dir() {
+            return error;
+        }
+        let kept = self.keep();
+        let message = format!("{error}; what was there is now {}", kept.display());
+        io::Error::new(error.kind(), message)
+    }
+
+    /// Syncs files of the folder and renames them, in this order, into the folder around it, then syncs that: the last one is there only if all
+    /// are. Whatever else is in the folder goes.
+    ///
+    /// # Errors
+    /// The system's error; [`ErrorKind::AlreadyExists`] where a name is taken. None of them is there then; only the last step,
+    /// syncing the folders around them, may fail with all in place.
+    pub fn commit_files<P: AsRef<Path>>(mut self, names: &[P]) -> io::Result<()> {
+        sync_tree(&self.folder)?;
+        let around = folder_of(&self.destination);
+        for (place, name) in names.iter().enumerate() {
+            let (from, to) = (self.folder.join(name), around.join(name));
+            let renamed = if to.exists() {
+                Err(ErrorKind::AlreadyExists.into())
+            } else {
+                fs::rename(from, to)
+            };
+            if let Err(error) = renamed {
+                for earlier in &names[..place] {
+                    let _ = fs::remove_file(around.join(earlier));
+                }
+                return Err(error);
+            }
+        }
+        sync_folder(around)?;
+        self.made.keep()
     }
 
     /// Removes the partial folders in a folder whose writers died, whatever their destinations; those that are still written
     /// are locked and stay. For those who ask whether the folder is empty: [`Self::beside`] does it by itself.
     ///
-    /// On a file system that machines share, that needs locks which they share, too, as NFS has. Where a file system has no
-    /// locks, everything stays. So does what cannot be removed: it is in nobody's way.
+    /// On a file system that machines share, a lock may be seen on the writer's machine alone: what another machine's process left or is
+    /// writing stays. So does everything where a file system has no locks, and what cannot be removed: [`crate::in_the_way()`] says what.
     pub fn remove_leftovers(folder: &Path) {
+        let here = Machine::this();
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            let lock = entry.path();
-            let partial = lock.with_extension("");
-            if lock.extension().is_none_or(|end| end != LOCK)
-                || Partial::target_of(&partial).is_none()
-            {
-                continue;
-            }
-            // For writing, without which shared file systems do not lock.
-            let Ok(file) = File::options().read(true).write(true).open(&lock) else {
+            let path = entry.path();
+            let Some(partial) = folder_of_lock(&path) else {
                 continue;
             };
-            if file.try_lock().is_ok() && remove_folder(&partial).is_ok() {
+            // For writing, without which shared file systems do not lock.
+            let Ok(mut lock) = File::options().read(true).write(true).open(&path) else {
+                continue;
+            };
+            let mut text = String::new();
+            let is_dead = lock.try_lock().is_ok()
+                && lock.read_to_string(&mut text).is_ok()
+                && Machine::from_text(&text).is_some_and(|writer| here.sees_locks_of(&writer));
+            if is_dead && remove_folder(&partial).is_ok() {
                 // Last, and while it is locked: without it nobody would know the folder.
-                let _ = fs::remove_file(&lock);
+                let _ = fs::remove_file(&path);
             }
         }
+    }
+
+    /// Leaves the folder where it is, for nobody to remove: without its lock's file it is no leftover.
+    fn keep(mut self) -> PathBuf {
+        if let Some(lock) = self.lock.take() {
+            let _ = fs::remove_file(lock_of(&self.folder));
+            drop(lock);
+        }
+        std::mem::take(&mut self.folder)
+    }
+
+    /// Leaves the folder as a process does that dies. For tests of what comes after.
+    #[doc(hidden)]
+    pub fn abandon(mut self) {
+        self.lock = None;
     }
 }
 
 impl Drop for PartialFolder {
     fn drop(&mut self) {
-        // Best effort: nothing can be done about failures here. After a commit there is no such folder, and the one around it
-        // is not empty.
+        let Some(lock) = self.lock.take() else {
+            return;
+        };
+        // Best effort: nothing can be done about failures here. After a commit there is no such folder.
         if remove_folder(&self.folder).is_ok() {
             let _ = fs::remove_file(lock_of(&self.folder));
         }
-        if let Some(made) = &self.made {
-            let _ = fs::remove_dir(made);
-        }
+        // An open file may keep its name in the folders around it, as on NFS, and they go next.
+        drop(lock);
     }
 }
 
@@ -142,6 +209,13 @@ fn lock_of(folder: &Path) -> PathBuf {
     path.push(".");
     path.push(LOCK);
     path.into()
+}
+
+/// The partial folder that `path` is the lock's file of.
+pub(crate) fn folder_of_lock(path: &Path) -> Option<PathBuf> {
+    path.extension().filter(|end| *end == LOCK)?;
+    let folder = path.with_extension("");
+    Partial::target_of(&folder).is_some().then_some(folder)
 }
 
 /// Removes a folder, which may not be there.
@@ -177,12 +251,16 @@ mod tests {
         fs::read_to_string(destination.join("sub/a")).unwrap()
     }
 
-    /// What a process leaves that died while it wrote.
-    fn leftover(dir: &Path) {
+    /// What a process leaves that died while it wrote, on the machine that the lock's text says.
+    fn leftover(dir: &Path, machine: &str) {
         let folder = dir.join(".drive.17-00ab.partial");
         fs::create_dir_all(folder.join("sub")).unwrap();
         fs::write(folder.join("sub/a"), "half").unwrap();
-        fs::write(lock_of(&folder), "").unwrap();
+        fs::write(lock_of(&folder), machine).unwrap();
+    }
+
+    fn here() -> String {
+        Machine::this().to_text()
     }
 
     #[test]
@@ -201,7 +279,7 @@ mod tests {
     fn a_dropped_folder_leaves_nothing() {
         let dir = tempfile::tempdir().unwrap();
         drop(filled(&dir.path().join("drive"), "half"));
-        drop(filled(&dir.path().join("made/drive"), "half"));
+        drop(filled(&dir.path().join("all/are/made/drive"), "half"));
         assert!(names(dir.path()).is_empty());
         // What else came into the folder that was made for it stays.
         let partial = filled(&dir.path().join("made/drive"), "half");
@@ -231,14 +309,14 @@ mod tests {
     fn what_a_dead_writer_left_goes_and_what_another_writes_stays() {
         let dir = tempfile::tempdir().unwrap();
         let destination = dir.path().join("drive");
-        leftover(dir.path());
+        leftover(dir.path(), &here());
         // Of one that died before it made its folder.
-        fs::write(dir.path().join(".other.18-1.partial.lock"), "").unwrap();
+        fs::write(dir.path().join(".other.18-1.partial.lock"), here()).unwrap();
         // Nobody's, or a file's: no lock is theirs.
         fs::create_dir(dir.path().join(".drive.17-2.partial")).unwrap();
         fs::write(dir.path().join("package.lock"), "").unwrap();
         let at_work = filled(&destination, "one");
-        leftover(dir.path());
+        leftover(dir.path(), &here());
         let beside_it = filled(&destination, "another");
         assert_ne!(at_work.path(), beside_it.path());
         PartialFolder::remove_leftovers(dir.path());
@@ -251,6 +329,72 @@ mod tests {
             [".drive.17-2.partial", "drive", "package.lock"]
         );
         PartialFolder::remove_leftovers(&dir.path().join("none"));
+        filled(&destination, "half").abandon();
+        assert_eq!(names(dir.path()).len(), 5, "{:?}", names(dir.path()));
+        PartialFolder::remove_leftovers(dir.path());
+        assert_eq!(names(dir.path()).len(), 3, "{:?}", names(dir.path()));
+    }
+
+    #[test]
+    fn what_another_machine_left_or_writes_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        for other in ["another\n00000000-0000-0000-0000-000000000000\n", "cut off"] {
+            leftover(dir.path(), other);
+            PartialFolder::remove_leftovers(dir.path());
+            assert_eq!(names(dir.path()).len(), 2, "{other}");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_folder_that_cannot_get_its_name_back_stays_and_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let destination = dir.path().join("drive");
+        let old = || {
+            let old = filled(&destination, "old");
+            (old.path().to_owned(), old)
+        };
+        let refused = || io::Error::from(ErrorKind::PermissionDenied);
+        let (_, back) = old();
+        assert_eq!(back.put_back(refused()).to_string(), refused().to_string());
+        assert_eq!(content(&destination), "old");
+        // Another process was quicker.
+        let (aside, replaced) = old();
+        replaced.put_back(refused());
+        assert!(!aside.exists());
+        // A file is no folder that could be meant.
+        fs::remove_dir_all(&destination).unwrap();
+        fs::write(&destination, "x").unwrap();
+        let (aside, kept) = old();
+        let error = kept.put_back(refused());
+        assert_eq!(error.kind(), ErrorKind::PermissionDenied);
+        let said = error.to_string();
+        assert!(said.contains(aside.to_str().unwrap()), "{said}");
+        PartialFolder::remove_leftovers(dir.path());
+        assert_eq!(content(&aside), "old");
+        assert_eq!(names(dir.path()).len(), 2, "{:?}", names(dir.path()));
+    }
+
+    #[test]
+    fn files_get_their_names_together() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("new/out");
+        let made = |content: &str| {
+            let partial = filled(&out.join("b"), content);
+            for name in ["a", "b"] {
+                fs::write(partial.path().join(name), content).unwrap();
+            }
+            partial
+        };
+        made("first").commit_files(&["a", "b"]).unwrap();
+        assert_eq!(names(&out), ["a", "b"]);
+        fs::remove_file(out.join("a")).unwrap();
+        // One name is taken, or one file is not there: none of the others stays.
+        let refused = made("second").commit_files(&["a", "b"]).unwrap_err();
+        assert_eq!(refused.kind(), ErrorKind::AlreadyExists);
+        made("second").commit_files(&["a", "c"]).unwrap_err();
+        assert_eq!(names(&out), ["b"]);
+        assert_eq!(fs::read(out.join("b")).unwrap(), b"first");
     }
 
     #[test]

@@ -121,16 +121,14 @@ mod tests {
             ..BagSettings::default()
         };
         let simulation = Simulation::new(&config).unwrap();
-        let bag = write_bag(&simulation, &at.join("sim"), &settings, &mut |_, _| {
-            ControlFlow::Continue(())
-        })
-        .unwrap();
+        let mut go_on = |_: usize, _: usize| ControlFlow::Continue(());
+        let bag = write_bag(&simulation, &at.join("sim"), &settings, &mut go_on).unwrap();
         let open = |path: &Path| Dataset::open(path, &OpenOptions::default()).unwrap();
         let kitti = at.join("kitti");
-        convert_to_kitti(&open(&bag), &kitti, &mut |_, _| ()).unwrap();
+        convert_to_kitti(&open(&bag), &kitti, &mut go_on).unwrap();
         let again = at.join("again.bag");
         let converted = open(&kitti);
-        convert_to_bag(&converted[0], &again, settings.compression, &mut |_, _| ()).unwrap();
+        convert_to_bag(&converted[0], &again, settings.compression, &mut go_on).unwrap();
         let mut card = deepfusion_weights::all().unwrap()[0].card.clone();
         card.simulated_only = true;
         for path in [&bag, &kitti, &again] {

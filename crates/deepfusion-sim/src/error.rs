@@ -4,8 +4,10 @@ mod varied_conflict;
 pub use expected::ExpectedSetting;
 pub use varied_conflict::VariedConflict;
 
+use deepfusion_fs::moved_path;
 use deepfusion_hint::{Hint, count_of};
-use std::path::PathBuf;
+use deepfusion_rosbag::Error as BagError;
+use std::path::{Path, PathBuf};
 
 /// What can go wrong while a drive is made or written.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +37,12 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
+    /// The output folder looks empty, and another writer is at work there, or died and what it left cannot be removed.
+    #[error("{}: the output folder is not empty: a writer left this in it, or is still writing it", path.display())]
+    Unfinished {
+        /// The hidden file or folder.
+        path: PathBuf,
+    },
     /// Writing ended before the last frame, as its caller wanted: nothing of it is left.
     #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
     Stopped {
@@ -55,7 +63,7 @@ pub enum Error {
     },
     /// A bag cannot be written.
     #[error(transparent)]
-    Bag(#[from] deepfusion_rosbag::Error),
+    Bag(#[from] BagError),
     /// A message cannot be made.
     #[error("a message of {topic}: {problem}")]
     Message {
@@ -84,6 +92,10 @@ impl Hint for Error {
             Self::OutputNotEmpty { .. } => {
                 Some("choose a new folder, or empty this one first".to_owned())
             }
+            Self::Unfinished { .. } => Some(
+                "if no program is writing there, remove it, and the file of its name with .lock; or choose another folder"
+                    .to_owned(),
+            ),
             Self::Io { source, .. } => Some(
                 match source.kind() {
                     std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
@@ -101,6 +113,36 @@ impl Hint for Error {
             Self::Message { problem, .. } => problem.hint(),
             Self::Stopped { .. } => Some("start it again: nothing is in the way".to_owned()),
             Self::Encode { .. } => None,
+        }
+    }
+}
+
+impl Error {
+    /// The same error with `to` in place of `from` in the path that it names: what was written aside is gone when it is read.
+    pub(crate) fn moved(self, from: &Path, to: &Path) -> Self {
+        let moved = |path| moved_path(path, from, to);
+        match self {
+            Self::Io {
+                path,
+                action,
+                source,
+            } => Self::Io {
+                path: moved(path),
+                action,
+                source,
+            },
+            Self::Encode { path, source } => Self::Encode {
+                path: moved(path),
+                source,
+            },
+            Self::Bag(BagError::NoSuchPath { path }) => {
+                Self::Bag(BagError::NoSuchPath { path: moved(path) })
+            }
+            Self::Bag(BagError::File { path, source }) => Self::Bag(BagError::File {
+                path: moved(path),
+                source,
+            }),
+            other => other,
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::oxts::DATA_FORMAT;
 use crate::rig::CAM2_FROM_CAM0_X;
 use crate::{Error, Result, SimFrame, Simulation, tracklets};
-use deepfusion_fs::PartialFolder;
+use deepfusion_fs::{InTheWay, PartialFolder};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Se3};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -31,13 +31,13 @@ const BATCH: usize = 8;
 /// its pictures are in `image_03`. A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
 /// ([`Simulation::drawn`]). Its boxes also hold what of an object was cut away over the camera's lane, as of a tree's crown.
 ///
-/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`]. Everything is written to
-/// a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a writer that was
-/// killed left there is removed, and is not in the way.
+/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
+/// is written to a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a writer that
+/// was killed left there is removed, and is not in the way.
 ///
 /// # Errors
-/// [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Stopped`]; [`Error::Io`] and [`Error::Encode`], with the
-/// path, if something cannot be written.
+/// [`Error::OutputNotEmpty`] if `out` holds anything, [`Error::Unfinished`] if that is what another writes, or left and cannot be removed;
+/// [`Error::Stopped`]; [`Error::Io`] and [`Error::Encode`], with the path, if something cannot be written.
 pub fn write_kitti(
     simulation: &Simulation,
     out: &Path,
@@ -46,7 +46,8 @@ pub fn write_kitti(
     require_empty(out)?;
     let date = out.join(DATE);
     let partial = PartialFolder::beside(&date).map_err(io(out, "make this folder"))?;
-    let drive = write_all(simulation, partial.path(), progress)?;
+    let drive = write_all(simulation, partial.path(), progress)
+        .map_err(|error| error.moved(partial.path(), &date))?;
     let moved = partial.commit();
     moved.map_err(io(&date, "move the finished drive here"))?;
     Ok(date.join(drive))
@@ -54,16 +55,13 @@ pub fn write_kitti(
 
 /// Refuses an output folder that holds something; there may be none.
 pub(crate) fn require_empty(out: &Path) -> Result<()> {
-    PartialFolder::remove_leftovers(out);
-    match fs::read_dir(out) {
-        Ok(mut entries) => match entries.next() {
-            None => Ok(()),
-            Some(_) => Err(Error::OutputNotEmpty {
-                path: out.to_owned(),
-            }),
-        },
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(io(out, "use this as the output folder")(error)),
+    let found = deepfusion_fs::in_the_way(out);
+    match found.map_err(io(out, "use this as the output folder"))? {
+        None => Ok(()),
+        Some(InTheWay::Content) => Err(Error::OutputNotEmpty {
+            path: out.to_owned(),
+        }),
+        Some(InTheWay::Unfinished(path)) => Err(Error::Unfinished { path }),
     }
 }
 
@@ -113,7 +111,7 @@ fn write_all(
             }
             Ok::<(), Error>(())
         })?;
-        if progress(last, frames).is_break() {
+        if progress(last, frames).is_break() && last < frames {
             return Err(Error::Stopped {
                 done: last,
                 total: frames,
@@ -156,7 +154,10 @@ fn write_all(
     Ok(name)
 }
 
-fn io<'a>(path: &'a Path, action: &'static str) -> impl Fn(std::io::Error) -> Error + 'a {
+pub(crate) fn io<'a>(
+    path: &'a Path,
+    action: &'static str,
+) -> impl Fn(std::io::Error) -> Error + 'a {
     move |source| Error::Io {
         path: path.to_owned(),
         action,
@@ -164,7 +165,7 @@ fn io<'a>(path: &'a Path, action: &'static str) -> impl Fn(std::io::Error) -> Er
     }
 }
 
-pub(crate) fn make_folder(path: &Path) -> Result<()> {
+fn make_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(io(path, "make this folder"))
 }
 

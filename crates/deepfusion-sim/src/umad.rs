@@ -1,9 +1,10 @@
 //! Writes a drive as a bag with UMAD's sensors.
 
 use crate::fmcw::{self, SCAN_RATE_HZ};
-use crate::kitti::{encode_depth, encode_rgb, make_folder, require_empty};
+use crate::kitti::{encode_depth, encode_rgb, io, require_empty};
 use crate::rig::Rig;
 use crate::{Error, ExpectedSetting, Result, Simulation};
+use deepfusion_fs::PartialFolder;
 use deepfusion_rosbag::msg::{
     AckermannDrive, AckermannDriveStamped, CameraInfo, CompressedImage, Header, Imu, Odometry,
     Point, PointCloud2, Pose, PoseWithCovariance, Quaternion, RegionOfInterest, Twist,
@@ -12,6 +13,7 @@ use deepfusion_rosbag::msg::{
 use deepfusion_rosbag::{BagWriter, Compression, ConnectionId, Time, WriterOptions};
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs;
 use std::ops::ControlFlow;
@@ -78,12 +80,14 @@ impl Default for BagSettings {
 ///
 /// The camera's stamps and those of the LiDAR carry the clock's offset; IMU, speed, steering and truth do not.
 ///
-/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`]: after an error, or stopped,
-/// `out` is as it was.
+/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
+/// is written to a folder within `out` and renamed at the end, the bag last: after an error, or stopped, `out` is as it was. What a writer
+/// that was killed left there is removed, and is not in the way.
 ///
 /// # Errors
-/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` holds anything;
-/// [`Error::Stopped`]; [`Error::Io`], [`Error::Encode`], [`Error::Bag`].
+/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` holds anything,
+/// [`Error::Unfinished`] if that is what another writes, or left and cannot be removed; [`Error::Stopped`]; [`Error::Io`],
+/// [`Error::Encode`], [`Error::Bag`].
 pub fn write_bag(
     simulation: &Simulation,
     out: &Path,
@@ -110,37 +114,39 @@ pub fn write_bag(
     }
     let scene = config.scene.name();
     let path = out.join(format!("{scene}_{:04}.bag", config.seed));
-    let mounts = describe(&simulation.rig(), scene);
-    let mut beside = vec![(path.with_extension("toml"), mounts)];
-    if let Some(drawn) = simulation.drawn() {
-        beside.push((path.with_extension("varied.json"), drawn.to_json()));
-    }
     require_empty(out)?;
-    let existed = out.is_dir();
-    make_folder(out)?;
-    let written = beside
-        .iter()
-        .try_for_each(|(file, text)| write_beside(file, text))
-        .and_then(|()| write_messages(simulation, &path, settings, progress));
-    if written.is_err() {
-        // Best effort: the first error is the one to report.
-        for (file, _) in &beside {
-            let _ = fs::remove_file(file);
-        }
-        if !existed {
-            let _ = fs::remove_dir(out);
-        }
-    }
-    written.map(|()| path)
+    let partial = PartialFolder::beside(&path).map_err(io(out, "make this folder"))?;
+    let names = write_all(simulation, partial.path(), &path, settings, progress)
+        .map_err(|error| error.moved(partial.path(), out))?;
+    let moved = partial.commit_files(&names);
+    moved.map_err(io(&path, "move the finished bag here"))?;
+    Ok(path)
 }
 
-/// Writes a small file beside the bag, whole or not at all.
-fn write_beside(path: &Path, text: &str) -> Result<()> {
-    deepfusion_fs::write(path, text).map_err(|source| Error::Io {
-        path: path.to_owned(),
-        action: "write this file",
-        source,
-    })
+/// Writes the bag that is to be at `path` into a folder, and what lies beside it; returns their names, the bag's last.
+fn write_all(
+    simulation: &Simulation,
+    folder: &Path,
+    path: &Path,
+    settings: &BagSettings,
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Vec<OsString>> {
+    let name = Path::new(path.file_name().unwrap_or_default());
+    let scene = simulation.config().scene.name();
+    let mut beside = vec![("toml", describe(&simulation.rig(), scene))];
+    if let Some(drawn) = simulation.drawn() {
+        beside.push(("varied.json", drawn.to_json()));
+    }
+    let mut names = Vec::new();
+    for (ending, text) in beside {
+        let name = name.with_extension(ending);
+        let file = folder.join(&name);
+        fs::write(&file, text).map_err(io(&file, "write this file"))?;
+        names.push(name.into_os_string());
+    }
+    write_messages(simulation, &folder.join(name), settings, progress)?;
+    names.push(name.as_os_str().to_owned());
+    Ok(names)
 }
 
 /// The bag's connections.
@@ -207,7 +213,7 @@ fn write_messages(
             write_scan(simulation, &mut bag, &topics, (time_s, scans), settings)?;
             scans += 1;
         }
-        if progress(last, frames).is_break() {
+        if progress(last, frames).is_break() && last < frames {
             return Err(Error::Stopped {
                 done: last,
                 total: frames,

@@ -1,6 +1,7 @@
 //! What is written is a KITTI drive: the project's own reader opens it and finds the same truth.
 
 use deepfusion_data::{Dataset, GtKind, OpenOptions, load_rgb, read_depth_png};
+use deepfusion_fs::PartialFolder;
 use deepfusion_hint::Hint;
 use deepfusion_sim::{Error, SimConfig, Simulation, write_kitti};
 use std::fs;
@@ -205,13 +206,58 @@ fn a_drive_that_is_stopped_leaves_nothing() {
     }
 }
 
+#[test]
+fn a_drive_that_is_stopped_at_its_last_frame_is_done() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("new");
+    let drive = write_kitti(&small(2), &out, &mut |_, _| ControlFlow::Break(()));
+    let drive = drive.expect("the drive is written");
+    let sets = Dataset::open(&drive, &OpenOptions::default()).expect("the reader opens it");
+    assert_eq!(sets[0].frames().len(), 2);
+    assert!(drive.join("tracklet_labels.xml").exists());
+    assert_eq!(leftovers(&out), 0);
+}
+
+/// The folder that was written aside is gone when its error is read.
+#[test]
+fn what_cannot_be_written_is_named_by_its_place() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let error = write_kitti(&small(9), folder.path(), &mut |_, _| {
+        let mut entries = fs::read_dir(folder.path()).expect("the folder");
+        let aside = entries.find_map(|entry| {
+            let path = entry.expect("an entry").path();
+            path.is_dir().then_some(path)
+        });
+        fs::remove_dir_all(aside.expect("the folder aside")).expect("it is removed");
+        ControlFlow::Continue(())
+    })
+    .expect_err("its folders are gone");
+    let said = error.to_string();
+    assert!(said.contains("2026_01_01_drive_0012_sync"), "{said}");
+    assert!(!said.contains("partial"), "{said}");
+}
+
+#[test]
+fn what_another_writes_is_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let another = PartialFolder::beside(&folder.path().join("2026_01_01")).expect("a folder");
+    let error = write_kitti(&small(1), folder.path(), &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .expect_err("refused");
+    assert!(matches!(&error, Error::Unfinished { path } if path == another.path()));
+    assert!(error.hint().is_some());
+    assert!(another.path().exists());
+}
+
 /// What a process left that was killed while it wrote is not in the way of the next one.
 #[test]
 fn what_a_killed_writer_left_is_removed() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let left = folder.path().join(".2026_01_01.17-00ab.partial");
-    fs::create_dir_all(left.join("2026_01_01_drive_0012_sync/image_02")).expect("a folder");
-    fs::write(folder.path().join(".2026_01_01.17-00ab.partial.lock"), "").expect("a file");
+    let left = PartialFolder::beside(&folder.path().join("2026_01_01")).expect("a folder");
+    let images = left.path().join("2026_01_01_drive_0012_sync/image_02");
+    fs::create_dir_all(images).expect("a folder");
+    left.abandon();
     write_kitti(&small(1), folder.path(), &mut |_, _| {
         ControlFlow::Continue(())
     })

@@ -1,5 +1,6 @@
 //! A drive written as a bag: what is in it, and that it is the drive.
 
+use deepfusion_fs::PartialFolder;
 use deepfusion_rosbag::msg::{CameraInfo, CompressedImage, Imu, PointCloud2, TwistStamped};
 use deepfusion_rosbag::{Bag, Selection};
 use deepfusion_sim::{BagSettings, Error, Scene, Sensors, SimConfig, Simulation, topic, write_bag};
@@ -95,6 +96,53 @@ fn equal_drives_make_equal_bags_and_nothing_is_overwritten() {
     assert!(a == b, "the bytes differ");
     let error = write("a").unwrap_err();
     assert!(error.to_string().contains("not empty"), "{error}");
+}
+
+/// Stopped at its last frame it is whole, and what a killed writer left is not in its way.
+#[test]
+fn a_bag_that_is_stopped_at_its_last_frame_is_done() {
+    let simulation = simulation();
+    let folder = tempfile::tempdir().unwrap();
+    let left = PartialFolder::beside(&folder.path().join("commercial_0011.bag")).unwrap();
+    std::fs::write(left.path().join("commercial_0011.toml"), "half").unwrap();
+    left.abandon();
+    let settings = BagSettings {
+        lidar_step_deg: 5.0,
+        ..BagSettings::default()
+    };
+    let path = write_bag(&simulation, folder.path(), &settings, &mut |done, of| {
+        if done == of {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    let path = path.unwrap();
+    assert!(Bag::open(&path).unwrap().damage().is_none());
+    let entries = std::fs::read_dir(folder.path()).unwrap();
+    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["commercial_0011.bag", "commercial_0011.toml"]);
+}
+
+/// A name that is taken while the bag is written stays another's, and nothing is beside it.
+#[test]
+fn a_bag_takes_nobodys_place() {
+    let simulation = simulation();
+    let folder = tempfile::tempdir().unwrap();
+    let taken = folder.path().join("commercial_0011.bag");
+    let settings = BagSettings {
+        lidar_step_deg: 5.0,
+        ..BagSettings::default()
+    };
+    let error = write_bag(&simulation, folder.path(), &settings, &mut |_, _| {
+        std::fs::write(&taken, "another's").unwrap();
+        ControlFlow::Continue(())
+    });
+    let said = error.unwrap_err().to_string();
+    assert!(said.contains("commercial_0011.bag: cannot move"), "{said}");
+    assert_eq!(std::fs::read(&taken).unwrap(), b"another's");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 #[test]

@@ -263,10 +263,16 @@ fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
     let folder = tempfile::tempdir().unwrap();
     let first = open(&bag(&simulation, folder.path(), &BagSettings::default()));
     let out = folder.path().join("kitti");
-    let drives = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {}).unwrap();
+    let drives = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let second = open(&drives.paths[0]);
     let again = folder.path().join("again.bag");
-    convert_to_bag(&second, &again, Compression::Bz2, &mut |_, _| {}).unwrap();
+    convert_to_bag(&second, &again, Compression::Bz2, &mut |_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let third = open(&again);
     let snippets = [&first, &second, &third].map(|set| set.snippets(&[1], 0.5).unwrap());
     for (set, snippets_of) in [(&second, &snippets[1]), (&third, &snippets[2])] {
@@ -293,6 +299,8 @@ fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
             assert_eq!(apart.count(), 0, "frame {frame}");
         }
     }
-    let refused = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {});
+    let refused = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {
+        ControlFlow::Continue(())
+    });
     assert!(refused.unwrap_err().to_string().contains("already exists"));
 }

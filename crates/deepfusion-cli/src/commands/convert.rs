@@ -9,6 +9,7 @@ use super::warnings;
 use crate::cli::{CameraIntrinsics, ConvertArgs};
 use crate::error::CliError;
 use crate::failure::Result;
+use crate::interrupt;
 use crate::output;
 use crate::progress::{Progress, say};
 
@@ -30,8 +31,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, input, &options)?;
     let datasets = open_recordings(input, &options)?;
+    interrupt::catch("stopping after the frames at work");
     let mut progress = Progress::new("converting");
-    let mut report = |done, total| progress.set(done, total);
+    let mut report = |done, total| {
+        progress.set(done, total);
+        interrupt::flow()
+    };
     let written = if ends_in("bag") {
         let [dataset] = datasets.as_slice() else {
             let drives = datasets.len();

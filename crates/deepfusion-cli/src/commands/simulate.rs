@@ -20,7 +20,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     if let Some(warning) = fewer_cars(config.moving_cars, simulation.moving_cars()) {
         tracing::warn!("{warning}");
     }
-    interrupt::catch("stopping after the frames at work; nothing is written");
+    interrupt::catch("stopping after the frames at work");
     let mut progress = Progress::new("simulating");
     let mut report = |done, total| {
         progress.set(done, total);

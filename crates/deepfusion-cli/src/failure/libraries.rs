@@ -184,6 +184,13 @@ impl Reportable for deepfusion_data::Error {
         }
     }
 
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Stopped { .. } => Exit::Stopped,
+            _ => Exit::Failed,
+        }
+    }
+
     fn missing(&self) -> Option<&Path> {
         match self {
             Self::NoSuchPath { path } => Some(path),

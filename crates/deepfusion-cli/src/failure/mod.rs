@@ -256,6 +256,8 @@ mod tests {
         assert_eq!(view.error.exit(), Exit::Stopped);
         let simulated = deepfusion_sim::Error::Stopped { done, total };
         assert_eq!(simulated.exit(), Exit::Stopped);
+        let converted = deepfusion_data::Error::Stopped { done, total };
+        assert_eq!(converted.exit(), Exit::Stopped);
         assert_eq!(CliError::NoMedia.exit(), Exit::Failed);
         assert_eq!(CliError::NoModelGiven.exit(), Exit::WrongArguments);
     }

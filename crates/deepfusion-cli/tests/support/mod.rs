@@ -37,6 +37,11 @@ pub(crate) fn run(folder: &Path, args: &str) -> Run {
     in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
 }
 
+/// Whether a file is a shard's lock, which stays for good.
+pub(crate) fn is_lock(name: &str) -> bool {
+    name.starts_with(".predict-") && name.ends_with(".lock")
+}
+
 /// A run that must succeed.
 pub(crate) fn ok(folder: &Path, args: &str) -> Run {
     let run = run(folder, args);

@@ -1,5 +1,5 @@
 use super::parts::{
-    Converted, SIMULATED, at_ns, cam_from_scanner, moving_at, points, seconds_to_move,
+    Converted, SIMULATED, at_ns, cam_from_scanner, go_on, moving_at, points, seconds_to_move,
 };
 use crate::{Dataset, Error, GtKind, ImageProblem, Result, TopicProblem};
 use deepfusion_geometry::Se3;
@@ -13,6 +13,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::fmt::Write as _;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Frames read and written together.
@@ -22,14 +23,17 @@ const BATCH: usize = 8;
 /// CameraInfo, speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place. Times are the vehicle's
 /// clock's, for all sensors.
 ///
+/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done: after an
+/// error, or stopped, neither file is there.
+///
 /// # Errors
-/// [`Error::Exists`] where `out` is there already; [`Error::NoTimes`] where a frame has no time; [`Error::Bag`], and
-/// what reading can have wrong.
+/// [`Error::Exists`] where `out` is there already; [`Error::NoTimes`] where a frame has no time; [`Error::Stopped`];
+/// [`Error::Bag`], and what reading can have wrong.
 pub fn convert_to_bag(
     dataset: &Dataset,
     out: &Path,
     compression: Compression,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<Converted> {
     let sidecar = out.with_extension("toml");
     for path in [out, &sidecar] {
@@ -121,12 +125,14 @@ pub fn convert_to_bag(
             }
         }
         done += batch.len();
-        progress(done, times.len());
+        go_on(progress(done, times.len()), done, times.len())?;
     }
     super::parts::write_text(&sidecar, &describe(dataset))?;
     if let Err(error) = bag.finish() {
-        // Best effort: without its bag it would be in the way of the next try.
-        let _ = std::fs::remove_file(&sidecar);
+        // Best effort: without its bag it would be in the way of the next try. With the bag in place, only the wait for the disk has failed.
+        if !out.exists() {
+            let _ = std::fs::remove_file(&sidecar);
+        }
         return Err(error.into());
     }
     Ok(Converted {

@@ -1,6 +1,7 @@
 use super::calendar::{date, stamp};
 use super::parts::{
-    Converted, Moving, SIMULATED, at_ns, cam_from_scanner, moving_at, points, seconds_to_move,
+    Converted, Moving, SIMULATED, at_ns, cam_from_scanner, go_on, moving_at, points,
+    seconds_to_move,
 };
 use crate::dataset_toml::FolderConfig;
 use crate::{Dataset, Error, Result, save_png};
@@ -9,6 +10,7 @@ use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
 use rayon::prelude::*;
 use std::fmt::Write as _;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and returns the drives'
@@ -20,15 +22,17 @@ use std::path::{Path, PathBuf};
 /// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in the drive's `dataset.toml`, which goes
 /// with the drive wherever it is moved.
 ///
-/// Everything is written to a folder beside its final place and renamed at the end: after an error `out` is as it was. What a
-/// conversion that was killed left there is removed, and is not in the way.
+/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
+/// is written to a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a conversion
+/// that was killed left there is removed, and is not in the way.
 ///
 /// # Errors
-/// [`Error::Exists`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
+/// [`Error::Exists`] if `out` holds anything, [`Error::Unfinished`] if that is what another writes, or left and cannot be removed;
+/// [`Error::Cameras`] where the cameras differ; [`Error::Stopped`]; and what reading or writing can have wrong.
 pub fn convert_to_kitti(
     datasets: &[Dataset],
     out: &Path,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<Converted> {
     let Some(first) = datasets.first() else {
         return Ok(Converted::default());
@@ -50,32 +54,43 @@ pub fn convert_to_kitti(
     let date_name = format!("{year:04}_{month:02}_{day:02}");
     let date_folder = out.join(&date_name);
     let partial = PartialFolder::beside(&date_folder).map_err(|e| Error::file(out, e))?;
-    write_calibration(
-        partial.path(),
-        &first.intrinsics(0),
-        first.cam_from_vehicle(),
-    )?;
-    let total: usize = datasets.iter().map(|d| d.frames().len()).sum();
-    let (mut done, mut folders) = (0, Vec::new());
-    for (number, dataset) in datasets.iter().enumerate() {
-        let name = format!("{date_name}_drive_{:04}_sync", number + 1);
-        let folder = partial.path().join(&name);
-        write_drive(dataset, &folder, moved_s, &mut |frames| {
-            done += frames;
-            progress(done, total);
-        })?;
-        if dataset.is_simulated() {
-            mark_simulated(&folder)?;
-        }
-        folders.push(date_folder.join(name));
-    }
+    let names = write_date(datasets, partial.path(), &date_name, moved_s, progress)
+        .map_err(|error| error.moved(partial.path(), &date_folder))?;
     // Waits for the disk once: a wait for each of its thousands of files would take longer than writing them.
     let committed = partial.commit();
     committed.map_err(|e| Error::file(&date_folder, e))?;
     Ok(Converted {
-        paths: folders,
+        paths: names.iter().map(|name| date_folder.join(name)).collect(),
         moved_s,
     })
+}
+
+/// Writes all drives of a date and its calibration into a folder; gives the drives' names.
+fn write_date(
+    datasets: &[Dataset],
+    folder: &Path,
+    date_name: &str,
+    moved_s: i64,
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Vec<String>> {
+    if let Some(first) = datasets.first() {
+        write_calibration(folder, &first.intrinsics(0), first.cam_from_vehicle())?;
+    }
+    let total: usize = datasets.iter().map(|d| d.frames().len()).sum();
+    let (mut done, mut names) = (0, Vec::new());
+    for (number, dataset) in datasets.iter().enumerate() {
+        let name = format!("{date_name}_drive_{:04}_sync", number + 1);
+        let drive = folder.join(&name);
+        write_drive(dataset, &drive, moved_s, &mut |frames| {
+            done += frames;
+            go_on(progress(done, total), done, total)
+        })?;
+        if dataset.is_simulated() {
+            mark_simulated(&drive)?;
+        }
+        names.push(name);
+    }
+    Ok(names)
 }
 
 /// Says of a drive that nobody drove it.
@@ -91,7 +106,7 @@ fn write_drive(
     dataset: &Dataset,
     folder: &Path,
     moved_s: i64,
-    progress: &mut dyn FnMut(usize),
+    progress: &mut dyn FnMut(usize) -> Result<()>,
 ) -> Result<()> {
     let part = |name: &str| -> Result<PathBuf> {
         let path = folder.join(name).join("data");
@@ -130,7 +145,7 @@ fn write_drive(
             }
             Ok::<(), Error>(())
         })?;
-        progress(batch.len());
+        progress(batch.len())?;
     }
     // A line for every number, as KITTI has it: numbers without a frame get the time between their neighbours'.
     let last = dataset.frames().last().map_or(0, |f| f.number);

@@ -1,10 +1,11 @@
 //! What both layouts are written from: points, times, how the vehicle moves.
 
 use crate::{Dataset, Error, GtKind, MotionModel, Result};
-use deepfusion_fs::PartialFolder;
+use deepfusion_fs::InTheWay;
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
-use std::io::{ErrorKind, Write as _};
+use std::io::Write as _;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
@@ -73,16 +74,22 @@ pub(super) const SIMULATED: &str = "simulated = true\n";
 
 /// Refuses an output folder that holds something; there may be none.
 pub(super) fn require_empty(out: &Path) -> Result<()> {
-    PartialFolder::remove_leftovers(out);
-    match std::fs::read_dir(out) {
-        Ok(mut entries) => match entries.next() {
-            None => Ok(()),
-            Some(_) => Err(Error::Exists {
-                path: out.to_owned(),
-            }),
-        },
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(Error::file(out, error)),
+    let found = deepfusion_fs::in_the_way(out);
+    match found.map_err(|e| Error::file(out, e))? {
+        None => Ok(()),
+        Some(InTheWay::Content) => Err(Error::Exists {
+            path: out.to_owned(),
+        }),
+        Some(InTheWay::Unfinished(path)) => Err(Error::Unfinished { path }),
+    }
+}
+
+/// Ends a conversion whose listener asks for it, where frames are left.
+pub(super) fn go_on(asked: ControlFlow<()>, done: usize, total: usize) -> Result<()> {
+    if asked.is_break() && done < total {
+        Err(Error::Stopped { done, total })
+    } else {
+        Ok(())
     }
 }
 

@@ -29,6 +29,10 @@ impl Hint for Error {
                 return Some(format!("give them by themselves, one or several: {one}"));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
+            Self::Unfinished { .. } => {
+                "if no program is writing there, remove it, and the file of its name with .lock; or choose another folder"
+            }
+            Self::Stopped { .. } => "start it again: nothing is in the way",
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),

@@ -15,7 +15,7 @@ pub(super) fn file(path: &Path) -> FoundInstead {
     }
 }
 
-/// A folder without a recording; it is read, and those in it.
+/// A folder without a recording; it is read, and those in it, without what is hidden.
 ///
 /// # Errors
 /// [`Error::File`], [`Error::NoSuchPath`].
@@ -25,8 +25,10 @@ pub(super) fn folder(folder: &Path) -> Result<FoundInstead> {
     let inner = folders(folder)?;
     for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
         for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
-            let path = entry.map_err(|e| Error::file(&place, e))?.path();
-            if path.is_dir() {
+            let entry = entry.map_err(|e| Error::file(&place, e))?;
+            let hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
+            let path = entry.path();
+            if hidden || path.is_dir() {
                 continue;
             }
             files += 1;

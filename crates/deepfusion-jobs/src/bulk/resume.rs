@@ -154,7 +154,10 @@ impl BulkJob<'_> {
         let out = self.folder;
         let files_of = |input: &&Input| {
             let endings = self.endings.iter().copied().chain([".json"]);
-            let file = |ending| format!("{}{ending}", input.name);
+            let file = |ending| {
+                let name = format!("{}{ending}", input.name);
+                Partial::name_of(&name).into_owned()
+            };
             endings.map(file).collect::<Vec<String>>()
         };
         let files: HashSet<String> = mine.iter().flat_map(files_of).collect();

@@ -1,0 +1,98 @@
+//! Which machine this is: on a file system that machines share, one may not see what another has locked.
+
+use std::fs;
+
+/// A machine from its start to its end: its name, and a number that it draws at each start. Empty where the system does not say.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Machine {
+    name: String,
+    boot: String,
+}
+
+impl Machine {
+    /// The one that this process runs on.
+    pub(crate) fn this() -> Self {
+        let said = |path: &str| {
+            let text = fs::read_to_string(path).unwrap_or_default();
+            text.trim().to_owned()
+        };
+        let mut name = said("/proc/sys/kernel/hostname");
+        if name.is_empty() {
+            // Windows has it there.
+            name = std::env::var("COMPUTERNAME").unwrap_or_default();
+        }
+        Self {
+            name,
+            boot: said("/proc/sys/kernel/random/boot_id"),
+        }
+    }
+
+    /// A line for each.
+    pub(crate) fn to_text(&self) -> String {
+        format!("{}\n{}\n", self.name, self.boot)
+    }
+
+    /// `None` of a text that is not whole.
+    pub(crate) fn from_text(text: &str) -> Option<Self> {
+        let mut lines = text.split_terminator('\n').map(str::to_owned);
+        Some(Self {
+            name: lines.next()?,
+            boot: lines.next()?,
+        })
+    }
+
+    /// Whether a process of `other` that is alive would be known here by its lock: both are under one kernel, as containers are, or `other` is this
+    /// machine before it was started again, and its processes have ended.
+    pub(crate) fn sees_locks_of(&self, other: &Self) -> bool {
+        let same_start = !self.boot.is_empty() && self.boot == other.boot;
+        let same_name = is_own_name(&self.name) && self.name == other.name;
+        same_start || same_name || self == other
+    }
+}
+
+/// Whether a name tells a machine from others.
+fn is_own_name(name: &str) -> bool {
+    !name.is_empty() && !name.starts_with("localhost") && name != "(none)"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn machine(name: &str, boot: &str) -> Machine {
+        Machine {
+            name: name.to_owned(),
+            boot: boot.to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_machine_is_known_by_its_start_or_its_name() {
+        let this = machine("a", "1");
+        for (other, expected) in [
+            (machine("a", "1"), true),
+            (machine("a", "2"), true),
+            (machine("container", "1"), true),
+            (machine("b", "2"), false),
+            (machine("", ""), false),
+            (machine("a", ""), true),
+        ] {
+            assert_eq!(this.sees_locks_of(&other), expected, "{other:?}");
+        }
+        // Where nothing is known, and where the name is everybody's.
+        assert!(machine("", "").sees_locks_of(&machine("", "")));
+        assert!(!machine("", "").sees_locks_of(&this));
+        assert!(!machine("localhost", "1").sees_locks_of(&machine("localhost", "2")));
+    }
+
+    #[test]
+    fn a_machine_is_what_its_text_says() {
+        for machine in [Machine::this(), machine("a", "1"), machine("", "")] {
+            let text = machine.to_text();
+            assert_eq!(Machine::from_text(&text), Some(machine));
+        }
+        for cut in ["", "a\n", "a"] {
+            assert_eq!(Machine::from_text(cut), None, "{cut:?}");
+        }
+    }
+}

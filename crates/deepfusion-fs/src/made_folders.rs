@@ -1,0 +1,77 @@
+//! Folders that are made for something, and go again if nothing comes of it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::sync::{folder_of, sync_folder};
+
+/// Folders that were made, the innermost first. Dropped, it removes those in which nothing is, unless they were [kept](Self::keep).
+#[derive(Debug, Default)]
+pub(crate) struct MadeFolders(Vec<PathBuf>);
+
+impl MadeFolders {
+    /// Makes a folder, and those around it that are not there.
+    pub(crate) fn make(folder: &Path) -> io::Result<Self> {
+        let missing = folder
+            .ancestors()
+            .take_while(|around| !around.as_os_str().is_empty() && !around.exists());
+        // Before they are made: what is made before one that cannot be is removed, too.
+        let made = Self(missing.map(Path::to_owned).collect());
+        fs::create_dir_all(folder)?;
+        Ok(made)
+    }
+
+    /// They stay, and their names are on the disk once this returns.
+    pub(crate) fn keep(&mut self) -> io::Result<()> {
+        std::mem::take(&mut self.0)
+            .iter()
+            .try_for_each(|made| sync_folder(folder_of(made)))
+    }
+}
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        for made in &self.0 {
+            // Fails where there is something in it, and that is meant.
+            let _ = fs::remove_dir(made);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_that_were_made_go_or_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let there = dir.path().join("there");
+        fs::create_dir(&there).unwrap();
+        let folder = there.join("a/b/c");
+        let made = MadeFolders::make(&folder).unwrap();
+        assert!(folder.is_dir());
+        drop(made);
+        assert!(there.is_dir() && !there.join("a").exists());
+        let made = MadeFolders::make(&folder).unwrap();
+        fs::write(there.join("a/x"), "x").unwrap();
+        drop(made);
+        assert!(there.join("a/x").exists() && !there.join("a/b").exists());
+        let mut made = MadeFolders::make(&folder).unwrap();
+        made.keep().unwrap();
+        drop(made);
+        assert!(folder.is_dir());
+        // One that was there is nobody's to remove.
+        drop(MadeFolders::make(&folder).unwrap());
+        assert!(folder.is_dir());
+    }
+
+    #[test]
+    fn where_none_can_be_made_none_is_left() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("file");
+        fs::write(&file, "x").unwrap();
+        MadeFolders::make(&file.join("a/b")).unwrap_err();
+        assert_eq!(fs::read(&file).unwrap(), b"x");
+    }
+}
