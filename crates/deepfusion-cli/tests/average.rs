@@ -91,7 +91,7 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     fails(
         at,
         "weights average a b --shares 1 --out no",
-        &["shares", "hint:"],
+        &["1 share for 2 networks", "hint:"],
     );
     fails(
         at,
