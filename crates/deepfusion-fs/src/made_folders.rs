@@ -13,11 +13,21 @@ pub(crate) struct MadeFolders(Vec<PathBuf>);
 impl MadeFolders {
     /// Makes a folder, and those around it that are not there.
     pub(crate) fn make(folder: &Path) -> io::Result<Self> {
-        let missing = folder
+        let missing: Vec<&Path> = folder
             .ancestors()
-            .take_while(|around| !around.as_os_str().is_empty() && !around.exists());
-        // Before they are made: what is made before one that cannot be is removed, too.
-        let made = Self(missing.map(Path::to_owned).collect());
+            .take_while(|around| !around.as_os_str().is_empty() && !around.exists())
+            .collect();
+        // Grows as they are made: what is made before one that cannot be is removed, too, and what was there is not.
+        let mut made = Self::default();
+        for around in missing.into_iter().rev() {
+            match fs::create_dir(around) {
+                Ok(()) => made.0.insert(0, around.to_owned()),
+                // Another process was quicker, or it is there by way of `..`.
+                Err(_) if around.is_dir() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        // The error where a file is in its place.
         fs::create_dir_all(folder)?;
         Ok(made)
     }
@@ -57,6 +67,9 @@ mod tests {
         fs::write(there.join("a/x"), "x").unwrap();
         drop(made);
         assert!(there.join("a/x").exists() && !there.join("a/b").exists());
+        // There already, and only not seen until `a` is.
+        drop(MadeFolders::make(&there.join("new/../../there")).unwrap());
+        assert!(there.is_dir());
         let mut made = MadeFolders::make(&folder).unwrap();
         made.keep().unwrap();
         drop(made);

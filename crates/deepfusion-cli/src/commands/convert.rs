@@ -31,21 +31,26 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, input, &options)?;
     let datasets = open_recordings(input, &options)?;
+    if ends_in("bag") && datasets.len() != 1 {
+        let drives = datasets.len();
+        let input = args.input.clone();
+        return Err(CliError::SeveralDrives { input, drives }.into());
+    }
+    // A video is decoded at its first frame, by a program that Ctrl-C ends, too: until then a signal ends this one at once.
+    for dataset in datasets.iter().filter(|d| !d.frames().is_empty()) {
+        dataset.load_image(0)?;
+    }
     interrupt::catch("stopping after the frames at work");
     let mut progress = Progress::new("converting");
     let mut report = |done, total| {
         progress.set(done, total);
         interrupt::flow()
     };
-    let written = if ends_in("bag") {
-        let [dataset] = datasets.as_slice() else {
-            let drives = datasets.len();
-            let input = args.input.clone();
-            return Err(CliError::SeveralDrives { input, drives }.into());
-        };
-        convert_to_bag(dataset, &args.out, args.compression, &mut report)?
-    } else {
-        convert_to_kitti(&datasets, &args.out, &mut report)?
+    let written = match datasets.as_slice() {
+        [dataset] if ends_in("bag") => {
+            convert_to_bag(dataset, &args.out, args.compression, &mut report)?
+        }
+        _ => convert_to_kitti(&datasets, &args.out, &mut report)?,
     };
     drop(progress);
     datasets.iter().for_each(warn_of_missing);
