@@ -36,9 +36,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
         let input = args.input.clone();
         return Err(CliError::SeveralDrives { input, drives }.into());
     }
-    // A video is decoded at its first frame, by a program that Ctrl-C ends, too: until then a signal ends this one at once.
-    for dataset in datasets.iter().filter(|d| !d.frames().is_empty()) {
-        dataset.load_image(0)?;
+    // A video is decoded at its first frame, by a program that Ctrl-C ends, too: until then a signal ends this one at once. Where something is
+    // in the way, that is said without decoding first.
+    if matches!(deepfusion_fs::in_the_way(&args.out), Ok(None)) {
+        for dataset in datasets.iter().filter(|d| !d.frames().is_empty()) {
+            dataset.load_image(0)?;
+        }
     }
     interrupt::catch("stopping after the frames at work");
     let mut progress = Progress::new("converting");
