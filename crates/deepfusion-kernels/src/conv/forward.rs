@@ -2,6 +2,7 @@ use super::{
     ConvShape,
     arithmetic::{Arithmetic, Product, Weights},
     lattice::{Lattice, Tile, tiles},
+    winograd::{self, Image, Kernels},
 };
 use crate::{
     scratch::with_scratch,
@@ -54,10 +55,37 @@ pub fn conv2d(
     if out.is_empty() {
         return;
     }
+    let out = SharedMut::new(room(out));
+    let (height, width) = (shape.out_height(), shape.out_width());
+    let sum = winograd::Sum {
+        source: Image {
+            values: x,
+            images: shape.batch,
+            channels: shape.in_channels,
+            size: (shape.in_height, shape.in_width),
+            padding: shape.padding,
+            reflect: shape.reflect,
+        },
+        out: (height, width),
+        rows: shape.out_channels,
+        kernels: Kernels {
+            values: weight,
+            strides: (shape.taps(), shape.kernel_area()),
+            turned: false,
+        },
+        bias,
+    };
+    if shape.is_plain_3x3() && sum.pays() {
+        return sum.run(|image, channel, (y, x), values| {
+            let at = ((image * shape.out_channels + channel) * height + y) * width + x;
+            // SAFETY: every line is written once.
+            let to = unsafe { out.slice(at, values.len()) };
+            filled(to, values.iter().copied());
+        });
+    }
     let row_floats = shape.in_channels * shape.stride * (shape.in_width + 2 * shape.padding)
         + shape.out_channels * (shape.out_width() + 2);
     let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
-    let out = SharedMut::new(room(out));
     let arithmetic = Arithmetic::of(shape);
     let run = |weight: &[f32]| {
         tasks(&tiles, shape.out_channels, arithmetic.rows())

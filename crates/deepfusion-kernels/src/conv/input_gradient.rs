@@ -3,11 +3,12 @@ use super::{
     arithmetic::{Arithmetic, Product, Weights},
     forward::tasks,
     lattice::{Lattice, Tile, Window, inside, tiles},
+    winograd::{self, Image, Kernels, Margins},
 };
 use crate::{
     scratch::with_scratch,
     send_ptr::SharedMut,
-    slot::{Slot, room},
+    slot::{Slot, filled, room},
 };
 use rayon::prelude::*;
 use std::mem::MaybeUninit;
@@ -45,6 +46,9 @@ pub fn conv2d_backward_input(
     if grad_x.is_empty() {
         return;
     }
+    if shape.is_plain_3x3() && by_winograd(shape, weight, grad_out, grad_x) {
+        return;
+    }
     // Elsewhere every value is written exactly once.
     if shape.stride > 1 || shape.reflect || grad_out.is_empty() {
         let zero = MaybeUninit::new(0.0);
@@ -60,6 +64,82 @@ pub fn conv2d_backward_input(
         let phases = phases(shape, arithmetic, weight, transposed);
         backward_input(shape, arithmetic, &phases, grad_out, grad_x);
     });
+}
+
+/// The gradient by Winograd's form; false, and nothing done, where that would be slower.
+fn by_winograd(
+    shape: &ConvShape,
+    weight: &[f32],
+    grad_out: &[f32],
+    grad_x: &mut [MaybeUninit<f32>],
+) -> bool {
+    let (height, width) = (shape.in_height, shape.in_width);
+    // Mirrored, the margin's gradient belongs to pixels of the image; in a padding of zeros nobody needs it.
+    let margin = if shape.reflect { shape.padding } else { 0 };
+    let sum = winograd::Sum {
+        source: Image {
+            values: grad_out,
+            images: shape.batch,
+            channels: shape.out_channels,
+            size: (shape.out_height(), shape.out_width()),
+            padding: shape.padding + margin,
+            reflect: false,
+        },
+        out: (height + 2 * margin, width + 2 * margin),
+        rows: shape.in_channels,
+        // Every pixel gathers from the outputs that it went into.
+        kernels: Kernels {
+            values: weight,
+            strides: (shape.kernel_area(), shape.taps()),
+            turned: true,
+        },
+        bias: None,
+    };
+    if !sum.pays() {
+        return false;
+    }
+    let plane = |image: usize, channel: usize| image * shape.in_channels + channel;
+    let to = SharedMut::new(grad_x);
+    let write = |plane: usize, (y, x): (usize, usize), values: &[f32]| {
+        // SAFETY: every line is written once.
+        let to = unsafe { to.slice((plane * height + y) * width + x, values.len()) };
+        filled(to, values.iter().copied());
+    };
+    if !shape.reflect {
+        sum.run(|image, channel, at, values| write(plane(image, channel), at, values));
+        return true;
+    }
+    let margins = Margins::new((height, width));
+    with_scratch(shape.batch * shape.in_channels * margins.len(), |kept| {
+        let kept = SharedMut::new(kept);
+        sum.run(|image, channel, at, values| {
+            let plane = plane(image, channel);
+            margins.split(
+                at,
+                values,
+                |y, x, values| write(plane, (y, x), values),
+                |at, values| {
+                    // SAFETY: every value of the margin is written once.
+                    let to = unsafe { kept.slice(plane * margins.len() + at, values.len()) };
+                    to.copy_from_slice(values);
+                },
+            );
+        });
+        (0..shape.batch * shape.in_channels)
+            .into_par_iter()
+            .for_each(|plane| {
+                // SAFETY: a plane each, all of which were written.
+                let (kept, to) = unsafe {
+                    (
+                        kept.slice(plane * margins.len(), margins.len()),
+                        to.slice(plane * height * width, height * width)
+                            .assume_init_mut(),
+                    )
+                };
+                margins.fold(kept, to);
+            });
+    });
+    true
 }
 
 /// With reflection, what it adds to must have been cleared.

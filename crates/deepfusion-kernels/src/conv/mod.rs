@@ -7,6 +7,8 @@
 //!   the s×s residues of the input's rows and columns,
 //! - weight gradient: ∂W\[o, k\] = Σ_q ∂Y\[o, q\]·X\[q + offset k\].
 //!
+//! All three take [another form](winograd) where kernels are 3×3 and the images large enough.
+//!
 //! In [`Precision::Bf16`] the planes hold pairs, and other loops multiply them ([`bf16`]).
 //!
 //! Tiles are sized for the second cache; where an image has few pixels (deep layers), a tile holds several
@@ -20,7 +22,9 @@ mod input_gradient;
 mod lattice;
 mod product;
 mod shape;
+mod transpose;
 mod weight_gradient;
+mod winograd;
 
 pub use bf16::{Precision, has_bf16};
 pub use forward::conv2d;

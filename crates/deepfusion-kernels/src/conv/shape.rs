@@ -1,3 +1,4 @@
+use super::arithmetic::Arithmetic;
 use super::bf16::Precision;
 use super::lattice::{Lattice, Window};
 use crate::sizes::product;
@@ -143,6 +144,13 @@ impl ConvShape {
     #[must_use]
     pub fn multiply_adds(&self) -> usize {
         product([self.batch, self.out_area(), self.weight_len()])
+    }
+
+    /// Whether it is of the kind that Winograd's form computes: 3×3 with a margin of one pixel, at stride 1, in f32.
+    pub(super) fn is_plain_3x3(&self) -> bool {
+        (self.kernel_height, self.kernel_width) == (3, 3)
+            && (self.stride, self.dilation, self.padding) == (1, 1, 1)
+            && Arithmetic::of(self) == Arithmetic::Single
     }
 
     /// # Panics

@@ -5,6 +5,8 @@ use super::{
     few_outputs,
     lattice::{Lattice, Tile, gather_channels, tiles},
     product::{LANES, PixelProduct, padded},
+    transpose::transpose,
+    winograd::{Image, WeightGradient},
 };
 use crate::{scratch::with_scratch, send_ptr::SharedMut};
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
@@ -17,9 +19,6 @@ const TASKS: usize = 8;
 /// Weights up to which every task sums all of them over its own tiles; above, every task sums a group
 /// of channels over all tiles.
 const FEW_WEIGHTS: usize = 1 << 16;
-
-/// Side of the blocks of [`transpose`]: a block of rows and one of columns fit the first cache together.
-const BLOCK: usize = 16;
 
 /// `total` cut into at most `parts` ranges of nearly equal length.
 fn split(total: usize, parts: usize) -> Vec<Range<usize>> {
@@ -62,6 +61,22 @@ pub fn conv2d_backward_weight(
             |_: &mut (), tile, sum: &mut [f32]| few_outputs::add(shape, tile, x, grad_out, sum);
         grad_weight.copy_from_slice(&sum_over(&tiles, shape.weight_len(), || (), add));
         return;
+    }
+    let winograd = WeightGradient {
+        source: Image {
+            values: x,
+            images: shape.batch,
+            channels: shape.in_channels,
+            size: (shape.in_height, shape.in_width),
+            padding: shape.padding,
+            reflect: shape.reflect,
+        },
+        grad_out,
+        outputs: shape.out_channels,
+        out: (shape.out_height(), shape.out_width()),
+    };
+    if shape.is_plain_3x3() && winograd.pays() {
+        return by_winograd(shape, &winograd, grad_weight);
     }
     let arithmetic = Arithmetic::of(shape);
     let to = SharedMut::new(grad_weight);
@@ -114,6 +129,24 @@ pub fn conv2d_backward_weight(
     write(shape, all.clone(), &total, &to);
 }
 
+fn by_winograd(shape: &ConvShape, gradient: &WeightGradient, grad_weight: &mut [f32]) {
+    let to = SharedMut::new(grad_weight);
+    if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS {
+        let groups = split(shape.in_channels, TASKS);
+        return gradient.by_channels(groups, |channels, sum| write(shape, channels, sum, &to));
+    }
+    let parts = gradient.parts();
+    let sums: Vec<Vec<f32>> = split(parts.len(), TASKS)
+        .into_par_iter()
+        .map(|range| {
+            let mut sum = vec![0.0; gradient.sum_len(shape.in_channels)];
+            gradient.over(&parts[range], &mut sum);
+            sum
+        })
+        .collect();
+    write(shape, 0..shape.in_channels, &total(sums), &to);
+}
+
 /// `len` sums over tiles, to which `add` adds a tile's; every task has a state of its own.
 fn sum_over<S>(
     tiles: &[Tile],
@@ -121,7 +154,7 @@ fn sum_over<S>(
     state: impl Fn() -> S + Sync,
     add: impl Fn(&mut S, Tile, &mut [f32]) + Sync,
 ) -> Vec<f32> {
-    let mut parts: Vec<Vec<f32>> = split(tiles.len(), TASKS)
+    let parts: Vec<Vec<f32>> = split(tiles.len(), TASKS)
         .into_par_iter()
         .map(|range| {
             let (mut state, mut sum) = (state(), vec![0.0; len]);
@@ -131,6 +164,11 @@ fn sum_over<S>(
             sum
         })
         .collect();
+    total(parts)
+}
+
+/// The sum of at least one part, in order.
+fn total(mut parts: Vec<Vec<f32>>) -> Vec<f32> {
     let mut total = parts.swap_remove(0);
     for part in &parts {
         for (sum, add) in total.iter_mut().zip(part) {
@@ -322,43 +360,6 @@ fn write(shape: &ConvShape, channels: Range<usize>, sum: &[f32], to: &SharedMut<
         for (tap, sums) in sum.chunks_exact(stride).enumerate() {
             for (row, value) in rows.iter_mut().zip(&sums[first..]) {
                 row[tap] = *value;
-            }
-        }
-    }
-}
-
-/// `to[q][r] = from[r][q]` for `rows` rows of `columns` values; the rest of each row of `to` is zeroed.
-///
-/// # Panics
-/// When a slice is too short for its strides.
-fn transpose<T: Copy + Default>(
-    from: &[T],
-    from_stride: usize,
-    rows: usize,
-    columns: usize,
-    to: &mut [T],
-    to_stride: usize,
-) {
-    assert!(rows <= to_stride && to.len() >= columns * to_stride);
-    for first_row in (0..to_stride).step_by(BLOCK) {
-        let height = BLOCK.min(rows.saturating_sub(first_row));
-        for first in (0..columns).step_by(BLOCK) {
-            let width = BLOCK.min(columns - first);
-            let mut block = [[T::default(); BLOCK]; BLOCK];
-            for r in 0..height {
-                let from = &from[(first_row + r) * from_stride + first..][..width];
-                if width == BLOCK {
-                    for q in 0..BLOCK {
-                        block[q][r] = from[q];
-                    }
-                } else {
-                    for q in 0..width {
-                        block[q][r] = from[q];
-                    }
-                }
-            }
-            for q in 0..width {
-                to[(first + q) * to_stride + first_row..][..BLOCK].copy_from_slice(&block[q]);
             }
         }
     }

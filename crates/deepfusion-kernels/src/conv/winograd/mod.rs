@@ -1,0 +1,190 @@
+//! 3×3 sums at stride 1 by Winograd's F(4×4, 3×3): 36 products for 16 outputs instead of 144.
+//!
+//! Y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs Y (Lavin and Gray, "Fast
+//! Algorithms for Convolutional Neural Networks", 2016). The sums of ⊙ over channels are 36 matrix products, whose
+//! columns are tiles: images stay planar. A tile's sums do not depend on what it is computed with, so neither threads
+//! nor tasks change a bit.
+
+mod image;
+mod tiles;
+mod transform;
+mod weight_gradient;
+
+pub(super) use image::{Image, Margins};
+pub(super) use weight_gradient::WeightGradient;
+
+use super::product::{LANES, TapProduct, padded};
+use crate::scratch::with_scratch;
+use crate::send_ptr::SharedMut;
+use pulp::Arch;
+use rayon::prelude::*;
+use std::ops::Range;
+use tiles::{Grid, Run};
+use transform::{TransformInputs, TransformKernels, TransformOutputs};
+
+/// Outputs of a tile along one side.
+const OUT: usize = 4;
+/// Inputs of a tile along one side.
+const IN: usize = 6;
+/// Products of a tile.
+const AREA: usize = IN * IN;
+/// Tiles of a batch below which the transformed weights, four times as many, cost more than products less.
+const FEWEST_TILES: usize = 64;
+
+/// Kernels below which moving values takes as long as multiplying them.
+const FEWEST_KERNELS: usize = 512;
+
+/// A sum over channels and 3×3 taps at stride 1: a convolution, or the gradient of its input.
+#[derive(Clone, Copy)]
+pub(super) struct Sum<'a> {
+    pub(super) source: Image<'a>,
+    /// Output rows and columns.
+    pub(super) out: (usize, usize),
+    /// Output channels.
+    pub(super) rows: usize,
+    pub(super) kernels: Kernels<'a>,
+    pub(super) bias: Option<&'a [f32]>,
+}
+
+/// The kernels of a sum, as they lie in a convolution's weights: nine taps each, one after the other.
+#[derive(Clone, Copy)]
+pub(super) struct Kernels<'a> {
+    pub(super) values: &'a [f32],
+    /// From an output channel's to the next one's, and from an input channel's to the next one's.
+    pub(super) strides: (usize, usize),
+    /// Turned by half a turn.
+    pub(super) turned: bool,
+}
+
+impl Sum<'_> {
+    /// Whether this form is faster than plain sums.
+    pub(super) fn pays(&self) -> bool {
+        let (height, width) = self.out;
+        let tiles = Grid::new(self.source.images, self.out).count();
+        let plain = 9 * self.source.images * height * width;
+        self.source.channels.is_multiple_of(LANES)
+            && self.rows * self.source.channels >= FEWEST_KERNELS
+            && tiles >= FEWEST_TILES
+            && 2 * AREA * tiles <= plain
+    }
+
+    /// Calls `write` with every row of outputs: image, output channel, row, first column and values.
+    pub(super) fn run(&self, write: impl Fn(usize, usize, (usize, usize), &[f32]) + Sync) {
+        let channels = self.source.channels;
+        with_scratch(AREA * self.rows * channels, |weights| {
+            self.transform_kernels(weights);
+            let grid = Grid::new(self.source.images, self.out);
+            let tasks = grid.tasks(channels, self.rows);
+            tasks.into_par_iter().for_each(|(tiles, rows)| {
+                self.task(
+                    &grid.runs(tiles.clone()),
+                    tiles.len(),
+                    rows,
+                    weights,
+                    &write,
+                );
+            });
+        });
+    }
+
+    fn task(
+        &self,
+        runs: &[Run],
+        tiles: usize,
+        rows: Range<usize>,
+        weights: &[f32],
+        write: &impl Fn(usize, usize, (usize, usize), &[f32]),
+    ) {
+        let (channels, tiles) = (self.source.channels, padded(tiles));
+        // Products of neighbouring numbers do not lie whole pages apart.
+        let product_len = rows.len() * tiles + LANES;
+        let lens = [
+            AREA * tiles * channels,
+            AREA * product_len,
+            AREA * tiles,
+            self.source.line_len(runs),
+        ];
+        with_scratch(lens.iter().sum(), |buffer| {
+            let (inputs, buffer) = buffer.split_at_mut(lens[0]);
+            let (products, buffer) = buffer.split_at_mut(lens[1]);
+            let (plain, line) = buffer.split_at_mut(lens[2]);
+            for (channel, to) in inputs.chunks_exact_mut(AREA * tiles).enumerate() {
+                self.source.gather(channel, runs, line, plain, tiles);
+                Arch::new().dispatch(TransformInputs {
+                    from: plain,
+                    pitch: tiles,
+                    tiles,
+                    to,
+                    to_pitch: tiles,
+                });
+            }
+            let offsets: Vec<usize> = (0..channels).map(|c| c * AREA * tiles).collect();
+            for product in 0..AREA {
+                let weights = &weights[(product * self.rows + rows.start) * channels..];
+                TapProduct {
+                    weights: &weights[..rows.len() * channels],
+                    weight_stride: channels,
+                    offsets: &offsets,
+                    source: &inputs[product * tiles..],
+                    columns: tiles,
+                    out: &mut products[product * product_len..][..rows.len() * tiles],
+                    rows: rows.len(),
+                }
+                .run();
+            }
+            for (index, row) in rows.enumerate() {
+                Arch::new().dispatch(TransformOutputs {
+                    from: &products[index * tiles..],
+                    pitch: product_len,
+                    tiles,
+                    bias: self.bias.map_or(0.0, |bias| bias[row]),
+                    to: plain,
+                    to_pitch: tiles,
+                });
+                image::scatter(self.out, runs, plain, tiles, line, |run, at, values| {
+                    write(run.image, row, at, values);
+                });
+            }
+        });
+    }
+
+    /// G g Gᵀ of every kernel: `to[(product·rows + row)·channels + channel]`.
+    fn transform_kernels(&self, to: &mut [f32]) {
+        /// Rows of a task: a channel's of them lie near each other.
+        const GROUP: usize = 8;
+        let Kernels {
+            values,
+            strides: (row_stride, channel_stride),
+            turned,
+        } = self.kernels;
+        let (rows, channels) = (self.rows, self.source.channels);
+        let to = SharedMut::new(to);
+        (0..rows.div_ceil(GROUP)).into_par_iter().for_each(|group| {
+            let rows_of_task = group * GROUP..((group + 1) * GROUP).min(rows);
+            let (mut taps, mut transformed) = ([[0.0; LANES]; 9], [[0.0; LANES]; AREA]);
+            for first in (0..channels).step_by(LANES) {
+                for row in rows_of_task.clone() {
+                    for lane in 0..LANES {
+                        let from = row * row_stride + (first + lane) * channel_stride;
+                        let from = &values[from..][..9];
+                        for tap in 0..9 {
+                            taps[tap][lane] = from[tap];
+                        }
+                    }
+                    if turned {
+                        taps.reverse();
+                    }
+                    Arch::new().dispatch(TransformKernels {
+                        taps: &taps,
+                        to: &mut transformed,
+                    });
+                    for (product, values) in transformed.iter().enumerate() {
+                        let at = (product * rows + row) * channels + first;
+                        // SAFETY: each task writes the rows of its own.
+                        unsafe { to.slice(at, LANES) }.copy_from_slice(values);
+                    }
+                }
+            }
+        });
+    }
+}
