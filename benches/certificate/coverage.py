@@ -125,13 +125,13 @@ def table(rows):
     print("|---|---|---|---|---|---|")
     for case in [None, *dict.fromkeys(row["case"] for row in rows)]:
         some = [row for row in rows if case in (None, row["case"])]
-        told = [row for row in some if not math.isnan(row["low"])]
-        widths = sorted(math.log(row["high"] / row["low"]) / 2 for row in told)
+        certified = [row for row in some if not math.isnan(row["low"])]
+        widths = sorted(math.log(row["high"] / row["low"]) / 2 for row in certified)
         errors = [abs(math.log(row["scale"] / row["true"])) for row in some if not math.isnan(row["scale"])]
         width = f"± {100 * widths[len(widths) // 2]:.1f} %" if widths else "–"
         error = f"{100 * max(errors):.1f} %" if errors else "–"
-        held = sum(row["held"] for row in told)
-        print(f"| {case or 'all'} | {len(some)} | {len(told)} | {held} | {width} | {error} |")
+        held = sum(row["held"] for row in certified)
+        print(f"| {case or 'all'} | {len(some)} | {len(certified)} | {held} | {width} | {error} |")
 
 
 def main():

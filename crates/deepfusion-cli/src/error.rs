@@ -351,7 +351,7 @@ impl Reportable for CliError {
 /// The failures of a run, a line each, as many as a person reads; the manifest has them all.
 fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
     const SHOWN: usize = 20;
-    let mut text = format!("{} of {total} images failed", failures.len());
+    let mut text = format!("{} of {} failed", failures.len(), count_of(total, "image"));
     if interrupted {
         text += " before the run was stopped";
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::compare::{
-    Error, Evaluation, FrameScore, Measured, MetricScale, ModelFile, SAVED_VERSION,
+    Error, Evaluation, FrameScore, MeasuredOn, MetricScale, ModelFile, SAVED_VERSION,
     SavedEvaluation, Verdict, published_tables, run_tables, sha256_of_file,
 };
 use deepfusion_eval::{Crop, Evaluator, Grid, PostProcess, Prediction, Protocol, Report};
@@ -39,12 +39,12 @@ fn run(at: &Path, name: &str, data: &str, (report, images): (Report, Vec<FrameSc
     std::fs::write(&checkpoint, name).unwrap();
     let saved = SavedEvaluation {
         format_version: SAVED_VERSION,
-        measured: Measured {
+        measured: MeasuredOn {
             data: vec![PathBuf::from(data)],
             camera: "2".into(),
             engine: "fused f32".into(),
             focal_correction: true,
-            ..Measured::default()
+            ..MeasuredOn::default()
         },
         model: ModelFile {
             checkpoint: "best.safetensors".into(),
@@ -272,11 +272,11 @@ fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
         for (i, change) in changes.iter().enumerate() {
             let mut saved = SavedEvaluation {
                 format_version: SAVED_VERSION,
-                measured: Measured {
+                measured: MeasuredOn {
                     data: vec![PathBuf::from(format!("street-{i}"))],
                     focal_correction: true,
                     held_out: Some(true),
-                    ..Measured::default()
+                    ..MeasuredOn::default()
                 },
                 model: ModelFile {
                     checkpoint: "best.safetensors".into(),

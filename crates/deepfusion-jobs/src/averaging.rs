@@ -1,7 +1,8 @@
 //! The mean of several networks' weights, as a run of its own.
 //!
-//! Networks that were trained from the same one lie in one valley of the loss, so that the mean of their weights is a network as well, and can be a better
-//! one on images that none of them saw ("model soups", Wortsman et al., arXiv 2203.05482; of a network and the one it began from, arXiv 2109.01903).
+//! Networks that were trained from the same one lie in one valley of the loss. So the mean of their weights is a network as well, and can be a
+//! better one on images that none of them saw: "model soups" (Wortsman et al., arXiv 2203.05482); of a network and the one it began from,
+//! arXiv 2109.01903.
 //!
 //! What batch norms measured of their inputs is averaged like weights, and not measured anew. Where they were frozen (`frozen_statistics`), as in
 //! `adapt`, all networks have the same, and the mean is exact; where they were not, [`Averaged::statistics`] says how far apart they are.

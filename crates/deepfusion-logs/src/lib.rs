@@ -1,6 +1,6 @@
 //! A vehicle's speed over time, from the log that happens to be there.
 //!
-//! [`read`] takes a file or an app's export folder, finds out what it is by what stands in it, and gives a [`DriveLog`]: speeds
+//! [`read`] takes a file or an app's export folder, and finds out what it is by what stands in it. It gives a [`DriveLog`]: speeds
 //! in m/s at times in nanoseconds, yaw rates where the log has a gyroscope, and [notes](DriveLog::notes) that say how it was
 //! understood. What would change the scale is never guessed: a speed without a unit is an error that lists the columns.
 //!

@@ -27,7 +27,8 @@ pub enum Error {
     },
     /// A stream has too few usable samples.
     #[error(
-        "{stream}: {usable} usable samples of {total} (finite, and later than the one before), expected at least {needed}"
+        "{stream}: {} of {total} (finite, and later than the one before), expected at least {needed}",
+        deepfusion_hint::count_of(*usable, "usable sample")
     )]
     TooFewSamples {
         /// The stream: "speed", "imu", …

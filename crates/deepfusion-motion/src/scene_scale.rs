@@ -1,8 +1,8 @@
 //! The scale of a depth image, from how the scene moves in a neighbouring image as the vehicle drives.
 //!
 //! A point at depth Z moves in the image by what the camera's way t and Z give; the way is measured in metres, so the movement
-//! tells Z in metres. [`align`] first finds how the camera turned and where it headed between the two images, which a vehicle's sensors know
-//! too coarsely (a tenth of a degree of pitch moves the picture as much as a metre of driving); [`scene_points`] then finds, for
+//! tells Z in metres. [`align`] first finds how the camera turned and where it headed between the two images. A vehicle's sensors know that
+//! too coarsely: a tenth of a degree of pitch moves the picture as much as a metre of driving. [`scene_points`] then finds, for
 //! patches all over the image, the factor on their depth with which they are found again in the other image:
 //!
 //! s\* = argmax over s of ZNCC(I₁(p), I₀(π(K (R s·D(p) K⁻¹ p + t))))

@@ -56,7 +56,7 @@ impl Silhouette {
             ..Self::default()
         };
         [silhouette.bottom, silhouette.top] = reach(cluster, obstacles, width);
-        let mut above = Above::default();
+        let mut above = Continuation::default();
         Columns::of(cluster, depth, width).for_each(|u, pixels| {
             let top = obstacles.height[pixels[0].1 as usize * width + u];
             let rises = above.follow(u, pixels[0], depth, rays, ground, config);
@@ -133,13 +133,13 @@ fn reach(cluster: &Cluster, obstacles: &Obstacles, width: usize) -> [f32; 2] {
 
 /// The continuation of a cluster above the height up to which pixels are joined.
 #[derive(Default)]
-struct Above {
+struct Continuation {
     columns: usize,
     tall: usize,
     tops: Vec<f32>,
 }
 
-impl Above {
+impl Continuation {
     /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance. Returns
     /// whether it rises above the highest target.
     fn follow(

@@ -22,13 +22,17 @@ const BATCH: usize = 8;
 
 /// Writes the whole drive below `out`, which must be new or empty, and returns the drive's folder.
 ///
-/// Below `out/2026_01_01`: the three calibration files and `2026_01_01_drive_<seed>_sync` with `image_02` (PNG), `oxts`,
-/// `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame), `proj_depth/groundtruth/image_02` (dense exact camera z,
-/// 16-bit PNG, metres × 256, 0 beyond 255 m), `moving_02` (255 on dynamic objects), `tracklet_labels.xml` (exact boxes of
-/// everything in reach, in the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`,
-/// and with [`crate::SimConfig::riders`] `Cyclist` and `Pedestrian`), and `poses.txt`
-/// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line). With a second camera ([`crate::SimConfig::stereo_baseline_m`])
-/// its pictures are in `image_03`. A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
+/// Below `out/2026_01_01` are the three calibration files and `2026_01_01_drive_<seed>_sync` with
+///
+/// - `image_02` (PNG), and with a second camera ([`crate::SimConfig::stereo_baseline_m`]) `image_03`;
+/// - `oxts`; `velodyne_points` of every [`crate::SimConfig::scan_every`]-th frame;
+/// - `proj_depth/groundtruth/image_02`: dense exact camera z, 16-bit PNG, metres × 256, 0 beyond 255 m;
+/// - `moving_02`: 255 on dynamic objects;
+/// - `tracklet_labels.xml`: exact boxes of everything in reach, in the velodyne's axes. Objects are `Car`, `Pole`, `Tree`, `Building`,
+///   `Fence`, and with [`crate::SimConfig::riders`] `Cyclist` and `Pedestrian`;
+/// - `poses.txt`: `world_from_cam`, the upper three rows of the matrix in 12 numbers a line.
+///
+/// A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
 /// ([`Simulation::drawn`]). Its boxes also hold what of an object was cut away over the camera's lane, as of a tree's crown.
 ///
 /// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything

@@ -1,4 +1,3 @@
-mod on_device;
 mod values;
 
 use crate::{Error, Model};
@@ -9,7 +8,7 @@ use deepfusion_nn::ops::{self, has_kernels};
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use values::{Values, to_vec};
+use values::{Values, to_vec, update_on_device};
 
 /// A parameter's moments, in the same place as its gradient.
 #[derive(Debug, Clone)]
@@ -384,7 +383,7 @@ impl ModuleMapper for Update<'_> {
             }
             Values::Device(gradient) => {
                 let moments = [&*first, &*second].map(|moment| moment.beside(gradient));
-                let (moved, [m, v]) = on_device::update(&step, tensor, gradient.clone(), moments);
+                let (moved, [m, v]) = update_on_device(&step, tensor, gradient.clone(), moments);
                 (*first, *second) = (Values::Device(m), Values::Device(v));
                 moved
             }

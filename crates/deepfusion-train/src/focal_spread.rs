@@ -23,8 +23,8 @@ const MOST: f64 = 0.5;
 /// The standard deviation of ln f; `None` where the loss hardly depends on it.
 ///
 /// The networks are held, and the loss of parts of the drives is taken at f and 5 % to either side. Each part says by its slope g_b how far
-/// it would like f elsewhere, all of them by their curvature H how much that matters: σ² = n/(n − 1) · Σ(g_b − ḡ)²/(ΣH_b)² is the sandwich
-/// of M-estimators with a part for a cluster, to which the step (Σg/ΣH)² is added by which f is off its optimum. Where the turns are
+/// it would like f elsewhere, all of them by their curvature H how much that matters. σ² = n/(n − 1) · Σ(g_b − ḡ)²/(ΣH_b)² is the sandwich
+/// of M-estimators with a part for a cluster. To it the step (Σg/ΣH)² is added by which f is off its optimum. Where the turns are
 /// PoseNet's, these would have followed another f: they are divided by it, so that only what no turn can imitate counts (Gordon et al.,
 /// arXiv 1904.04998). An error in the scale of measured turns goes into f as it is, and is not part of this.
 ///

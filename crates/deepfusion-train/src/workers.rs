@@ -175,7 +175,7 @@ impl WorkerGroup {
 mod tests {
     use super::*;
 
-    /// A worker among others that say what they are told to.
+    /// A worker among others that give what the test sets.
     struct Among {
         rank: usize,
         others: Vec<f32>,

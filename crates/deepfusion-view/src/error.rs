@@ -52,7 +52,7 @@ pub enum Error {
         path: PathBuf,
     },
     /// A file that was not written to its end, because somebody asked to stop.
-    #[error("{}: not written: stopped after {done} of {total} frames", path.display())]
+    #[error("{}: not written: stopped after {done} of {}", path.display(), deepfusion_hint::count_of(*total, "frame"))]
     Stopped {
         /// The file that would have been written.
         path: PathBuf,

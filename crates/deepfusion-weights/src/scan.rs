@@ -29,7 +29,7 @@ pub(crate) enum ScanError {
     Alone {
         folder: PathBuf,
         name: String,
-        lacks: Half,
+        lacks: NetworkFile,
     },
     /// A file that `include_bytes!` could not name.
     Path { path: PathBuf },
@@ -37,7 +37,7 @@ pub(crate) enum ScanError {
 
 /// One of a network's two files.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Half {
+pub(crate) enum NetworkFile {
     Card,
     Weights,
 }
@@ -57,8 +57,8 @@ impl std::fmt::Display for ScanError {
                 lacks,
             } => {
                 let [has, lacks] = match lacks {
-                    Half::Card => ["safetensors", "toml"],
-                    Half::Weights => ["toml", "safetensors"],
+                    NetworkFile::Card => ["safetensors", "toml"],
+                    NetworkFile::Weights => ["toml", "safetensors"],
                 };
                 write!(
                     f,
@@ -122,8 +122,8 @@ pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, ScanError> {
             folder: folder.to_owned(),
             name,
             lacks: match card {
-                Some(_) => Half::Weights,
-                None => Half::Card,
+                Some(_) => NetworkFile::Weights,
+                None => NetworkFile::Card,
             },
         }),
     };

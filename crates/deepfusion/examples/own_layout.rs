@@ -1,18 +1,10 @@
-//! A recording in a layout of your own, opened as a [`Dataset`]: here, images named by their times in milliseconds
-//! (`0.png`, `100.png`, …), of a vehicle at a known speed.
-//!
-//! ```text
-//! cargo run --release --example own_layout -- FOLDER SPEED_MPS
-//! ```
-
+//! A layout of your own, opened as a [`Dataset`]: images named by their times in milliseconds (`0.png`, `100.png`, …), of a
+//! vehicle at a known speed: `cargo run --release --example own_layout -- FOLDER SPEED_MPS`
+use anyhow::{Context, Result};
+use deepfusion::data::{self, DataWarning, Dataset, DatasetParts, Frame, FrameImage, Recording};
+use deepfusion::geometry::Intrinsics;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-use anyhow::{Context, Result};
-use deepfusion::data::{
-    self, DataWarning, Dataset, DatasetParts, Frame, FrameImage, Recording, RgbImage,
-};
-use deepfusion::geometry::Intrinsics;
 
 /// What all layouts share lies in the dataset; this is the rest, read when it is asked for. More can be said, such as ground truth.
 #[derive(Debug)]
@@ -28,7 +20,7 @@ impl Recording for NamedByTime {
     fn warnings(&self) -> &[DataWarning] {
         &self.warnings
     }
-    fn load_image(&self, frame: &Frame) -> data::Result<RgbImage> {
+    fn load_image(&self, frame: &Frame) -> data::Result<data::RgbImage> {
         data::load_rgb(frame.image.path())
     }
 }
@@ -48,9 +40,8 @@ fn main() -> Result<()> {
     let (_, first) = images.first().context("no image is named by its time")?;
     let size = data::image_size(first)?;
     let camera = Intrinsics::centred(f64::from(size.0) / 2.0, size);
-    let warnings = vec![DataWarning::Other(
-        "the camera is taken to be 90 degrees wide".into(),
-    )];
+    let assumed = "the camera is taken to be 90 degrees wide";
+    let warnings = vec![DataWarning::Other(assumed.into())];
     let frame = |(number, (ms, path)): (usize, (u64, PathBuf))| Frame {
         drive: "own".into(),
         number: number as u64,
@@ -61,11 +52,8 @@ fn main() -> Result<()> {
     let frames = images.into_iter().enumerate().map(frame).collect();
     let parts = DatasetParts::of_frames("own", frames, camera);
     let dataset = Dataset::new(parts, Arc::new(NamedByTime { folder, warnings }));
-    for warning in dataset.warnings() {
-        eprintln!("warning: {warning}");
-    }
-    let pairs = dataset.snippets(&[1], 0.5)?.len();
-    let frames = dataset.frames().len();
+    println!("warnings: {:?}", dataset.warnings());
+    let (frames, pairs) = (dataset.frames().len(), dataset.snippets(&[1], 0.5)?.len());
     println!("{frames} frames, {pairs} pairs to learn from");
     Ok(())
 }

@@ -209,7 +209,7 @@ def calibrated(camera, corners):
 
 
 def main():
-    told = {"board": list(BOARD), "square": SQUARE, "opencv": cv2.__version__, "cameras": {}}
+    fixture = {"board": list(BOARD), "square": SQUARE, "opencv": cv2.__version__, "cameras": {}}
     for name, camera in CAMERAS.items():
         folder = HERE / name
         folder.mkdir(exist_ok=True)
@@ -241,8 +241,8 @@ def main():
         about["views"] = views
         about["opencv"] = calibrated(camera, corners)
         print(name, about["opencv"])
-        told["cameras"][name] = about
-    (HERE / "boards.json").write_text(json.dumps(told) + "\n")
+        fixture["cameras"][name] = about
+    (HERE / "boards.json").write_text(json.dumps(fixture) + "\n")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 
-use deepfusion_jobs::live::{Feed, Until};
+use deepfusion_jobs::live::{Feed, LiveLimits};
 use deepfusion_video::Address;
 
 use crate::cli::LiveArgs;
@@ -28,7 +28,7 @@ pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Addres
 
 /// Begins to read a source, until Ctrl-C or what the options say.
 pub(super) fn open(address: &Address, args: &LiveArgs) -> Result<Feed> {
-    let until = Until {
+    let until = LiveLimits {
         frames: args.frames,
         duration_s: args.duration,
         timeout_s: args.timeout_s(),

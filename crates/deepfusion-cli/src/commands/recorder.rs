@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use deepfusion_hint::count_of;
-use deepfusion_jobs::training::{Choice, Pace, RunLog, TimeEstimate};
+use deepfusion_jobs::training::{OtherSetting, Pace, RunLog, TimeEstimate};
 use deepfusion_train::{Control, LossTerms, TrainEvent};
 
 use crate::failure::{Failure, Result};
@@ -209,8 +209,8 @@ fn how_long(estimate: &TimeEstimate) -> String {
     );
     let choices = estimate.choices.iter().map(|(choice, total_s)| {
         let option = match choice {
-            Choice::Size(size) => format!("--size {}x{}", size.width, size.height),
-            Choice::Preset(preset) => format!("--preset {preset}"),
+            OtherSetting::Size(size) => format!("--size {}x{}", size.width, size.height),
+            OtherSetting::Preset(preset) => format!("--preset {preset}"),
         };
         format!("{option} about {}", clock(*total_s))
     });
@@ -240,13 +240,13 @@ mod tests {
             step_s: 1.0,
             choices: vec![
                 (
-                    Choice::Size(InputSize {
+                    OtherSetting::Size(InputSize {
                         width: 640,
                         height: 192,
                     }),
                     4800.0,
                 ),
-                (Choice::Preset(Preset::Tiny), 300.0),
+                (OtherSetting::Preset(Preset::Tiny), 300.0),
             ],
             bf16: false,
         };

@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use deepfusion_hint::count_of;
 use deepfusion_jobs::training::{
     AskedRecordings, Pace, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
     leaves_turns_unused,
@@ -116,14 +117,14 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     recorder.finish()?;
     say(&format!(
-        "{} {} of {} steps in {}{}",
+        "{} {} of {} in {}{}",
         if summary.step < summary.steps {
             "stopped after"
         } else {
             "done:"
         },
         summary.step,
-        summary.steps,
+        count_of(summary.steps, "step"),
         clock(summary.seconds),
         if summary.skipped > 0 {
             format!(

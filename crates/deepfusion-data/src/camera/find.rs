@@ -46,9 +46,8 @@ pub(crate) enum Pictures<'a> {
     Video(&'a Path, Option<&'a GoproLens>),
 }
 
-/// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
-/// them, or in the folder above, or what the `pictures` say themselves, which becomes one of the `warnings`; where nothing says it, the
-/// one that is to be assumed, which does too.
+/// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside them or in the folder above. Else
+/// what the `pictures` say themselves, and where nothing says it the one that is to be assumed; both become one of the `warnings`.
 ///
 /// # Errors
 /// [`Error::NoCameraFile`] where nothing says it; [`Error::CameraFile`], [`Error::Config`].

@@ -104,7 +104,7 @@ impl Lens {
     }
 
     /// The corrected depth map (camera z, which a lens does not change), each pixel from its nearest: a
-    /// mean over an edge would be a depth that is nowhere. A map of the images' shape in another size, as of a telephone's depth sensor, is taken
+    /// mean over an edge would be a depth that is nowhere. A map of the images' shape in another size, as of a phone's depth sensor, is taken
     /// for what the whole image shows.
     ///
     /// # Errors

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// sensors.
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
-/// frame's time), not the scanner's own; `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
+/// frame's time), not the scanner's own. `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
 /// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in the drive's `dataset.toml`, which goes
 /// with the drive wherever it is moved.
 ///

@@ -14,10 +14,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Dataset {
-    /// Opens a recording of any known layout, recognised by what is there: a KITTI raw drive, date or root (one
-    /// data set for each drive and camera, in order of names), KITTI odometry (one for each sequence), KITTI-360 (one for each drive), nuScenes (one for each
-    /// scene), a folder of images, a
-    /// video file, a comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
+    /// Opens a recording of any known layout, recognised by what is there. A KITTI raw drive, date or root gives one data set for
+    /// each drive and camera, in order of names; KITTI odometry one for each sequence, KITTI-360 one for each drive, nuScenes one for
+    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. Drives without images of the camera, or without a
     /// selected frame, are left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be absent

@@ -1,4 +1,4 @@
-//! Telephones whose main camera's view is published, for pictures whose EXIF block names the telephone and the lens, but not the
+//! Phones whose main camera's view is published, for pictures whose EXIF block names the phone and the lens, but not the
 //! focal length in 35 mm film.
 
 /// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
@@ -14,7 +14,7 @@ pub(super) fn is_action_camera(make: &str) -> bool {
     ACTION_CAMERA_MAKERS.iter().any(named)
 }
 
-/// How far EXIF's focal length may be from the main lens', as a share: other lenses of the same telephone are farther away.
+/// How far EXIF's focal length may be from the main lens', as a share: other lenses of the same phone are farther away.
 const SAME_LENS: f64 = 0.03;
 
 /// How wide a main camera sees.
@@ -26,7 +26,7 @@ enum View {
     DiagonalDeg(f64),
 }
 
-/// A telephone's main camera, with a sensor of 4:3.
+/// A phone's main camera, with a sensor of 4:3.
 #[derive(Debug, PartialEq)]
 pub(super) struct KnownCamera {
     make: &'static str,
@@ -70,7 +70,7 @@ const fn samsung(models: &'static [&'static str], lens_mm: f64, diagonal_deg: f6
 
 /// Views as the makers publish them: Apple's technical specifications ("26 mm, ƒ/1.6"; support.apple.com/specs), Google's
 /// ("82° field of view"; support.google.com/pixelphone/answer/7158570), Samsung's ("FOV 85°"; the models' specifications on
-/// samsung.com). The lenses' own focal lengths are those that the telephones write into EXIF. No picture of each was at hand to try
+/// samsung.com). The lenses' own focal lengths are those that the phones write into EXIF. No picture of each was at hand to try
 /// them: where EXIF's lens is not the one here, the table is not used, so that a wrong row is an unused one. Left out: the Galaxy S21 and S21+,
 /// whose two longer lenses are too alike to tell them apart, and action cameras, of whose photographs the maker alone is known
 /// ([`is_action_camera`]); their videos say more ([`deepfusion_logs::GoproLens`]).

@@ -1,4 +1,4 @@
-//! A single picture as a camera or a telephone wrote it.
+//! A single picture as a camera or a phone wrote it.
 
 use super::exif_camera::{block, camera_of, number};
 use super::files::decode_bytes;
@@ -15,7 +15,7 @@ use std::path::Path;
 pub struct Photo {
     /// Upright: turned as EXIF's orientation says.
     pub image: RgbImage,
-    /// The camera by EXIF's focal length in 35 mm film, or by the telephone's model and lens where their view is known, with square
+    /// The camera by EXIF's focal length in 35 mm film, or by the phone's model and lens where their view is known, with square
     /// pixels and the principal point in the middle; `None` where nothing is said. It is the lens's nominal focal length: of a picture that was cut since it is wrong.
     pub intrinsics: Option<Intrinsics>,
     /// EXIF's orientation that the picture was turned by: 1 is as it is stored, 6 and 8 are quarter turns, 3 is half a turn.

@@ -5,7 +5,7 @@ use crate::{PostProcess, Report};
 use deepfusion_hint::count_of;
 use serde_json::Value;
 
-use super::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
+use super::saved::{MeasuredOn, ModelFile, SavedEvaluation, sha256_of_file};
 use super::{Error, EvaluationProblem, Result, SAVED_VERSION};
 
 /// An evaluation to be compared.
@@ -29,7 +29,7 @@ pub enum Origin {
     /// A file of a run's folder.
     Saved {
         /// What was measured on.
-        measured: Box<Measured>,
+        measured: Box<MeasuredOn>,
         /// With which weights.
         model: ModelFile,
         /// Whether the run's checkpoint is another one by now.

@@ -63,9 +63,9 @@ impl MetricScale {
         }
     }
 
-    /// From the evaluations that a run's folder keeps: those of this very checkpoint (by the SHA-256 of its file), of the same
-    /// data set where it learned several, with the same correction for the focal length and the same post-processing, and known to be of frames that training
-    /// did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
+    /// From the evaluations that a run's folder keeps: those of this very checkpoint (by the SHA-256 of its file), and of the same
+    /// data set where it learned several. They must have the same correction for the focal length and the same post-processing, and be known
+    /// to be of frames that training did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
     /// place and not in another are not trusted.
     ///
     /// A file that cannot be read, or is of an older version that does not say what training saw, says nothing.

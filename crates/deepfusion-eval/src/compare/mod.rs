@@ -21,5 +21,7 @@ pub use evaluation::{Evaluation, Origin};
 pub use metric_scale::{LEAST_IMAGES, LEAST_STEPS, MetricScale, TRUSTED_WITHIN, Verdict};
 pub use published::{Published, published_tables};
 pub use runs::run_tables;
-pub use saved::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file};
+pub use saved::{
+    FrameScore, MeasuredOn, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file,
+};
 pub use table::{Better, Column, Rank, Row, Table, Tables, Value};

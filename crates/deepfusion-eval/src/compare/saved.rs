@@ -19,7 +19,7 @@ pub struct SavedEvaluation {
     /// [`SAVED_VERSION`].
     pub format_version: u32,
     /// What was measured on.
-    pub measured: Measured,
+    pub measured: MeasuredOn,
     /// The weights that were measured.
     pub model: ModelFile,
     /// What `eval --json` prints.
@@ -30,7 +30,7 @@ pub struct SavedEvaluation {
 
 /// What an evaluation was measured on, and how it was asked for.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Measured {
+pub struct MeasuredOn {
     /// The recordings, as given.
     pub data: Vec<PathBuf>,
     /// The split file, if any.
@@ -48,7 +48,7 @@ pub struct Measured {
     pub set: Option<String>,
     /// Whether depth was corrected for another focal length than the one trained on.
     pub focal_correction: bool,
-    /// In how many ways the network looked at each image; absent: in one.
+    /// The test-time augmentation, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub post_process: Option<PostProcess>,
     /// Whether training saw none of these frames; absent where that is unknown.

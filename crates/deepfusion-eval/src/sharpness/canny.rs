@@ -1,8 +1,7 @@
 //! Edges of a depth map.
 //!
-//! Our own, after `imageproc` 0.27 was looked at: its `canny` takes 8-bit images, so that a depth map would be cut into
-//! 256 steps (0.3 m each up to 80 m, which makes stairs of every slope), its σ is fixed, and it has no mask for pixels
-//! without depth.
+//! Our own: `canny` of `imageproc` 0.27 takes 8-bit images, so that a depth map would be cut into 256 steps (0.3 m each up to
+//! 80 m, which makes stairs of every slope). Its σ is fixed, and it has no mask for pixels without depth.
 
 use super::smooth::gaussian;
 

@@ -23,7 +23,7 @@ pub struct PoorFit {
 }
 
 impl PoorFit {
-    /// Whether an image that was prepared for a network is one: a side of the part that the network sees is shorter than a quarter of
+    /// Whether an image that was prepared for a network is one. A side of the part that the network sees is shorter than a quarter of
     /// the input's, or the part's aspect ratio differs by more than a factor of 2.5 from that of the images it learned from. Training
     /// resizes those to its input whatever their shape, so the input says nothing of them.
     ///

@@ -69,7 +69,7 @@ pub fn run<P: Send, O: Send>(
         // The threads hold the other ends: the loops end when those do.
         drop(computed);
         for item in 0..items {
-            // A maker that ends early was told to stop.
+            // A maker that ends early was asked to stop.
             let Ok(made) = prepared[item % makers].recv() else {
                 break;
             };

@@ -76,7 +76,7 @@ impl Evaluated {
     }
 }
 
-/// The looks that a way of post-processing takes.
+/// The test-time augmentation that a way of post-processing is.
 #[must_use]
 pub fn augmentation(how: Option<PostProcess>) -> Augmentation {
     match how {
@@ -101,7 +101,7 @@ pub fn predict(
     predict_by(estimator, image, camera, focal_correction, None)
 }
 
-/// As [`predict`], by as many looks as the post-processing takes.
+/// As [`predict`], by as many predictions as the post-processing takes.
 ///
 /// # Errors
 /// What the network's engine says; several input sizes of a network that takes one.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Cameras, Dataset};
 use deepfusion_eval::PostProcess;
-use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
+use deepfusion_eval::compare::{FrameScore, MeasuredOn, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::Evaluated;
@@ -51,7 +51,7 @@ impl EvaluationRequest<'_> {
     ) -> Result<SavedEvaluation> {
         Ok(SavedEvaluation {
             format_version: SAVED_VERSION,
-            measured: Measured {
+            measured: MeasuredOn {
                 data: self.data.iter().map(|path| absolute(path)).collect(),
                 split: self.split.map(absolute),
                 gt: self.truth.map(absolute),

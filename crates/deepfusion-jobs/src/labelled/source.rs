@@ -55,24 +55,24 @@ impl DepthSource {
         dataset: &Dataset,
         index: usize,
         visibility: Option<&VisibilityDepth>,
-    ) -> Result<Option<Measured>> {
+    ) -> Result<Option<FrameDepth>> {
         let camera = dataset.intrinsics(index);
         Ok(match self {
             Self::Truth => visibility
                 .filter(|visibility| visibility.dense)
-                .map(|visibility| Measured::exact(working_depth(&visibility.depth, &camera))),
+                .map(|visibility| FrameDepth::exact(working_depth(&visibility.depth, &camera))),
             Self::Lidar => dataset
                 .ground_truth(index, GtKind::Z)?
-                .map(|scan| Measured::exact(gathered(&scan, &camera))),
+                .map(|scan| FrameDepth::exact(gathered(&scan, &camera))),
             Self::Network(network) => Some(network.measured(&dataset.load_image(index)?, &camera)?),
         })
     }
 
     /// What is seen of a labelled frame; it has no exact depth.
-    pub(super) fn of_object_frame(&mut self, frame: &ObjectFrame) -> Result<Option<Measured>> {
+    pub(super) fn of_object_frame(&mut self, frame: &ObjectFrame) -> Result<Option<FrameDepth>> {
         Ok(match self {
             Self::Truth => None,
-            Self::Lidar => Some(Measured::exact(gathered(&frame.scan, &frame.camera))),
+            Self::Lidar => Some(FrameDepth::exact(gathered(&frame.scan, &frame.camera))),
             Self::Network(network) => {
                 let image = deepfusion_data::load_rgb(&frame.image)?;
                 Some(network.measured(&image, &frame.camera)?)
@@ -82,13 +82,13 @@ impl DepthSource {
 }
 
 impl PredictedDepth {
-    fn measured(&mut self, image: &RgbImage, camera: &Intrinsics) -> Result<Measured> {
+    fn measured(&mut self, image: &RgbImage, camera: &Intrinsics) -> Result<FrameDepth> {
         let prepared = self.preparer.prepare(image, Some(camera), true, true);
         let prediction = self.estimator.infer(&prepared)?;
         let whole = prediction.depth();
         let sigma = intervals::sigma(&prediction, &whole, &self.intervals);
         let (depth, camera_of_depth) = working_depth(&whole, camera);
-        Ok(Measured {
+        Ok(FrameDepth {
             depth,
             sigma: sigma.map(|sigma| working_depth(&sigma, camera).0),
             camera: camera_of_depth,
@@ -97,13 +97,13 @@ impl PredictedDepth {
 }
 
 /// Depth of a frame, and what it is worth where its source says so.
-pub(super) struct Measured {
+pub(super) struct FrameDepth {
     depth: DepthMap,
     sigma: Option<DepthMap>,
     camera: Intrinsics,
 }
 
-impl Measured {
+impl FrameDepth {
     fn exact((depth, camera): (DepthMap, Intrinsics)) -> Self {
         Self {
             depth,

@@ -7,7 +7,7 @@ use deepfusion_records::{LiveMark, Sidecar};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_video::{Address, LiveFrame, shown_for};
 
-use super::{Ending, Feed, VIDEO, input, run};
+use super::{Feed, LiveEnd, VIDEO, input, run};
 use crate::bulk::{DepthJob, LoadedImage, write_one_video};
 use crate::outputs::{DepthOutput, SeenDepth};
 use crate::{Error, Input, Result};
@@ -17,7 +17,7 @@ pub struct LiveDepth<E> {
     /// Name and time of arrival, seconds since 1970, of each frame that was written.
     written: Vec<(String, Option<f64>)>,
     /// Why the source was left, or what failed.
-    pub ending: Result<Ending, E>,
+    pub ending: Result<LiveEnd, E>,
 }
 
 /// A frame and its depth.

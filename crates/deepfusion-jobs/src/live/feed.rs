@@ -14,16 +14,16 @@ const ASK_EVERY: Duration = Duration::from_millis(100);
 /// Why a run over a live source came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Ending {
+pub enum LiveEnd {
     /// The stream was over.
     Stream,
     /// As many frames, or as long, as were asked for.
     Enough,
-    /// It was told to stop.
+    /// It was asked to stop.
     Stopped,
 }
 
-impl Ending {
+impl LiveEnd {
     /// In words.
     #[must_use]
     pub fn as_str(self) -> &'static str {
@@ -47,7 +47,7 @@ pub struct Feed {
 
 /// When a live source is left.
 #[derive(Debug, Clone, Copy)]
-pub struct Until {
+pub struct LiveLimits {
     /// After so many frames; skipped ones do not count.
     pub frames: Option<u64>,
     /// So many seconds after the first frame.
@@ -63,7 +63,7 @@ impl Feed {
     ///
     /// # Errors
     /// A source that cannot be opened.
-    pub fn open(address: &Address, until: &Until) -> Result<Self> {
+    pub fn open(address: &Address, until: &LiveLimits) -> Result<Self> {
         Ok(Self {
             source: LiveSource::open(address.clone(), seconds(until.timeout_s))?,
             frames: until.frames.unwrap_or(u64::MAX),
@@ -91,14 +91,14 @@ impl Feed {
     }
 
     /// The next frame: the newest there is, or why there is none.
-    fn next(&mut self) -> Result<Result<LiveFrame, Ending>> {
+    fn next(&mut self) -> Result<Result<LiveFrame, LiveEnd>> {
         loop {
             let late = |first: Instant| self.duration.is_some_and(|d| first.elapsed() >= d);
             if (self.stop)() {
-                return Ok(Err(Ending::Stopped));
+                return Ok(Err(LiveEnd::Stopped));
             }
             if self.frames == 0 || self.first.is_some_and(late) {
-                return Ok(Err(Ending::Enough));
+                return Ok(Err(LiveEnd::Enough));
             }
             match self.source.take(ASK_EVERY)? {
                 NextFrame::Frame(frame) => {
@@ -109,7 +109,7 @@ impl Feed {
                 NextFrame::NotYet => {}
                 NextFrame::Ended => {
                     self.warn_of_end();
-                    return Ok(Err(Ending::Stream));
+                    return Ok(Err(LiveEnd::Stream));
                 }
             }
         }
@@ -135,7 +135,7 @@ pub fn run<O: Send, E: From<crate::Error> + Send>(
     mut process: impl FnMut(LiveFrame) -> Result<(O, f64), E>,
     write: impl Fn(O) -> Result<(), E> + Sync,
     say: impl Fn(&str),
-) -> Result<Ending, E> {
+) -> Result<LiveEnd, E> {
     std::thread::scope(|scope| {
         let (to_writer, results) = bounded(1);
         let write = &write;
@@ -154,7 +154,7 @@ pub fn run<O: Send, E: From<crate::Error> + Send>(
                     }
                     if to_writer.send(result).is_err() {
                         // The writer has failed, and says why below.
-                        break Ok(Ending::Stopped);
+                        break Ok(LiveEnd::Stopped);
                     }
                 }
                 Err(error) => break Err(error),

@@ -8,7 +8,7 @@ mod folder;
 mod targets;
 
 pub use depth::{LiveDepth, predict};
-pub use feed::{Ending, Feed, Until, run};
+pub use feed::{Feed, LiveEnd, LiveLimits, run};
 pub use folder::{VIDEO, make_room};
 pub use targets::{LiveTargets, perceive};
 

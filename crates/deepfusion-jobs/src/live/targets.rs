@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use deepfusion_records::{FrameRecord, LiveMark};
 use deepfusion_video::{Address, LiveFrame};
 
-use super::{Ending, Feed, input, run};
+use super::{Feed, LiveEnd, input, run};
 use crate::bulk::DepthJob;
 use crate::outputs::TargetWriter;
 use crate::scene::StraightWay;
@@ -19,7 +19,7 @@ pub struct LiveTargets<E> {
     /// Targets that were found in them.
     pub targets: usize,
     /// Why the source was left, or what failed.
-    pub ending: Result<Ending, E>,
+    pub ending: Result<LiveEnd, E>,
 }
 
 /// Finds the targets of the newest frame of a source again and again, and writes them; `found` sees each frame's before its files are written:

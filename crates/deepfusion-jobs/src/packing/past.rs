@@ -21,13 +21,13 @@ pub(super) fn not_known_as_simulated(
     config: &TrainConfig,
     findings: &TrainFindings,
 ) -> Result<Vec<PathBuf>> {
-    let mut past = Past::default();
+    let mut past = Ancestry::default();
     past.add_run(run, config, findings)?;
     Ok(past.not_known)
 }
 
 #[derive(Default)]
-struct Past {
+struct Ancestry {
     /// Runs that were looked at.
     seen: HashSet<PathBuf>,
     /// Recordings that were, each with the split that selected its frames.
@@ -35,7 +35,7 @@ struct Past {
     not_known: Vec<PathBuf>,
 }
 
-impl Past {
+impl Ancestry {
     fn add_run(
         &mut self,
         run: &Path,

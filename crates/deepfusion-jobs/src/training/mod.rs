@@ -16,4 +16,4 @@ pub use plan::{RunLength, TrainingPlan, leaves_turns_unused};
 pub use run_log::RunLog;
 pub use start::{SettingsOfMean, Start, StartReport};
 pub use start_request::StartRequest;
-pub use time_estimate::{Choice, Pace, TimeEstimate};
+pub use time_estimate::{OtherSetting, Pace, TimeEstimate};

@@ -31,14 +31,14 @@ pub struct TimeEstimate {
     /// Seconds of a step.
     pub step_s: f64,
     /// Other settings, and how long as many steps would take with them by their multiply-adds, seconds.
-    pub choices: Vec<(Choice, f64)>,
+    pub choices: Vec<(OtherSetting, f64)>,
     /// Whether bf16 could be chosen on this processor and is not.
     pub bf16: bool,
 }
 
 /// Another setting that a user may want.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Choice {
+pub enum OtherSetting {
     /// A larger input.
     Size(InputSize),
     /// A smaller network.
@@ -89,7 +89,7 @@ impl Pace {
         }
     }
 
-    fn choices(&self) -> Vec<(Choice, TrainConfig)> {
+    fn choices(&self) -> Vec<(OtherSetting, TrainConfig)> {
         let mut choices = Vec::new();
         let full = Preset::Light.config().size;
         let pixels = |size: InputSize| size.width * size.height;
@@ -98,11 +98,11 @@ impl Pace {
                 size: full,
                 ..self.config.clone()
             };
-            choices.push((Choice::Size(full), config));
+            choices.push((OtherSetting::Size(full), config));
         }
         if self.config.preset != Preset::Tiny {
             let tiny = Preset::Tiny.config_on(self.compute);
-            choices.push((Choice::Preset(Preset::Tiny), tiny));
+            choices.push((OtherSetting::Preset(Preset::Tiny), tiny));
         }
         choices
     }
@@ -148,7 +148,7 @@ fn work(config: &TrainConfig) -> u64 {
 mod tests {
     use super::*;
 
-    fn choices(config: TrainConfig, compute: Compute) -> Vec<Choice> {
+    fn choices(config: TrainConfig, compute: Compute) -> Vec<OtherSetting> {
         let estimate = Pace::of(config, compute).estimate(0.2, 1200);
         estimate.choices.iter().map(|(choice, _)| *choice).collect()
     }
@@ -160,8 +160,8 @@ mod tests {
         let estimate = Pace::of(light.clone(), Compute::Processor).estimate(1.0, 1200);
         assert_eq!(estimate.total_s(), 1200.0);
         let [
-            (Choice::Size(size), larger),
-            (Choice::Preset(Preset::Tiny), smaller),
+            (OtherSetting::Size(size), larger),
+            (OtherSetting::Preset(Preset::Tiny), smaller),
         ] = estimate.choices[..]
         else {
             panic!("{:?}", estimate.choices);
@@ -177,9 +177,9 @@ mod tests {
         };
         assert!(!Pace::of(in_bf16, Compute::Processor).estimate(1.0, 9).bf16);
         let tiny = choices(Preset::Tiny.config(), Compute::Processor);
-        assert_eq!(tiny, [Choice::Size(full)]);
+        assert_eq!(tiny, [OtherSetting::Size(full)]);
         let full = choices(Preset::Light.config(), Compute::Gpu);
-        assert_eq!(full, [Choice::Preset(Preset::Tiny)]);
+        assert_eq!(full, [OtherSetting::Preset(Preset::Tiny)]);
     }
 
     #[test]

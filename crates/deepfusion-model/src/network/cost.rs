@@ -20,7 +20,7 @@ pub struct ModuleCost {
 
 /// What follows a convolution's sum.
 #[derive(Clone, Copy)]
-pub(super) enum After {
+pub(super) enum ConvTail {
     Norm,
     Bias,
     Nothing,
@@ -67,7 +67,7 @@ impl ModuleCost {
         [from, to]: [usize; 2],
         kernel: usize,
         pixels: usize,
-        after: After,
+        after: ConvTail,
     ) {
         self.products(from * to * kernel * kernel, to, pixels, after);
     }
@@ -78,17 +78,17 @@ impl ModuleCost {
         channels: usize,
         kernel: usize,
         pixels: usize,
-        after: After,
+        after: ConvTail,
     ) {
         self.products(channels * kernel * kernel, channels, pixels, after);
     }
 
-    pub(super) fn products(&mut self, weights: usize, to: usize, pixels: usize, after: After) {
+    pub(super) fn products(&mut self, weights: usize, to: usize, pixels: usize, after: ConvTail) {
         let learned = match after {
-            After::Norm => weights + 2 * to,
-            After::Bias => weights + to,
-            After::Nothing => weights,
-            After::Fixed => 0,
+            ConvTail::Norm => weights + 2 * to,
+            ConvTail::Bias => weights + to,
+            ConvTail::Nothing => weights,
+            ConvTail::Fixed => 0,
         };
         self.parameters += learned as u64;
         self.multiply_adds += (weights * pixels) as u64;
@@ -111,7 +111,7 @@ impl ResNetConfig {
         let channels = self.channels();
         let pixels = feature_pixels(self, size);
         let mut stem = ModuleCost::new(format!("{prefix}.stem"));
-        stem.conv([3 * self.frames, channels[0]], 7, pixels[0], After::Norm);
+        stem.conv([3 * self.frames, channels[0]], 7, pixels[0], ConvTail::Norm);
         stem.give(channels[0], pixels[1]);
         let mut costs = vec![stem];
         let mut from = channels[0];
@@ -123,15 +123,15 @@ impl ResNetConfig {
             for block in 0..blocks {
                 let [stride, _] = self.steps(layer, block);
                 if stride != 1 || from != to {
-                    cost.conv([from, to], 1, after, After::Norm);
+                    cost.conv([from, to], 1, after, ConvTail::Norm);
                 }
                 if self.depth.is_bottleneck() {
-                    cost.conv([from, width], 1, before, After::Norm);
-                    cost.conv([width, width], 3, after, After::Norm);
-                    cost.conv([width, to], 1, after, After::Norm);
+                    cost.conv([from, width], 1, before, ConvTail::Norm);
+                    cost.conv([width, width], 3, after, ConvTail::Norm);
+                    cost.conv([width, to], 1, after, ConvTail::Norm);
                 } else {
-                    cost.conv([from, width], 3, after, After::Norm);
-                    cost.conv([width, width], 3, after, After::Norm);
+                    cost.conv([from, width], 3, after, ConvTail::Norm);
+                    cost.conv([width, width], 3, after, ConvTail::Norm);
                 }
                 (from, before) = (to, after);
             }
@@ -166,7 +166,7 @@ impl DepthNetConfig {
             if self.uncertainty {
                 let finest = disp_net.decoder_widths()[DISP_NET_LEVELS - 1];
                 let mut cost = ModuleCost::new("uncertainty");
-                cost.conv([finest, 1], 3, size.width * size.height, After::Bias);
+                cost.conv([finest, 1], 3, size.width * size.height, ConvTail::Bias);
                 costs.push(cost);
             }
             return costs;
@@ -177,7 +177,7 @@ impl DepthNetConfig {
                 let [finest, ..] = lite_mono.decoder_widths();
                 let mut cost = ModuleCost::new("uncertainty");
                 let half = (size.width >> 1) * (size.height >> 1);
-                cost.conv([finest, 1], 3, half, After::Bias);
+                cost.conv([finest, 1], 3, half, ConvTail::Bias);
                 cost.give(1, size.width * size.height);
                 costs.push(cost);
             }
@@ -192,19 +192,19 @@ impl DepthNetConfig {
                 let mut cost = ModuleCost::new(format!("hce.{index}"));
                 let reduce = hce.reduce_first && !hce.rates.is_empty();
                 for _ in 0..1 + usize::from(reduce) {
-                    cost.conv([channels, width], 1, pixels, After::Norm);
+                    cost.conv([channels, width], 1, pixels, ConvTail::Norm);
                 }
                 let from = if reduce { width } else { channels };
                 for _ in &hce.rates {
-                    cost.conv([from, width], 3, pixels, After::Norm);
+                    cost.conv([from, width], 3, pixels, ConvTail::Norm);
                 }
                 let local = (1 + hce.rates.len()) * width;
-                cost.conv([local, width], 1, pixels, After::Norm);
+                cost.conv([local, width], 1, pixels, ConvTail::Norm);
                 if hce.global_pool {
                     cost.give(channels, 1);
-                    cost.conv([channels, width], 1, 1, After::Bias);
+                    cost.conv([channels, width], 1, 1, ConvTail::Bias);
                     // The projection's share of the branch that is the same everywhere.
-                    cost.conv([width, width], 1, 1, After::Nothing);
+                    cost.conv([width, width], 1, 1, ConvTail::Nothing);
                 }
                 costs.push(cost);
             }
@@ -212,10 +212,10 @@ impl DepthNetConfig {
                 let mut cost = ModuleCost::new(format!("attention.{index}"));
                 let hidden = attention.hidden(width);
                 cost.give(width, 1);
-                cost.conv([width, hidden], 1, 1, After::Nothing);
-                cost.conv([hidden, width], 1, 1, After::Nothing);
+                cost.conv([width, hidden], 1, 1, ConvTail::Nothing);
+                cost.conv([hidden, width], 1, 1, ConvTail::Nothing);
                 cost.give(2, pixels);
-                cost.conv([2, 1], attention.kernel, pixels, After::Nothing);
+                cost.conv([2, 1], attention.kernel, pixels, ConvTail::Nothing);
                 cost.give(width, pixels);
                 costs.push(cost);
             }
@@ -223,7 +223,7 @@ impl DepthNetConfig {
         if self.aggregation {
             let mut cost = ModuleCost::new("aggregation");
             cost.give(refined[4], 1);
-            cost.conv([refined[4]; 2], 1, 1, After::Bias);
+            cost.conv([refined[4]; 2], 1, 1, ConvTail::Bias);
             cost.give(refined[4], pixels[4]);
             costs.push(cost);
         }
@@ -246,16 +246,16 @@ impl DepthNetConfig {
                 Some(level) => (channels[level], pixels[level]),
                 None => (0, size.width * size.height),
             };
-            cost.conv([from, width], 3, before, After::Bias);
+            cost.conv([from, width], 3, before, ConvTail::Bias);
             if after != before {
                 cost.give(width, after);
             }
-            cost.conv([width + skip, width], 3, after, After::Bias);
+            cost.conv([width + skip, width], 3, after, ConvTail::Bias);
             (from, before) = (width, after);
             costs.push(cost);
         }
         let mut heads = ModuleCost::new("decoder.heads");
-        heads.conv([from, 1], 3, before, After::Bias);
+        heads.conv([from, 1], 3, before, ConvTail::Bias);
         heads.parameters = self.decoder.widths[1..]
             .iter()
             .map(|w| (9 * w + 1) as u64)
@@ -263,7 +263,7 @@ impl DepthNetConfig {
         costs.push(heads);
         if self.uncertainty {
             let mut cost = ModuleCost::new("uncertainty");
-            cost.conv([from, 1], 3, before, After::Bias);
+            cost.conv([from, 1], 3, before, ConvTail::Bias);
             costs.push(cost);
         }
     }
@@ -281,10 +281,15 @@ impl PoseNetConfig {
         }
         let pixels = feature_pixels(&self.encoder, size)[4];
         let width = POSE_WIDTH;
-        all.conv([self.encoder.channels()[4], width], 1, pixels, After::Bias);
-        all.conv([width; 2], 3, pixels, After::Bias);
-        all.conv([width; 2], 3, pixels, After::Bias);
-        all.conv([width, 6 * self.poses], 1, pixels, After::Bias);
+        all.conv(
+            [self.encoder.channels()[4], width],
+            1,
+            pixels,
+            ConvTail::Bias,
+        );
+        all.conv([width; 2], 3, pixels, ConvTail::Bias);
+        all.conv([width; 2], 3, pixels, ConvTail::Bias);
+        all.conv([width, 6 * self.poses], 1, pixels, ConvTail::Bias);
         if self.explainability {
             self.explainability_cost(size, &mut all);
         }
@@ -299,14 +304,14 @@ impl PoseNetConfig {
             if index > 0 {
                 all.give(from, pixels);
             }
-            all.conv([from, width], 3, pixels, After::Bias);
+            all.conv([from, width], 3, pixels, ConvTail::Bias);
             from = width;
         }
         all.conv(
             [from, 2],
             3,
             (size.width >> 1) * (size.height >> 1),
-            After::Bias,
+            ConvTail::Bias,
         );
         all.give(2, size.width * size.height);
     }

@@ -1,6 +1,6 @@
 //! What DispNet costs: [`super::ModuleCost`]s of its parts.
 
-use super::cost::After;
+use super::cost::ConvTail;
 use super::{DISP_NET_KERNELS, DISP_NET_LEVELS, DispNetConfig, InputSize, ModuleCost};
 
 impl DispNetConfig {
@@ -12,8 +12,8 @@ impl DispNetConfig {
         {
             let pixels = Self::pixels(size, level + 1);
             let mut cost = ModuleCost::new(format!("disp_net.encoder.{level}"));
-            cost.conv([from, width], kernel, pixels, After::Bias);
-            cost.conv([width; 2], kernel, pixels, After::Bias);
+            cost.conv([from, width], kernel, pixels, ConvTail::Bias);
+            cost.conv([width; 2], kernel, pixels, ConvTail::Bias);
             costs.push(cost);
             from = width;
         }
@@ -27,16 +27,16 @@ impl DispNetConfig {
                 [self.before(stage), width],
                 3,
                 Self::pixels(size, halvings + 1),
-                After::Bias,
+                ConvTail::Bias,
             );
             cost.give(3 * width, Self::pixels(size, halvings + 1));
             let coarse = usize::from(Self::reads_disparity(stage));
             cost.give(coarse, pixels);
             let joined = width + self.skip(stage) + coarse;
-            cost.conv([joined, width], 3, pixels, After::Bias);
+            cost.conv([joined, width], 3, pixels, ConvTail::Bias);
             costs.push(cost);
             if Self::scale_of(stage).is_some() {
-                heads.conv([width, 1], 3, pixels, After::Bias);
+                heads.conv([width, 1], 3, pixels, ConvTail::Bias);
             }
         }
         costs.push(heads);

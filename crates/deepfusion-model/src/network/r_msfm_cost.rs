@@ -1,6 +1,6 @@
 //! What R-MSFM costs: [`super::ModuleCost`]s of its parts.
 
-use super::cost::After;
+use super::cost::ConvTail;
 use super::{InputSize, ModuleCost, R_MSFM_STATE, RMsfmConfig, ResNetConfig};
 
 impl RMsfmConfig {
@@ -13,10 +13,10 @@ impl RMsfmConfig {
         let (state, pixels) = (R_MSFM_STATE, Self::pixels(size));
         let quarter = (size.width >> 2) * (size.height >> 2);
         let mut features = ModuleCost::new("r_msfm.features");
-        features.conv([f2, state], 3, pixels, After::Bias);
-        features.conv([f1, state], 3, pixels, After::Bias);
-        features.conv([f0, 96], 3, quarter, After::Bias);
-        features.conv([96, state], 3, pixels, After::Bias);
+        features.conv([f2, state], 3, pixels, ConvTail::Bias);
+        features.conv([f1, state], 3, pixels, ConvTail::Bias);
+        features.conv([f0, 96], 3, quarter, ConvTail::Bias);
+        features.conv([96, state], 3, pixels, ConvTail::Bias);
         if self.twice() {
             for _ in 0..6 {
                 features.strip([state; 2], pixels);
@@ -40,13 +40,13 @@ impl RMsfmConfig {
             (256, 1, 3),
         ];
         for (from, to, kernel) in layers {
-            update.conv([from, to], kernel, pixels, After::Bias);
+            update.conv([from, to], kernel, pixels, ConvTail::Bias);
         }
         update.repeated(self.iterations);
         costs.push(update);
         let mut weights = ModuleCost::new("r_msfm.weights");
-        weights.conv([192, 324], 3, pixels, After::Bias);
-        weights.conv([324, 576], 1, pixels, After::Bias);
+        weights.conv([192, 324], 3, pixels, ConvTail::Bias);
+        weights.conv([324, 576], 1, pixels, ConvTail::Bias);
         weights.give(1, size.width * size.height);
         costs.push(weights);
         costs
@@ -56,7 +56,7 @@ impl RMsfmConfig {
 impl ModuleCost {
     /// A kernel of 1×3 or 3×1.
     fn strip(&mut self, [from, to]: [usize; 2], pixels: usize) {
-        self.products(3 * from * to, to, pixels, After::Bias);
+        self.products(3 * from * to, to, pixels, ConvTail::Bias);
     }
 
     /// The same run several times.

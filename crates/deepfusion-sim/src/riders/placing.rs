@@ -40,7 +40,7 @@ const BICYCLE: f32 = 0.7;
 
 /// What people do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Does {
+enum Activity {
     /// Rides as the street goes.
     RideAlong,
     /// Crosses the road, and walks on.
@@ -51,7 +51,7 @@ enum Does {
     Walk,
 }
 
-impl Does {
+impl Activity {
     const ALL: [Self; 4] = [Self::RideAlong, Self::Cross, Self::RideAgainst, Self::Walk];
 
     /// Whether someone of a model does that.
@@ -83,8 +83,8 @@ impl Riders {
         }
         let mut moments = moments(world, drive, duration_s, traffic);
         for number in 0..count {
-            for attempt in 0..TRIES * Does::ALL.len() {
-                let does = Does::ALL[(number + attempt / TRIES) % Does::ALL.len()];
+            for attempt in 0..TRIES * Activity::ALL.len() {
+                let does = Activity::ALL[(number + attempt / TRIES) % Activity::ALL.len()];
                 let part = (number as f64 + rng.random::<f64>()) / count as f64;
                 let met = ((part * moments.len() as f64) as usize).min(moments.len() - 1);
                 if riders.place(rng, world, models, does, &mut moments, met) {
@@ -119,7 +119,7 @@ impl Riders {
         let mut riders = Self::default();
         for _ in 0..rng.random_range(2..=8) {
             for _ in 0..TRIES {
-                let does = Does::ALL[rng.random_range(0..Does::ALL.len())];
+                let does = Activity::ALL[rng.random_range(0..Activity::ALL.len())];
                 if riders.place(rng, world, models, does, &mut moments, 0) {
                     break;
                 }
@@ -134,7 +134,7 @@ impl Riders {
         rng: &mut ChaCha8Rng,
         world: &World,
         models: &[CarModel],
-        does: Does,
+        does: Activity,
         moments: &mut [Moment],
         met: usize,
     ) -> bool {
@@ -213,7 +213,7 @@ fn draw(
     rng: &mut ChaCha8Rng,
     world: &World,
     models: &[CarModel],
-    does: Does,
+    does: Activity,
     (time_s, s): (f64, f64),
 ) -> Option<Person> {
     let those: Vec<&CarModel> = models.iter().filter(|model| does.suits(model)).collect();
@@ -223,7 +223,7 @@ fn draw(
     let model = those[rng.random_range(0..those.len())].clone();
     let sample = world.road.sample(world.road.index_at(s));
     let route = match does {
-        Does::RideAlong | Does::RideAgainst => {
+        Activity::RideAlong | Activity::RideAgainst => {
             // On the right, near the edge of the road or in the lane.
             let edge = f64::from(sample.half_width) - rng.random_range(0.5..0.9);
             let out = if rng.random_bool(0.7) {
@@ -232,7 +232,7 @@ fn draw(
                 rng.random_range(1.0..2.3f64).min(edge)
             };
             let speed = rng.random_range(3.0..7.0);
-            let (rate, lateral) = if does == Does::RideAlong {
+            let (rate, lateral) = if does == Activity::RideAlong {
                 (speed, -out)
             } else {
                 (-speed, out)
@@ -244,7 +244,7 @@ fn draw(
                 crossing: None,
             }
         }
-        Does::Walk => {
+        Activity::Walk => {
             let side = usize::from(rng.random_bool(0.5));
             let lateral = pavement(rng, sample, side)?;
             let rate = pace(rng);
@@ -255,7 +255,7 @@ fn draw(
                 crossing: None,
             }
         }
-        Does::Cross => {
+        Activity::Cross => {
             let side = usize::from(rng.random_bool(0.5));
             let (lateral, to) = (
                 pavement(rng, sample, side)?,

@@ -112,7 +112,7 @@ pub(super) fn lens(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: b
     }
 }
 
-/// fy / fx of a picture of a usual aspect ratio that was brought to another one: 16:9 as of dashcams and telephones,
+/// fy / fx of a picture of a usual aspect ratio that was brought to another one: 16:9 as of dashcams and phones,
 /// 4:3 as of depth cameras, or anything between 5:4 and 3:1. 1 where the wanted one is not wider.
 fn squeeze(rng: &mut ChaCha8Rng, wanted: f64) -> f64 {
     let aspect = match rng.random_range(0..20) {
@@ -406,7 +406,7 @@ mod tests {
         assert!((2900..3400).contains(&usual), "{usual}");
         assert!((2350..2650).contains(&square), "{square}");
         assert!(like_kitti > 190, "{like_kitti}");
-        // Asked for a picture of 4:3, nothing is squeezed by more than a telephone's 5:4.
+        // Asked for a picture of 4:3, nothing is squeezed by more than a phone's 5:4.
         let tall = lens(&mut rng, (320, 240), true).intrinsics((320, 240));
         assert!(tall.fy / tall.fx > 0.9, "{tall:?}");
     }

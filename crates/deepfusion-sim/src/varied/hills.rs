@@ -76,7 +76,8 @@ fn poles(world: &World, eye: &Vector3<f64>, heading: f64) -> Vec<Pole> {
 }
 
 /// Draws one to three slopes, with crests and dips between them as curves of creases 8 to 20 m apart, the first one 6 to
-/// 40 m ahead, each put a little on where it would cut a pole; in the end the ground is about level again, so that it reaches the horizon. Slopes follow the road's
+/// 40 m ahead. A crease that would cut a pole is put a little farther on. In the end the ground is about level again, so that it reaches the
+/// horizon. Slopes follow the road's
 /// direction, the way that the camera looks.
 fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
     let eye = world_from_cam.translation();

@@ -103,7 +103,7 @@ fn a_step_is_the_kernels() {
             weight_decay: 0.1,
         };
         adam(&step, &mut p, gradient, &mut m, &mut v);
-        (parameter, moments) = on_device::update(&step, parameter, tensor(gradient), moments);
+        (parameter, moments) = update_on_device(&step, parameter, tensor(gradient), moments);
         let pairs = [
             (&p, to_vec(parameter.clone().inner())),
             (&m, to_vec(moments[0].clone())),

@@ -1,6 +1,8 @@
 //! Numbers of a parameter, where it is learned.
 
 use burn::tensor::Tensor;
+use deepfusion_kernels::AdamStep;
+use deepfusion_nn::ops;
 
 /// A parameter's gradient or one of its moments, flat.
 #[derive(Debug, Clone)]
@@ -69,6 +71,20 @@ impl Values {
             Self::Device(values) => to_vec(values),
         }
     }
+}
+
+/// [`deepfusion_kernels::adam`] of one parameter as tensor operations: it comes back ready to learn again, with its moments, and all of
+/// them stay on the GPU.
+pub(super) fn update_on_device<const D: usize>(
+    step: &AdamStep,
+    parameter: Tensor<D>,
+    gradient: Tensor<1>,
+    moments: [Tensor<1>; 2],
+) -> (Tensor<D>, [Tensor<1>; 2]) {
+    let shape = parameter.dims();
+    let values = parameter.inner().reshape([gradient.dims()[0]]);
+    let (moved, moments) = ops::adam(step, values, gradient, moments);
+    (moved.reshape(shape).autodiff().require_grad(), moments)
 }
 
 #[expect(clippy::expect_used, reason = "it was converted")]

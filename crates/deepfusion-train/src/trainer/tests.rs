@@ -121,7 +121,7 @@ fn numbers_read_at_the_end_are_those_read_at_once() {
 /// A loss that is not finite is the same error, of the same batch, whenever it is read.
 #[test]
 fn a_loss_that_is_not_finite_is_named_either_way() {
-    let spoiled = |mut model: Model| {
+    let damaged = |mut model: Model| {
         let output = &mut model.pose_net.as_mut().unwrap().decoder.output;
         output.bias = output
             .bias
@@ -132,7 +132,7 @@ fn a_loss_that_is_not_finite_is_named_either_way() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let [soon, late] = [("soon", false), ("late", true)].map(|(name, reads_late)| {
-        let trainer = started(&drive, &folder.path().join(name), reads_late, spoiled);
+        let trainer = started(&drive, &folder.path().join(name), reads_late, damaged);
         let (learned, transfers) = learned(&trainer);
         assert_eq!(transfers, 1);
         let Err(error) = learned else {

@@ -6,15 +6,15 @@ use crate::PacketProblem;
 
 /// Looks at a stream's packets in their order.
 #[derive(Debug, Default)]
-pub(super) struct Watch {
-    set: Option<Set>,
+pub(super) struct PacketWatch {
+    set: Option<ParameterSet>,
     /// The count of the last picture that others refer to.
     last: Option<u32>,
 }
 
 /// Of a sequence parameter set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Set {
+struct ParameterSet {
     /// The counter has so many bits.
     bits: u32,
     /// Gaps are on purpose: the encoder leaves pictures out.
@@ -23,7 +23,7 @@ struct Set {
     planes: bool,
 }
 
-impl Watch {
+impl PacketWatch {
     /// Looks at the next packet: what is wrong with it, if something is.
     pub(super) fn next(&mut self, packet: &[u8]) -> Result<(), PacketProblem> {
         for unit in units(packet) {
@@ -60,7 +60,7 @@ impl Watch {
 }
 
 /// Type and `frame_num` of a slice.
-fn slice(unit: &[u8], set: Set) -> Option<(u32, u32)> {
+fn slice(unit: &[u8], set: ParameterSet) -> Option<(u32, u32)> {
     // A dozen bytes do.
     let mut bits = Bits::of(unit.get(1..)?, 32);
     let _first_macroblock = bits.exp_golomb()?;
@@ -73,7 +73,7 @@ fn slice(unit: &[u8], set: Set) -> Option<(u32, u32)> {
 }
 
 /// A sequence parameter set, up to what matters.
-fn parameters(unit: &[u8]) -> Option<Set> {
+fn parameters(unit: &[u8]) -> Option<ParameterSet> {
     let mut bits = Bits::of(unit.get(1..)?, usize::MAX);
     let profile = bits.take(8)?;
     bits.take(16)?;
@@ -112,7 +112,7 @@ fn parameters(unit: &[u8]) -> Option<Set> {
         _ => {}
     }
     let _references = bits.exp_golomb()?;
-    Some(Set {
+    Some(ParameterSet {
         bits: counter,
         gaps: bits.take(1)? == 1,
         planes,
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn nothing_of_rubbish_is_believed() {
-        let mut watch = Watch::default();
+        let mut watch = PacketWatch::default();
         for packet in [
             &[][..],
             &[1; 9],
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn a_count_that_jumps_shows_a_gap() {
         let first = |gaps| {
-            let mut watch = Watch::default();
+            let mut watch = PacketWatch::default();
             let packet = [baseline(gaps), picture(0, 0x65, 0)].concat();
             assert_eq!(watch.next(&packet), Ok(()));
             watch
@@ -242,7 +242,7 @@ mod tests {
         let mut watch = first(0);
         assert_eq!(
             watch.set,
-            Some(Set {
+            Some(ParameterSet {
                 bits: 4,
                 gaps: false,
                 planes: false

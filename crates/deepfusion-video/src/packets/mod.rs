@@ -101,7 +101,7 @@ impl PacketFrames {
         packets: impl Iterator<Item = std::result::Result<Vec<u8>, E>>,
     ) -> std::result::Result<(), E> {
         let codec = self.stream.codec;
-        let mut watch = (codec == Codec::H264).then(h264::Watch::default);
+        let mut watch = (codec == Codec::H264).then(h264::PacketWatch::default);
         let mut batch = Batch::new(part, codec, 0)?;
         let mut number = 0;
         for packet in packets {

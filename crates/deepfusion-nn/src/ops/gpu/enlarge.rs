@@ -29,19 +29,19 @@ pub(in super::super) trait EnlargeBackward: Backend {
 
 /// The two pixels along an axis that one of the result lies between, and how far it is on the way to the second.
 #[derive(CubeType)]
-struct Between {
+struct PixelPair {
     low: i32,
     high: i32,
     fraction: f32,
 }
 
 #[cube]
-fn between(at: i32, from: i32, to: i32) -> Between {
+fn between(at: i32, from: i32, to: i32) -> PixelPair {
     let last = from - 1;
     let position = (at as f32 + 0.5f32) * from as f32 / to as f32 - 0.5f32;
     let position = position.max(0.0f32).min(last as f32);
     let low = position.floor() as i32;
-    Between {
+    PixelPair {
         low,
         high: (low + 1).min(last),
         fraction: position - low as f32,
