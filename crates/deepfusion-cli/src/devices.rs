@@ -5,8 +5,6 @@ use burn::tensor::Device;
 pub(crate) use deepfusion_jobs::devices::{Backend, ComputeDevice, NoDevice, megabytes};
 
 #[cfg(feature = "train")]
-use crate::failure::Result;
-#[cfg(feature = "train")]
 use crate::progress::say;
 
 /// Opens a device, and says which it is where it is not the processor.
@@ -14,7 +12,7 @@ use crate::progress::say;
 /// # Errors
 /// As [`deepfusion_jobs::devices::open`].
 #[cfg(feature = "train")]
-pub(crate) fn open(device: ComputeDevice) -> Result<Device> {
+pub(crate) fn open(device: ComputeDevice) -> deepfusion_jobs::Result<Device> {
     let opened = deepfusion_jobs::devices::open(device)?;
     // Whoever said `auto` hears what it came to.
     if device.backend != Backend::Cpu {

@@ -16,9 +16,9 @@ pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstima
     let network = model.load(args.set.as_deref())?;
     let int8 = args.settings().calibration(&network)?;
     let args = args.clone();
-    DepthEstimator::of(network, move |config, weights| {
+    Ok(DepthEstimator::of(network, move |config, weights| {
         runner(&args, config, weights, int8.as_ref())
-    })
+    })?)
 }
 
 /// The engine asked for, with a network of this configuration and these weights, and what it was calibrated to.
@@ -27,7 +27,7 @@ pub(crate) fn runner(
     config: &TrainConfig,
     weights: Weights,
     int8: Option<&Int8Calibration>,
-) -> Result<Box<dyn DepthRunner>> {
+) -> deepfusion_jobs::Result<Box<dyn DepthRunner>> {
     let settings = args.settings();
     let engine = settings.chosen()?;
     if engine == Engine::Burn {

@@ -328,13 +328,10 @@ pub enum Error {
         /// The file, or the folder that is not empty.
         path: PathBuf,
     },
-    /// The folder to be written looks empty, and another writer is at work there, or died and what it left cannot be removed.
-    #[error("{}: the output folder is not empty: a writer left this in it, or is still writing it", path.display())]
-    Unfinished {
-        /// The hidden file or folder.
-        path: PathBuf,
-    },
-    /// Writing ended before the last frame, as its caller wanted: nothing of it is left.
+    /// The folder for a converted recording looks empty, and another writer is at work there, or died and what it left cannot be removed.
+    #[error(transparent)]
+    Unfinished(#[from] deepfusion_fs::Unfinished),
+    /// A conversion ended before the last frame, as its caller wanted: nothing of it is left.
     #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
     Stopped {
         /// Frames done.

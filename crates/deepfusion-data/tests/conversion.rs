@@ -80,7 +80,7 @@ fn what_a_killed_one_left_is_removed_and_what_another_writes_is_not() {
     });
     let refused = refused.unwrap_err();
     assert!(refused.hint().unwrap().contains(".lock"), "{refused}");
-    assert!(matches!(refused, Error::Unfinished { path } if path == another.path()));
+    assert!(matches!(refused, Error::Unfinished(found) if found.path == another.path()));
     assert!(another.path().exists() && !folder.exists());
     drop(another);
     convert(dataset, &out);

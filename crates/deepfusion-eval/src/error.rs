@@ -1,4 +1,4 @@
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
 use std::path::PathBuf;
 
 mod arrays;
@@ -158,11 +158,7 @@ impl Hint for Error {
             Self::Intervals { .. } => {
                 Some("calibrate the network's uncertainty anew".into())
             }
-            Self::Io { source, .. } => match source.kind() {
-                std::io::ErrorKind::NotFound => Some("check the spelling, and that the disk is mounted".into()),
-                std::io::ErrorKind::PermissionDenied => Some("check the permissions of the file".into()),
-                _ => None,
-            },
+            Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
             Self::ArrayFile { reason, .. } => reason.remedy().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(

@@ -1,5 +1,7 @@
 //! Whether a folder is as empty as a writer wants it.
 
+use std::error::Error;
+use std::fmt;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -12,10 +14,34 @@ use crate::partial_folder::{PartialFolder, folder_of_lock};
 pub enum InTheWay {
     /// Files or folders.
     Content,
-    /// Nothing that is seen: a hidden file or folder, this one, that a writer is writing, or left when it died, and which cannot be removed or is
-    /// another machine's.
-    Unfinished(PathBuf),
+    /// Nothing that is seen.
+    Unfinished(Unfinished),
 }
+
+/// Why a folder that looks empty is not: a hidden file or folder, this one, that a writer is writing, or left when it died, and which cannot be
+/// removed or is another machine's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unfinished {
+    /// The hidden file or folder.
+    pub path: PathBuf,
+}
+
+impl Unfinished {
+    /// What to do about it.
+    pub const REMEDY: &str = "if no program is writing there, remove it, and the file of its name with .lock; or choose another folder";
+}
+
+impl fmt::Display for Unfinished {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: the output folder is not empty: a writer left this in it, or is still writing it",
+            self.path.display()
+        )
+    }
+}
+
+impl Error for Unfinished {}
 
 /// Removes what writers that died left in a folder ([`PartialFolder::remove_leftovers`]), and says whether something is in it still; there may be
 /// no such folder.
@@ -40,7 +66,7 @@ pub fn in_the_way(folder: &Path) -> io::Result<Option<InTheWay>> {
             unfinished = Some(path);
         }
     }
-    Ok(unfinished.map(InTheWay::Unfinished))
+    Ok(unfinished.map(|path| InTheWay::Unfinished(Unfinished { path })))
 }
 
 #[cfg(test)]
@@ -58,7 +84,10 @@ mod tests {
         dead.abandon();
         assert_eq!(in_the_way(&folder).unwrap(), None);
         let alive = PartialFolder::beside(&folder.join("b")).unwrap();
-        let unfinished = InTheWay::Unfinished(alive.path().to_owned());
+        let path = alive.path().to_owned();
+        let unfinished = Unfinished { path };
+        assert!(unfinished.to_string().contains("still writing it"));
+        let unfinished = InTheWay::Unfinished(unfinished);
         assert_eq!(in_the_way(&folder).unwrap(), Some(unfinished));
         fs::write(folder.join(".gitkeep"), "").unwrap();
         assert_eq!(in_the_way(&folder).unwrap(), Some(InTheWay::Content));

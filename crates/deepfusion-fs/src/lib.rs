@@ -10,7 +10,7 @@ mod partial_folder;
 mod sync;
 
 pub use content::Content;
-pub use in_the_way::{InTheWay, in_the_way};
+pub use in_the_way::{InTheWay, Unfinished, in_the_way};
 pub use names::{moved_path, unused};
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
 pub use partial_folder::PartialFolder;

@@ -15,7 +15,12 @@
 //! }
 //! ```
 //!
-//! [`count_of`] writes the counts of a message: `1 frame`, `2 frames`.
+//! [`system_hint`] is the hint of an error that holds a reason of the system's: a missing file, a full disk. [`count_of`] writes the
+//! counts of a message: `1 frame`, `2 frames`.
+
+mod system;
+
+pub use self::system::system_hint;
 
 /// A count with its noun, in the plural where it is not one; for nouns with a regular plural.
 ///
@@ -47,7 +52,7 @@ where
 /// The remedy is said in the library's words: fields, files and values, never the options of a program. The command line says
 /// which option is meant.
 pub trait Hint: std::error::Error {
-    /// What to do about it, in one line; none where only the system's reason or the message itself says it.
+    /// What to do about it, in one line; none where the message itself says it.
     #[must_use]
     fn hint(&self) -> Option<String>;
 }

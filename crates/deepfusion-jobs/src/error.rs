@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use deepfusion_data::{DatasetKind, NoNamedTopic};
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
 use deepfusion_records::Difference;
 use deepfusion_runtime::Precision;
 
@@ -616,7 +616,7 @@ impl Hint for Error {
                 Some("give the folder that the adapted network was written to".into())
             }
             #[cfg(feature = "train")]
-            Self::ReadBack { .. } => None,
+            Self::ReadBack { source, .. } => Some(system_hint(source.kind()).into()),
             #[cfg(feature = "train")]
             Self::Deviates { .. } => {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())
@@ -638,14 +638,18 @@ impl Hint for Error {
             Self::NoLayers => Some(
                 "leave out features; targets have none, and depth has them where a job is given what shows layers".into(),
             ),
+            Self::Picture(image::ImageError::IoError(source))
+            | Self::Npy(ndarray_npy::WriteNpyError::Io(source)) => {
+                Some(system_hint(source.kind()).into())
+            }
+            Self::Json(error) => error.io_error_kind().map(|kind| system_hint(kind).into()),
             Self::Pattern(_)
             | Self::Picture(_)
             | Self::Shape(_)
             | Self::Npy(_)
             | Self::Kept { .. }
             | Self::NoTomlForm { .. }
-            | Self::Toml(_)
-            | Self::Json(_) => None,
+            | Self::Toml(_) => None,
             Self::KeptFactors { source, .. } => source.hint(),
             Self::Video(error) => error.hint(),
             Self::Data(error) => error.hint(),

@@ -4,7 +4,7 @@ use crate::blf;
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed};
 use crate::note::{CanNote, LogNote};
-use crate::problem::{FrameProblem, SignalProblem, SpeedProblem};
+use crate::problem::{CanFrameProblem, SignalProblem, SpeedProblem};
 use crate::rows::{enough, text_of};
 use crate::units::SpeedUnit;
 use deepfusion_motion::can::{CanId, Dbc};
@@ -12,7 +12,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// What reading a part of a frame gives.
-type Parsed<T> = std::result::Result<T, FrameProblem>;
+type Parsed<T> = std::result::Result<T, CanFrameProblem>;
 
 /// A frame of a trace.
 struct Frame {
@@ -230,7 +230,7 @@ fn candump(line: &str) -> Option<Parsed<Frame>> {
     let parsed = || {
         let ns = seconds(time)?;
         let number =
-            u32::from_str_radix(id, 16).map_err(|_| FrameProblem::Identifier(id.to_owned()))?;
+            u32::from_str_radix(id, 16).map_err(|_| CanFrameProblem::Identifier(id.to_owned()))?;
         // The tool writes 3 digits of a standard identifier, 8 of an extended one; the top bit marks errors.
         let id = can_id(number, id.len() > 3)?;
         Ok(Frame {
@@ -274,13 +274,13 @@ fn asc(line: &str, decimal: bool) -> Option<Parsed<Frame>> {
             None => (id, false),
         };
         let number = u32::from_str_radix(digits, radix)
-            .map_err(|_| FrameProblem::Identifier(id.to_owned()))?;
-        let bytes = data.get(..length).ok_or(FrameProblem::Length {
+            .map_err(|_| CanFrameProblem::Identifier(id.to_owned()))?;
+        let bytes = data.get(..length).ok_or(CanFrameProblem::Length {
             bytes: data.len(),
             length,
         })?;
         let byte = |word: &&str| {
-            u8::from_str_radix(word, radix).map_err(|_| FrameProblem::Byte((*word).to_owned()))
+            u8::from_str_radix(word, radix).map_err(|_| CanFrameProblem::Byte((*word).to_owned()))
         };
         Ok(Frame {
             ns: seconds(time)?,
@@ -298,17 +298,18 @@ fn can_id(number: u32, extended: bool) -> Parsed<CanId> {
             extended: number & 0x1fff_ffff,
         }),
         (false, Ok(standard)) if standard < 0x800 => Ok(CanId::Standard(standard)),
-        _ => Err(FrameProblem::LongIdentifier(number)),
+        _ => Err(CanFrameProblem::LongIdentifier(number)),
     }
 }
 
 fn seconds(word: &str) -> Parsed<i64> {
     let style = crate::dates::TimeStyle::Number(1_000_000_000);
-    crate::dates::nanoseconds(word, style, None).ok_or_else(|| FrameProblem::Time(word.to_owned()))
+    crate::dates::nanoseconds(word, style, None)
+        .ok_or_else(|| CanFrameProblem::Time(word.to_owned()))
 }
 
 fn hex(digits: &str) -> Parsed<Vec<u8>> {
-    let bad = || FrameProblem::Bytes(digits.to_owned());
+    let bad = || CanFrameProblem::Bytes(digits.to_owned());
     if !digits.is_ascii() || !digits.len().is_multiple_of(2) {
         return Err(bad());
     }

@@ -1,5 +1,5 @@
 use crate::problem::{BytesProblem, LineField, LineProblem, SignalProblem, SpeedProblem};
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, system_hint};
 use std::path::{Path, PathBuf};
 
 /// What can be wrong with a log.
@@ -134,7 +134,7 @@ pub enum ColumnProblem {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::File { .. } => return None,
+            Self::File { source, .. } => system_hint(source.kind()),
             Self::Motion(error) => return error.hint(),
             Self::Line { .. } => "correct the line or delete it, or export the log anew",
             Self::Bytes { .. } => "copy the file again from where it was recorded",

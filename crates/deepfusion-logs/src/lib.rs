@@ -49,7 +49,7 @@ pub use gopro_lens::GoproLens;
 pub use log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
 pub use note::{CanNote, ClockNote, FixesNote, GoproNote, LogNote, TableNote, TurnSign, TurnsNote};
 pub use problem::{
-    BlfProblem, BytesProblem, FrameProblem, GpmfProblem, GpxProblem, LineField, LineProblem,
+    BlfProblem, BytesProblem, CanFrameProblem, GpmfProblem, GpxProblem, LineField, LineProblem,
     Mp4Problem, NmeaProblem, SignalProblem, SpeedProblem, TableProblem,
 };
 pub use read::{is_gps_track, may_hold_log, read, read_all};

@@ -7,7 +7,7 @@ mod gopro;
 mod table;
 
 pub use self::blf::BlfProblem;
-pub use self::can::{FrameProblem, SignalProblem};
+pub use self::can::{CanFrameProblem, SignalProblem};
 pub use self::fixes::{GpxProblem, NmeaProblem};
 pub use self::gopro::{GpmfProblem, Mp4Problem};
 pub use self::table::TableProblem;
@@ -64,7 +64,7 @@ pub enum LineProblem {
     Nmea(#[from] NmeaProblem),
     /// A frame of a CAN trace cannot be read.
     #[error(transparent)]
-    Frame(#[from] FrameProblem),
+    Frame(#[from] CanFrameProblem),
 }
 
 /// Why bytes of a binary log cannot be read.

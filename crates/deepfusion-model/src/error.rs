@@ -1,6 +1,6 @@
 //! What can go wrong with a configuration, or with a run on disk.
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of, system_hint};
 use std::path::PathBuf;
 
 use crate::NetworkError;
@@ -171,7 +171,7 @@ impl Hint for Error {
                 std::io::ErrorKind::PermissionDenied => {
                     Some(format!("no permission to {action} there"))
                 }
-                _ => None,
+                kind => Some(system_hint(kind).into()),
             },
             Self::NotToml { .. } => None,
             Self::Checkpoint { .. } => Some("use the version of the program that wrote it".into()),
@@ -209,6 +209,42 @@ pub enum SettingProblem {
     #[error("`{key}` is a value and no table")]
     NoTable {
         /// What is no table.
+        key: String,
+    },
+    /// A place in what is no list.
+    #[error("`{key}` is no list")]
+    NoList {
+        /// What is no list.
+        key: String,
+    },
+    /// A place that a list does not have.
+    #[error("there is no `{key}[{place}]`: the list has {}, counted from 0", count_of(*length, "element"))]
+    BeyondList {
+        /// The list.
+        key: String,
+        /// The place.
+        place: usize,
+        /// How many elements the list has.
+        length: usize,
+    },
+    /// A name in a list, whose elements have places.
+    #[error("`{key}` is a list of {}: say which, such as {key}[0]", count_of(*length, "element"))]
+    NameInList {
+        /// The list.
+        key: String,
+        /// How many elements it has.
+        length: usize,
+    },
+    /// A place that is none.
+    #[error("`{part}`: a place in a list is a number in brackets, such as [0]")]
+    NoPlace {
+        /// The part of the key between two dots.
+        part: String,
+    },
+    /// An element of a list that is to be taken away.
+    #[error("`{key}` is an element of a list, which can only be set anew without it")]
+    ElementOfList {
+        /// The element.
         key: String,
     },
     /// Nothing has this name.

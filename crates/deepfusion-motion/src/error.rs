@@ -8,7 +8,7 @@ pub use self::array::{ArrayProblem, TimesArray};
 pub use self::expected::{ExpectedLayout, ExpectedSetting};
 pub use self::signal::SignalProblem;
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, system_hint};
 use std::path::{Path, PathBuf};
 
 /// What can go wrong while a vehicle's sensors are read and fused.
@@ -165,7 +165,7 @@ impl Hint for Error {
             Self::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "a comma2k19 segment has processed_log/CAN, processed_log/IMU and global_pose"
             }
-            Self::File { .. } => return None,
+            Self::File { source, .. } => system_hint(source.kind()),
             Self::Array { .. } => {
                 "fetch the recording again: the file is cut off, or of another data set"
             }

@@ -1,4 +1,4 @@
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
 
 /// What can go wrong while a picture or a report is made.
 #[derive(Debug, thiserror::Error)]
@@ -53,6 +53,9 @@ impl Hint for Error {
         match self {
             Self::Data(inner) => inner.hint(),
             Self::Log { .. } => Some("it should be the log.csv of a run's folder".into()),
+            Self::Encode(image::ImageError::IoError(source)) => {
+                Some(system_hint(source.kind()).into())
+            }
             Self::Size { .. } | Self::Encode(_) => None,
         }
     }

@@ -1,5 +1,5 @@
 use crate::{BagProblem, MessageError, Time};
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a bag.
@@ -171,12 +171,10 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         use std::io::ErrorKind;
         let text = match self {
-            Self::NoSuchPath { .. } => "check the spelling, and that the disk is mounted",
+            Self::NoSuchPath { .. } => system_hint(ErrorKind::NotFound),
             Self::File { source, .. } => match source.kind() {
-                ErrorKind::StorageFull => "the disk is full: free some space and run again",
-                ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
                 ErrorKind::IsADirectory => "give the .bag file itself",
-                _ => return None,
+                kind => system_hint(kind),
             },
             Self::NotABag { .. } => {
                 "a ROS 2 recording (.mcap, .db3) keeps its own ending; other files are no recordings of ROS"

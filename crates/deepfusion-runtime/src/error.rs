@@ -11,9 +11,19 @@ pub enum EngineProblem {
     /// ONNX Runtime refuses it.
     #[error("{0}")]
     Onnx(#[from] deepfusion_onnx::Error),
-    /// What the caller's own runner says, whose error may be of any type.
+    /// The caller's own runner refuses it.
     #[error("{0}")]
-    Runner(String),
+    Runner(Box<dyn Hint + Send + Sync>),
+}
+
+impl Hint for EngineProblem {
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Fused(error) => error.hint(),
+            Self::Onnx(error) => error.hint(),
+            Self::Runner(error) => error.hint(),
+        }
+    }
 }
 
 /// What can go wrong on the way from a network's name to metres.
@@ -88,13 +98,11 @@ impl Hint for Error {
                     known.join(", ")
                 ),
             }),
-            Self::Engine { .. } => {
-                Some(
-                    "f32 in the fused engine runs on every processor; with the training framework, Burn runs \
-                     every network on every device"
-                        .into(),
-                )
-            }
+            Self::Engine { reason, .. } => Some(reason.hint().unwrap_or(
+                "f32 in the fused engine runs on every processor; with the training framework, Burn runs \
+                 every network on every device"
+                    .into(),
+            )),
             Self::NotCalibrated => Some("bf16 needs no calibration".into()),
             Self::Calibration(_) => Some("calibrate the network again; bf16 needs no calibration".into()),
             Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),

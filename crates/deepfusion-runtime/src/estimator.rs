@@ -1,18 +1,19 @@
-use std::fmt;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_hint::Hint;
 use deepfusion_infer::Precision;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{InputSize, LOG_SCALE_BOUNDS, StoredNetwork, TrainConfig};
 
 use crate::augmentation::{blend_flipped, mirror};
+use crate::other_sizes::OtherSizes;
 use crate::resample::Resample;
 use crate::{
     Augmentation, DepthRunner, EngineProblem, Error, FusedRunner, ModelSource, NetworkOutput,
-    Prediction, PreparedImage, Preparer, RunnerPlan, View,
+    Prediction, PreparedImage, Preparer, View,
 };
 
 /// A trained depth network, ready for images. It belongs to one thread; [`Self::another`] makes one for another thread.
@@ -26,99 +27,6 @@ pub struct DepthEstimator {
     others: Option<OtherSizes>,
     /// Steps it was trained for.
     pub step: usize,
-}
-
-/// Number of other input sizes for which runners are kept; each camera needs one, or as many as [`Augmentation::scales`].
-const SIZES_KEPT: usize = 6;
-
-/// Runners for other input sizes, made on demand.
-struct OtherSizes {
-    plans: Arc<PlansBySize>,
-    /// Most recently used last.
-    made: Vec<(InputSize, Box<dyn DepthRunner>)>,
-}
-
-/// What an estimator and its like on other threads share: of each size what is packed. (Of ONNX Runtime's that is the model's bytes alone.)
-struct PlansBySize {
-    make: Box<MakeRunner>,
-    /// Most recently used last.
-    packed: Mutex<Packed>,
-}
-
-type Packed = Vec<(InputSize, Arc<dyn RunnerPlan>)>;
-
-type MakeRunner = dyn Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync;
-
-impl fmt::Debug for OtherSizes {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("OtherSizes").finish_non_exhaustive()
-    }
-}
-
-impl OtherSizes {
-    fn runner(&mut self, size: InputSize) -> Result<&mut dyn DepthRunner, Error> {
-        let found = match self.made.iter().position(|(of, _)| *of == size) {
-            Some(place) => {
-                self.plans.kept(size);
-                self.made.remove(place)
-            }
-            None => (size, self.plans.runner(size)?),
-        };
-        keep_last(&mut self.made, found);
-        let last = self.made.len() - 1;
-        Ok(&mut *self.made[last].1)
-    }
-}
-
-impl PlansBySize {
-    fn runner(&self, size: InputSize) -> Result<Box<dyn DepthRunner>, Error> {
-        if let Some(plan) = self.kept(size) {
-            return plan.runner();
-        }
-        // The lock is never held while something is packed: that is parallel work, and a thread that waits for its own may take up another
-        // estimator's task, which would wait for the lock. Two threads may so pack a size at once: the first one's is kept by both.
-        let runner = (self.make)(size)?;
-        let mut packed = self.lock();
-        let first = used(&mut packed, size);
-        if first.is_none() {
-            keep_last(&mut packed, (size, runner.plan()));
-        }
-        drop(packed);
-        match first {
-            Some(plan) => {
-                drop(runner);
-                plan.runner()
-            }
-            None => Ok(runner),
-        }
-    }
-
-    /// What is packed for a size already; it was then used last.
-    fn kept(&self, size: InputSize) -> Option<Arc<dyn RunnerPlan>> {
-        used(&mut self.lock(), size)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Packed> {
-        // Whoever panicked left a list that is whole.
-        self.packed.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// What is packed for a size, as what was used last.
-fn used(packed: &mut Packed, size: InputSize) -> Option<Arc<dyn RunnerPlan>> {
-    let place = packed.iter().position(|(of, _)| *of == size)?;
-    let found = packed.remove(place);
-    let plan = Arc::clone(&found.1);
-    packed.push(found);
-    Some(plan)
-}
-
-/// Adds what was used last; what was not used for longest goes, where there are [`SIZES_KEPT`].
-fn keep_last<T>(kept: &mut Vec<T>, last: T) {
-    if kept.len() == SIZES_KEPT {
-        kept.remove(0);
-    }
-    kept.push(last);
 }
 
 impl DepthEstimator {
@@ -155,7 +63,7 @@ impl DepthEstimator {
     ///
     /// # Errors
     /// The runner's own.
-    pub fn of<E: fmt::Display>(
+    pub fn of<E: Hint + Send + Sync + 'static>(
         network: StoredNetwork,
         runner: impl Fn(&TrainConfig, Weights) -> Result<Box<dyn DepthRunner>, E>
         + Send
@@ -174,21 +82,14 @@ impl DepthEstimator {
         let own = runner(&config, weights)?;
         let others = kept.map(|weights| {
             let of = Arc::clone(&config);
-            let make = move |size: InputSize| {
+            OtherSizes::new(move |size| {
                 let config = TrainConfig {
                     size,
                     ..of.as_ref().clone()
                 };
                 runner(&config, weights.clone())
-                    .map_err(|e| Error::engine("other size", EngineProblem::Runner(e.to_string())))
-            };
-            OtherSizes {
-                plans: Arc::new(PlansBySize {
-                    make: Box::new(make),
-                    packed: Mutex::default(),
-                }),
-                made: Vec::new(),
-            }
+                    .map_err(|e| Error::engine("other size", EngineProblem::Runner(Box::new(e))))
+            })
         });
         Ok(Self {
             runner: own,
@@ -200,27 +101,17 @@ impl DepthEstimator {
     }
 
     /// An estimator for another thread: it shares the weights, those of input sizes yet to come as well, and has its own buffers. The fused engine's
-    /// weights are shared as they are packed; each session of ONNX Runtime packs its own.
+    /// weights are shared as they are packed, for the first six further input sizes; each session of ONNX Runtime packs its own.
     ///
     /// # Errors
     /// As [`DepthRunner::another`].
     pub fn another(&self) -> Result<Self, Error> {
-        let others = match &self.others {
-            Some(OtherSizes { plans, made }) => {
-                let plans = Arc::clone(plans);
-                let made = made
-                    .iter()
-                    .map(|(size, runner)| Ok((*size, runner.another()?)));
-                let made = made.collect::<Result<_, Error>>()?;
-                Some(OtherSizes { plans, made })
-            }
-            None => None,
-        };
+        let others = self.others.as_ref().map(OtherSizes::another);
         Ok(Self {
             config: Arc::clone(&self.config),
             camera: self.camera,
             runner: self.runner.another()?,
-            others,
+            others: others.transpose()?,
             step: self.step,
         })
     }

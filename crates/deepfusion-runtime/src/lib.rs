@@ -14,14 +14,15 @@
 //!
 //! [`ModelSource`] finds a network, [`DepthEstimator`] runs it on a [`DepthRunner`]: the fused engine ([`FusedRunner`]),
 //! ONNX Runtime ([`OrtRunner`]), or any other that yields disparities. Every thread has its own estimator
-//! ([`DepthEstimator::another`]). Those of the fused engine share one copy of the packed weights (each session of ONNX Runtime packs its own), and nothing is
-//! locked while a network runs. With time to spare, a prediction may be the mean of several of one image: test-time augmentation ([`Augmentation`]).
+//! ([`DepthEstimator::another`]). Those of the fused engine share one copy of the packed weights (each session of ONNX Runtime packs its own), and no lock
+//! is needed. With time to spare, a prediction may be the mean of several of one image: test-time augmentation ([`Augmentation`]).
 
 mod augmentation;
 mod error;
 mod estimator;
 mod fused;
 mod ort;
+mod other_sizes;
 mod prediction;
 mod prepare;
 mod resample;

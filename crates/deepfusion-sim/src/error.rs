@@ -4,8 +4,8 @@ mod varied_conflict;
 pub use expected::ExpectedSetting;
 pub use varied_conflict::VariedConflict;
 
-use deepfusion_fs::moved_path;
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_fs::{Unfinished, moved_path};
+use deepfusion_hint::{Hint, count_of, system_hint};
 use deepfusion_rosbag::Error as BagError;
 use std::path::{Path, PathBuf};
 
@@ -37,13 +37,10 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
-    /// The output folder looks empty, and another writer is at work there, or died and what it left cannot be removed.
-    #[error("{}: the output folder is not empty: a writer left this in it, or is still writing it", path.display())]
-    Unfinished {
-        /// The hidden file or folder.
-        path: PathBuf,
-    },
-    /// Writing ended before the last frame, as its caller wanted: nothing of it is left.
+    /// The folder for a simulated drive looks empty, and another writer is at work there, or died and what it left cannot be removed.
+    #[error(transparent)]
+    Unfinished(#[from] Unfinished),
+    /// Simulating ended before the last frame, as its caller wanted: nothing of it is left.
     #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
     Stopped {
         /// Frames done.
@@ -92,10 +89,7 @@ impl Hint for Error {
             Self::OutputNotEmpty { .. } => {
                 Some("choose a new folder, or empty this one first".to_owned())
             }
-            Self::Unfinished { .. } => Some(
-                "if no program is writing there, remove it, and the file of its name with .lock; or choose another folder"
-                    .to_owned(),
-            ),
+            Self::Unfinished(_) => Some(Unfinished::REMEDY.to_owned()),
             Self::Io { source, .. } => Some(
                 match source.kind() {
                     std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
@@ -112,6 +106,10 @@ impl Hint for Error {
             Self::Bag(error) => error.hint(),
             Self::Message { problem, .. } => problem.hint(),
             Self::Stopped { .. } => Some("start it again: nothing is in the way".to_owned()),
+            Self::Encode {
+                source: image::ImageError::IoError(source),
+                ..
+            } => Some(system_hint(source.kind()).to_owned()),
             Self::Encode { .. } => None,
         }
     }

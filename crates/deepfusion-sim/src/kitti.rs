@@ -65,7 +65,7 @@ pub(crate) fn require_empty(out: &Path) -> Result<()> {
         Some(InTheWay::Content) => Err(Error::OutputNotEmpty {
             path: out.to_owned(),
         }),
-        Some(InTheWay::Unfinished(path)) => Err(Error::Unfinished { path }),
+        Some(InTheWay::Unfinished(unfinished)) => Err(unfinished.into()),
     }
 }
 

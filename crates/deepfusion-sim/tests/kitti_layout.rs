@@ -245,7 +245,7 @@ fn what_another_writes_is_named() {
         ControlFlow::Continue(())
     })
     .expect_err("refused");
-    assert!(matches!(&error, Error::Unfinished { path } if path == another.path()));
+    assert!(matches!(&error, Error::Unfinished(found) if found.path == another.path()));
     assert!(error.hint().is_some());
     assert!(another.path().exists());
 }

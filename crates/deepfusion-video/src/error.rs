@@ -1,5 +1,5 @@
 use crate::problem::{PacketProblem, ProgramProblem, quoted};
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -85,12 +85,7 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::File { source, .. } => match source.kind() {
-                ErrorKind::NotFound => "check the spelling, and that the disk is mounted",
-                ErrorKind::StorageFull => "the disk is full: free some space and run again",
-                ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
-                _ => return None,
-            },
+            Self::File { source, .. } => system_hint(source.kind()),
             Self::Picture { .. } => "PNG and JPEG are read",
             Self::Program { problem, .. } => return problem.hint(),
             Self::Packet { problem, .. } => return problem.hint(),

@@ -4,7 +4,7 @@ mod live;
 mod packet;
 
 pub(crate) use self::live::quoted;
-pub use self::live::{FrameProblem, LiveProblem, SourceKind};
+pub use self::live::{LiveFrameProblem, LiveProblem, SourceKind};
 pub use self::packet::PacketProblem;
 
 use deepfusion_hint::{Hint, count_of};

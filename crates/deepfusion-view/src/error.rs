@@ -4,7 +4,7 @@ mod content;
 
 pub use self::content::{ArrayProblem, ContentProblem, FolderKind};
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, system_hint};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 #[cfg(feature = "rerun")]
@@ -167,7 +167,8 @@ impl Hint for Error {
                 Some("give two folders of predictions, or two of training runs".into())
             }
             Self::NoFrames { .. } => Some("give a folder of predictions or of targets".into()),
-            Self::File { .. } | Self::Content { .. } | Self::Stopped { .. } => None,
+            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::Content { .. } | Self::Stopped { .. } => None,
             #[cfg(feature = "rerun")]
             Self::Encoding { .. } => None,
             Self::Picture(error) => error.hint(),

@@ -76,7 +76,7 @@ pub(crate) struct AdaptArgs {
     /// Fixes everything that is random.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub seed: u64,
-    /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
+    /// Any key of the configuration, as `loss.smoothness=0.01` or `data.sets[0].learn=depth` (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Where to compute; one of several GPUs by its index, as cuda:1.

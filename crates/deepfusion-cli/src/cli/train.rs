@@ -106,7 +106,7 @@ pub(crate) struct TrainArgs {
     /// Parts of the network and terms of the loss to leave out.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
     pub without: Vec<String>,
-    /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
+    /// Any key of the configuration, as `loss.smoothness=0.01` or `data.sets[0].learn=depth` (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

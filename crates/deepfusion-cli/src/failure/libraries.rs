@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use deepfusion_data::{CalibrationSource, DatasetKind};
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 
 use super::{Exit, Reportable};
@@ -357,11 +357,11 @@ impl Reportable for deepfusion_runtime::Error {
                     known => format!("{WROTE}, or an embedded network: {}", known.join(", ")),
                 })
             }
-            Self::Engine { .. } => Some(
+            Self::Engine { reason, .. } => Some(reason.hint().unwrap_or(
                 "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
                  every network on every device"
                     .into(),
-            ),
+            )),
             Self::NotCalibrated | Self::Calibration(_) => Some(
                 "look at some of your images first: deepfusion weights calibrate --model RUN DRIVE; `--precision bf16` needs no calibration"
                     .into(),
@@ -503,10 +503,17 @@ macro_rules! foreign {
     };
 }
 
-foreign!(
-    clap::Error,
-    serde_json::Error,
-    std::io::Error,
-    toml::de::Error,
-    toml::ser::Error,
-);
+foreign!(clap::Error, toml::de::Error, toml::ser::Error);
+
+impl Reportable for std::io::Error {
+    fn remedy(&self) -> Option<String> {
+        Some(system_hint(self.kind()).into())
+    }
+}
+
+impl Reportable for serde_json::Error {
+    fn remedy(&self) -> Option<String> {
+        self.io_error_kind()
+            .map(|reason| system_hint(reason).into())
+    }
+}

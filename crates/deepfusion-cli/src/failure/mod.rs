@@ -6,7 +6,7 @@ mod libraries;
 
 use std::error::Error;
 use std::fmt;
-use std::io::{ErrorKind, Write};
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -40,6 +40,9 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
         None
     }
 }
+
+/// What to do about an error that knows no remedy, nor a reason of the system's, which has one.
+const OURS_TO_MEND: &str = "where the message names no input of yours to mend, it is a fault of the program: please report it with the command";
 
 /// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
 pub(crate) const STOPPED: u8 = 130;
@@ -134,9 +137,8 @@ impl Failure {
                 last = cause;
             }
         }
-        let hint = self
-            .hint()
-            .unwrap_or_else(|| self.general_hint().to_owned());
+        let hint = self.hint();
+        let hint = hint.as_deref().unwrap_or(OURS_TO_MEND);
         text += &format!("{HINT}hint:{HINT:#} {hint}\n");
         // Where nobody reads it any more, the code still says it.
         let _ = anstream::stderr().write_all(text.as_bytes());
@@ -147,36 +149,9 @@ impl Failure {
     fn chain(&self) -> Vec<String> {
         let mut chain: Vec<String> = self.contexts.iter().rev().cloned().collect();
         chain.push(self.error.message());
-        chain.extend(self.causes().skip(1).map(ToString::to_string));
+        let causes = std::iter::successors(self.error.source(), |&cause| cause.source());
+        chain.extend(causes.map(ToString::to_string));
         chain
-    }
-
-    /// The error and what caused it.
-    fn causes(&self) -> impl Iterator<Item = &(dyn Error + 'static)> {
-        let error: &(dyn Error + 'static) = &*self.error;
-        std::iter::successors(Some(error), |&error| error.source())
-    }
-
-    /// What to do about an error that knows no remedy of its own: the system's reason decides.
-    fn general_hint(&self) -> &'static str {
-        // No typed way: the causes are errors of other people's crates, which the standard library's chain hides behind `dyn Error`.
-        // Its own error is the one type that any of them may end with.
-        let mut system = self.causes().filter_map(|cause| cause.downcast_ref());
-        match system.next().map(std::io::Error::kind) {
-            Some(ErrorKind::NotFound) => "check the spelling, and that the disk is mounted",
-            Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => {
-                "check the permissions, or choose a place that you may write to"
-            }
-            Some(ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => {
-                "the disk is full: free some space and run the same again"
-            }
-            Some(_) => {
-                "the system gave this reason: look at the disk or the network that the file is on"
-            }
-            None => {
-                "where the message names no input of yours to mend, it is a fault of the program: please report it with the command"
-            }
-        }
     }
 }
 
@@ -184,6 +159,7 @@ impl Failure {
 mod tests {
     use super::*;
     use crate::error::CliError;
+    use std::io::ErrorKind;
     use std::path::PathBuf;
 
     /// No error leaves its reader without a next step, whatever kind it is.
@@ -191,18 +167,18 @@ mod tests {
     fn every_error_has_a_hint() {
         let full = std::io::Error::from(ErrorKind::StorageFull);
         let full = Failure::from(full).context("log.csv");
-        assert_eq!(full.hint(), None);
-        assert!(full.general_hint().contains("disk is full"));
+        assert!(full.hint().unwrap().contains("disk is full"));
         let wrapped = Failure::from(deepfusion_data::Error::File {
             path: "log.csv".into(),
             source: ErrorKind::QuotaExceeded.into(),
         });
-        assert_eq!(wrapped.hint(), None);
-        assert!(wrapped.general_hint().contains("disk is full"));
+        assert!(wrapped.hint().unwrap().contains("disk is full"));
+        let unwritten = serde_json::to_writer(&mut [0_u8; 0][..], &7).unwrap_err();
+        let hint = Failure::from(unwritten).hint();
+        assert!(hint.unwrap().contains("the system gave this reason"));
         let foreign = "?".parse::<toml::Table>().unwrap_err();
-        let foreign = Failure::from(foreign);
-        assert_eq!(foreign.hint(), None);
-        assert!(foreign.general_hint().contains("report"));
+        assert_eq!(Failure::from(foreign).hint(), None);
+        assert!(OURS_TO_MEND.contains("report"));
         let expected = deepfusion_model::ExpectedSetting::AtLeastOne;
         let config = deepfusion_model::Error::config("batch", expected, "0".to_owned());
         assert!(Failure::from(config).hint().unwrap().contains("batch"));

@@ -80,7 +80,7 @@ pub(super) fn require_empty(out: &Path) -> Result<()> {
         Some(InTheWay::Content) => Err(Error::Exists {
             path: out.to_owned(),
         }),
-        Some(InTheWay::Unfinished(path)) => Err(Error::Unfinished { path }),
+        Some(InTheWay::Unfinished(unfinished)) => Err(unfinished.into()),
     }
 }
 

@@ -2,18 +2,15 @@
 
 use super::{Error, FoundInstead};
 use crate::{DatasetKind, ImageProblem};
-use deepfusion_hint::Hint;
+use deepfusion_fs::Unfinished;
+use deepfusion_hint::{Hint, system_hint};
+use std::io::ErrorKind;
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
-        use std::io::ErrorKind;
         let text = match self {
-            Self::NoSuchPath { .. } => "check the spelling, and that the disk is mounted",
-            Self::File { source, .. } => match source.kind() {
-                ErrorKind::StorageFull => "the disk is full: free some space and run again",
-                ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
-                _ => return None,
-            },
+            Self::NoSuchPath { .. } => system_hint(ErrorKind::NotFound),
+            Self::File { source, .. } => system_hint(source.kind()),
             Self::UnknownLayout { .. } if self.needs_ros2() => {
                 "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }
@@ -29,9 +26,7 @@ impl Hint for Error {
                 return Some(format!("give them by themselves, one or several: {one}"));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
-            Self::Unfinished { .. } => {
-                "if no program is writing there, remove it, and the file of its name with .lock; or choose another folder"
-            }
+            Self::Unfinished(_) => Unfinished::REMEDY,
             Self::Stopped { .. } => "start it again: nothing is in the way",
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",

@@ -1,4 +1,4 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, system_hint};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -95,18 +95,8 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::NoSuchPath { .. } => {
-                Some("check the spelling, and that the disk is mounted".into())
-            }
-            Self::File { source, .. } => match source.kind() {
-                ErrorKind::StorageFull => {
-                    Some("the disk is full: free some space and run again".into())
-                }
-                ErrorKind::PermissionDenied => {
-                    Some("check the permissions of the file and its folder".into())
-                }
-                _ => None,
-            },
+            Self::NoSuchPath { .. } => Some(system_hint(ErrorKind::NotFound).into()),
+            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or an evaluation as JSON".into(),
             ),

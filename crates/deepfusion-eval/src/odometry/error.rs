@@ -1,6 +1,6 @@
 //! What can go wrong with paths that are compared, and with their files.
 
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::{Hint, count_of, system_hint};
 use std::path::PathBuf;
 
 /// Two paths that cannot be compared.
@@ -92,10 +92,7 @@ impl Hint for PoseFileError {
     fn hint(&self) -> Option<String> {
         Some(
             match self {
-                Self::Io { source, .. } => match source.kind() {
-                    std::io::ErrorKind::NotFound => "check the spelling, and that the disk is mounted",
-                    _ => return None,
-                },
+                Self::Io { source, .. } => system_hint(source.kind()),
                 Self::Line { .. } | Self::Empty { .. } => {
                     "a line is a pose of the camera in the world: KITTI's 12 numbers (the rows of [R t]), or TUM's \
                      8 (time tx ty tz qx qy qz qw); # starts a comment"

@@ -4,7 +4,7 @@ mod size;
 
 pub use self::size::SizeProblem;
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, system_hint};
 use std::path::PathBuf;
 
 /// What can go wrong with a cloud or its file.
@@ -58,8 +58,8 @@ fn columns(point: usize) -> &'static str {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::File { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
-                Some("the disk is full: free some space and run again".into())
+            Self::File { source, .. } | Self::Stream(source) => {
+                Some(system_hint(source.kind()).into())
             }
             Self::Truncated { .. } => {
                 Some("the scan was cut off while copying or unpacking: fetch it again".into())
@@ -67,7 +67,7 @@ impl Hint for Error {
             Self::Ply(_) => Some(
                 "readable are PLY files in binary_little_endian with float x, y, z in a vertex element".into(),
             ),
-            _ => None,
+            Self::Size(_) => None,
         }
     }
 }

@@ -36,7 +36,7 @@ fn by_name(candidates: &[String]) -> String {
 /// Why a frame of a CAN trace cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum FrameProblem {
+pub enum CanFrameProblem {
     /// Its time is none.
     #[error("'{0}' is not a time in seconds")]
     Time(String),

@@ -4,6 +4,8 @@ use crate::{Compute, Error, ExpectedSetting, Preset, SettingProblem, TrainConfig
 use std::path::Path;
 use toml::{Table, Value};
 
+use super::setting_key;
+
 /// What stands for "without a value" in [`TrainConfig::set`].
 const NONE: &str = "none";
 
@@ -42,7 +44,8 @@ impl TrainConfig {
     }
 
     /// Sets one key, as `loss.smoothness=0.01` says it: dots between tables, a TOML value or a bare word, and `none` to take
-    /// an optional one away. A list, of tables, too, is set as a whole. What comes out is not validated.
+    /// an optional one away. Elements of lists have their place, counted from 0, in brackets: `data.sets[0].learn=depth`; how many there are
+    /// changes only where a list is set as a whole. What comes out is not validated.
     ///
     /// # Errors
     /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have; [`Error::PresetAsKey`].
@@ -61,35 +64,10 @@ impl TrainConfig {
                 assignment: assignment.to_owned(),
             });
         }
-        let mut parts: Vec<&str> = key.split('.').collect();
-        let last = parts.pop().unwrap_or_default();
-        let mut table = table_of(self)?;
-        let mut inner = &mut table;
-        for part in parts {
-            let next = inner
-                .entry(part)
-                .or_insert_with(|| Value::Table(Table::new()));
-            let Value::Table(next) = next else {
-                return Err(wrong(SettingProblem::NoTable {
-                    key: part.to_owned(),
-                }));
-            };
-            inner = next;
-        }
-        if value == NONE {
-            if inner.remove(last).is_none() {
-                return if crate::config_keys().iter().any(|k| k.key == key) {
-                    Ok(())
-                } else {
-                    Err(wrong(SettingProblem::NoSuchKey {
-                        key: key.to_owned(),
-                    }))
-                };
-            }
-        } else {
-            inner.insert(last.to_owned(), parsed(value));
-        }
-        let changed = Value::Table(table).try_into::<Self>();
+        let value = (value != NONE).then(|| parsed(value));
+        let mut config = Value::Table(table_of(self)?);
+        setting_key::put(&mut config, key, value).map_err(wrong)?;
+        let changed = config.try_into::<Self>();
         *self = changed.map_err(|e| wrong(SettingProblem::Value(e.into())))?;
         Ok(())
     }
@@ -221,9 +199,49 @@ mod tests {
             assert!(text.contains(reason) && text.contains(assignment), "{text}");
             assert!(error.hint().is_some());
         }
+        let of_lists = [
+            ("augmentation.sizes[0].width=64", "0 elements"),
+            ("frames[2]=1", "2 elements"),
+            ("frames[0]=none", "an element of a list"),
+            ("size[0]=64", "no list"),
+            ("frames.first=1", "such as frames[0]"),
+            ("frames[*]=1", "number in brackets"),
+            ("frames[0]=far", "far"),
+        ];
+        for (assignment, reason) in of_lists {
+            let text = config.set(assignment).unwrap_err().to_string();
+            assert!(text.contains(reason) && text.contains(assignment), "{text}");
+        }
         let error = config.set("preset=tiny").unwrap_err();
         assert!(matches!(error, Error::PresetAsKey { .. }), "{error}");
         assert!(error.to_string().contains("preset=tiny"), "{error}");
         assert_eq!(config, expected, "what failed changed nothing");
+    }
+
+    #[test]
+    fn elements_of_lists_are_set_one_by_one() {
+        let mut config = Preset::Light.config();
+        for assignment in [
+            "frames=[-1, 1]",
+            "frames[0]=-2",
+            "augmentation.sizes=[{width = 416, height = 128}, {width = 320, height = 96}]",
+            "augmentation.sizes[1].width = 352",
+            "data.sets=[{name = \"a\", paths = [\"drive\"]}]",
+            "data.sets[0].learn=depth",
+            "data.sets[0].paths[0]=other",
+        ] {
+            config.set(assignment).unwrap();
+        }
+        let mut expected = Preset::Light.config();
+        expected.frames = vec![-2, 1];
+        expected.augmentation.sizes = [(416, 128), (352, 96)]
+            .map(|(width, height)| crate::InputSize { width, height })
+            .to_vec();
+        assert_eq!(config.data.sets.len(), 1);
+        let set = &config.data.sets[0];
+        assert_eq!((&*set.name, set.learn), ("a", crate::Learn::Depth));
+        assert_eq!(set.paths, [Path::new("other")]);
+        expected.data.sets.clone_from(&config.data.sets);
+        assert_eq!(config, expected);
     }
 }

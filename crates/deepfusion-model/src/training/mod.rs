@@ -9,6 +9,7 @@ mod findings;
 mod loss_config;
 mod preset;
 mod sample_factors;
+mod setting_key;
 mod train_config;
 mod validation;
 

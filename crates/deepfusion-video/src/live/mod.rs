@@ -14,7 +14,7 @@ pub use slot::LiveFrame;
 
 use self::ffmpeg::Ffmpeg;
 use self::slot::SlotState;
-use crate::{Error, FrameProblem, LiveProblem, Result};
+use crate::{Error, LiveFrameProblem, LiveProblem, Result};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -85,7 +85,7 @@ impl LiveSource {
     }
 
     /// The pipe was closed: by the stream's end, or by what went wrong.
-    fn ended(&mut self, problem: Option<Arc<FrameProblem>>) -> Result<NextFrame> {
+    fn ended(&mut self, problem: Option<Arc<LiveFrameProblem>>) -> Result<NextFrame> {
         let end = self.ffmpeg.end();
         let came = self.ffmpeg.slot().arrived();
         if came == 0 && !self.old_names && end.knows_no_option() {

@@ -1,6 +1,6 @@
 //! Pictures as ffmpeg pipes them: each begins with its size, so that nothing has to be asked beforehand.
 
-use crate::FrameProblem;
+use crate::LiveFrameProblem;
 use image::RgbImage;
 use std::io::{BufRead, ErrorKind};
 
@@ -15,12 +15,12 @@ const LARGEST: u32 = 1 << 15;
 pub(super) fn read(
     input: &mut impl BufRead,
     spare: Vec<u8>,
-) -> Result<Option<RgbImage>, FrameProblem> {
+) -> Result<Option<RgbImage>, LiveFrameProblem> {
     let Some(magic) = word(input)? else {
         return Ok(None);
     };
     if magic != "P6" {
-        return Err(FrameProblem::Magic);
+        return Err(LiveFrameProblem::Magic);
     }
     let mut numbers = [0_u32; 3];
     for number in &mut numbers {
@@ -31,7 +31,7 @@ pub(super) fn read(
             .parse()
             .ok()
             .filter(|n| (1..=LARGEST).contains(n))
-            .ok_or(FrameProblem::Size(word))?;
+            .ok_or(LiveFrameProblem::Size(word))?;
     }
     let [width, height, _] = numbers;
     let mut pixels = spare;
@@ -44,7 +44,7 @@ pub(super) fn read(
 }
 
 /// The next word and the one blank that ends it; `None` at the end.
-fn word(input: &mut impl BufRead) -> Result<Option<String>, FrameProblem> {
+fn word(input: &mut impl BufRead) -> Result<Option<String>, LiveFrameProblem> {
     /// Longer words are no header's.
     const LONGEST: usize = 8;
     let mut word = String::new();
@@ -59,7 +59,7 @@ fn word(input: &mut impl BufRead) -> Result<Option<String>, FrameProblem> {
         }
         word.push(char::from(byte[0]));
         if word.len() > LONGEST {
-            return Err(FrameProblem::Header);
+            return Err(LiveFrameProblem::Header);
         }
     }
 }

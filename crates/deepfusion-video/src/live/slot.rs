@@ -1,6 +1,6 @@
 //! Room for one frame, between who reads the source and who looks at its frames.
 
-use crate::FrameProblem;
+use crate::LiveFrameProblem;
 use image::RgbImage;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant, SystemTime};
@@ -34,7 +34,7 @@ struct State {
     dropped: u64,
     /// When the last frame came, or the wait for the first began.
     last: Instant,
-    closed: Option<Option<Arc<FrameProblem>>>,
+    closed: Option<Option<Arc<LiveFrameProblem>>>,
 }
 
 /// What a slot had.
@@ -46,7 +46,7 @@ pub(super) enum SlotState {
         silence: Duration,
     },
     /// There will be no more; with what went wrong while reading.
-    Closed(Option<Arc<FrameProblem>>),
+    Closed(Option<Arc<LiveFrameProblem>>),
 }
 
 impl Slot {
@@ -86,7 +86,7 @@ impl Slot {
     }
 
     /// Says that no more will come; `problem` where that is a failure.
-    pub(super) fn close(&self, problem: Option<FrameProblem>) {
+    pub(super) fn close(&self, problem: Option<LiveFrameProblem>) {
         self.lock().closed.get_or_insert(problem.map(Arc::new));
         self.changed.notify_all();
     }
@@ -157,7 +157,7 @@ mod tests {
         let slot = Slot::new();
         slot.put(picture(7));
         slot.close(None);
-        slot.close(Some(FrameProblem::Magic));
+        slot.close(Some(LiveFrameProblem::Magic));
         assert_eq!(frame(&slot).number, 0);
         assert!(matches!(slot.take(Duration::MAX), SlotState::Closed(None)));
         assert!(matches!(slot.take(Duration::MAX), SlotState::Closed(None)));
@@ -171,7 +171,7 @@ mod tests {
             slot.put(picture(1));
             assert!(matches!(waiting.join().unwrap(), SlotState::Frame(_)));
             let waiting = scope.spawn(|| slot.take(Duration::from_secs(60)));
-            slot.close(Some(FrameProblem::Magic));
+            slot.close(Some(LiveFrameProblem::Magic));
             assert!(matches!(
                 waiting.join().unwrap(),
                 SlotState::Closed(Some(_))

@@ -36,7 +36,7 @@ pub enum LiveProblem {
     },
     /// What comes is no frame.
     #[error("cannot be read: {0}")]
-    Frame(#[source] Arc<FrameProblem>),
+    Frame(#[source] Arc<LiveFrameProblem>),
     /// ffmpeg ended, and the source should not have.
     #[error("{}: {}{}", happened(*frames), ended(*code), quoted(said))]
     Lost {
@@ -115,7 +115,7 @@ pub(crate) fn quoted(said: &[String]) -> String {
 /// Why a live source's frame cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum FrameProblem {
+pub enum LiveFrameProblem {
     /// It does not begin as a picture.
     #[error("a frame that does not begin with P6")]
     Magic,

@@ -119,8 +119,9 @@ impl TableDecides {
     /// What it decides of the key of an assignment, as `seed=3`.
     #[must_use]
     pub fn about(assignment: &str) -> Option<Self> {
-        let key = assignment.split('=').next().unwrap_or_default().trim();
-        match key {
+        // Of a list's element, as `data.paths[0]`, what is decided of the list.
+        let key = assignment.split(['=', '[']).next().unwrap_or_default();
+        match key.trim() {
             "steps" | "epochs" | "min_steps" => Some(Self::Length),
             "seed" => Some(Self::Seed),
             "init" | "init_sha256" => Some(Self::Start),
@@ -204,6 +205,7 @@ mod tests {
             ("seed=3", TableDecides::Seed),
             ("init=\"a\"", TableDecides::Start),
             ("data.paths=[]", TableDecides::Recordings),
+            ("data.paths[0]=a", TableDecides::Recordings),
             ("data.camera=\"3\"", TableDecides::Cameras),
         ] {
             assert_eq!(TableDecides::about(assignment), Some(decides));

@@ -64,7 +64,7 @@ pub struct AdaptSettings {
     pub speed_sd: f64,
     /// Fixes everything that is random.
     pub seed: u64,
-    /// Any key of the configuration over these, as `loss.smoothness=0.01`.
+    /// Any key of the configuration over these, as `loss.smoothness=0.01` ([`TrainConfig::set`]).
     pub set: Vec<String>,
     /// What it learns on.
     pub compute: Compute,

@@ -99,16 +99,25 @@ pub(super) fn config(
         config.loss.depth.weight = 1.0;
         config.loss.depth.gradient = 0.5;
     }
-    assign(&mut config, &settings.set)?;
+    assign(&mut config, &of_no_element(&settings.set))?;
     if new_pose_net {
         leave_pose_net_out(&mut config, &settings.set);
     }
-    // Around the size as it is now; a setting of the sizes themselves has the last word.
+    // Around the size as it is now; a setting of the sizes themselves, or of one of them, has the last word.
     if own.canonical_focal_px.is_some() {
         learn_at_several_sizes(&mut config, settings.simulated > 0);
-        assign(&mut config, &settings.set)?;
     }
+    assign(&mut config, &settings.set)?;
     Ok(config)
+}
+
+/// The settings but for those of single elements of lists, which may not be there yet.
+fn of_no_element(set: &[String]) -> Vec<String> {
+    let of_none = |assignment: &&String| {
+        let key = assignment.split('=').next();
+        key.is_none_or(|key| !key.contains('['))
+    };
+    set.iter().filter(of_none).cloned().collect()
 }
 
 fn assign(config: &mut TrainConfig, settings: &[String]) -> Result<()> {
@@ -173,9 +182,7 @@ pub(super) fn takes_measured_turns_only(
 ) -> Result<bool> {
     let mut config = estimator.config().clone();
     config.data = Default::default();
-    for assignment in &settings.set {
-        config.set(assignment)?;
-    }
+    assign(&mut config, &of_no_element(&settings.set))?;
     Ok(config.data.measured_turns_only)
 }
 
@@ -255,8 +262,15 @@ mod tests {
         learn_at_several_sizes(&mut config, true);
         assert_eq!(config.augmentation.video_sizes, own);
         assert_eq!(config.augmentation.sizes, video);
-        assign(&mut config, &["augmentation.video_sizes=[]".into()]).unwrap();
+        // Those of one size wait until there are some.
+        let set: [String; 2] = [
+            "augmentation.sizes[1].width = 800".into(),
+            "augmentation.video_sizes=[]".into(),
+        ];
+        assert_eq!(of_no_element(&set), set[1..]);
+        assign(&mut config, &set).unwrap();
         assert!(config.augmentation.video_sizes.is_empty());
+        assert_eq!(config.augmentation.sizes[1].width, 800);
     }
 
     #[test]

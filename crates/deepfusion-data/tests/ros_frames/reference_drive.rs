@@ -1,0 +1,115 @@
+//! A whole drive, which another program wrote and knows the truth of.
+
+use super::common::{open, reference, says};
+use crate::common::text_of;
+use deepfusion_data::{Dataset, GtKind, inspect};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix4, Vector3};
+use serde::Deserialize;
+use std::fs;
+
+/// What `reference/ros_drive.py` says of its drive.
+#[derive(Deserialize)]
+struct DriveFacts {
+    cam_from_vehicle: [[f64; 4]; 4],
+    cam_from_lidar: [[f64; 4]; 4],
+    vehicle_from_imu: [[f64; 4]; 4],
+    /// Nanoseconds and m/s, along the exact path.
+    speeds: Vec<(i64, f64)>,
+    images: usize,
+}
+
+fn facts() -> DriveFacts {
+    serde_json::from_str(&fs::read_to_string(reference("drive.json")).unwrap()).unwrap()
+}
+
+/// The chain of quaternions is exact to rounding; the file's own transforms are given to 16 digits.
+fn is_transform(found: &Se3, expected: &[[f64; 4]; 4], what: &str) {
+    let expected = Matrix4::from_fn(|r, c| expected[r][c]);
+    let apart = (found.matrix() - expected).abs().max();
+    assert!(apart < 1e-9, "{what}: {apart}");
+}
+
+/// Mounts are where scipy puts them, and speeds those of the path that the positions are of.
+fn is_the_drive(dataset: &Dataset, known: &DriveFacts) {
+    let mount = |name: &str| {
+        let mount = dataset.mounts().iter().find(|m| m.name == name).unwrap();
+        assert!(mount.source.starts_with("frames "), "{mount:?}");
+        Se3::from_axis_angle(
+            Vector3::from(mount.rotation),
+            Vector3::from(mount.translation),
+        )
+    };
+    let name = "cam_from_vehicle";
+    is_transform(&mount(name), &known.cam_from_vehicle, name);
+    let used = dataset.cam_from_vehicle().unwrap();
+    is_transform(&used, &known.cam_from_vehicle, "used");
+    let name = "vehicle_from_imu";
+    is_transform(&mount(name), &known.vehicle_from_imu, name);
+
+    // 1 Hz, straight lines between: over the whole drive and at each frame.
+    let origin_ns = dataset.origin_ns().unwrap();
+    let speed_at = |time_s: f64| {
+        let ns = origin_ns + (time_s * 1e9).round() as i64;
+        let after = known.speeds.partition_point(|s| s.0 < ns);
+        known.speeds[after.min(known.speeds.len() - 1)].1
+    };
+    let frames = dataset.frames().iter();
+    let pairs: Vec<(f64, f64)> = frames
+        .filter_map(|f| Some((f.speed_mps?, speed_at(f.time_s?))))
+        .collect();
+    // The last position is of the drive's ninth second, its end of the tenth.
+    let after = dataset.frames().iter().filter(|f| f.time_s > Some(9.1));
+    assert_eq!(pairs.len() + after.count(), dataset.frames().len());
+    let of = |part: fn(&(f64, f64)) -> f64| pairs.iter().map(part).sum::<f64>();
+    let ratio = of(|p| p.0) / of(|p| p.1);
+    assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+    // It brakes at 1.7 m/s² where the positions end, which they cannot show.
+    let rms = (of(|p| (p.0 - p.1).powi(2)) / pairs.len() as f64).sqrt();
+    assert!(rms < 0.5, "{rms} m/s");
+
+    let warnings = text_of(dataset.warnings());
+    assert!(!warnings.contains("nothing says"), "{warnings}");
+    says(
+        &warnings,
+        &[
+            "/gnss/fix: left out, as they have no position: 1 of 10 messages",
+            "smoothed, sure to 0.",
+            "bridged",
+        ],
+    );
+}
+
+#[test]
+fn a_drive_needs_no_file_beside_it() {
+    let known = facts();
+    let dataset = open(&reference("drive.bag")).unwrap();
+    is_the_drive(&dataset, &known);
+    assert_eq!(dataset.frames().len(), known.images);
+    let lidar = dataset.mounts().iter().find(|m| m.name == "cam_from_lidar");
+    let lidar = lidar.unwrap();
+    let found = Se3::from_axis_angle(
+        Vector3::from(lidar.rotation),
+        Vector3::from(lidar.translation),
+    );
+    is_transform(&found, &known.cam_from_lidar, "cam_from_lidar");
+    let truths = (0..dataset.frames().len()).filter(|i| dataset.has_ground_truth(*i, GtKind::Z));
+    assert!(truths.count() >= 10);
+
+    let seen = inspect(&reference("drive.bag")).unwrap();
+    let text = seen.to_string();
+    says(
+        &text,
+        &[
+            "cam_from_vehicle",
+            "frames base_link → roof_rack → camera_front_link → camera_front_optical",
+        ],
+    );
+    assert!(seen.drives[0].usable_pairs > 40, "{text}");
+}
+
+#[cfg(feature = "ros2")]
+#[test]
+fn the_same_drive_of_ros_2_needs_none_either() {
+    is_the_drive(&open(&reference("drive_ros2")).unwrap(), &facts());
+}

@@ -1,0 +1,116 @@
+//! Which topics are taken, and what they say of speed.
+
+use super::common::{Drive, open, open_with, refusal, says};
+use crate::common::bag::{CAMERA, TinyBag};
+use deepfusion_data::Error;
+
+#[test]
+fn the_speeds_messages_are_read_and_positions_come_last() {
+    let speed = |fill: fn(&mut TinyBag)| {
+        let dataset = Drive::bare(CAMERA, |bag| {
+            bag.images("/image");
+            fill(bag);
+        })
+        .opened();
+        dataset.frames()[12].speed_mps.unwrap()
+    };
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.05, "{found}");
+    near(
+        speed(|bag| {
+            bag.twist_with_covariance("/fused", 7.0)
+                .odometry("/odom", 4.0);
+        }),
+        7.0,
+    );
+    near(
+        speed(|bag| {
+            bag.fixes("/fix", 12.0).ackermann("/drive", 3.0, 0.0);
+        }),
+        3.0,
+    );
+    near(
+        speed(|bag| {
+            bag.fixes("/fix", 12.0);
+        }),
+        12.0,
+    );
+    let scaled = Drive::bare(
+        &format!("{CAMERA}vehicle = {{ speed_scale = 0.5 }}\n"),
+        |bag| {
+            bag.images("/image").fixes("/fix", 12.0);
+        },
+    );
+    near(scaled.opened().frames()[12].speed_mps.unwrap(), 6.0);
+    let error = Drive::bare(
+        &format!("{CAMERA}vehicle = {{ max_gap_s = 0.0 }}\n"),
+        |bag| {
+            bag.images("/image");
+        },
+    )
+    .refusal();
+    says(&error, &["vehicle.max_gap_s is 0"]);
+}
+
+#[test]
+fn a_topic_is_named_by_a_caller() {
+    let drive = Drive::bare(
+        "[vehicle]\nspeed_unit = \"km/h\"\n[topics]\nspeed = \"/speed\"\n",
+        |bag| {
+            for (name, focal) in [("front", 60.0), ("left", 90.0)] {
+                bag.images(&format!("/{name}/image_raw"));
+                bag.camera_info(&format!("/{name}/camera_info"), focal);
+            }
+            bag.float("/speed", 36.0)
+                .twist("/twist", 5.0)
+                .fixes("/fix", 12.0);
+        },
+    );
+    let text = drive.refusal();
+    says(
+        &text,
+        &[
+            "2 topics could be the image",
+            "name it: [topics] image = \"/front/image_raw\"",
+        ],
+    );
+    let Err(Error::Topic {
+        choice: Some(choice),
+        ..
+    }) = open(&drive.bag)
+    else {
+        panic!("two cameras");
+    };
+    assert_eq!(choice.to_string(), "image=/front/image_raw");
+    // Each camera with the calibration beside it; what is named goes before the file.
+    let opened = |topics: &[&str]| open_with(&drive.bag, topics).unwrap();
+    assert_eq!(opened(&["image=/front/image_raw"]).intrinsics(0).fx, 60.0);
+    let left = opened(&["image=/left/image_raw"]);
+    assert_eq!(left.intrinsics(0).fx, 90.0);
+    assert!((left.frames()[12].speed_mps.unwrap() - 10.0).abs() < 1e-3);
+    let other = opened(&[
+        "image=/left/image_raw",
+        "speed=/fix",
+        "camera_info=/front/camera_info",
+    ]);
+    assert_eq!(other.intrinsics(0).fx, 60.0);
+    assert!((other.frames()[12].speed_mps.unwrap() - 12.0).abs() < 0.05);
+    let text = refusal(open_with(&drive.bag, &["image=/rear/image_raw"]));
+    says(
+        &text,
+        &["has no topic /rear/image_raw", "/front/image_raw, "],
+    );
+    let text = refusal(open_with(&drive.bag, &["image=/twist"]));
+    says(
+        &text,
+        &[
+            "/twist holds geometry_msgs/TwistStamped",
+            "sensor_msgs/Image",
+        ],
+    );
+    // A video, a folder of images: neither has topics.
+    let folder = tempfile::tempdir().unwrap();
+    let picture = deepfusion_data::RgbImage::new(8, 8);
+    deepfusion_data::save_png(&picture, &folder.path().join("0.png")).unwrap();
+    let text = refusal(open_with(folder.path(), &["image=/twist"]));
+    says(&text, &["image=/twist", "has no topics"]);
+}

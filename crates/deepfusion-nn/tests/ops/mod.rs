@@ -1,0 +1,10 @@
+//! The kernels as differentiable operations, against the same composed of Burn's operations: values
+//! and gradients. On the CPU, or, with the feature `vulkan`, `wgpu`, `cuda` or `metal`, on a GPU.
+
+mod adam;
+mod batch_norm;
+mod common;
+mod convolution;
+mod pointwise;
+mod resizing;
+mod views;

@@ -1,0 +1,194 @@
+//! Runners for input sizes other than the one that a network was trained at.
+
+use std::fmt;
+use std::sync::{Arc, OnceLock};
+
+use deepfusion_model::InputSize;
+
+use crate::{DepthRunner, Error, RunnerPlan};
+
+/// Number of other input sizes for which an estimator keeps runners, and for which what is packed is shared; each camera needs one, or as many as
+/// [`crate::Augmentation::scales`].
+const SIZES_KEPT: usize = 6;
+
+/// Runners for other input sizes, made on demand.
+pub(crate) struct OtherSizes {
+    shared: Arc<Shared>,
+    /// Most recently used last.
+    made: Vec<(InputSize, Box<dyn DepthRunner>)>,
+}
+
+/// What an estimator and its like on other threads share.
+struct Shared {
+    make: Box<MakeRunner>,
+    /// The first sizes that were asked for. Places are taken in their order and never emptied, so that nobody waits to read them.
+    packed: [OnceLock<Packed>; SIZES_KEPT],
+}
+
+/// What is packed for a size. (Of ONNX Runtime's that is the model's bytes alone.)
+type Packed = (InputSize, Arc<dyn RunnerPlan>);
+
+type MakeRunner = dyn Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync;
+
+impl fmt::Debug for OtherSizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OtherSizes").finish_non_exhaustive()
+    }
+}
+
+impl OtherSizes {
+    /// None yet; `make` makes one of a size that nobody has packed.
+    pub(crate) fn new(
+        make: impl Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            shared: Arc::new(Shared {
+                make: Box::new(make),
+                packed: [const { OnceLock::new() }; SIZES_KEPT],
+            }),
+            made: Vec::new(),
+        }
+    }
+
+    /// The same for another thread.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::another`].
+    pub(crate) fn another(&self) -> Result<Self, Error> {
+        let made = self.made.iter();
+        let made = made.map(|(size, runner)| Ok((*size, runner.another()?)));
+        Ok(Self {
+            shared: Arc::clone(&self.shared),
+            made: made.collect::<Result<_, Error>>()?,
+        })
+    }
+
+    /// The runner for a size.
+    ///
+    /// # Errors
+    /// Those of making it.
+    pub(crate) fn runner(&mut self, size: InputSize) -> Result<&mut dyn DepthRunner, Error> {
+        let found = match self.made.iter().position(|(of, _)| *of == size) {
+            Some(place) => self.made.remove(place),
+            None => (size, self.shared.runner(size)?),
+        };
+        if self.made.len() == SIZES_KEPT {
+            self.made.remove(0);
+        }
+        self.made.push(found);
+        let last = self.made.len() - 1;
+        Ok(&mut *self.made[last].1)
+    }
+}
+
+impl Shared {
+    fn runner(&self, size: InputSize) -> Result<Box<dyn DepthRunner>, Error> {
+        let mut packed = self.packed.iter().filter_map(OnceLock::get);
+        if let Some((_, plan)) = packed.find(|(of, _)| *of == size) {
+            return plan.runner();
+        }
+        // Nobody waits while a size is packed: that is parallel work, and a thread that waits for its own may take up another
+        // estimator's task, which would wait for this one. Two threads may so pack a size at once: the first one's is kept by both.
+        let runner = (self.make)(size)?;
+        match self.publish(size, runner.plan()) {
+            Some(first) => {
+                drop(runner);
+                first.runner()
+            }
+            None => Ok(runner),
+        }
+    }
+
+    /// Shares what was packed for a size, if there is a place left. Returns what another thread has packed for it meanwhile.
+    fn publish(&self, size: InputSize, plan: Arc<dyn RunnerPlan>) -> Option<&dyn RunnerPlan> {
+        let mut ours = (size, plan);
+        for place in &self.packed {
+            match place.set(ours) {
+                Ok(()) => return None,
+                Err(refused) => ours = refused,
+            }
+            if let Some((of, first)) = place.get()
+                && *of == size
+            {
+                return Some(&**first);
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::NetworkOutput;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// A runner without a network, and its own plan.
+    #[derive(Debug, Clone, Copy)]
+    struct Idle;
+
+    impl DepthRunner for Idle {
+        fn name(&self) -> &'static str {
+            "idle"
+        }
+
+        fn run(&mut self, _: &[f32], _: &mut NetworkOutput) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn plan(&self) -> Arc<dyn RunnerPlan> {
+            Arc::new(*self)
+        }
+    }
+
+    impl RunnerPlan for Idle {
+        fn runner(&self) -> Result<Box<dyn DepthRunner>, Error> {
+            Ok(Box::new(*self))
+        }
+    }
+
+    fn size(number: usize) -> InputSize {
+        InputSize {
+            width: 64 + 32 * number,
+            height: 64,
+        }
+    }
+
+    #[test]
+    fn what_is_packed_for_the_first_sizes_is_shared() {
+        let packed = Arc::new(AtomicUsize::new(0));
+        let count = Arc::clone(&packed);
+        let mut first = OtherSizes::new(move |_| {
+            count.fetch_add(1, Ordering::Relaxed);
+            Ok(Box::new(Idle))
+        });
+        let mut second = first.another().unwrap();
+        let sizes = SIZES_KEPT + 2;
+        for number in 0..sizes {
+            first.runner(size(number)).unwrap();
+        }
+        assert_eq!(packed.load(Ordering::Relaxed), sizes);
+        // Beyond, each thread packs for itself, and keeps what it used last.
+        for number in (0..sizes).chain(SIZES_KEPT..sizes) {
+            second.runner(size(number)).unwrap();
+        }
+        assert_eq!(packed.load(Ordering::Relaxed), sizes + 2);
+        // The first two went from the list of the first thread, not from what is shared.
+        first.runner(size(0)).unwrap();
+        assert_eq!(packed.load(Ordering::Relaxed), sizes + 2);
+    }
+
+    #[test]
+    fn of_two_that_were_packed_at_once_the_first_is_kept() {
+        let sizes = OtherSizes::new(|_| Ok(Box::new(Idle)));
+        let shared = &sizes.shared;
+        assert!(shared.publish(size(0), Idle.plan()).is_none());
+        assert!(shared.publish(size(1), Idle.plan()).is_none());
+        assert!(shared.publish(size(1), Idle.plan()).is_some());
+        let taken = shared.packed.iter().filter_map(OnceLock::get);
+        assert_eq!(
+            taken.map(|(of, _)| *of).collect::<Vec<_>>(),
+            [size(0), size(1)]
+        );
+    }
+}
