@@ -46,6 +46,10 @@ impl Reportable for Error {
                 "setting `{}`: expected none beside [[data.sets]] in the config file: each set has its own, found both",
                 option_of(setting)
             ),
+            #[cfg(feature = "train")]
+            Self::CheckNotStarted { .. } => "cannot start this program again".into(),
+            #[cfg(feature = "train")]
+            Self::CheckNotEnded { .. } => "cannot wait for this program".into(),
             Self::OnlyOnCpu => {
                 "only `--engine burn` computes on other devices than the processor".into()
             }

@@ -1,8 +1,10 @@
 //! Blurred frames: single ones against the drive's usual sharpness, and a whole drive out of focus.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::PicturesReason;
+use super::remedy::PicturesRemedy;
+use super::skip::PicturesSkip;
 use super::survey::Survey;
-use deepfusion_hint::count_of;
 
 /// A frame with less than this share of the drive's usual sharpness is blurred.
 const BLURRED: f64 = 0.5;
@@ -17,16 +19,13 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         .filter_map(|f| Some((f.number, f.quality.sharpness?)))
         .collect();
     if seen.is_empty() {
-        return Outcome::skipped("blur", "no image has any detail");
+        return Outcome::skipped("blur", PicturesSkip::NoDetail);
     }
     let mut outcome = Outcome::new("blur");
     let usual = median(seen.iter().map(|s| s.1).collect());
     let whole = Figure::new("sharpness", usual, "", Limit::AtLeast(LEAST));
     outcome.judge(Severity::Warning, whole, || {
-        (
-            "the pictures lack the finest detail, as out of focus, shaken or enlarged ones do".into(),
-            "focus the lens, clean the windscreen, expose shorter; enlarged pictures train as well at half their size".into(),
-        )
+        (PicturesReason::Soft, PicturesRemedy::Focus)
     });
     let blurred: Vec<u64> = seen
         .iter()
@@ -37,16 +36,12 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let figure = Figure::new("blurred frames", share, "%", Limit::AtMost(MOST));
     let first = blurred.first().copied();
     outcome.judge_at(Severity::Warning, first, figure, || {
-        let have = if blurred.len() == 1 { "has" } else { "have" };
-        (
-            format!(
-                "{} of {} {have} less than half the drive's usual sharpness, the first of them frame {}",
-                blurred.len(),
-                count_of(seen.len(), "frame"),
-                blurred[0]
-            ),
-            "expose shorter, fix the mount, or leave these frames out".into(),
-        )
+        let reason = PicturesReason::Blurred {
+            blurred: blurred.len(),
+            frames: seen.len(),
+            first: blurred[0],
+        };
+        (reason, PicturesRemedy::HoldStill)
     });
     outcome
 }

@@ -1,11 +1,14 @@
 //! The camera's clock against the vehicle's.
 
-use super::camera_ahead::{self, NoCameraAhead};
+use super::camera_ahead;
 use super::clock_offset::{rates, settled};
 use super::epipolar::EpipolarPair;
-use super::finding::{Figure, Limit, Outcome, Remedy, Severity};
+use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::MotionReason;
+use super::remedy::Remedy;
+use super::skip::ClockSkip;
 use super::survey::Survey;
-use deepfusion_motion::{NoTimeOffset, OffsetConfig, Signal, TimeOffset};
+use deepfusion_motion::{OffsetConfig, Signal, TimeOffset};
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
 const MOST_S: f64 = 0.020;
@@ -18,7 +21,7 @@ const SURE_S: f64 = 0.05;
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     let Estimate { offset, least_s } = match estimate(survey, pairs) {
         Ok(estimate) => estimate,
-        Err(why) => return Outcome::skipped("clock", why.to_string()),
+        Err(why) => return Outcome::skipped("clock", why),
     };
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
     let mut outcome = Outcome::new("clock");
@@ -32,15 +35,11 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     );
     outcome.judge(Severity::Error, figure, || {
         let camera_ahead_s = survey.dataset.camera_ahead_s() - value;
-        let ahead = if value < 0.0 { "ahead of" } else { "behind" };
-        (
-            format!(
-                "the camera's clock is {:.0} ± {:.0} ms {ahead} the vehicle's: every frame gets the speed of another moment",
-                1e3 * value.abs(),
-                1e3 * error
-            ),
-            Remedy::ClockOffset { camera_ahead_s },
-        )
+        let reason = MotionReason::ClockOffset {
+            vehicle_minus_camera_s: value,
+            std_error_s: error,
+        };
+        (reason, Remedy::ClockOffset { camera_ahead_s })
     });
     outcome
 }
@@ -52,37 +51,23 @@ pub(super) struct Estimate {
     least_s: f64,
 }
 
-/// Why there is no estimate.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum NoEstimate {
-    #[error("no speed and yaw rate to compare the picture with")]
-    NoRates,
-    /// The line is the drive's own.
-    #[error("{}", .0.reason())]
-    ByCourse(NoCameraAhead),
-    #[error(transparent)]
-    NotFound(#[from] NoTimeOffset),
-    #[error("the estimate {value_s:.2} s has a standard error of {error_s:.2} s")]
-    Unsure { value_s: f64, error_s: f64 },
-}
-
 /// The offset of the clocks; else why there is none.
-pub(super) fn estimate(
-    survey: &Survey<'_>,
-    pairs: &[EpipolarPair],
-) -> Result<Estimate, NoEstimate> {
+pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Estimate, ClockSkip> {
     let rates = rates(survey.dataset).filter(|rates| rates.yaw_rate_radps.is_some());
-    let rates = rates.ok_or(NoEstimate::NoRates)?;
+    let rates = rates.ok_or(ClockSkip::NoRates)?;
     if !survey.dataset.yaw_known() {
         // A course takes more pictures and other settings than a yaw rate.
-        let offset = camera_ahead::offset(survey.dataset).map_err(NoEstimate::ByCourse)?;
+        let offset = camera_ahead::offset(survey.dataset).map_err(ClockSkip::ByCourse)?;
         let least_s = MOST_BY_COURSE_S;
         return Ok(Estimate { offset, least_s });
     }
     let offset = settled(survey, pairs, &rates, &OffsetConfig::default())?;
-    let (value_s, error_s) = (offset.vehicle_minus_camera_s, offset.std_error_s);
-    if error_s.is_nan() || error_s >= SURE_S {
-        Err(NoEstimate::Unsure { value_s, error_s })
+    let (offset_s, std_error_s) = (offset.vehicle_minus_camera_s, offset.std_error_s);
+    if std_error_s.is_nan() || std_error_s >= SURE_S {
+        Err(ClockSkip::Unsure {
+            offset_s,
+            std_error_s,
+        })
     } else {
         // A stream is not placed better than its own interval (KITTI's oxts, at 10 Hz, come out 60 ms late).
         let interval_s = rates.speed_mps.as_ref().and_then(Signal::interval_s);

@@ -2,9 +2,11 @@
 //! everything is far away.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::FramesReason;
+use super::remedy::FramesRemedy;
+use super::skip::FramesSkip;
 use super::survey::Survey;
 use deepfusion_data::Frame;
-use deepfusion_hint::count_of;
 
 /// The vehicle certainly moves above this, m/s.
 const MOVING_MPS: f64 = 1.0;
@@ -15,7 +17,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let mut outcome = Outcome::new("duplicates");
     let frames = survey.dataset.frames();
     let moving = |a: usize, b: usize| survey.speed_mps(a, b).is_some_and(|v| v > MOVING_MPS);
-    let (mut compared, mut repeated) = (0, Vec::new());
+    let (mut compared, mut repeated) = (0_u32, Vec::new());
     if frames.iter().all(|f| f.image.file().is_some()) {
         for (i, pair) in frames.windows(2).enumerate() {
             if moving(i, i + 1) {
@@ -32,29 +34,18 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         }
     }
     if compared == 0 {
-        return Outcome::skipped(
-            "duplicates",
-            "no neighbouring frames while the vehicle moves",
-        );
+        return Outcome::skipped("duplicates", FramesSkip::NoneInMotion);
     }
     let share = 100.0 * repeated.len() as f64 / f64::from(compared);
     let figure = Figure::new("repeated frames", share, "%", Limit::AtMost(MOST));
     let first = repeated.first().copied();
     outcome.judge_at(Severity::Error, first, figure, || {
-        let (are, each) = match repeated.as_slice() {
-            [_] => ("is", "it"),
-            _ => ("are", "each of them"),
+        let reason = FramesReason::Repeated {
+            repeated: repeated.len(),
+            frames: compared,
+            first: repeated[0],
         };
-        (
-            format!(
-                "{} of {} {are} the frame before once more while the vehicle moves, the first of them \
-                 frame {}: {each} teaches that everything is infinitely far",
-                repeated.len(),
-                count_of(compared, "frame"),
-                repeated[0]
-            ),
-            "record at the camera's own rate, and remove the repeated frames (time stamps and all)".into(),
-        )
+        (reason, FramesRemedy::RemoveRepeated)
     });
     outcome
 }

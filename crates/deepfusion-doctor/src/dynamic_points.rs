@@ -1,8 +1,11 @@
 //! A topic of dynamic points against the radial velocities of its LiDAR.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::MotionReason;
+use super::remedy::MotionRemedy;
+use super::shared_error::SharedError;
+use super::skip::MotionSkip;
 use deepfusion_data::Dataset;
-use deepfusion_hint::count_of;
 
 const CHECK: &str = "dynamic-points";
 /// Scans looked at.
@@ -15,15 +18,12 @@ const LEAST_SHARE: Limit = Limit::AtLeast(0.7);
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let agreement = match dataset.dynamic_agreement(MOST_SCANS) {
         Ok(Some(agreement)) => agreement,
-        Ok(None) => {
-            let why = "no topic of dynamic points beside a LiDAR with radial velocities";
-            return Outcome::skipped(CHECK, why);
-        }
-        Err(error) => return Outcome::skipped(CHECK, error.to_string()),
+        Ok(None) => return Outcome::skipped(CHECK, MotionSkip::NoDynamicPoints),
+        Err(error) => return Outcome::skipped(CHECK, SharedError::from(error)),
     };
     if agreement.listed.max(agreement.fast) < LEAST_POINTS {
-        let why = format!("too little moves in {}", count_of(agreement.scans, "scan"));
-        return Outcome::skipped(CHECK, why);
+        let scans = agreement.scans;
+        return Outcome::skipped(CHECK, MotionSkip::LittleDynamic { scans });
     }
     // Where one says that nothing moves, it has none of what the other says.
     let share = |share: f64| if share.is_nan() { 0.0 } else { share };
@@ -36,13 +36,12 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         LEAST_SHARE,
     );
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!(
-                "of {} that the topic of dynamic points lists, {} are in the scans and {} move by their radial velocity",
-                count_of(agreement.listed, "point"), agreement.in_scan, agreement.both
-            ),
-            "topics.dynamic names the topic; its points must be the LiDAR's, in its axes and at its times; lidar.moving_mps may be too high".into(),
-        )
+        let reason = MotionReason::DynamicAndSlow {
+            listed: agreement.listed,
+            in_scan: agreement.in_scan,
+            fast: agreement.both,
+        };
+        (reason, MotionRemedy::DynamicTopic)
     });
     let figure = Figure::new(
         "share of the points that move by radial velocity that are dynamic points",
@@ -51,13 +50,11 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         LEAST_SHARE,
     );
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!(
-                "of {} points that move by their radial velocity, the topic of dynamic points lists {}",
-                agreement.fast, agreement.both
-            ),
-            "see lidar.over_ground and lidar.velocity_field; lidar.moving_mps may be lower than the driver's threshold".into(),
-        )
+        let reason = MotionReason::FastAndUnlisted {
+            fast: agreement.fast,
+            listed: agreement.both,
+        };
+        (reason, MotionRemedy::RadialVelocities)
     });
     outcome
 }

@@ -1,8 +1,10 @@
 //! Brightness: jumps from frame to frame, darkness, whiteness. View synthesis compares colours.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::PicturesReason;
+use super::remedy::PicturesRemedy;
+use super::skip::PicturesSkip;
 use super::survey::Survey;
-use deepfusion_hint::count_of;
 
 /// A change of the mean grey level by more than this share is a jump of the exposure, not of the scene.
 const JUMP: f64 = 0.12;
@@ -16,10 +18,10 @@ const FLOOR: f64 = 10.0;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     if survey.frames.is_empty() {
-        return Outcome::skipped("exposure", "no image can be read");
+        return Outcome::skipped("exposure", PicturesSkip::NoImage);
     }
     let mut outcome = Outcome::new("exposure");
-    let (mut neighbours, mut jumps) = (0, Vec::new());
+    let (mut neighbours, mut jumps) = (0_u32, Vec::new());
     for (a, b) in survey.neighbours() {
         neighbours += 1;
         let ratio = (b.quality.mean + FLOOR) / (a.quality.mean + FLOOR);
@@ -37,18 +39,15 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         );
         let first = jumps.first().map(|jump| jump.0);
         outcome.judge_at(Severity::Warning, first, figure, || {
-            let (number, ratio) = jumps[0];
-            let differ = if jumps.len() == 1 { "differs" } else { "differ" };
-            (
-                format!(
-                    "{} of {} {differ} by more than {:.0} % in brightness, the first at frame {number} ({:+.0} %): the photometric error then measures the exposure",
-                    jumps.len(),
-                    count_of(neighbours, "neighbour"),
-                    100.0 * JUMP,
-                    100.0 * (ratio - 1.0)
-                ),
-                "fix the camera's exposure and gain, or let them change slowly; record anew".into(),
-            )
+            let (first, first_ratio) = jumps[0];
+            let reason = PicturesReason::BrightnessJumps {
+                jumps: jumps.len(),
+                neighbours,
+                more_than: JUMP,
+                first,
+                first_ratio,
+            };
+            (reason, PicturesRemedy::FixExposure)
         });
     }
     let typical = |of: fn(&super::image_quality::ImageQuality) -> f64| {
@@ -61,10 +60,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         Limit::AtMost(MOST_DARK),
     );
     outcome.judge(Severity::Warning, dark, || {
-        (
-            "most of the picture is black: nothing can be compared there".into(),
-            "expose longer, or leave the darkest drives out".into(),
-        )
+        (PicturesReason::Dark, PicturesRemedy::ExposeLonger)
     });
     let white = Figure::new(
         "white pixels",
@@ -73,10 +69,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         Limit::AtMost(MOST_WHITE),
     );
     outcome.judge(Severity::Warning, white, || {
-        (
-            "much of the picture is white: nothing can be compared there".into(),
-            "expose shorter".into(),
-        )
+        (PicturesReason::White, PicturesRemedy::ExposeShorter)
     });
     outcome
 }

@@ -1,9 +1,10 @@
 //! What a check says: a figure against its limit, and, where it does not hold, what is wrong and what to do.
 
-use deepfusion_logs::Clock;
+use super::reason::FindingReason;
+use super::remedy::Remedy;
+use super::skip::SkipReason;
 use serde::{Serialize, Serializer};
 use std::fmt;
-use std::path::PathBuf;
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -54,47 +55,10 @@ pub struct Finding {
     pub frame: Option<u64>,
     /// What was measured, where something was.
     pub figure: Option<Figure>,
-    /// What is wrong, and what it does to a training, in a sentence.
-    pub what: String,
-    /// What to do about it.
+    /// What is wrong, and what it does to a training; in JSON a sentence.
+    pub what: FindingReason,
+    /// What to do about it; in JSON a sentence.
     pub remedy: Remedy,
-}
-
-/// What to do about a finding. As text it is in the library's words; the named ones let a program say which of its own options does it.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum Remedy {
-    /// Something that no option does, or a program's own words ([`crate::Diagnosis::reworded`]).
-    Words(String),
-    /// The camera's GPS switched on, or another log beside the video.
-    OtherLog,
-    /// The DBC file of a CAN trace, and the speed's signal in it.
-    Signal,
-    /// The log's columns of time and speed and the speed's unit; what the log's own error says of them.
-    Columns(String),
-    /// The unit of the log's speeds.
-    SpeedUnit,
-    /// Faster or longer drives, or the vehicle's own speed.
-    VehicleSpeed,
-    /// Making a drive of the log.
-    Import {
-        /// The log.
-        log: PathBuf,
-        /// Whether the pictures are in a file of their own.
-        video: bool,
-    },
-    /// Poses that need no turns, or a log that has them.
-    Turns {
-        /// Whether a course of positions shows some.
-        from_positions: bool,
-    },
-    /// What connects the clock of a log with the video's.
-    StartOfVideo(Clock),
-    /// The offset of the camera's clock that was measured.
-    ClockOffset {
-        /// How far the camera's clock is ahead of the vehicle's, in seconds.
-        camera_ahead_s: f64,
-    },
 }
 
 /// How a check came out.
@@ -116,8 +80,8 @@ pub struct Outcome {
     pub check: &'static str,
     /// Everything it measured, whether it holds or not.
     pub measured: Vec<Figure>,
-    /// Why it could not measure, if so.
-    pub skipped: Option<String>,
+    /// Why it could not measure, if so; in JSON a sentence.
+    pub skipped: Option<SkipReason>,
     /// What it found.
     pub findings: Vec<Finding>,
 }
@@ -164,6 +128,13 @@ impl Outcome {
         }
     }
 
+    /// How many of its findings are as bad as this.
+    #[must_use]
+    pub fn count(&self, severity: Severity) -> usize {
+        let findings = self.findings.iter();
+        findings.filter(|found| found.severity == severity).count()
+    }
+
     /// Of a check that has not measured yet.
     pub(crate) fn new(check: &'static str) -> Self {
         Self {
@@ -175,30 +146,30 @@ impl Outcome {
     }
 
     /// Of a check that cannot measure.
-    pub(crate) fn skipped(check: &'static str, why: impl Into<String>) -> Self {
+    pub(crate) fn skipped(check: &'static str, why: impl Into<SkipReason>) -> Self {
         Self {
             skipped: Some(why.into()),
             ..Self::new(check)
         }
     }
 
-    /// Notes a figure; where it does not hold, `what` and `remedy` become a finding.
-    pub(crate) fn judge(
+    /// Notes a figure; where it does not hold, `what` and its remedy become a finding.
+    pub(crate) fn judge<W: Into<FindingReason>, R: Into<Remedy>>(
         &mut self,
         severity: Severity,
         figure: Figure,
-        what: impl FnOnce() -> (String, Remedy),
+        what: impl FnOnce() -> (W, R),
     ) {
         self.judge_at(severity, None, figure, what);
     }
 
     /// The same of a figure that comes from single frames: the first of them, to look at.
-    pub(crate) fn judge_at(
+    pub(crate) fn judge_at<W: Into<FindingReason>, R: Into<Remedy>>(
         &mut self,
         severity: Severity,
         frame: Option<u64>,
         figure: Figure,
-        what: impl FnOnce() -> (String, Remedy),
+        what: impl FnOnce() -> (W, R),
     ) {
         if !figure.holds() {
             let (what, remedy) = what();
@@ -207,8 +178,8 @@ impl Outcome {
                 check: self.check,
                 frame,
                 figure: Some(figure.clone()),
-                what,
-                remedy,
+                what: what.into(),
+                remedy: remedy.into(),
             });
         }
         self.measured.push(figure);
@@ -219,7 +190,7 @@ impl Outcome {
         &mut self,
         severity: Severity,
         frame: Option<u64>,
-        what: String,
+        what: impl Into<FindingReason>,
         remedy: impl Into<Remedy>,
     ) {
         self.findings.push(Finding {
@@ -227,70 +198,9 @@ impl Outcome {
             check: self.check,
             frame,
             figure: None,
-            what,
+            what: what.into(),
             remedy: remedy.into(),
         });
-    }
-}
-
-impl From<&str> for Remedy {
-    fn from(words: &str) -> Self {
-        Self::Words(words.to_owned())
-    }
-}
-
-impl From<String> for Remedy {
-    fn from(words: String) -> Self {
-        Self::Words(words)
-    }
-}
-
-impl fmt::Display for Remedy {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Words(words) => f.write_str(words),
-            Self::OtherLog => f.write_str(
-                "switch the camera's GPS on and wait for its fix; or bring another log beside the video",
-            ),
-            Self::Signal => {
-                f.write_str("give the DBC file, and the speed's signal as Message.Signal")
-            }
-            Self::Columns(hint) => write!(f, "{hint}, and the speed's unit"),
-            Self::SpeedUnit => f.write_str("say the unit of speed (m/s, km/h, mph, knots)"),
-            Self::VehicleSpeed => {
-                f.write_str("drive faster or longer, or log the vehicle's own speed: OBD, CAN")
-            }
-            Self::Import { log, video } => {
-                let beside = if *video { " with its video" } else { "" };
-                let log = log.display();
-                write!(f, "make a drive of {log}{beside} and the camera; then examine the drive")
-            }
-            Self::Turns { .. } => f.write_str(
-                "poses by the network or by the distance driven need no turns; a second log with a gyroscope brings them",
-            ),
-            Self::StartOfVideo(Clock::LocalDate) => {
-                f.write_str("say the log's time zone; pictures and speeds show what is left between the clocks")
-            }
-            Self::StartOfVideo(Clock::TimeOfDay | Clock::Free) => f.write_str(
-                "say when the first frame was taken, on the log's clock; pictures and speeds show what is left between the clocks",
-            ),
-            Self::StartOfVideo(Clock::Date | Clock::Video) => {
-                f.write_str("pictures and speeds show what is left between the clocks")
-            }
-            Self::ClockOffset { camera_ahead_s } => write!(
-                f,
-                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one clock \
-                 for all (PTP, trigger)",
-                1e3 * camera_ahead_s
-            ),
-        }
-    }
-}
-
-/// As its text.
-impl Serialize for Remedy {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
     }
 }
 

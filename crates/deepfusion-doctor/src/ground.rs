@@ -1,9 +1,12 @@
 //! The road in the measured depth against the camera's mount: the way up, and the height.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::{CameraReason, RoadAngle};
+use super::remedy::{CameraRemedy, Remedy};
+use super::skip::CameraSkip;
 use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
 use deepfusion_geometry::DepthMap;
-use deepfusion_hint::{Hint, count_of};
+use deepfusion_hint::Hint;
 use nalgebra::{Matrix3, Vector3};
 
 /// Frames looked at.
@@ -29,7 +32,7 @@ const MOST_ROLL_DEG: f64 = 3.5;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let Some(mount) = dataset.cam_from_vehicle() else {
-        return Outcome::skipped("ground", "nothing says where the camera is on the vehicle");
+        return Outcome::skipped("ground", CameraSkip::NoMount);
     };
     let up = mount.rotate(&Vector3::z());
     let with_depth: Vec<usize> = (0..dataset.frames().len())
@@ -48,9 +51,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
                 let mut outcome = Outcome::new("ground");
                 let remedy = error
                     .hint()
-                    .unwrap_or_else(|| "copy the recording again".into());
+                    .map_or(CameraRemedy::CopyAgain.into(), Remedy::Hint);
                 let number = dataset.frames()[frame].number;
-                outcome.find(Severity::Warning, Some(number), error.to_string(), remedy);
+                let what = CameraReason::Depth(error.into());
+                outcome.find(Severity::Warning, Some(number), what, remedy);
                 return outcome;
             }
         }
@@ -58,10 +62,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     // What is turned by more is a wall or a car, not the road: a LiDAR that looks ahead sees little of that.
     planes.retain(|(n, _)| n.angle(&up).to_degrees() <= MOST_TILT_DEG);
     if planes.len() < LEAST_PLANES {
-        let why = format!(
-            "the road before the camera is in the measured depth of {}, {LEAST_PLANES} are needed",
-            count_of(planes.len(), "frame")
-        );
+        let why = CameraSkip::LittleRoad {
+            frames: planes.len(),
+            needed: LEAST_PLANES,
+        };
         return Outcome::skipped("ground", why);
     }
     // Up by the road, turned into the mount's: about the camera's x and z.
@@ -73,10 +77,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     if pitches.scatter > MOST_SCATTER * MOST_PITCH_DEG
         || rolls.scatter > MOST_SCATTER * MOST_ROLL_DEG
     {
-        let why = format!(
-            "the planes before the camera differ between frames (pitch by {:.1} degrees, roll by {:.1}): not the road alone",
-            pitches.scatter, rolls.scatter
-        );
+        let why = CameraSkip::UnevenRoad {
+            pitch_deg: pitches.scatter,
+            roll_deg: rolls.scatter,
+        };
         return Outcome::skipped("ground", why);
     }
     let height = median(planes.iter().map(|p| p.1).collect());
@@ -85,36 +89,32 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         (
             "pitch of the road against the mount",
             pitches.median,
-            "pitch",
+            RoadAngle::Pitch,
             MOST_PITCH_DEG,
         ),
         (
             "roll of the road against the mount",
             rolls.median,
-            "roll",
+            RoadAngle::Roll,
             MOST_ROLL_DEG,
         ),
     ];
-    for (quantity, value, name, most) in angles {
-        let limit = Limit::Within(-most, most);
-        outcome.judge(Severity::Warning, Figure::new(quantity, value, "degrees", limit), || {
-            (
-                format!(
-                    "the road in the measured depth of {} frames is turned by {:.1} degrees ({name}) against what the mounts say",
-                    planes.len(),
-                    value.abs()
-                ),
-                format!("correct the {name} of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle").into(),
-            )
+    for (quantity, value, angle, most) in angles {
+        let figure = Figure::new(quantity, value, "degrees", Limit::Within(-most, most));
+        outcome.judge(Severity::Warning, figure, || {
+            let reason = CameraReason::RoadTurned {
+                frames: planes.len(),
+                by_deg: value.abs(),
+                angle,
+            };
+            (reason, CameraRemedy::Mount { angle })
         });
     }
     let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
     let figure = Figure::new("camera above the measured road", height, "m", limit);
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!("the measured depth puts the camera {height:.2} m above the road, where no car has it"),
-            "see the unit of the depth (metres, millimetres, 1/256 m) and the LiDAR's place on the camera".into(),
-        )
+        let reason = CameraReason::Height { height_m: height };
+        (reason, CameraRemedy::DepthUnit)
     });
     outcome
 }

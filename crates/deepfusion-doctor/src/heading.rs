@@ -6,11 +6,13 @@
 
 use super::epipolar::{self, EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::no_heading::NoHeading;
+use super::reason::{CameraReason, CentreCoordinate, HeadingAngle};
+use super::remedy::CameraRemedy;
+use super::skip::{CameraSkip, UnsureHeading};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Heading};
-use deepfusion_hint::{Hint, count_of};
 use nalgebra::Vector2;
-use std::fmt;
 
 /// Straight enough, rad/s, and fast enough, m/s.
 const MOST_TURN: f64 = 0.06;
@@ -41,43 +43,16 @@ pub fn heading(dataset: &Dataset) -> Result<Heading, NoHeading> {
     measure(&epipolar::pairs(&survey))
 }
 
-/// Why images do not show where a camera heads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct NoHeading {
-    /// Pairs of them that were taken driving straight ahead.
-    pub straight: usize,
-}
-
-impl fmt::Display for NoHeading {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} straight ahead, {LEAST_PAIRS} are needed",
-            count_of(self.straight, "pair")
-        )
-    }
-}
-
-impl std::error::Error for NoHeading {}
-
-impl Hint for NoHeading {
-    fn hint(&self) -> Option<String> {
-        Some(
-            "give a drive with more of it straight ahead, or the camera's place on the vehicle"
-                .into(),
-        )
-    }
-}
-
 fn measure(pairs: &[EpipolarPair]) -> Result<Heading, NoHeading> {
     let straight: Vec<&EpipolarPair> = pairs
         .iter()
         .filter(|p| p.vehicle_yaw_rate().abs() < MOST_TURN && p.speed_mps > LEAST_MPS)
         .collect();
     if straight.len() < LEAST_PAIRS {
-        let straight = straight.len();
-        return Err(NoHeading { straight });
+        return Err(NoHeading {
+            straight: straight.len(),
+            needed: LEAST_PAIRS,
+        });
     }
     let thin = straight.len().div_ceil(MOST_PAIRS);
     let straight: Vec<&EpipolarPair> = straight.into_iter().step_by(thin).collect();
@@ -100,51 +75,52 @@ fn measure(pairs: &[EpipolarPair]) -> Result<Heading, NoHeading> {
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     let found = match measure(pairs) {
         Ok(found) => found,
-        Err(why) => return Outcome::skipped("heading", why.to_string()),
+        Err(why) => return Outcome::skipped("heading", CameraSkip::from(why)),
     };
     let k = &survey.dataset.intrinsics(0);
     let mut outcome = Outcome::new("heading");
+    let (cx, cy) = (CentreCoordinate::Cx, CentreCoordinate::Cy);
     let axes = [
-        ("pitch of the way ahead", 0, k.fy, "cy", "up"),
-        ("yaw of the way ahead", 1, k.fx, "cx", "right"),
+        ("pitch of the way ahead", 0, k.fy, cy, HeadingAngle::Pitch),
+        ("yaw of the way ahead", 1, k.fx, cx, HeadingAngle::Yaw),
     ];
     let mut unsure = Vec::new();
-    for (quantity, axis, focal, name, side) in axes {
-        let (off, error) = (
-            found.off[axis].to_degrees(),
-            found.std_error[axis].to_degrees(),
-        );
-        if error > SURE_DEG {
-            unsure.push(format!("{quantity} {off:.1} ± {error:.1} degrees"));
+    for (quantity, axis, focal, coordinate, angle) in axes {
+        let off_deg = found.off[axis].to_degrees();
+        let std_error_deg = found.std_error[axis].to_degrees();
+        if std_error_deg > SURE_DEG {
+            unsure.push(UnsureHeading {
+                angle,
+                off_deg,
+                std_error_deg,
+            });
             continue;
         }
-        let limit = WARN_DEG.max(3.0 * error);
-        let severity = if off.abs() > ERROR_DEG {
+        let limit = WARN_DEG.max(3.0 * std_error_deg);
+        let severity = if off_deg.abs() > ERROR_DEG {
             Severity::Error
         } else {
             Severity::Warning
         };
-        let figure = Figure::new(quantity, off, "degrees", Limit::Within(-limit, limit));
+        let figure = Figure::new(quantity, off_deg, "degrees", Limit::Within(-limit, limit));
         outcome.judge(severity, figure, || {
             let pixels = focal * found.off[axis].tan();
-            // v grows downward, the angle upward.
-            let pixels = if axis == 0 { -pixels } else { pixels };
-            (
-                format!(
-                    "driving straight, the camera heads {:.1} ± {error:.1} degrees further {} than its mount says",
-                    off.abs(),
-                    if off > 0.0 { side } else if axis == 0 { "down" } else { "left" },
-                ),
-                format!(
-                    "correct the camera's {} on the vehicle by that angle, or, if the mount is right, {name} by {pixels:+.0} px",
-                    if axis == 0 { "pitch" } else { "yaw" }
-                )
-                .into(),
-            )
+            let reason = CameraReason::Heading {
+                angle,
+                off_deg,
+                std_error_deg,
+            };
+            let remedy = CameraRemedy::Heading {
+                angle,
+                coordinate,
+                // v grows downward, the angle upward.
+                by_px: if axis == 0 { -pixels } else { pixels },
+            };
+            (reason, remedy)
         });
     }
     if outcome.measured.is_empty() {
-        outcome.skipped = Some(format!("not sure enough: {}", unsure.join(", ")));
+        outcome.skipped = Some(CameraSkip::Unsure(unsure).into());
     }
     outcome
 }

@@ -5,6 +5,9 @@
 //! standing edge ends it. A plain sky hardly changes either, but nothing that stays put ends it.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::{ImageSide, PicturesReason};
+use super::remedy::PicturesRemedy;
+use super::skip::PicturesSkip;
 use super::survey::Survey;
 
 /// The vehicle certainly moves above this, m/s.
@@ -25,8 +28,8 @@ const MOST_ELSEWHERE: f64 = 75.0;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let Some(still) = Still::of(survey) else {
-        let why = format!("fewer than {LEAST_FRAMES} frames while the vehicle moves");
-        return Outcome::skipped("bonnet", why);
+        let needed = LEAST_FRAMES;
+        return Outcome::skipped("bonnet", PicturesSkip::FewInMotion { needed });
     };
     let k = survey.dataset.intrinsics(0);
     let (width, height) = (still.width, still.height);
@@ -34,25 +37,25 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let across = f64::from(k.width) / width as f64;
     let sides = [
         (
-            "bottom",
+            ImageSide::Bottom,
             "still rim at the bottom",
             down,
             still.rim(width, height, |along, deep| (along, height - 1 - deep)),
         ),
         (
-            "top",
+            ImageSide::Top,
             "still rim at the top",
             down,
             still.rim(width, height, |along, deep| (along, deep)),
         ),
         (
-            "left",
+            ImageSide::Left,
             "still rim at the left",
             across,
             still.rim(height, width, |along, deep| (deep, along)),
         ),
         (
-            "right",
+            ImageSide::Right,
             "still rim at the right",
             across,
             still.rim(height, width, |along, deep| (width - 1 - deep, along)),
@@ -61,7 +64,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let mut outcome = Outcome::new("bonnet");
     for (side, quantity, scale, rim) in sides {
         let most = match side {
-            "bottom" => MOST_BOTTOM,
+            ImageSide::Bottom => MOST_BOTTOM,
             _ => MOST_ELSEWHERE,
         };
         let figure = Figure::new(
@@ -71,21 +74,25 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
             Limit::AtMost(most),
         );
         outcome.judge(Severity::Warning, figure, || {
-            let pixels = (rim.depth as f64 * scale).ceil();
-            let kept = match side {
-                "bottom" => format!("keep rows 0 to {:.0}", f64::from(k.height) - pixels - 1.0),
-                "top" => format!("keep rows from {pixels:.0}, and subtract {pixels:.0} from cy"),
-                "left" => format!("keep columns from {pixels:.0}, and subtract {pixels:.0} from cx"),
-                _ => format!("keep columns 0 to {:.0}", f64::from(k.width) - pixels - 1.0),
+            let pixels = (rim.depth as f64 * scale).ceil() as u32;
+            let last_of = |size: u32| size.saturating_sub(pixels + 1);
+            let remedy = match side {
+                ImageSide::Bottom => PicturesRemedy::CutBottom {
+                    last_row: last_of(k.height),
+                },
+                ImageSide::Top => PicturesRemedy::CutTop { rows: pixels },
+                ImageSide::Left => PicturesRemedy::CutLeft { columns: pixels },
+                ImageSide::Right => PicturesRemedy::CutRight {
+                    last_column: last_of(k.width),
+                },
             };
-            (
-                format!(
-                    "{pixels:.0} pixels at the {side} do not change while the vehicle moves (over {:.0} % of that side): \
-                     they teach that what stands still on the vehicle is infinitely far",
-                    100.0 * rim.share
-                ),
-                format!("cut them off: {kept}").into(),
-            )
+            let share = rim.share;
+            let reason = PicturesReason::StillRim {
+                side,
+                pixels,
+                share,
+            };
+            (reason, remedy)
         });
     }
     outcome

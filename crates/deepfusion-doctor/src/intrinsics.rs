@@ -1,6 +1,8 @@
 //! Whether the camera's numbers can be a camera's, and this image's.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::{CameraReason, CentreCoordinate};
+use super::remedy::CameraRemedy;
 use deepfusion_geometry::Intrinsics;
 
 /// Widths of view of cameras on cars, degrees. KITTI's is 81, UMAD's 49, the simulator's 81.
@@ -49,10 +51,12 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
         Severity::Error,
         Figure::new("width of view", view, "degrees", VIEW_DEG),
         || {
-            (
-                format!("fx {:.1} px sees {view:.0} degrees of {width} pixels, which no camera on a car does: depths would be wrong by the same factor", k.fx),
-                "calibrate at the size of these images; a focal length in millimetres has to be divided by the size of a pixel".into(),
-            )
+            let reason = CameraReason::View {
+                fx: k.fx,
+                view_deg: view,
+                width: k.width,
+            };
+            (reason, CameraRemedy::Calibrate)
         },
     );
     let ratio = k.fx / k.fy;
@@ -60,10 +64,8 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
         Severity::Warning,
         Figure::new("fx / fy", ratio, "", RATIO),
         || {
-            (
-                format!("fx {:.1} and fy {:.1} px differ more than pixels do", k.fx, k.fy),
-                "where the images were resized, scale fx by the new width over the old, fy by the heights".into(),
-            )
+            let reason = CameraReason::PixelShape { fx: k.fx, fy: k.fy };
+            (reason, CameraRemedy::ScaleEach)
         },
     );
     let off = |c: f64, size: f64| 100.0 * (c - 0.5 * (size - 1.0)) / size;
@@ -75,22 +77,34 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
         Some(_) => Severity::Error,
         None => Severity::Warning,
     };
+    let (cx, cy) = (CentreCoordinate::Cx, CentreCoordinate::Cy);
     let both = [
-        ("cx from the middle", "cx", k.cx, off_x, width),
-        ("cy from the middle", "cy", k.cy, off_y, height),
+        ("cx from the middle", cx, k.cx, off_x, k.width),
+        ("cy from the middle", cy, k.cy, off_y, k.height),
     ];
-    for (quantity, name, value, off, size) in both {
-        outcome.judge(severity, Figure::new(quantity, off, "% of the size", limit), || match other {
+    for (quantity, coordinate, value, off, size) in both {
+        let figure = Figure::new(quantity, off, "% of the size", limit);
+        outcome.judge(severity, figure, || match other {
             Some((w, h)) => (
-                format!(
-                    "{name} {value:.1} is far from the middle of {size} pixels: these are the numbers of an image of about {w}x{h}, not of {}x{}",
-                    k.width, k.height
-                ),
-                format!("give the matrix of the images' own size: fx and cx times {:.4}, fy and cy times {:.4}", width / f64::from(w), height / f64::from(h)).into(),
+                CameraReason::OtherSize {
+                    coordinate,
+                    value,
+                    size,
+                    other: [w, h],
+                    image: [k.width, k.height],
+                },
+                CameraRemedy::OwnSize {
+                    x: width / f64::from(w),
+                    y: height / f64::from(h),
+                },
             ),
             None => (
-                format!("{name} {value:.1} is far from the middle of {size} pixels: only a cut-out image has it there"),
-                "look it up again; where the images were cut, subtract the cut from cx and cy, else calibrate anew".into(),
+                CameraReason::OffCentre {
+                    coordinate,
+                    value,
+                    size,
+                },
+                CameraRemedy::LookUp,
             ),
         });
     }
@@ -153,7 +167,8 @@ mod tests {
         assert_eq!(finding.severity, Severity::Warning);
         let off = finding.figure.as_ref().unwrap().value;
         assert!((off + 25.4).abs() < 0.1, "{off}");
-        assert!(finding.what.contains("cy 117.6"), "{}", finding.what);
+        let what = finding.what.to_string();
+        assert!(what.contains("cy 117.6"), "{what}");
     }
 
     #[test]
@@ -165,12 +180,12 @@ mod tests {
         };
         let finding = &check(&wrong).findings[0];
         assert_eq!(finding.severity, Severity::Error);
+        let what = finding.what.to_string();
         assert!(
-            finding.what.contains("about 1242x375")
-                || finding.what.contains("about 1226x370")
-                || finding.what.contains("about 1224x370"),
-            "{}",
-            finding.what
+            what.contains("about 1242x375")
+                || what.contains("about 1226x370")
+                || what.contains("about 1224x370"),
+            "{what}"
         );
         assert!(
             finding.remedy.to_string().contains("0.52")

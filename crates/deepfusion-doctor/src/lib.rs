@@ -2,12 +2,14 @@
 //!
 //! [`doctor`] opens a recording and lets one check after the other look at it. A check measures a figure and compares
 //! it with a limit; what does not keep to it is a [`Finding`] with a remedy. The limits are such that the clean drives
-//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them.
+//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them. What is wrong ([`FindingReason`]),
+//! what to do ([`Remedy`]) and why a check could not look ([`SkipReason`]) are types, and sentences as text and in JSON.
 
 mod blur;
 mod camera_ahead;
 mod clock;
 mod clock_offset;
+mod depth_pictures;
 mod duplicates;
 mod dynamic_points;
 mod epipolar;
@@ -21,15 +23,21 @@ mod image_quality;
 mod intrinsics;
 mod lidar_speed;
 mod log;
+mod no_heading;
 mod opening;
 mod parallax;
 mod plots;
+mod reason;
 mod record;
+mod remedy;
 mod seen_turns;
+mod shared_error;
+mod skip;
 mod speed;
 mod standing;
 mod steering;
 mod stereo;
+mod summary;
 mod survey;
 mod timing;
 mod turn;
@@ -38,12 +46,26 @@ pub use camera_ahead::{
     CameraAhead, CommonCameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S,
     NoCameraAhead, camera_ahead, common_camera_ahead,
 };
-pub use finding::{Figure, Finding, Limit, Outcome, Remedy, Severity, Status};
-pub use heading::{NoHeading, heading};
+pub use depth_pictures::{DepthPicture, depth_pictures};
+pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
+pub use heading::heading;
 pub use log::{doctor_log, is_log};
+pub use no_heading::NoHeading;
 pub use plots::{DrivePlots, Line};
+pub use reason::{
+    CameraReason, CentreCoordinate, FindingReason, FramesReason, HeadingAngle, ImageSide,
+    LogReason, MotionReason, OpeningReason, PicturesReason, RoadAngle,
+};
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
+pub use remedy::{
+    CameraRemedy, FramesRemedy, LogRemedy, MotionRemedy, OpeningRemedy, PicturesRemedy, Remedy,
+};
 pub use seen_turns::seen_turns;
+pub use shared_error::SharedError;
+pub use skip::{
+    CameraSkip, ClockSkip, FramesSkip, LogSkip, MotionSkip, PicturesSkip, SkipReason, UnsureHeading,
+};
+pub use summary::CheckSummary;
 
 use deepfusion_data::{
     Cameras, ClockOffset, Dataset, DatasetKind, Error, Inspection, OpenOptions, Result,
@@ -84,13 +106,16 @@ pub struct DriveDiagnosis {
 }
 
 impl Diagnosis {
-    /// Of a recording that cannot be opened: why, and what to do about it.
+    /// Of a recording that cannot be opened: why, and what to do about it, in a program's own words.
     #[must_use]
     pub fn unopened(why: String, remedy: Option<String>) -> Self {
+        Self::not_opened(FindingReason::Words(why), remedy.map(Remedy::Words))
+    }
+
+    fn not_opened(why: FindingReason, remedy: Option<Remedy>) -> Self {
         let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
-        let skipped =
-            |check: &&'static str| Outcome::skipped(check, "the recording cannot be opened");
-        let failed = std::iter::once(opening::failed(why, remedy.map(Remedy::Words)));
+        let skipped = |check: &&'static str| Outcome::skipped(check, SkipReason::NotOpened);
+        let failed = std::iter::once(opening::failed(why, remedy));
         Self {
             recording: failed.chain(others.map(skipped)).collect(),
             drives: Vec::new(),
@@ -168,7 +193,10 @@ pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
         intrinsics,
         ..OpenOptions::default()
     };
-    doctor_with(path, &options).unwrap_or_else(|e| Diagnosis::unopened(e.to_string(), e.hint()))
+    doctor_with(path, &options).unwrap_or_else(|error| {
+        let remedy = error.hint().map(Remedy::Hint);
+        Diagnosis::not_opened(OpeningReason::Recording(error.into()).into(), remedy)
+    })
 }
 
 /// [`doctor`] with a camera or a clock offset given; camera and split of the options are not looked at.

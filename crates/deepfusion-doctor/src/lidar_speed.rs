@@ -1,6 +1,10 @@
 //! The vehicle's speed against the radial velocities of an FMCW LiDAR.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::MotionReason;
+use super::remedy::MotionRemedy;
+use super::shared_error::SharedError;
+use super::skip::MotionSkip;
 use deepfusion_data::{Dataset, LidarMotion};
 use nalgebra::Vector3;
 
@@ -20,15 +24,14 @@ const MOST_UPWARD_DEG: f64 = 2.0;
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let motions = match dataset.lidar_motion(MOST_SCANS) {
         Ok(motions) => motions,
-        Err(error) => return Outcome::skipped("lidar-speed", error.to_string()),
+        Err(error) => return Outcome::skipped("lidar-speed", SharedError::from(error)),
     };
     let moving: Vec<_> = motions
         .iter()
         .filter(|m| m.by_scan_mps.norm().max(m.by_vehicle_mps.norm()) > MOVING_MPS)
         .collect();
     if moving.len() < LEAST_SCANS {
-        let why = "no LiDAR with radial velocities, or no scans of it while the vehicle moves";
-        return Outcome::skipped("lidar-speed", why);
+        return Outcome::skipped("lidar-speed", MotionSkip::NoRadialVelocities);
     }
     let ratio = median(
         moving
@@ -50,10 +53,11 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         RATIO,
     );
     outcome.judge(Severity::Error, figure, || {
-        (
-            format!("the vehicle's speed is {ratio:.2} times what the LiDAR's {} scans say: depths would come out {ratio:.2} times as large", moving.len()),
-            "see the speed signal's unit and factor (km/h is 3.6), and lidar.receding for the sign of the radial velocities".into(),
-        )
+        let reason = MotionReason::LidarSpeed {
+            factor: ratio,
+            scans: moving.len(),
+        };
+        (reason, MotionRemedy::SpeedOrSign)
     });
     let limit = Limit::Within(-MOST_SIDEWAYS_DEG, MOST_SIDEWAYS_DEG);
     let figure = Figure::new(
@@ -63,26 +67,15 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         limit,
     );
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!(
-                "by its radial velocities the LiDAR drives {:.1} degrees to the {} of where its mount says",
-                sideways.abs(),
-                if sideways > 0.0 { "left" } else { "right" }
-            ),
-            "correct the yaw of cam_from_lidar or of cam_from_vehicle by that angle".into(),
-        )
+        let left_deg = sideways;
+        let reason = MotionReason::LidarSideways { left_deg };
+        (reason, MotionRemedy::LidarYaw)
     });
     let limit = Limit::Within(-MOST_UPWARD_DEG, MOST_UPWARD_DEG);
     let figure = Figure::new("the LiDAR climbs by", upward, "degrees", limit);
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!(
-                "by its radial velocities the LiDAR drives {:.1} degrees {} where its mount says",
-                upward.abs(),
-                if upward > 0.0 { "above" } else { "below" }
-            ),
-            "correct the pitch of cam_from_lidar or of cam_from_vehicle by that angle".into(),
-        )
+        let reason = MotionReason::LidarUpward { up_deg: upward };
+        (reason, MotionRemedy::LidarPitch)
     });
     outcome
 }

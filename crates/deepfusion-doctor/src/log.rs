@@ -1,10 +1,13 @@
 //! A log of speeds by itself, before it is put beside a video: what it is good for, what is missing, and what to do.
 
-use super::finding::{Figure, Limit, Outcome, Remedy, Severity, median};
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::LogReason;
+use super::remedy::{LogRemedy, Remedy};
+use super::skip::LogSkip;
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
-use deepfusion_hint::{Hint, count_of};
-use deepfusion_logs::{Clock, DriveLog, Error, Format, LogNote, ReadOptions, may_hold_log, read};
+use deepfusion_hint::Hint;
+use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, may_hold_log, read};
 use std::path::Path;
 
 /// Names of the files that are looked at as logs where they are no recording.
@@ -40,7 +43,11 @@ pub fn is_log(path: &Path) -> bool {
 pub fn doctor_log(path: &Path, options: &ReadOptions) -> Diagnosis {
     let recording = match read(path, options) {
         Ok(log) => outcomes(path, &log),
-        Err(error) => vec![opening::failed(error.to_string(), remedy(&error))],
+        Err(error) => {
+            let remedy = remedy(&error);
+            let why = LogReason::Unreadable(error.into());
+            vec![opening::failed(why.into(), remedy)]
+        }
     };
     Diagnosis {
         recording,
@@ -61,7 +68,7 @@ pub(super) fn within(path: &Path) -> Vec<Outcome> {
             outcome.find(
                 Severity::Warning,
                 None,
-                format!("the camera's own log has no speed: {why}"),
+                LogReason::NoSpeed(why),
                 Remedy::OtherLog,
             );
             vec![outcome]
@@ -88,24 +95,22 @@ fn remedy(error: &Error) -> Option<Remedy> {
     match error {
         Error::Signal { .. } => Some(Remedy::Signal),
         Error::Column { .. } => error.hint().map(Remedy::Columns),
-        _ => error.hint().map(Remedy::Words),
+        _ => error.hint().map(Remedy::Hint),
     }
 }
 
 /// What it is, and what it still needs.
 fn opened(path: &Path, log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log");
-    let notes: Vec<String> = log.notes.iter().map(LogNote::to_string).collect();
     outcome.find(
         Severity::Note,
         None,
-        format!(
-            "{} with {} and {}: {}",
-            log.format,
-            count_of(log.speeds.len(), "speed"),
-            count_of(log.yaw_rates.len(), "yaw rate"),
-            notes.join("; ")
-        ),
+        LogReason::Holds {
+            format: log.format,
+            speeds: log.speeds.len(),
+            yaw_rates: log.yaw_rates.len(),
+            notes: log.notes.clone(),
+        },
         Remedy::Import {
             log: path.to_owned(),
             video: log.format != Format::Gpmf,
@@ -125,13 +130,8 @@ fn rate(log: &DriveLog) -> Outcome {
     let hz = median(steps(log)).recip();
     let figure = Figure::new("speeds", hz, "/s", Limit::AtLeast(LEAST_HZ));
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!(
-                "a speed every {:.1} s: starts and stops lie between them",
-                hz.recip()
-            ),
-            "log at 1 Hz or more; an OBD reader or CAN gives ten a second".into(),
-        )
+        let every_s = hz.recip();
+        (LogReason::Sparse { every_s }, LogRemedy::LogOften)
     });
     outcome
 }
@@ -141,10 +141,8 @@ fn gaps(log: &DriveLog) -> Outcome {
     let longest = steps(log).into_iter().fold(0.0, f64::max);
     let figure = Figure::new("longest gap", longest, "s", Limit::AtMost(MOST_GAP_S));
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!("{longest:.1} s without a speed: frames of that time are not used"),
-            "max_gap_s in dataset.toml bridges it in a straight line, where the vehicle did not stop in between".into(),
-        )
+        let longest_s = longest;
+        (LogReason::Gap { longest_s }, LogRemedy::BridgeGap)
     });
     outcome
 }
@@ -154,10 +152,8 @@ fn moving(log: &DriveLog) -> Outcome {
     let fastest = log.speeds.iter().map(|s| s.mps.abs()).fold(0.0, f64::max);
     let figure = Figure::new("fastest", fastest, "m/s", Limit::AtMost(MOST_MPS));
     outcome.judge(Severity::Error, figure, || {
-        (
-            format!("{fastest:.0} m/s are {:.0} km/h: the unit is another one, and every depth would be scaled by it", 3.6 * fastest),
-            Remedy::SpeedUnit,
-        )
+        let fastest_mps = fastest;
+        (LogReason::TooFast { fastest_mps }, Remedy::SpeedUnit)
     });
     let moving = log.speeds.iter().filter(|s| s.mps.abs() > MOVING_MPS);
     let share = 100.0 * moving.count() as f64 / log.speeds.len().max(1) as f64;
@@ -168,12 +164,8 @@ fn moving(log: &DriveLog) -> Outcome {
         Severity::Warning
     };
     outcome.judge(severity, figure, || {
-        (
-            format!(
-                "the vehicle moves in {share:.0} % of the log: nothing is learned from the rest"
-            ),
-            "log a drive".into(),
-        )
+        let moving_percent = share;
+        (LogReason::Standing { moving_percent }, LogRemedy::LogDrive)
     });
     outcome
 }
@@ -185,7 +177,7 @@ fn sure(log: &DriveLog) -> Outcome {
         .filter_map(|s| Some(100.0 * s.sigma_mps? / s.mps.abs()))
         .collect();
     if shares.is_empty() {
-        return Outcome::skipped("log-sure", "the log does not say how sure its speeds are");
+        return Outcome::skipped("log-sure", LogSkip::NoDeviation);
     }
     let mut outcome = Outcome::new("log-sure");
     let share = median(shares);
@@ -196,10 +188,8 @@ fn sure(log: &DriveLog) -> Outcome {
         Limit::AtMost(MOST_SIGMA),
     );
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!("expect distances, and with them a short drive's scale, within ±{share:.0} %: such pairs weigh less in training, above 20 % nothing"),
-            Remedy::VehicleSpeed,
-        )
+        let sigma_percent = share;
+        (LogReason::Unsure { sigma_percent }, Remedy::VehicleSpeed)
     });
     outcome
 }
@@ -208,21 +198,18 @@ fn turns(log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log-turns");
     if !log.yaw_rates.is_empty() {
         let count = log.yaw_rates.len() as f64;
-        outcome.judge(
-            Severity::Note,
-            Figure::new("yaw rates", count, "", Limit::AtLeast(1.0)),
-            || (String::new(), "".into()),
-        );
+        let figure = Figure::new("yaw rates", count, "", Limit::AtLeast(1.0));
+        outcome.measured.push(figure);
         return outcome;
     }
     let from_positions = !log.course_rates.is_empty();
     let what = if from_positions {
-        "turns are known from positions alone: enough to compare the clocks on a few minutes with bends, not for the vehicle's own poses"
+        LogReason::CourseAlone
     } else {
-        "nothing says how the vehicle turned: the vehicle's own poses cannot train, and clocks are compared by changes of speed alone"
+        LogReason::NoTurns
     };
     let remedy = Remedy::Turns { from_positions };
-    outcome.find(Severity::Note, None, what.into(), remedy);
+    outcome.find(Severity::Note, None, what, remedy);
     outcome
 }
 
@@ -230,21 +217,12 @@ fn clock(log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log-clock");
     let (severity, what) = match log.clock {
         // The camera wrote it itself.
-        Clock::Video => return Outcome::skipped("log-clock", "the camera's own clock"),
-        Clock::Date => (
-            Severity::Note,
-            "dates in UTC: the video begins when its recorder says that it was made, to a second or so",
-        ),
-        Clock::LocalDate => (
-            Severity::Warning,
-            "dates without a zone, taken for UTC: hours off where they are local",
-        ),
-        Clock::TimeOfDay | Clock::Free => (
-            Severity::Warning,
-            "times that are no dates: nothing says when the video began, unless the log began with it",
-        ),
+        Clock::Video => return Outcome::skipped("log-clock", LogSkip::OwnClock),
+        Clock::Date => (Severity::Note, LogReason::Dates),
+        Clock::LocalDate => (Severity::Warning, LogReason::LocalDates),
+        Clock::TimeOfDay | Clock::Free => (Severity::Warning, LogReason::NoDates),
     };
     let remedy = Remedy::StartOfVideo(log.clock);
-    outcome.find(severity, None, what.into(), remedy);
+    outcome.find(severity, None, what, remedy);
     outcome
 }

@@ -1,6 +1,8 @@
 //! Whether everything can be read: the recording, its images, its motion.
 
-use super::finding::{Outcome, Remedy, Severity};
+use super::finding::{Outcome, Severity};
+use super::reason::{FindingReason, OpeningReason};
+use super::remedy::{OpeningRemedy, Remedy};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Error, Result};
 use deepfusion_hint::Hint;
@@ -18,9 +20,9 @@ pub(super) fn pairs(dataset: &Dataset) -> Result<usize> {
 }
 
 /// Of a recording that cannot be opened.
-pub(super) fn failed(why: String, remedy: Option<Remedy>) -> Outcome {
+pub(super) fn failed(why: FindingReason, remedy: Option<Remedy>) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
-    let remedy = remedy.unwrap_or_else(|| "correct what the message names".into());
+    let remedy = remedy.unwrap_or(OpeningRemedy::Correct.into());
     outcome.find(Severity::Error, None, why, remedy);
     outcome
 }
@@ -33,38 +35,38 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         outcome.find(
             Severity::Error,
             Some(*number),
-            problem.to_string(),
-            "copy the recording again, or leave the frame out",
+            OpeningReason::Image(problem.clone()),
+            OpeningRemedy::CopyOrLeaveOut,
         );
     }
     if let Err(error) = pairs(survey.dataset) {
         let remedy = error
             .hint()
-            .unwrap_or_else(|| "training needs pairs of frames with a known motion".into());
+            .map_or(OpeningRemedy::KnownMotion.into(), Remedy::Hint);
         let harmless = matches!(
             error,
             Error::OneFrame { .. } | Error::Standing { .. } | Error::NoPairs { .. }
         );
-        let (severity, what) = if harmless && others_train {
-            (Severity::Warning, "training leaves this drive out")
+        let left_out = harmless && others_train;
+        let severity = if left_out {
+            Severity::Warning
         } else {
-            (Severity::Error, "no pair of frames can train")
+            Severity::Error
         };
-        outcome.find(severity, None, format!("{what}: {error}"), remedy);
+        let problem = error.into();
+        let what = OpeningReason::NoPair { left_out, problem };
+        outcome.find(severity, None, what, remedy);
     }
     if survey.dataset.track().is_some() && !survey.dataset.yaw_known() {
         outcome.find(
             Severity::Note,
             None,
             if survey.dataset.receiver().course_rate_radps.is_some() {
-                "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot; \
-                 training takes the turns from the images"
+                OpeningReason::CourseAlone
             } else {
-                "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from \
-                 the images"
-            }
-            .into(),
-            "record an inertial unit or the steering angle",
+                OpeningReason::NoTurns
+            },
+            OpeningRemedy::RecordTurns,
         );
     }
     for warning in survey.dataset.warnings() {
@@ -75,13 +77,14 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
             Severity::Note
         };
         let remedy = if damaged {
-            "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
+            OpeningRemedy::RepairBag
         } else if survey.dataset.passed_over() == Some(warning) {
-            "give what is to be read as well by its own path"
+            OpeningRemedy::OwnPath
         } else {
-            "see that it is so, or say otherwise in the file beside the recording"
+            OpeningRemedy::SayOtherwise
         };
-        outcome.find(severity, None, warning.to_string(), remedy);
+        let what = OpeningReason::from(warning.clone());
+        outcome.find(severity, None, what, remedy);
     }
     outcome
 }

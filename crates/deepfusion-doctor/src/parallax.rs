@@ -2,6 +2,9 @@
 
 use super::epipolar::{EpipolarPair, YawTrust};
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::PicturesReason;
+use super::remedy::PicturesRemedy;
+use super::skip::PicturesSkip;
 use super::survey::Survey;
 
 /// Width at which networks train, pixels.
@@ -20,10 +23,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         .filter_map(|p| Some(scale * p.turn(&p.direction()?, YawTrust(0.001))?.parallax))
         .collect();
     if moved.is_empty() {
-        return Outcome::skipped(
-            "parallax",
-            "no moving pair with points to follow and a yaw rate",
-        );
+        return Outcome::skipped("parallax", PicturesSkip::NoPoints);
     }
     let mut outcome = Outcome::new("parallax");
     let moved = median(moved);
@@ -34,11 +34,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         Limit::AtLeast(LEAST_PX),
     );
     outcome.judge(Severity::Warning, figure, || {
-        (
-            "from frame to frame the picture hardly moves: what is taught lies below the images' noise".into(),
-            "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or drives at \
-             more speed".into(),
-        )
+        (PicturesReason::LittleParallax, PicturesRemedy::FurtherApart)
     });
     outcome
 }

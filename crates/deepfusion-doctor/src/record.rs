@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{Diagnosis, DriveDiagnosis, Finding, Outcome, Severity, Status};
+use crate::{Diagnosis, DriveDiagnosis, Finding, Outcome, Severity, SkipReason, Status};
 
 /// A [`Diagnosis`] with its findings counted and in one list: what `deepfusion doctor --json` prints.
 #[derive(Debug, Serialize)]
@@ -33,7 +33,7 @@ pub struct CheckRecord<'a> {
     /// How much it found.
     pub findings: usize,
     /// Why it was not made.
-    pub why: Option<&'a str>,
+    pub why: Option<&'a SkipReason>,
 }
 
 /// A finding and where it was made.
@@ -72,7 +72,7 @@ impl Diagnosis {
             check: outcome.check,
             status: outcome.status(),
             findings: outcome.findings.len(),
-            why: outcome.skipped.as_deref(),
+            why: outcome.skipped.as_ref(),
         });
         let findings = self.findings().into_iter();
         DiagnosisRecord {

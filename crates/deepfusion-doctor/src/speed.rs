@@ -1,6 +1,10 @@
 //! The speeds against the road in the images, and against the recording's own poses.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::MotionReason;
+use super::remedy::MotionRemedy;
+use super::shared_error::SharedError;
+use super::skip::MotionSkip;
 use deepfusion_data::{
     CameraPath, Dataset, DatasetKind, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
 };
@@ -15,8 +19,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     by_road(dataset, &mut outcome);
     by_poses(dataset, &mut outcome);
     if outcome.measured.is_empty() && outcome.skipped.is_none() {
-        outcome.skipped =
-            Some("no road to see (too dark, too plain, or no yaw rate), and no poses".into());
+        outcome.skipped = Some(MotionSkip::NoRoad.into());
     }
     outcome
 }
@@ -26,22 +29,22 @@ fn by_road(dataset: &Dataset, outcome: &mut Outcome) {
         Ok(Some(seen)) => seen,
         Ok(None) => return,
         Err(error) => {
-            outcome.skipped = Some(error.to_string());
+            outcome.skipped = Some(SharedError::from(error).into());
             return;
         }
     };
     let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
     let figure = Figure::new("camera height by the road's motion", height_m, "m", limit);
-    let warning = SpeedWarning::of_height(height_m, pairs);
     outcome.judge(Severity::Error, figure, || {
-        let unit = warning.and_then(|w| w.likely_unit());
-        (
-            warning.map_or_else(String::new, |w| w.to_string()),
-            match unit {
-                Some(unit) => format!("divide the speeds: they seem to be in {unit} (speed_unit says so for tables and bare numbers)").into(),
-                None => "see the speed signal's unit and factor, and the camera's focal length".into(),
-            },
-        )
+        let warning = SpeedWarning {
+            implied_height_m: height_m,
+            pairs,
+        };
+        let remedy = match warning.likely_unit() {
+            Some(unit) => MotionRemedy::DivideSpeeds { unit },
+            None => MotionRemedy::SpeedOrFocalLength,
+        };
+        (MotionReason::Road(warning), remedy)
     });
 }
 
@@ -75,12 +78,11 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
     let ratio = by_poses / by_speeds;
     let figure = Figure::new("way by the poses over way by the speeds", ratio, "", RATIO);
     outcome.judge(Severity::Error, figure, || {
-        (
-            format!(
-                "the poses go {by_poses:.0} m, the speeds {by_speeds:.0} m: depths would come out {:.2} times as large",
-                1.0 / ratio
-            ),
-            "see the speed signal's unit and factor (km/h is 3.6, a worn tyre 1.02)".into(),
-        )
+        let reason = MotionReason::Poses {
+            by_poses_m: by_poses,
+            by_speeds_m: by_speeds,
+            depth_factor: 1.0 / ratio,
+        };
+        (reason, MotionRemedy::SpeedFactor)
     });
 }

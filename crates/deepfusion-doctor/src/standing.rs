@@ -1,6 +1,9 @@
 //! How much of the drive stands still.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::FramesReason;
+use super::remedy::FramesRemedy;
+use super::skip::FramesSkip;
 use deepfusion_data::Dataset;
 
 /// Slower pairs do not train, m/s.
@@ -10,7 +13,7 @@ const MOST: f64 = 25.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let Ok(ego) = dataset.ego() else {
-        return Outcome::skipped("standing", "the recording has no speeds");
+        return Outcome::skipped("standing", FramesSkip::NoSpeeds);
     };
     let frames = dataset.frames();
     let motions = (1..frames.len()).filter(|i| frames[*i].number == frames[*i - 1].number + 1);
@@ -21,10 +24,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         })
         .collect();
     if stands.is_empty() {
-        return Outcome::skipped(
-            "standing",
-            "no pair of neighbouring frames has a known motion",
-        );
+        return Outcome::skipped("standing", FramesSkip::NoKnownMotion);
     }
     let mut outcome = Outcome::new("standing");
     let standing = stands.iter().filter(|(_, stands)| *stands).count();
@@ -34,14 +34,13 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let from = longest.map(|(from, _)| from);
     outcome.judge_at(Severity::Warning, from, figure, || {
         let (from, to) = longest.unwrap_or_default();
-        (
-            format!(
-                "the vehicle stands in {standing} of {} pairs, longest in frames {from} to {to}: they show no parallax and are left out of \
-                 training",
-                stands.len()
-            ),
-            "cut the standing parts out, or see whether the speed signal drops out".into(),
-        )
+        let reason = FramesReason::Standing {
+            standing,
+            pairs: stands.len(),
+            from,
+            to,
+        };
+        (reason, FramesRemedy::CutStanding)
     });
     outcome
 }

@@ -1,6 +1,9 @@
 //! How far the steering turns the vehicle, against what its gyro feels: wheelbase and steering ratio.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
+use super::reason::MotionReason;
+use super::remedy::MotionRemedy;
+use super::skip::MotionSkip;
 use deepfusion_data::{Dataset, MotionModel};
 
 const CHECK: &str = "steering";
@@ -13,25 +16,24 @@ const FACTOR: Limit = Limit::Within(0.8, 1.2);
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let Some(MotionModel::Fused(track)) = dataset.track() else {
-        return Outcome::skipped(
-            CHECK,
-            "no steering angle and inertial unit beside the speed",
-        );
+        return Outcome::skipped(CHECK, MotionSkip::NotFused);
     };
     if track.imu().is_none() {
-        return Outcome::skipped(CHECK, "no inertial unit to compare the steering with");
+        return Outcome::skipped(CHECK, MotionSkip::NoImu);
     }
     if track.steering_yaw_rate().is_none() {
-        let why = "no steering angle, or no vehicle.wheelbase_m to make it a yaw rate";
-        return Outcome::skipped(CHECK, why);
+        return Outcome::skipped(CHECK, MotionSkip::NoSteering);
     }
     let Some((factor, turning_s)) = track.gyro_over_steering(SLOW_MPS) else {
-        return Outcome::skipped(CHECK, "the vehicle does not turn below 8 m/s");
+        let below_mps = SLOW_MPS;
+        return Outcome::skipped(CHECK, MotionSkip::NoSlowTurns { below_mps });
     };
     if turning_s < LEAST_TURNING_S {
-        let why = format!(
-            "{turning_s:.1} s of turning below {SLOW_MPS} m/s, {LEAST_TURNING_S} s are needed"
-        );
+        let why = MotionSkip::FewSlowTurns {
+            turning_s,
+            below_mps: SLOW_MPS,
+            needed_s: LEAST_TURNING_S,
+        };
         return Outcome::skipped(CHECK, why);
     }
     let mut outcome = Outcome::new(CHECK);
@@ -42,17 +44,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         FACTOR,
     );
     outcome.judge(Severity::Warning, figure, || {
-        (
-            format!(
-                "in {turning_s:.0} s of turning the vehicle turned {factor:.2} times as far as its steering says: the \
-                 wheelbase or the steering ratio is wrong"
-            ),
-            format!(
-                "multiply vehicle.wheelbase_m by {:.2}, or vehicle.steering_ratio if that is the wrong one",
-                1.0 / factor
-            )
-            .into(),
-        )
+        let remedy = MotionRemedy::Wheelbase {
+            factor: 1.0 / factor,
+        };
+        (MotionReason::Steering { turning_s, factor }, remedy)
     });
     outcome
 }

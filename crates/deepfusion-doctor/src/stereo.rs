@@ -2,6 +2,10 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::flow::flow;
+use super::reason::CameraReason;
+use super::remedy::CameraRemedy;
+use super::shared_error::SharedError;
+use super::skip::CameraSkip;
 use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions, Result, grey_image};
 use deepfusion_motion::GreyImage;
 use std::path::Path;
@@ -22,7 +26,7 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     };
     let datasets = match Dataset::open(path, &options) {
         Ok(datasets) => datasets,
-        Err(error) => return Outcome::skipped(CHECK, error.to_string()),
+        Err(error) => return Outcome::skipped(CHECK, SharedError::from(error)),
     };
     let is = |camera| {
         datasets
@@ -34,16 +38,16 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
         for right in is(Camera::Right).filter(|right| right.name() == left.name()) {
             match disparities(left, right) {
                 Ok(found) => moved.extend(found),
-                Err(error) => return Outcome::skipped(CHECK, error.to_string()),
+                Err(error) => return Outcome::skipped(CHECK, SharedError::from(error)),
             }
         }
     }
     if moved.len() < LEAST_POINTS {
         let cameras = [Camera::Left, Camera::Right];
         let why = if cameras.iter().all(|camera| is(*camera).next().is_some()) {
-            "too few points are seen by both cameras"
+            CameraSkip::FewPoints
         } else {
-            "one camera"
+            CameraSkip::OneCamera
         };
         return Outcome::skipped(CHECK, why);
     }
@@ -55,10 +59,7 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
         Limit::AtLeast(0.0),
     );
     outcome.judge(Severity::Error, figure, || {
-        (
-            "what camera 2 sees lies further right in camera 3: the two are swapped".into(),
-            "rename image_02 to image_03 and the other way round".into(),
-        )
+        (CameraReason::Swapped, CameraRemedy::Rename)
     });
     outcome
 }

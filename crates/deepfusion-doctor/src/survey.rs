@@ -2,6 +2,7 @@
 
 use super::flow::{Flow, flow};
 use super::image_quality::ImageQuality;
+use super::shared_error::SharedError;
 use deepfusion_data::{Dataset, Ego, EgoMotion, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::GreyImage;
@@ -32,7 +33,7 @@ pub(crate) struct Survey<'a> {
     /// The camera of the small images.
     pub(crate) intrinsics: Intrinsics,
     /// Numbers of frames whose image cannot be read, and why.
-    pub(crate) unreadable: Vec<(u64, Box<deepfusion_data::Error>)>,
+    pub(crate) unreadable: Vec<(u64, SharedError<deepfusion_data::Error>)>,
 }
 
 /// A frame that was read.
@@ -153,11 +154,11 @@ impl SeenFrame {
         index: usize,
         width: u32,
         height: u32,
-    ) -> Result<Self, (u64, Box<deepfusion_data::Error>)> {
+    ) -> Result<Self, (u64, SharedError<deepfusion_data::Error>)> {
         let frame = &dataset.frames()[index];
         let image = dataset
             .load_image(index)
-            .map_err(|e| (frame.number, Box::new(e)))?;
+            .map_err(|e| (frame.number, SharedError::from(e)))?;
         let small = grey_image(&image, width, height);
         let coarse = frame.time_s.and_then(|time_s| {
             let width = COARSE_WIDTH.min(width);

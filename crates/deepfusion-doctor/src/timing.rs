@@ -2,8 +2,10 @@
 //! known, by its own.
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::reason::FramesReason;
+use super::remedy::FramesRemedy;
+use super::skip::FramesSkip;
 use deepfusion_data::Dataset;
-use deepfusion_hint::count_of;
 
 /// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
 const MOST_LOST: f64 = 1.0;
@@ -23,14 +25,14 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         })
         .collect();
     if steps.is_empty() {
-        return Outcome::skipped("timing", "the frames have no time stamps");
+        return Outcome::skipped("timing", FramesSkip::NoTimes);
     }
     for (number, apart, _) in steps.iter().filter(|(_, apart, _)| *apart <= 0.0) {
         outcome.find(
             Severity::Error,
             Some(*number),
-            format!("its time stamp is {:.3} s before the frame before", -apart),
-            "sort the frames by time, or correct the time stamps",
+            FramesReason::Backwards { by_s: -apart },
+            FramesRemedy::SortFrames,
         );
     }
     let usual = median(
@@ -54,16 +56,12 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let figure = Figure::new("lost frames", share, "%", Limit::AtMost(MOST_LOST));
     let first = first.map(|(number, _, _)| *number);
     outcome.judge_at(Severity::Warning, first, figure, || {
-        let at = first.unwrap_or(0);
-        (
-            format!(
-                "{lost:.0} frames are missing at {:.1} frames a second, the first before frame {at}: pairs across \
-                 a gap are left out or move further than others",
-                1.0 / usual
-            ),
-            "find out where the recorder drops frames (disk, network, queue length), or cut the recording there"
-                .into(),
-        )
+        let reason = FramesReason::Lost {
+            lost,
+            rate_hz: 1.0 / usual,
+            first: first.unwrap_or(0),
+        };
+        (reason, FramesRemedy::FindLostFrames)
     });
     unknown_motion(dataset, &mut outcome);
     outcome
@@ -101,14 +99,11 @@ fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
         Limit::AtMost(MOST_UNKNOWN),
     );
     outcome.judge_at(Severity::Warning, first, figure, || {
-        let at = first.unwrap_or(0);
-        (
-            format!(
-                "the vehicle's motion is unknown for {unknown:.1} s in {}, the first from frame {at}: \
-                 its speed has gaps there, and no pair of these frames can train",
-                count_of(stretches, "stretch")
-            ),
-            "find out where the recorder drops messages of the speed, or cut the recording there".into(),
-        )
+        let reason = FramesReason::UnknownMotion {
+            unknown_s: unknown,
+            stretches,
+            first: first.unwrap_or(0),
+        };
+        (reason, FramesRemedy::FindLostSpeeds)
     });
 }

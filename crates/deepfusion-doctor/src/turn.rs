@@ -5,7 +5,9 @@
 
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
-use deepfusion_hint::count_of;
+use super::reason::MotionReason;
+use super::remedy::MotionRemedy;
+use super::skip::MotionSkip;
 use nalgebra::Vector3;
 
 /// Least standard deviation of the vehicle's yaw rate that can be compared, rad/s.
@@ -17,10 +19,10 @@ const SURE: f64 = 0.9;
 pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
     let seen: Vec<(f64, f64)> = pairs.iter().filter_map(turns).collect();
     if seen.len() < LEAST_PAIRS {
-        let why = format!(
-            "{} with a turn, {LEAST_PAIRS} are needed",
-            count_of(seen.len(), "pair")
-        );
+        let why = MotionSkip::FewTurns {
+            pairs: seen.len(),
+            needed: LEAST_PAIRS,
+        };
         return Outcome::skipped("turn", why);
     }
     let n = seen.len() as f64;
@@ -35,9 +37,10 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
     }
     let spread = (xx / n).sqrt();
     if spread < LEAST_TURN {
-        let why = format!(
-            "the vehicle hardly turns (yaw rate ±{spread:.3} rad/s, {LEAST_TURN} are needed)"
-        );
+        let why = MotionSkip::HardlyTurns {
+            spread_radps: spread,
+            needed_radps: LEAST_TURN,
+        };
         return Outcome::skipped("turn", why);
     }
     let correlation = xy / (xx * yy).sqrt();
@@ -50,13 +53,20 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
         Limit::AtLeast(0.5),
     );
     let mirrored = correlation < -0.5;
-    outcome.judge(if mirrored { Severity::Error } else { Severity::Warning }, figure, || if mirrored { (
-        "the picture turns right where the vehicle turns left: the images are mirrored, or the yaw rate has the wrong sign".into(),
-        "mirror the images back, or negate the yaw rate (positive is to the left, z up)".into(),
-    ) } else { (
-        "the picture's turns do not follow the vehicle's: clock, yaw rate or camera are not of this drive".into(),
-        "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)".into(),
-    ) });
+    let (severity, reason, remedy) = if mirrored {
+        (
+            Severity::Error,
+            MotionReason::Mirrored,
+            MotionRemedy::Mirror,
+        )
+    } else {
+        (
+            Severity::Warning,
+            MotionReason::TurnsUnrelated,
+            MotionRemedy::CompareTimes,
+        )
+    };
+    outcome.judge(severity, figure, || (reason, remedy));
     if correlation >= SURE {
         let figure = Figure::new(
             "turns in the picture over the vehicle's",
@@ -65,13 +75,10 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
             Limit::Within(0.85, 1.18),
         );
         outcome.judge(Severity::Error, figure, || {
+            let factor = slope;
             (
-                format!(
-                    "turns come out {slope:.2} times the vehicle's with this focal length: it is about {:.2} times the \
-                     true one (or the yaw rate has another unit), and depths would be wrong by as much",
-                    1.0 / slope
-                ),
-                format!("calibrate at the size of these images; fx and fy times {slope:.2} would fit").into(),
+                MotionReason::TurnsFactor { factor },
+                MotionRemedy::FocalLength { factor },
             )
         });
     }

@@ -62,9 +62,10 @@ fn the_printed_centre_is_taken_and_flagged() {
 
     let diagnosis = doctor(&path, None);
     let findings = diagnosis.findings();
-    let flagged = findings
-        .iter()
-        .find(|(_, finding)| finding.what.contains("cy") && finding.what.contains("117.6"));
+    let flagged = findings.iter().find(|(_, finding)| {
+        let what = finding.what.to_string();
+        what.contains("cy") && what.contains("117.6")
+    });
     let (_, finding) = flagged.unwrap_or_else(|| panic!("{findings:#?}"));
     assert!(finding.severity >= Severity::Warning, "{finding:?}");
 }

@@ -7,6 +7,7 @@ use deepfusion_hint::Hint;
 use deepfusion_model::Compute;
 #[cfg(feature = "train")]
 use deepfusion_train::Device;
+use serde::{Serialize, Serializer};
 
 #[cfg(feature = "train")]
 use crate::Error;
@@ -30,6 +31,11 @@ pub enum Backend {
 impl Backend {
     /// Each, those that this build lacks as well ([`Self::is_built`]): they are known, so that they are answered with how to build them.
     pub const ALL: [Self; 5] = [Self::Cpu, Self::Vulkan, Self::Wgpu, Self::Cuda, Self::Metal];
+
+    /// Those that this build has.
+    pub fn built() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|one| one.is_built())
+    }
 
     /// Its name, as in `cuda:1`.
     #[must_use]
@@ -65,6 +71,13 @@ impl Backend {
             Self::Cuda => cfg!(feature = "cuda"),
             Self::Metal => cfg!(feature = "metal"),
         }
+    }
+}
+
+/// As its name.
+impl Serialize for Backend {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 
@@ -141,8 +154,8 @@ impl Hint for NoDevice {
     fn hint(&self) -> Option<String> {
         Some(match self {
             Self::Name => {
-                let built = Backend::ALL.into_iter().filter(|one| one.is_built());
-                let names: Vec<&str> = built.map(Backend::name).chain(["auto"]).collect();
+                let built = Backend::built().map(Backend::name);
+                let names: Vec<&str> = built.chain(["auto"]).collect();
                 format!("this build has {}", names.join(", "))
             }
             Self::Index => "such as cuda:1 or vulkan:0; they are counted from 0".into(),

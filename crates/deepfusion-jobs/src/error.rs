@@ -306,6 +306,20 @@ pub enum Error {
         /// Why not.
         source: serde_json::Error,
     },
+    /// A process that is to check a device cannot be started.
+    #[cfg(feature = "train")]
+    #[error("cannot start the process that checks the device")]
+    CheckNotStarted {
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Nobody can say how a process ended that checked a device.
+    #[cfg(feature = "train")]
+    #[error("cannot wait for the process that checks the device")]
+    CheckNotEnded {
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// A file that was written and cannot be read again.
     #[cfg(feature = "train")]
     #[error("cannot read {} back", path.display())]
@@ -616,7 +630,9 @@ impl Hint for Error {
                 Some("give the folder that the adapted network was written to".into())
             }
             #[cfg(feature = "train")]
-            Self::ReadBack { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::ReadBack { source, .. }
+            | Self::CheckNotStarted { source }
+            | Self::CheckNotEnded { source } => Some(system_hint(source.kind()).into()),
             #[cfg(feature = "train")]
             Self::Deviates { .. } => {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())

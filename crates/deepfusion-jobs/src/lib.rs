@@ -17,7 +17,7 @@
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`devices`], [`engine`] | where a network computes, and what runs it there |
 //! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
-//! | [`machine`] | what this machine has: vector instructions, memory, disk |
+//! | [`machine`] | what this machine has: vector instructions, memory, disk, programs from outside |
 //! | [`importing`] | other projects' weights: which are known, and with the feature `train` as a run |
 //! | [`RunHistory`] | how a run learned, by what its folder keeps |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
@@ -28,6 +28,10 @@
 #![cfg_attr(
     feature = "train",
     doc = "| [`export`] | a network as an ONNX file, compared with it |"
+)]
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`device_check`] | whether a device computes what the processor does, in processes that its driver may end |"
 )]
 #![cfg_attr(
     feature = "train",
@@ -45,6 +49,8 @@ pub mod bench;
 pub mod board;
 pub mod bulk;
 pub mod dates;
+#[cfg(feature = "train")]
+pub mod device_check;
 pub mod devices;
 pub mod engine;
 mod error;

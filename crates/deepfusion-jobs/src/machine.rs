@@ -1,7 +1,15 @@
 //! What this machine has for the program: vector instructions, memory, disk, and programs from outside. Megabytes are of 2²⁰ bytes.
 
+mod overview;
+mod tool;
+
 use std::io;
 use std::process::{Command, ExitStatus, Stdio};
+
+use serde::{Serialize, Serializer};
+
+pub use self::overview::Machine;
+pub use self::tool::{NoTool, Tool};
 
 /// Instructions that the kernels make use of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +41,13 @@ impl InstructionSet {
             Self::AmxBf16 => "amx-bf16",
             Self::Neon => "neon",
         }
+    }
+}
+
+/// As its name.
+impl Serialize for InstructionSet {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the command line says of the doctor's findings: the library names a remedy, this the options that do it.
 
-use deepfusion_doctor::{Diagnosis, Remedy};
+use deepfusion_doctor::{Diagnosis, FindingReason, Remedy};
 use deepfusion_logs::Clock;
 
 /// A diagnosis whose findings name the command's options, as `deepfusion doctor` prints them and its JSON has them.
@@ -9,7 +9,7 @@ pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.reworded(|finding| {
         if let Some(words) = remedy(&finding.remedy) {
             if let Some(what) = what(&finding.remedy) {
-                finding.what = what.to_owned();
+                finding.what = FindingReason::Words(what.to_owned());
             }
             finding.remedy = Remedy::Words(words);
         }

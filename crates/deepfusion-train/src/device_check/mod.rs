@@ -2,6 +2,7 @@
 //! trustworthy.
 
 mod cases;
+mod failure;
 mod inputs;
 mod summary;
 
@@ -11,7 +12,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use burn::tensor::Device;
 use inputs::{Inputs, Outcome};
 
-pub use summary::DeviceCheck;
+pub use failure::OperationFailure;
+pub use summary::{DeviceCheck, DeviceUse};
 
 /// How far a device may be from the processor, over the largest value: both round in single precision, in another order.
 pub const TOLERANCE: f64 = 1e-3;
@@ -54,7 +56,7 @@ pub struct OperationCheck {
     /// The same of its gradients; `None` of an operation without.
     pub backward: Option<f64>,
     /// Why it did not run to its end on the device.
-    pub failure: Option<String>,
+    pub failure: Option<OperationFailure>,
 }
 
 impl OperationCheck {
@@ -95,7 +97,7 @@ pub fn check_operation(operation: &str, device: &Device) -> Option<OperationChec
     Some(match found {
         Ok(found) => compared(check, &right, &found),
         Err(panic) => OperationCheck {
-            failure: Some(said(&*panic)),
+            failure: Some(OperationFailure::Panicked(said(&*panic))),
             ..check
         },
     })
@@ -215,7 +217,7 @@ mod tests {
         };
         assert!(check.forward_is_right() && !check.is_right());
         let failed = OperationCheck {
-            failure: Some("gone".into()),
+            failure: Some(OperationFailure::Panicked("gone".into())),
             backward: None,
             ..check
         };

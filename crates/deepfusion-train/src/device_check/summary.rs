@@ -9,6 +9,28 @@ pub struct DeviceCheck {
     pub operations: Vec<OperationCheck>,
 }
 
+/// What a device can be used for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum DeviceUse {
+    /// Nothing: depth would not be what was trained.
+    Nothing,
+    /// Prediction alone: its gradients or losses are not to be relied on.
+    Prediction,
+    /// Training, too, but for these; all of it where there are none.
+    TrainingWithout(Vec<NeededBy>),
+}
+
+/// What training can do without, in the order in which it is said.
+const OPTIONAL: [NeededBy; 7] = [
+    NeededBy::Flow,
+    NeededBy::Affine,
+    NeededBy::MixedPrecision,
+    NeededBy::Depth,
+    NeededBy::LiteMono,
+    NeededBy::RMsfm,
+    NeededBy::DispNet,
+];
+
 impl DeviceCheck {
     /// Whether every operation that something needs is the processor's, forward and backward.
     #[must_use]
@@ -31,6 +53,19 @@ impl DeviceCheck {
             .all(|needs| self.is_right(needs))
     }
 
+    /// What the device can be used for.
+    #[must_use]
+    pub fn good_for(&self) -> DeviceUse {
+        if !self.predicts() {
+            return DeviceUse::Nothing;
+        }
+        if !self.trains() {
+            return DeviceUse::Prediction;
+        }
+        let wrong = OPTIONAL.into_iter().filter(|needs| !self.is_right(*needs));
+        DeviceUse::TrainingWithout(wrong.collect())
+    }
+
     /// How many operations are not the processor's, or failed.
     #[must_use]
     pub fn wrong(&self) -> usize {
@@ -51,22 +86,29 @@ mod tests {
 
     /// Operations that are right, and one that is wrong in its result or in its gradients alone.
     fn check(wrong: NeededBy, forward: bool) -> DeviceCheck {
+        checks(&[(wrong, forward)])
+    }
+
+    /// The same of several that are wrong.
+    fn checks(wrong: &[(NeededBy, bool)]) -> DeviceCheck {
         let needed = [
             NeededBy::Network,
             NeededBy::Views,
             NeededBy::Learning,
             NeededBy::Flow,
+            NeededBy::Affine,
+            NeededBy::MixedPrecision,
         ];
-        let operation = |needed_by| OperationCheck {
-            operation: "any",
-            needed_by,
-            forward: if needed_by == wrong && forward {
-                0.1
-            } else {
-                0.0
-            },
-            backward: Some(if needed_by == wrong { 0.1 } else { 0.0 }),
-            failure: None,
+        let operation = |needed_by| {
+            let wrong = wrong.iter().find(|(needs, _)| *needs == needed_by);
+            let off = |is_off: bool| if is_off { 0.1 } else { 0.0 };
+            OperationCheck {
+                operation: "any",
+                needed_by,
+                forward: off(wrong.is_some_and(|(_, forward)| *forward)),
+                backward: Some(off(wrong.is_some())),
+                failure: None,
+            }
         };
         DeviceCheck {
             operations: needed.map(operation).to_vec(),
@@ -90,5 +132,20 @@ mod tests {
             assert_eq!(found.is_right(wrong), all_right);
             assert_eq!(found.wrong(), usize::from(!all_right));
         }
+    }
+    #[test]
+    fn what_to_do_without_follows_from_what_differs() {
+        let of = |wrong: &[(NeededBy, bool)]| checks(wrong).good_for();
+        let without = |parts: &[NeededBy]| DeviceUse::TrainingWithout(parts.to_vec());
+        assert_eq!(of(&[(NeededBy::Network, true)]), DeviceUse::Nothing);
+        assert_eq!(of(&[(NeededBy::Network, false)]), DeviceUse::Prediction);
+        assert_eq!(of(&[(NeededBy::Views, true)]), DeviceUse::Prediction);
+        assert_eq!(
+            of(&[(NeededBy::Affine, false), (NeededBy::Flow, true)]),
+            without(&[NeededBy::Flow, NeededBy::Affine])
+        );
+        let mixed = NeededBy::MixedPrecision;
+        assert_eq!(of(&[(mixed, true)]), without(&[mixed]));
+        assert_eq!(of(&[]), without(&[]));
     }
 }

@@ -4,8 +4,6 @@
 mod device;
 mod lines;
 mod machine;
-#[cfg(feature = "train")]
-mod patient_lines;
 mod report;
 
 use std::fmt::Write as _;
@@ -154,7 +152,7 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
     if !text.is_empty() {
         text.push('\n');
     }
-    text += &lines::of(&diagnosis.outcomes().collect::<Vec<_>>());
+    text += &lines::of(diagnosis);
     let findings = diagnosis.findings();
     for (drive, finding) in &findings {
         let _ = write!(text, "\n{} [{}]", finding.severity, finding.check);

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use deepfusion_data::{Camera, Cameras, Dataset, GtKind, OpenOptions, overlay};
-use deepfusion_doctor::{Diagnosis, DriveDiagnosis, Line};
+use deepfusion_data::OpenOptions;
+use deepfusion_doctor::{Diagnosis, DriveDiagnosis, Line, depth_pictures};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
 use super::lines;
@@ -37,8 +37,7 @@ pub(super) fn write(
     } else {
         report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows)
     };
-    let checks: Vec<_> = diagnosis.outcomes().collect();
-    let rows = lines::rows(&checks).into_iter();
+    let rows = lines::rows(diagnosis).into_iter();
     let rows: Vec<Vec<String>> = rows
         .map(|(check, how)| vec![check.to_owned(), how])
         .collect();
@@ -79,31 +78,9 @@ fn pictures(
     options: &OpenOptions,
     drive: &DriveDiagnosis,
 ) -> Result<HtmlReport> {
-    if drive.plots.with_depth.is_empty() {
-        return Ok(report);
-    }
-    let options = OpenOptions {
-        camera: if drive.camera == Camera::Left.number() {
-            Cameras::Left
-        } else {
-            Cameras::Right
-        },
-        ..options.clone()
-    };
-    let datasets = Dataset::open(path, &options)?;
-    let Some(dataset) = datasets.iter().find(|d| d.name() == drive.name) else {
-        return Ok(report);
-    };
-    for &frame in &drive.plots.with_depth {
-        // What cannot be read is among the findings.
-        let (Ok(image), Ok(Some(depth))) = (
-            dataset.load_image(frame),
-            dataset.ground_truth(frame, GtKind::Z),
-        ) else {
-            continue;
-        };
-        let caption = format!("frame {}, measured depth", dataset.frames()[frame].number);
-        report = report.picture(&caption, &overlay(&image, &depth)?, PictureFormat::Jpeg)?;
+    for picture in depth_pictures(path, options, drive)? {
+        let caption = format!("frame {}, measured depth", picture.frame);
+        report = report.picture(&caption, &picture.image, PictureFormat::Jpeg)?;
     }
     Ok(report)
 }
@@ -126,7 +103,7 @@ fn figures(report: HtmlReport, drive: &DriveDiagnosis) -> HtmlReport {
         if let Some(why) = &outcome.skipped {
             rows.push(vec![
                 outcome.check.to_owned(),
-                why.clone(),
+                why.to_string(),
                 "not checked".to_owned(),
             ]);
         }

@@ -1,0 +1,142 @@
+//! What is wrong with when frames were taken, and with whether the vehicle moved.
+
+use deepfusion_hint::count_of;
+
+/// What is wrong with when frames were taken, and with whether the vehicle moved.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FramesReason {
+    /// A frame was taken before the one before it.
+    #[error("its time stamp is {by_s:.3} s before the frame before")]
+    Backwards {
+        /// By how much, seconds.
+        by_s: f64,
+    },
+    /// Frames are missing.
+    #[error(
+        "{lost:.0} frames are missing at {rate_hz:.1} frames a second, the first before frame {first}: pairs across a gap are left out or move further than others"
+    )]
+    Lost {
+        /// How many.
+        lost: f64,
+        /// The camera's usual rate, 1/s.
+        rate_hz: f64,
+        /// The number of the first frame that has a gap before it.
+        first: u64,
+    },
+    /// At times the vehicle's motion is not known.
+    #[error(
+        "the vehicle's motion is unknown for {unknown_s:.1} s in {}, the first from frame {first}: its speed has gaps there, and no pair of these frames can train",
+        count_of(*stretches, "stretch")
+    )]
+    UnknownMotion {
+        /// For how long, seconds.
+        unknown_s: f64,
+        /// In how many stretches.
+        stretches: usize,
+        /// The number of the frame from which the first is.
+        first: u64,
+    },
+    /// Frames are the frame before once more.
+    #[error(
+        "{repeated} of {} {} the frame before once more while the vehicle moves, the first of them frame {first}: {} teaches that everything is infinitely far",
+        count_of(*frames, "frame"),
+        if *repeated == 1 { "is" } else { "are" },
+        if *repeated == 1 { "it" } else { "each of them" }
+    )]
+    Repeated {
+        /// How many.
+        repeated: usize,
+        /// Of how many that were compared.
+        frames: u32,
+        /// The number of the first.
+        first: u64,
+    },
+    /// Much of the drive stands.
+    #[error(
+        "the vehicle stands in {standing} of {pairs} pairs, longest in frames {from} to {to}: they show no parallax and are left out of training"
+    )]
+    Standing {
+        /// Pairs in which it stands.
+        standing: usize,
+        /// All pairs of neighbouring frames.
+        pairs: usize,
+        /// The first frame of the longest stretch.
+        from: u64,
+        /// Its last one.
+        to: u64,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_with_times_is_said() {
+        let unknown = |stretches| FramesReason::UnknownMotion {
+            unknown_s: 1.64,
+            stretches,
+            first: 40,
+        };
+        for (reason, said) in [
+            (
+                FramesReason::Backwards { by_s: 0.1 },
+                "its time stamp is 0.100 s before the frame before",
+            ),
+            (
+                FramesReason::Lost {
+                    lost: 12.0,
+                    rate_hz: 10.04,
+                    first: 31,
+                },
+                "12 frames are missing at 10.0 frames a second, the first before frame 31: pairs across a gap are left out or move further \
+                 than others",
+            ),
+            (
+                unknown(1),
+                "the vehicle's motion is unknown for 1.6 s in 1 stretch, the first from frame 40: its speed has gaps there, and no pair of \
+                 these frames can train",
+            ),
+            (
+                unknown(2),
+                "the vehicle's motion is unknown for 1.6 s in 2 stretches, the first from frame 40: its speed has gaps there, and no pair of \
+                 these frames can train",
+            ),
+        ] {
+            assert_eq!(reason.to_string(), said);
+        }
+    }
+
+    #[test]
+    fn frames_that_show_no_motion_are_counted() {
+        let repeated = |repeated| FramesReason::Repeated {
+            repeated,
+            frames: 9,
+            first: 5,
+        };
+        for (reason, said) in [
+            (
+                repeated(1),
+                "1 of 9 frames is the frame before once more while the vehicle moves, the first of them frame 5: it teaches that everything \
+                 is infinitely far",
+            ),
+            (
+                repeated(3),
+                "3 of 9 frames are the frame before once more while the vehicle moves, the first of them frame 5: each of them teaches that \
+                 everything is infinitely far",
+            ),
+            (
+                FramesReason::Standing {
+                    standing: 30,
+                    pairs: 99,
+                    from: 10,
+                    to: 25,
+                },
+                "the vehicle stands in 30 of 99 pairs, longest in frames 10 to 25: they show no parallax and are left out of training",
+            ),
+        ] {
+            assert_eq!(reason.to_string(), said);
+        }
+    }
+}

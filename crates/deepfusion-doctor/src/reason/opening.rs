@@ -1,0 +1,76 @@
+//! What of a recording cannot be read, or is taken for granted.
+
+use crate::shared_error::SharedError;
+use deepfusion_data::{DataWarning, Error};
+
+/// What of a recording cannot be read, or is taken for granted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpeningReason {
+    /// The recording cannot be opened.
+    #[error(transparent)]
+    Recording(SharedError<Error>),
+    /// An image cannot be read.
+    #[error(transparent)]
+    Image(SharedError<Error>),
+    /// The drive has no pair of frames to learn from.
+    #[error(
+        "{}: {problem}",
+        if *left_out { "training leaves this drive out" } else { "no pair of frames can train" }
+    )]
+    NoPair {
+        /// Whether training goes on without it: others of its folder have some, and nothing is wrong with it beyond that.
+        left_out: bool,
+        /// Why it has none.
+        problem: SharedError<Error>,
+    },
+    /// Nothing says how the vehicle turned.
+    #[error(
+        "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from the images"
+    )]
+    NoTurns,
+    /// A course of positions alone says how the vehicle turned.
+    #[error(
+        "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot; training takes the turns from the images"
+    )]
+    CourseAlone,
+    /// What opening it warns of.
+    #[error(transparent)]
+    Warning(#[from] DataWarning),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_data::CameraWarning;
+    use std::io::ErrorKind;
+    use std::path::Path;
+
+    #[test]
+    fn a_drive_without_pairs_is_left_out_or_fails() {
+        let error = Error::file(Path::new("drive"), ErrorKind::NotFound.into());
+        let said = error.to_string();
+        let problem = SharedError::from(error);
+        for (left_out, what) in [
+            (true, "training leaves this drive out"),
+            (false, "no pair of frames can train"),
+        ] {
+            let problem = problem.clone();
+            let reason = OpeningReason::NoPair { left_out, problem };
+            assert_eq!(reason.to_string(), format!("{what}: {said}"));
+        }
+        assert_eq!(OpeningReason::Image(problem.clone()).to_string(), said);
+        assert_eq!(OpeningReason::Recording(problem).to_string(), said);
+    }
+
+    #[test]
+    fn what_is_taken_for_granted_is_said() {
+        assert_eq!(
+            OpeningReason::NoTurns.to_string(),
+            "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked; training takes the turns from the images"
+        );
+        let warning = DataWarning::from(CameraWarning::LensCorrected);
+        let said = warning.to_string();
+        assert_eq!(OpeningReason::from(warning).to_string(), said);
+    }
+}

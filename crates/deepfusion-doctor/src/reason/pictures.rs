@@ -1,0 +1,165 @@
+//! What is wrong with how the pictures look.
+
+use deepfusion_hint::count_of;
+use std::fmt;
+
+/// What is wrong with how the pictures look.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PicturesReason {
+    /// They hardly change from frame to frame.
+    #[error(
+        "from frame to frame the picture hardly moves: what is taught lies below the images' noise"
+    )]
+    LittleParallax,
+    /// Neighbours differ in brightness.
+    #[error(
+        "{jumps} of {} {} by more than {:.0} % in brightness, the first at frame {first} ({:+.0} %): the photometric error then measures the exposure",
+        count_of(*neighbours, "neighbour"),
+        if *jumps == 1 { "differs" } else { "differ" },
+        100.0 * more_than,
+        100.0 * (first_ratio - 1.0)
+    )]
+    BrightnessJumps {
+        /// How many do.
+        jumps: usize,
+        /// Of how many.
+        neighbours: u32,
+        /// By which share.
+        more_than: f64,
+        /// The number of the first frame that does.
+        first: u64,
+        /// How many times as bright as the frame before it is.
+        first_ratio: f64,
+    },
+    /// They are dark.
+    #[error("most of the picture is black: nothing can be compared there")]
+    Dark,
+    /// They are overexposed.
+    #[error("much of the picture is white: nothing can be compared there")]
+    White,
+    /// The finest detail is missing in all of them.
+    #[error("the pictures lack the finest detail, as out of focus, shaken or enlarged ones do")]
+    Soft,
+    /// Some are blurred.
+    #[error(
+        "{blurred} of {} {} less than half the drive's usual sharpness, the first of them frame {first}",
+        count_of(*frames, "frame"),
+        if *blurred == 1 { "has" } else { "have" }
+    )]
+    Blurred {
+        /// How many.
+        blurred: usize,
+        /// Of how many.
+        frames: usize,
+        /// The number of the first.
+        first: u64,
+    },
+    /// A part of them belongs to the vehicle.
+    #[error(
+        "{pixels} pixels at the {side} do not change while the vehicle moves (over {:.0} % of that side): they teach that what stands still on the vehicle is infinitely far",
+        100.0 * share
+    )]
+    StillRim {
+        /// At which side.
+        side: ImageSide,
+        /// How far in, pixels.
+        pixels: u32,
+        /// Along which share of the side.
+        share: f64,
+    },
+}
+
+/// A side of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageSide {
+    /// The last rows.
+    Bottom,
+    /// The first rows.
+    Top,
+    /// The first columns.
+    Left,
+    /// The last columns.
+    Right,
+}
+
+impl fmt::Display for ImageSide {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bottom => "bottom",
+            Self::Top => "top",
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn how_pictures_look_is_said() {
+        let jumps = |jumps, first_ratio| PicturesReason::BrightnessJumps {
+            jumps,
+            neighbours: 99,
+            more_than: 0.12,
+            first: 5,
+            first_ratio,
+        };
+        let blurred = |blurred| PicturesReason::Blurred {
+            blurred,
+            frames: 99,
+            first: 3,
+        };
+        let rim = |side| PicturesReason::StillRim {
+            side,
+            pixels: 14,
+            share: 0.993,
+        };
+        for (reason, said) in [
+            (
+                PicturesReason::LittleParallax,
+                "from frame to frame the picture hardly moves: what is taught lies below the images' noise",
+            ),
+            (
+                jumps(1, 1.3),
+                "1 of 99 neighbours differs by more than 12 % in brightness, the first at frame 5 (+30 %): the photometric error then \
+                 measures the exposure",
+            ),
+            (
+                jumps(2, 0.7),
+                "2 of 99 neighbours differ by more than 12 % in brightness, the first at frame 5 (-30 %): the photometric error then \
+                 measures the exposure",
+            ),
+            (
+                PicturesReason::White,
+                "much of the picture is white: nothing can be compared there",
+            ),
+            (
+                PicturesReason::Soft,
+                "the pictures lack the finest detail, as out of focus, shaken or enlarged ones do",
+            ),
+            (
+                blurred(1),
+                "1 of 99 frames has less than half the drive's usual sharpness, the first of them frame 3",
+            ),
+            (
+                blurred(9),
+                "9 of 99 frames have less than half the drive's usual sharpness, the first of them frame 3",
+            ),
+            (
+                rim(ImageSide::Bottom),
+                "14 pixels at the bottom do not change while the vehicle moves (over 99 % of that side): they teach that what stands still \
+                 on the vehicle is infinitely far",
+            ),
+            (
+                rim(ImageSide::Left),
+                "14 pixels at the left do not change while the vehicle moves (over 99 % of that side): they teach that what stands still on \
+                 the vehicle is infinitely far",
+            ),
+        ] {
+            assert_eq!(reason.to_string(), said);
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Why nothing shows where the camera looks.
+
+use crate::no_heading::NoHeading;
+use crate::reason::HeadingAngle;
+use deepfusion_hint::count_of;
+use std::fmt;
+
+/// Why nothing shows where the camera looks.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraSkip {
+    /// Too few pictures were taken straight ahead.
+    #[error(transparent)]
+    Heading(#[from] NoHeading),
+    /// No angle is known well enough.
+    #[error("not sure enough: {}", together(.0))]
+    Unsure(Vec<UnsureHeading>),
+    /// Nothing says how the camera is mounted.
+    #[error("nothing says where the camera is on the vehicle")]
+    NoMount,
+    /// Too little of the road was measured.
+    #[error(
+        "the road before the camera is in the measured depth of {}, {needed} are needed",
+        count_of(*frames, "frame")
+    )]
+    LittleRoad {
+        /// Frames that show the road.
+        frames: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// What was measured before the camera is not the road alone.
+    #[error(
+        "the planes before the camera differ between frames (pitch by {pitch_deg:.1} degrees, roll by {roll_deg:.1}): not the road alone"
+    )]
+    UnevenRoad {
+        /// By how much the pitch differs, degrees.
+        pitch_deg: f64,
+        /// By how much the roll differs, degrees.
+        roll_deg: f64,
+    },
+    /// The two cameras see too little alike.
+    #[error("too few points are seen by both cameras")]
+    FewPoints,
+    /// There is one camera.
+    #[error("one camera")]
+    OneCamera,
+}
+
+/// Where the camera heads along an axis, with too large a standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UnsureHeading {
+    /// Along which one.
+    pub angle: HeadingAngle,
+    /// How far it is off, degrees: up and to the right are positive.
+    pub off_deg: f64,
+    /// The standard error of that, degrees.
+    pub std_error_deg: f64,
+}
+
+impl fmt::Display for UnsureHeading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            angle,
+            off_deg,
+            std_error_deg,
+        } = self;
+        write!(
+            f,
+            "{angle} of the way ahead {off_deg:.1} ± {std_error_deg:.1} degrees"
+        )
+    }
+}
+
+fn together(unsure: &[UnsureHeading]) -> String {
+    let unsure: Vec<String> = unsure.iter().map(UnsureHeading::to_string).collect();
+    unsure.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn why_the_camera_is_not_judged_is_said() {
+        let unsure = |angle| UnsureHeading {
+            angle,
+            off_deg: -0.44,
+            std_error_deg: 0.71,
+        };
+        for (reason, said) in [
+            (
+                CameraSkip::Heading(NoHeading {
+                    straight: 1,
+                    needed: 12,
+                }),
+                "1 pair straight ahead, 12 are needed",
+            ),
+            (
+                CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
+                "not sure enough: pitch of the way ahead -0.4 ± 0.7 degrees, yaw of the way ahead -0.4 ± 0.7 degrees",
+            ),
+            (
+                CameraSkip::NoMount,
+                "nothing says where the camera is on the vehicle",
+            ),
+            (
+                CameraSkip::LittleRoad {
+                    frames: 3,
+                    needed: 4,
+                },
+                "the road before the camera is in the measured depth of 3 frames, 4 are needed",
+            ),
+            (
+                CameraSkip::UnevenRoad {
+                    pitch_deg: 1.26,
+                    roll_deg: 2.0,
+                },
+                "the planes before the camera differ between frames (pitch by 1.3 degrees, roll by 2.0): not the road alone",
+            ),
+            (
+                CameraSkip::FewPoints,
+                "too few points are seen by both cameras",
+            ),
+        ] {
+            assert_eq!(reason.to_string(), said);
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Why nothing shows how far the camera's clock and the vehicle's are apart.
+
+use crate::camera_ahead::NoCameraAhead;
+use deepfusion_motion::NoTimeOffset;
+
+/// Why nothing shows how far the camera's clock and the vehicle's are apart.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClockSkip {
+    /// Nothing was recorded to compare the pictures with.
+    #[error("no speed and yaw rate to compare the picture with")]
+    NoRates,
+    /// A course of positions does not show it. What it says is of the drive that the check is of.
+    #[error("{}", .0.reason())]
+    ByCourse(NoCameraAhead),
+    /// The pictures do not follow the vehicle.
+    #[error(transparent)]
+    NotFound(#[from] NoTimeOffset),
+    /// The offset is not known well enough.
+    #[error("the estimate {offset_s:.2} s has a standard error of {std_error_s:.2} s")]
+    Unsure {
+        /// The offset, vehicle less camera, seconds.
+        offset_s: f64,
+        /// Its standard error, seconds.
+        std_error_s: f64,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The drive is named beside it.
+    #[test]
+    fn why_the_clocks_are_not_compared_is_said() {
+        let drive = "monday".to_owned();
+        for (reason, said) in [
+            (
+                ClockSkip::ByCourse(NoCameraAhead::NoSpeeds { drive }),
+                "the clocks cannot be compared: it has no speeds, or its frames no times",
+            ),
+            (
+                NoTimeOffset::NothingChanges.into(),
+                "time offset: nothing measured changes: no turn (0.004 rad/s), no change of speed (0.1 m/s)",
+            ),
+            (
+                ClockSkip::Unsure {
+                    offset_s: 0.304,
+                    std_error_s: 0.12,
+                },
+                "the estimate 0.30 s has a standard error of 0.12 s",
+            ),
+        ] {
+            assert_eq!(reason.to_string(), said);
+        }
+    }
+}

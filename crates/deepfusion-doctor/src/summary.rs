@@ -1,0 +1,118 @@
+//! Each check over all drives.
+
+use crate::{Diagnosis, Outcome, SkipReason, Status};
+
+/// A check, and how it came out wherever it looked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckSummary<'a> {
+    /// The check's name.
+    pub check: &'static str,
+    /// How it came out, each with the drive that it looked at; none where it looked at the recording.
+    pub outcomes: Vec<(Option<&'a str>, &'a Outcome)>,
+}
+
+impl<'a> CheckSummary<'a> {
+    /// Those that came out so, with their drives.
+    pub fn with(&self, status: Status) -> impl Iterator<Item = (Option<&'a str>, &'a Outcome)> {
+        let outcomes = self.outcomes.iter().copied();
+        outcomes.filter(move |(_, outcome)| outcome.status() == status)
+    }
+
+    /// Why it could not look, and at which drives: most drives of a folder have the same sensors, and so the same reason. Reasons are the
+    /// same where they say the same.
+    #[must_use]
+    pub fn not_checked(&self) -> Vec<(&'a SkipReason, Vec<Option<&'a str>>)> {
+        let mut reasons: Vec<(&SkipReason, Vec<Option<&str>>)> = Vec::new();
+        for (drive, outcome) in self.with(Status::NotChecked) {
+            let Some(why) = &outcome.skipped else {
+                continue;
+            };
+            let said = why.to_string();
+            match reasons.iter_mut().find(|(one, _)| one.to_string() == said) {
+                Some((_, drives)) => drives.push(drive),
+                None => reasons.push((why, vec![drive])),
+            }
+        }
+        reasons
+    }
+}
+
+impl Diagnosis {
+    /// The checks by name, in the order in which they come.
+    #[must_use]
+    pub fn checks(&self) -> Vec<CheckSummary<'_>> {
+        let mut checks: Vec<CheckSummary<'_>> = Vec::new();
+        for (drive, outcome) in self.outcomes() {
+            match checks.iter_mut().find(|one| one.check == outcome.check) {
+                Some(known) => known.outcomes.push((drive, outcome)),
+                None => checks.push(CheckSummary {
+                    check: outcome.check,
+                    outcomes: vec![(drive, outcome)],
+                }),
+            }
+        }
+        checks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DriveDiagnosis, DrivePlots, Figure, FramesSkip, Limit, MotionSkip};
+    use deepfusion_data::DatasetKind;
+
+    fn drive(name: &str, outcomes: Vec<Outcome>) -> DriveDiagnosis {
+        DriveDiagnosis {
+            name: name.into(),
+            camera: 2,
+            kind: DatasetKind::Folder,
+            frames: 9,
+            looked_at: 9,
+            outcomes,
+            plots: DrivePlots::default(),
+        }
+    }
+
+    fn ok(check: &'static str) -> Outcome {
+        let mut outcome = Outcome::new(check);
+        let figure = Figure::new("any", 0.0, "", Limit::AtMost(1.0));
+        outcome.measured.push(figure);
+        outcome
+    }
+
+    #[test]
+    fn a_check_is_one_over_all_drives_and_so_is_a_reason() {
+        let turns = |spread_radps| MotionSkip::HardlyTurns {
+            spread_radps,
+            needed_radps: 0.015,
+        };
+        let skipped = |why: MotionSkip| Outcome::skipped("turn", why);
+        let diagnosis = Diagnosis {
+            recording: vec![ok("stereo")],
+            drives: vec![
+                drive("a", vec![ok("timing"), skipped(turns(0.00401))]),
+                drive(
+                    "b",
+                    vec![
+                        Outcome::skipped("timing", FramesSkip::NoTimes),
+                        skipped(turns(0.00402)),
+                    ],
+                ),
+                drive("c", vec![ok("timing"), skipped(turns(0.009))]),
+            ],
+        };
+        let checks = diagnosis.checks();
+        let names: Vec<&str> = checks.iter().map(|check| check.check).collect();
+        assert_eq!(names, ["timing", "turn", "stereo"]);
+        assert_eq!(checks[0].with(Status::Ok).count(), 2);
+        let no_times = SkipReason::from(FramesSkip::NoTimes);
+        assert_eq!(checks[0].not_checked(), vec![(&no_times, vec![Some("b")])]);
+        let drives: Vec<_> = checks[1]
+            .not_checked()
+            .into_iter()
+            .map(|(_, d)| d)
+            .collect();
+        assert_eq!(drives, [vec![Some("a"), Some("b")], vec![Some("c")]]);
+        assert_eq!(checks[2].outcomes[0].0, None);
+    }
+}

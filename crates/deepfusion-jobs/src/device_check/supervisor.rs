@@ -1,0 +1,246 @@
+//! Processes that check a device, one after the other.
+
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use deepfusion_train::Device;
+use deepfusion_train::device_check::{
+    DeviceCheck, NeededBy, OperationCheck, OperationFailure, check_operation, operations,
+};
+
+use super::answer::answered;
+use super::event::DeviceCheckEvent;
+use super::patient_lines::PatientLines;
+use crate::devices::{Backend, ComputeDevice};
+use crate::{Error, Result};
+
+/// The longest that an operation may take, its kernels' compilation included. An H100 took less than a minute for all of them.
+const LIMIT: Duration = Duration::from_secs(300);
+
+/// Computes every operation on a device, which is open, and on the processor; `report` sees each as soon as it is done. The processor is
+/// compared with itself in this process. For another device `program` is called with an operation's name and gives the command of a process
+/// that prints each of [`checks_from`](super::checks_from) that one on, as its [`answer_line`](super::answer_line).
+///
+/// # Errors
+/// [`Error::CheckNotStarted`] and [`Error::CheckNotEnded`], and those of the callbacks. A process that runs then is ended.
+pub fn check_device<E: From<Error>>(
+    chosen: ComputeDevice,
+    device: &Device,
+    mut program: impl FnMut(&str) -> Result<Command, E>,
+    mut report: impl FnMut(&DeviceCheckEvent) -> Result<(), E>,
+) -> Result<DeviceCheck, E> {
+    let mut found = DeviceCheck::default();
+    let mut pass_on = |event: DeviceCheckEvent| -> Result<(), E> {
+        report(&event)?;
+        if let DeviceCheckEvent::Checked(check) = event {
+            found.operations.push(check);
+        }
+        Ok(())
+    };
+    if chosen.backend == Backend::Cpu {
+        for (operation, _) in operations() {
+            if let Some(check) = check_operation(operation, device) {
+                pass_on(DeviceCheckEvent::Checked(check))?;
+            }
+        }
+    } else {
+        let all: Vec<_> = operations().collect();
+        supervise(&all, LIMIT, &mut program, &mut pass_on)?;
+    }
+    Ok(found)
+}
+
+/// Has processes check these operations, so that a driver which ends its process, or hangs, does not take along what was found; another
+/// process continues with the next operation.
+fn supervise<E: From<Error>>(
+    asked: &[(&'static str, NeededBy)],
+    limit: Duration,
+    program: &mut impl FnMut(&str) -> Result<Command, E>,
+    report: &mut impl FnMut(DeviceCheckEvent) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut rest = asked;
+    while let Some(&(first, _)) = rest.first() {
+        report(DeviceCheckEvent::Started { operation: first })?;
+        let mut process = Process::start(program(first)?)?;
+        let (mut failed, mut hangs) = (false, false);
+        if let Some(printed) = process.child.stdout.take() {
+            let mut lines = PatientLines::of(printed, limit);
+            rest = answered(&mut lines, rest, |check| {
+                failed = check.failure.is_some();
+                report(DeviceCheckEvent::Checked(check))
+            })?;
+            hangs = lines.gave_up();
+        }
+        let why = if hangs {
+            process.kill()?;
+            OperationFailure::Silent(limit)
+        } else {
+            process.ended()?
+        };
+        if let ([(operation, needed_by), others @ ..], false) = (rest, failed) {
+            rest = others;
+            report(DeviceCheckEvent::Checked(OperationCheck {
+                operation,
+                needed_by: *needed_by,
+                forward: f64::INFINITY,
+                backward: None,
+                failure: Some(why),
+            }))?;
+        }
+    }
+    Ok(())
+}
+
+/// A process that does not outlive who started it.
+struct Process {
+    child: Child,
+}
+
+impl Process {
+    /// Starts a command, of which what it prints on stdout is read.
+    fn start(mut command: Command) -> Result<Self> {
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
+        match command.spawn() {
+            Ok(child) => Ok(Self { child }),
+            Err(source) => Err(Error::CheckNotStarted { source }),
+        }
+    }
+
+    /// Waits until it ends by itself.
+    fn ended(&mut self) -> Result<OperationFailure> {
+        match self.child.wait() {
+            Ok(status) => Ok(OperationFailure::ProcessEnded(status)),
+            Err(source) => Err(Error::CheckNotEnded { source }),
+        }
+    }
+
+    /// Ends it.
+    fn kill(&mut self) -> Result<()> {
+        // It may have ended by itself just now.
+        let _ = self.child.kill();
+        self.ended().map(drop)
+    }
+}
+
+/// One that was waited for is not killed.
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.kill();
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::device_check::answer_line;
+
+    const ASKED: [(&str, NeededBy); 3] = [
+        ("a", NeededBy::Network),
+        ("b", NeededBy::Flow),
+        ("c", NeededBy::Learning),
+    ];
+
+    /// A shell's command that answers an operation.
+    fn answer(operation: &'static str, failure: Option<&str>) -> String {
+        let check = OperationCheck {
+            operation,
+            needed_by: NeededBy::Network,
+            forward: 0.5,
+            backward: None,
+            failure: failure.map(|why| OperationFailure::Panicked(why.into())),
+        };
+        format!("echo '{}'", answer_line(&check).unwrap())
+    }
+
+    /// Where processes began, and what came of each operation.
+    type Seen = (
+        Vec<&'static str>,
+        Vec<(&'static str, Option<OperationFailure>)>,
+    );
+
+    /// What is seen of processes that run a shell's script, by the operation that they begin with.
+    fn seen(
+        asked: &[(&'static str, NeededBy)],
+        limit: Duration,
+        script: impl Fn(&str) -> String,
+    ) -> Seen {
+        let (mut started, mut checked) = (Vec::new(), Vec::new());
+        let mut program = |first: &str| -> Result<Command> {
+            let mut shell = Command::new("sh");
+            shell.arg("-c").arg(script(first));
+            Ok(shell)
+        };
+        let mut report = |event: DeviceCheckEvent| -> Result<()> {
+            match event {
+                DeviceCheckEvent::Started { operation } => started.push(operation),
+                DeviceCheckEvent::Checked(check) => checked.push((check.operation, check.failure)),
+            }
+            Ok(())
+        };
+        supervise(asked, limit, &mut program, &mut report).unwrap();
+        (started, checked)
+    }
+
+    const PATIENT: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn another_process_goes_on_behind_the_operation_that_ended_one() {
+        let (started, checked) = seen(&ASKED, PATIENT, |first| match first {
+            "a" => format!("{}; exit 3", answer("a", None)),
+            _ => answer("c", None),
+        });
+        assert_eq!(started, ["a", "c"]);
+        let [(_, None), (_, Some(ended)), (_, None)] = checked.as_slice() else {
+            panic!("{checked:?}")
+        };
+        assert_eq!(ended.to_string(), "its process ended (exit status: 3)");
+    }
+
+    #[test]
+    fn another_process_goes_on_behind_one_that_says_that_it_failed() {
+        let (started, checked) = seen(&ASKED, PATIENT, |first| match first {
+            "a" => answer("a", Some("out of memory")),
+            _ => format!("{}; {}", answer("b", None), answer("c", None)),
+        });
+        assert_eq!(started, ["a", "b"]);
+        let why = OperationFailure::Panicked("out of memory".into());
+        assert_eq!(checked, [("a", Some(why)), ("b", None), ("c", None)]);
+    }
+
+    #[test]
+    fn a_process_that_hangs_is_ended() {
+        let limit = Duration::from_millis(50);
+        let (_, checked) = seen(&ASKED[..1], limit, |_| "exec sleep 600".into());
+        assert_eq!(checked, [("a", Some(OperationFailure::Silent(limit)))]);
+    }
+
+    #[test]
+    fn who_is_told_may_stop_it() {
+        let mut program = |_: &str| -> Result<Command> {
+            let mut shell = Command::new("sh");
+            let script = format!("{}; exec sleep 600", answer("a", None));
+            shell.arg("-c").arg(script);
+            Ok(shell)
+        };
+        let mut report = |event: DeviceCheckEvent| match event {
+            DeviceCheckEvent::Started { .. } => Ok(()),
+            DeviceCheckEvent::Checked(_) => Err(Error::NoCamera),
+        };
+        let stopped = supervise(&ASKED, PATIENT, &mut program, &mut report);
+        assert!(matches!(stopped, Err(Error::NoCamera)), "{stopped:?}");
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_an_error() {
+        let mut program = |_: &str| -> Result<Command> { Ok(Command::new("/no/such/program")) };
+        let mut report = |_: DeviceCheckEvent| -> Result<()> { Ok(()) };
+        let failed = supervise(&ASKED, PATIENT, &mut program, &mut report);
+        assert!(
+            matches!(failed, Err(Error::CheckNotStarted { .. })),
+            "{failed:?}"
+        );
+    }
+}
