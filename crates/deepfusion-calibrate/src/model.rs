@@ -26,6 +26,15 @@ impl LensModel {
         }
     }
 
+    /// Its name, for people.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::BrownConrady => "Brown-Conrady",
+            Self::Fisheye => "fisheye (Kannala-Brandt)",
+        }
+    }
+
     /// How many numbers the camera has: fx, fy, cx, cy and the coefficients.
     pub(crate) fn numbers(self) -> usize {
         4 + self.coefficients().len()

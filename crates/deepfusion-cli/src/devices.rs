@@ -1,8 +1,8 @@
 //! The devices that this build and this machine have, and the line that says which one computes.
 
-#[cfg(feature = "train")]
-use burn::tensor::Device;
 pub(crate) use deepfusion_jobs::devices::{Backend, ComputeDevice, NoDevice, megabytes};
+#[cfg(feature = "train")]
+use deepfusion_train::Device;
 
 #[cfg(feature = "train")]
 use crate::progress::say;

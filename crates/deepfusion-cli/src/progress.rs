@@ -4,6 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+pub(crate) use deepfusion_jobs::dates::clock;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -95,30 +96,5 @@ impl Drop for Progress {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
-    }
-}
-
-/// Seconds as minutes and seconds, or hours and minutes.
-pub(crate) fn clock(seconds: f64) -> String {
-    if !seconds.is_finite() {
-        return "?".into();
-    }
-    let s = seconds.max(0.0).round() as u64;
-    if s >= 3600 {
-        format!("{} h {:02} min", s / 3600, s / 60 % 60)
-    } else {
-        format!("{}:{:02} min", s / 60, s % 60)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::clock;
-
-    #[test]
-    fn times_read_well() {
-        assert_eq!(clock(75.4), "1:15 min");
-        assert_eq!(clock(7_320.0), "2 h 02 min");
-        assert_eq!(clock(f64::NAN), "?");
     }
 }

@@ -1,5 +1,8 @@
 //! How fast a network is, and every stage around it: from a JPEG to depth, cloud, targets and colours.
 
+mod modules;
+mod report;
+
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -14,6 +17,9 @@ use deepfusion_runtime::DepthRunner;
 use deepfusion_sim::{SimConfig, Simulation};
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
+
+pub use self::modules::Modules;
+pub use self::report::{BenchReport, BenchRequest};
 
 use crate::Result;
 use crate::bulk::pipeline::{self, Threads};
@@ -220,6 +226,17 @@ impl StreetBench {
             None => Ok(images as f64 / seconds),
         }
     }
+}
+
+/// The weights of a configuration's depth network before its first step: how fast a network is does not depend on what it learned.
+///
+/// # Errors
+/// A network that cannot be built so.
+#[cfg(feature = "train")]
+pub fn first_weights(config: &TrainConfig) -> Result<deepfusion_model::weights::Weights> {
+    let device = deepfusion_train::Device::flex();
+    let net = deepfusion_nn::DepthNet::new(&config.depth_net, &device)?;
+    Ok(deepfusion_nn::weights::collect(&net))
 }
 
 /// Median time of `work` in milliseconds, after one run that is not counted.

@@ -1,6 +1,8 @@
 //! The board of a calibration in pictures and videos, and the camera by it.
 
 mod left_out;
+mod page;
+mod report;
 mod warning;
 
 use std::collections::BTreeMap;
@@ -18,6 +20,7 @@ use image::imageops::grayscale;
 use rayon::prelude::*;
 
 pub use self::left_out::{LeftOut, LeftOutReason};
+pub use self::report::CalibrationReport;
 pub use self::warning::BoardWarning;
 use self::warning::turned;
 use crate::{Error, Result, find_inputs};

@@ -41,6 +41,10 @@
     feature = "train",
     doc = "| [`training`] | what a run starts from and what it leaves; adapting a network to new drives; the table of an ablation |"
 )]
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`demo`] | the whole way with no data at all, on simulated streets |"
+)]
 //!
 //! Nothing here prints. What a person should know is returned, or passed to a callback.
 
@@ -49,6 +53,8 @@ pub mod bench;
 pub mod board;
 pub mod bulk;
 pub mod dates;
+#[cfg(feature = "train")]
+pub mod demo;
 #[cfg(feature = "train")]
 pub mod device_check;
 pub mod devices;

@@ -1,11 +1,17 @@
 //! The pose network's motions, chained, beside the drives' true paths.
 
+use std::path::Path;
+
 use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind};
-use deepfusion_eval::odometry::{PoseFile, TrackError, TrackPair, chain};
+use deepfusion_eval::odometry::{
+    PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
+};
 use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_render::TopView;
 use deepfusion_train::PosePredictor;
 
 use crate::Result;
+use crate::files::write;
 
 /// Exact poses of simulated drives.
 const EXACT_POSES: &str = "poses.txt";
@@ -84,6 +90,32 @@ pub fn tracks(
         }
     };
     Ok((tracks, truth))
+}
+
+/// Writes both paths of a track in the world of their first pose, and their picture from above, into a folder that is there.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_track(folder: &Path, track: &TrackPair) -> Result<()> {
+    let (truth, predicted) = (from_first(&track.truth), from_first(&track.predicted));
+    for (what, poses) in [("truth", &truth), ("predicted", &predicted)] {
+        let file = |kind: &str| folder.join(format!("{}_{what}.{kind}", track.name));
+        write(&file("txt"), kitti_text(poses))?;
+        if track.times_s.len() == poses.len() {
+            write(&file("tum"), tum_text(poses, &track.times_s))?;
+        }
+    }
+    // From above: the first camera's x to the right, its z ahead.
+    let seen = |poses: &[Se3]| -> Vec<[f64; 2]> {
+        let place = |p: &Se3| [p.translation().x, p.translation().z];
+        poses.iter().map(place).collect()
+    };
+    let title = format!("{}: {:.0} m from above", track.name, track.distance_m());
+    let svg = TopView::new(title)
+        .path("truth", seen(&truth))
+        .path("predicted, unscaled", seen(&predicted))
+        .to_svg();
+    Ok(write(&folder.join(format!("{}.svg", track.name)), svg)?)
 }
 
 /// The exact path of a simulated drive; `None` for real ones.

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use deepfusion_render::LearningLog;
+use deepfusion_hint::count_of;
+use deepfusion_render::{HtmlReport, LearningLog};
 use serde::Deserialize;
 
 use crate::Result;
@@ -36,6 +37,26 @@ impl RunHistory {
             images_a_step: settings.as_deref().and_then(images_a_step),
             settings,
         })
+    }
+
+    /// Adds to a page how the run learned, and its settings; nothing of what the folder does not keep.
+    #[must_use]
+    pub fn add_to(&self, mut page: HtmlReport) -> HtmlReport {
+        if let Some(log) = &self.log {
+            page = page
+                .section("How it learned")
+                .note(&format!(
+                    "{}; training curves are means over stretches of steps, held out: the samples never trained on.",
+                    count_of(log.steps(), "step")
+                ))
+                .learning(log, self.images_a_step);
+        }
+        if let Some(settings) = &self.settings {
+            page = page
+                .section("Settings")
+                .settings("config.toml of the run", settings);
+        }
+        page
     }
 }
 

@@ -15,9 +15,11 @@ mod error;
 )]
 mod scan;
 mod shipped;
+mod summary;
 mod tensors;
 
 pub use card::{Card, FORMAT_VERSION, Figure};
 pub use error::{CardProblem, Error};
 pub use shipped::{DEFAULT, MAX_BYTES, Shipped, all, find, names};
+pub use summary::CardSummary;
 pub use tensors::{NUMBERS, Tensor, pack};

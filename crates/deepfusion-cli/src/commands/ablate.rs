@@ -24,11 +24,7 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
     let (out, plan) = if args.resume {
         let out = args.out.clone().unwrap_or_default();
         let mut plan = Plan::read(&out)?;
-        plan.seeds = plan.seeds.max(args.seeds.unwrap_or(0) as u64);
-        if !args.data.is_empty() {
-            plan.config.data.paths.clone_from(&args.data);
-            plan.config.make_absolute();
-        }
+        plan.go_on_with(args.seeds.unwrap_or(0) as u64, &args.data);
         (out, plan)
     } else {
         let plan = request(args)?.plan().map_err(in_options)?;

@@ -133,15 +133,10 @@ fn report(args: &AdaptArgs, outcome: Outcome) -> Result<()> {
         }
         output::print(&text)?;
     }
-    if outcome.kept {
+    let Some(refusal) = outcome.refusal() else {
         return Ok(());
-    }
-    let worse: Vec<String> = outcome.worse.iter().map(ToString::to_string).collect();
-    let worse = if worse.is_empty() {
-        "the frames that are held out say nothing about it any more".into()
-    } else {
-        worse.join(", ")
     };
+    let worse = refusal.to_string();
     let path = outcome.run;
     Err(CliError::Refused { path, worse }.into())
 }

@@ -4,21 +4,18 @@ use std::path::Path;
 
 use deepfusion_data::{Cameras, save_png};
 use deepfusion_eval::compare::{Evaluation, Tables, published_tables, run_tables};
-use deepfusion_jobs::evaluation::ModelSheet;
-use deepfusion_render::{DepthScale, HtmlReport, PictureFormat, Tile, depth_legend, model_sheet};
+use deepfusion_jobs::evaluation::{ModelSheet, comparison_page};
+use deepfusion_render::{DepthScale, Tile, model_sheet};
 use deepfusion_runtime::ModelSource;
 
+use super::command_line;
 use super::recordings::open_datasets;
-use super::run_report;
 use crate::cli::{CompareArgs, TableFormat};
 use crate::engine;
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
-
-/// Width of the legend in the page.
-const LEGEND_WIDTH: u32 = 700;
 
 /// `deepfusion compare`.
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
@@ -52,23 +49,10 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
 }
 
 fn html(args: &CompareArgs, tables: &Tables, rows: &[Vec<Tile>]) -> Result<String> {
-    let names: Vec<_> = args.runs.iter().map(|p| output::name_of(p)).collect();
-    let mut page = HtmlReport::new("Depth, side by side", names.join(", ")).wide();
-    page = page.comparison(tables);
-    if let (false, Some(recording)) = (rows.is_empty(), &args.pictures) {
-        page = page
-            .section(&format!("Pictures of {}", output::name_of(recording)))
-            .picture_grid(rows)?
-            .picture(
-                "Depth in metres, the same colours in all pictures",
-                &depth_legend(LEGEND_WIDTH, &DepthScale::default()),
-                PictureFormat::Png,
-            )?;
-    }
-    Ok(page
-        .section("Again")
-        .command(&run_report::command())
-        .to_html())
+    let recording = args.pictures.as_deref().filter(|_| !rows.is_empty());
+    let pictures = recording.map(|recording| (recording, rows));
+    let command = command_line::typed_again();
+    Ok(comparison_page(&args.runs, tables, pictures, &command)?.to_html())
 }
 
 /// The same images by each model: a row an image, a column a model, with the scans where there are any.

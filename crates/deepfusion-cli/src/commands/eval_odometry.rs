@@ -1,12 +1,8 @@
 use std::path::Path;
 
 use deepfusion_data::OpenOptions;
-use deepfusion_eval::odometry::{
-    OdometryReport, PoseFile, TrackPair, from_first, kitti_text, tum_text,
-};
-use deepfusion_geometry::Se3;
-use deepfusion_jobs::odometry::tracks;
-use deepfusion_render::TopView;
+use deepfusion_eval::odometry::{OdometryReport, PoseFile, TrackPair};
+use deepfusion_jobs::odometry::{tracks, write_track};
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
 
@@ -68,27 +64,4 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     });
     let (tracks, truth) = found?;
     Ok((tracks, truth.to_owned()))
-}
-
-/// Both paths in the world of their first pose, and their picture.
-fn write_track(out: &Path, track: &TrackPair) -> Result<()> {
-    let (truth, predicted) = (from_first(&track.truth), from_first(&track.predicted));
-    for (what, poses) in [("truth", &truth), ("predicted", &predicted)] {
-        let file = |kind: &str| out.join(format!("{}_{what}.{kind}", track.name));
-        output::write(&file("txt"), kitti_text(poses))?;
-        if track.times_s.len() == poses.len() {
-            output::write(&file("tum"), tum_text(poses, &track.times_s))?;
-        }
-    }
-    // From above: the first camera's x to the right, its z ahead.
-    let seen = |poses: &[Se3]| -> Vec<[f64; 2]> {
-        let place = |p: &Se3| [p.translation().x, p.translation().z];
-        poses.iter().map(place).collect()
-    };
-    let title = format!("{}: {:.0} m from above", track.name, track.distance_m());
-    let svg = TopView::new(title)
-        .path("truth", seen(&truth))
-        .path("predicted, unscaled", seen(&predicted))
-        .to_svg();
-    output::write(&out.join(format!("{}.svg", track.name)), svg)
 }

@@ -7,6 +7,7 @@ mod adapt;
 mod bench;
 mod calibrate;
 mod clocks;
+mod command_line;
 mod compare;
 mod completions;
 mod config;
@@ -32,7 +33,6 @@ mod recorder;
 mod recordings;
 #[cfg(feature = "train")]
 mod resume;
-mod run_report;
 mod simulate;
 #[cfg(feature = "train")]
 mod train;

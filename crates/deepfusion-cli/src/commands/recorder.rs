@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use deepfusion_hint::count_of;
-use deepfusion_jobs::training::{OtherSetting, Pace, RunLog, TimeEstimate};
-use deepfusion_train::{Control, LossTerms, TrainEvent};
+use deepfusion_jobs::training::{OtherSetting, Pace, RunLog, TimeEstimate, event_line};
+use deepfusion_train::{Control, TrainEvent};
 
 use crate::failure::{Failure, Result};
 use crate::interrupt;
@@ -44,7 +44,7 @@ impl Recorder {
             self.failure.get_or_insert(error.into());
             return Control::Stop;
         }
-        self.say(event);
+        self.say(&event);
         if interrupt::asked() {
             Control::Stop
         } else {
@@ -60,140 +60,30 @@ impl Recorder {
         }
     }
 
-    fn say(&mut self, event: TrainEvent) {
-        match event {
-            TrainEvent::Started {
-                from_step,
-                steps,
-                samples,
-                validation_samples,
-                mean_displacement_m,
-            } => {
-                let going_on = if from_step > 0 {
-                    format!(", going on after step {from_step}")
-                } else {
-                    String::new()
-                };
-                // Images that are learned from by their depth have not moved.
-                let moved = if mean_displacement_m > 0.0 {
-                    format!(", mean displacement {mean_displacement_m:.3} m")
-                } else {
-                    String::new()
-                };
-                say(&format!(
-                    "{}, {validation_samples} held out{moved}; {}{going_on}",
-                    count_of(samples, "training sample"),
-                    count_of(steps, "step")
-                ));
-            }
-            TrainEvent::Step {
-                step,
-                steps,
-                losses,
-                images_per_second,
-                remaining_s,
-                scale_ratio,
-                ..
-            } => {
-                let line = format!(
-                    "loss {:.4} ({}){}, {images_per_second:.1} images/s, {} left",
-                    losses.total,
-                    terms_of_a_step(&losses),
-                    scale_text(scale_ratio),
-                    clock(remaining_s)
-                );
-                self.progress.note(&line);
-                self.progress.set(step, steps);
-                if !self.progress.is_bar()
-                    && (step <= 1 || step == steps || self.last_line.elapsed() > LINE_EVERY)
-                {
-                    self.last_line = Instant::now();
-                    say(&format!("step {step}/{steps}: {line}"));
-                }
-                if let Some(pace) = &mut self.pace
-                    && let Some(estimate) = pace.after_step(step, steps)
-                {
-                    say(&how_long(&estimate));
-                }
-            }
-            TrainEvent::Validated {
-                step,
-                losses,
-                selection,
-                scale_ratio,
-                best,
-            } => {
-                say(&format!(
-                    "step {step}: held out {selection:.4}{} ({}){}",
-                    if best { ", the best so far" } else { "" },
-                    held_out_terms(&losses),
-                    scale_text(scale_ratio),
-                ));
-            }
-            TrainEvent::Camera { camera, learned } => {
-                let [fx, fy] = learned.focal_px;
-                let spread = match learned.sigma_px {
-                    Some([x, y]) => format!("standard deviations {x:.1} and {y:.1}"),
-                    None => "not determined by these drives".into(),
-                };
-                say(&format!(
-                    "camera learned: fx {fx:.1}, fy {fy:.1} in pixels of {}x{} ({spread}), the principal point in the middle",
-                    camera.width, camera.height
-                ));
-            }
-            TrainEvent::Panel { .. } | TrainEvent::Saved { .. } => {}
-            TrainEvent::Warning { step, warning } => {
-                tracing::warn!("step {step}: {warning}");
-            }
+    fn say(&mut self, event: &TrainEvent) {
+        if let TrainEvent::Warning { step, warning } = event {
+            tracing::warn!("step {step}: {warning}");
+        }
+        let Some(line) = event_line(event) else {
+            return;
+        };
+        let &TrainEvent::Step { step, steps, .. } = event else {
+            return say(&line);
+        };
+        self.progress.note(&line);
+        self.progress.set(step, steps);
+        if !self.progress.is_bar()
+            && (step <= 1 || step == steps || self.last_line.elapsed() > LINE_EVERY)
+        {
+            self.last_line = Instant::now();
+            say(&format!("step {step}/{steps}: {line}"));
+        }
+        if let Some(pace) = &mut self.pace
+            && let Some(estimate) = pace.after_step(step, steps)
+        {
+            say(&how_long(&estimate));
         }
     }
-}
-
-/// The terms of what a step learned from.
-fn terms_of_a_step(losses: &LossTerms) -> String {
-    let mut terms = Vec::new();
-    if losses.reprojection > 0.0 {
-        terms.push(format!(
-            "reprojection {:.4}, smoothness {:.4}",
-            losses.reprojection, losses.smoothness
-        ));
-        terms.extend(speed_text(losses));
-    }
-    if losses.flow > 0.0 {
-        let moving = 100.0 * losses.moving_share;
-        terms.push(format!("flow {:.4}, moving {moving:.1} %", losses.flow));
-    }
-    if losses.depth > 0.0 {
-        terms.push(format!("depth {:.4}", losses.depth));
-    }
-    terms.join(", ")
-}
-
-/// Nothing where the run has no PoseNet.
-fn speed_text(losses: &LossTerms) -> Option<String> {
-    (losses.speed > 0.0).then(|| format!("speed {:.3} m", losses.speed))
-}
-
-/// Nothing where no network says a scale.
-fn scale_text(ratio: f64) -> String {
-    if ratio.is_finite() {
-        format!(", scale ratio {ratio:.3}")
-    } else {
-        String::new()
-    }
-}
-
-/// What was learned from, of the held-out samples.
-fn held_out_terms(losses: &LossTerms) -> String {
-    let mut terms = Vec::new();
-    if losses.reprojection > 0.0 {
-        terms.push(format!("reprojection {:.4}", losses.reprojection));
-        terms.extend(speed_text(losses));
-    }
-    if losses.depth > 0.0 {
-        terms.push(format!("depth {:.4}", losses.depth));
-    }
-    terms.join(", ")
 }
 
 /// How long a run will take, and the options that choose otherwise.
@@ -262,22 +152,5 @@ mod tests {
             line.contains("steps of 12 s; on this processor --set precision=bf16"),
             "{line}"
         );
-    }
-
-    #[test]
-    fn what_no_network_says_is_not_printed() {
-        let mut losses = LossTerms {
-            reprojection: 0.125,
-            speed: 0.25,
-            ..LossTerms::default()
-        };
-        assert_eq!(
-            held_out_terms(&losses),
-            "reprojection 0.1250, speed 0.250 m"
-        );
-        assert_eq!(scale_text(1.5), ", scale ratio 1.500");
-        losses.speed = 0.0;
-        assert_eq!(held_out_terms(&losses), "reprojection 0.1250");
-        assert_eq!(scale_text(f64::NAN), "");
     }
 }

@@ -1,8 +1,10 @@
 //! What a run's depth is worth, pixel by pixel: learned from frames with ground truth, kept beside the run.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Dataset;
+use deepfusion_hint::count_of;
 use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
 use deepfusion_runtime::DepthEstimator;
 use serde::{Deserialize, Serialize};
@@ -76,6 +78,52 @@ pub struct Calibrated {
     pub by_drive: bool,
     /// How it holds on the frames that it was judged by.
     pub reliability: Vec<Reliability>,
+}
+
+/// By what a confidence was judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum JudgedBy {
+    /// No frame was left.
+    Nothing,
+    /// So many frames of other drives.
+    OtherDrives(usize),
+    /// So many frames of another part of the one drive.
+    AnotherPart(usize),
+}
+
+impl fmt::Display for JudgedBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Nothing => f.write_str("none left to judge it by"),
+            Self::OtherDrives(n) => write!(f, "judged by {n} of other drives"),
+            Self::AnotherPart(n) => write!(f, "judged by {n} of another part"),
+        }
+    }
+}
+
+impl Calibrated {
+    /// By what it was judged.
+    #[must_use]
+    pub fn judged_by(&self) -> JudgedBy {
+        match (self.confidence.held_out, self.by_drive) {
+            (0, _) => JudgedBy::Nothing,
+            (n, true) => JudgedBy::OtherDrives(n),
+            (n, false) => JudgedBy::AnotherPart(n),
+        }
+    }
+}
+
+impl fmt::Display for Calibrated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "confidence learned from {}, {}, kept as {}",
+            count_of(self.confidence.frames, "frame"),
+            self.judged_by(),
+            self.path.display()
+        )
+    }
 }
 
 /// Learns from one part of the evaluated frames, keeps the result beside the run, and finds how it holds on the other, which

@@ -2,10 +2,14 @@
 
 mod chosen_images;
 mod comparison;
+mod comparison_page;
 pub mod confidence;
 mod coverage;
 mod division;
+mod measurement;
 mod model_sheet;
+mod outcome;
+mod page;
 mod saved;
 mod shown_images;
 mod truth;
@@ -26,9 +30,13 @@ use crate::{Error, Result, files};
 
 pub use self::chosen_images::{ChosenImage, Standing, chosen_images};
 pub use self::comparison::Comparison;
+pub use self::comparison_page::comparison_page;
 pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
 pub use self::division::{Division, divide};
+pub use self::measurement::{Measurement, MeasurementRequest};
 pub use self::model_sheet::ModelSheet;
+pub use self::outcome::EvaluationOutcome;
+pub use self::page::{EvaluationPage, MeasuredDepth};
 pub use self::saved::EvaluationRequest;
 pub use self::shown_images::{shown_of_arrays, shown_of_datasets};
 pub use self::truth::{

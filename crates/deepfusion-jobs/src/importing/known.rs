@@ -1,7 +1,9 @@
 //! What can be imported, for people.
 
+use serde::Serialize;
+
 /// Another project's weights that can be imported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct KnownWeights {
     /// The networks.
     pub name: &'static str,

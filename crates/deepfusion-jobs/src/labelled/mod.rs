@@ -2,6 +2,7 @@
 
 mod lidar;
 mod object_frames;
+mod report;
 mod source;
 mod tracklets;
 
@@ -18,6 +19,7 @@ pub use self::lidar::gathered;
 pub use self::object_frames::{
     ObjectFrame, ObjectFrameProblem, is_folder_of, read as read_object_frames,
 };
+pub use self::report::TargetReport;
 pub use self::source::{DepthSource, PredictedDepth};
 pub use self::tracklets::{Labels, pixels_within};
 use crate::scene::MotionTracker;

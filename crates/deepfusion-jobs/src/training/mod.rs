@@ -4,6 +4,7 @@
 pub mod ablation;
 pub mod adaptation;
 mod asked_recordings;
+mod event_line;
 mod plan;
 pub mod resume;
 mod run_log;
@@ -12,6 +13,7 @@ mod start_request;
 mod time_estimate;
 
 pub use asked_recordings::AskedRecordings;
+pub use event_line::event_line;
 pub use plan::{RunLength, TrainingPlan, leaves_turns_unused};
 pub use run_log::RunLog;
 pub use start::{SettingsOfMean, Start, StartReport};

@@ -5,10 +5,12 @@
 //! motion fit, and what the mirrored image gives tells how much of it is chance. [`verdict`] puts it together.
 
 mod evidence;
+mod page;
 mod plan;
 #[cfg(feature = "train")]
 mod pose;
 mod speeds;
+mod warning;
 
 use std::collections::HashSet;
 
@@ -20,9 +22,11 @@ use deepfusion_eval::verdict::{
 };
 use deepfusion_runtime::DepthEstimator;
 
+pub use self::page::verdict_page;
 pub use self::plan::{Block, Plan, Target, plan};
 #[cfg(feature = "train")]
-pub use self::pose::{pose_net_is_metric, pose_speeds};
+pub use self::pose::{metric_pose_net, pose_net_is_metric, pose_speeds, pose_speeds_of};
+pub use self::warning::VerdictWarning;
 
 use self::evidence::{FrameEvidence, evidence_of_frame};
 use crate::Result;

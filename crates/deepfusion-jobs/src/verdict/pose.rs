@@ -1,11 +1,14 @@
 //! The way between neighbouring frames as PoseNet sees it.
 
+use std::path::Path;
+
 use deepfusion_data::Dataset;
 use deepfusion_eval::verdict::{SpeedRow, speed_rows};
 use deepfusion_model::TrainConfig;
-use deepfusion_train::PosePredictor;
+use deepfusion_runtime::ModelSource;
+use deepfusion_train::{Device, PosePredictor};
 
-use super::{Unseen, VerdictOptions, plan};
+use super::{Unseen, VerdictOptions, VerdictWarning, plan};
 use crate::Result;
 
 /// Another focal length than the one trained with, at network size, by more than this share: PoseNet sees another motion.
@@ -22,6 +25,33 @@ pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
     let learned = !config.leaves_pose_net_out();
     let neighbours = config.frames.iter().all(|offset| offset.abs() == 1);
     from_video && learned && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
+}
+
+/// Where a network has a PoseNet of which [`pose_net_is_metric`] holds, as it is loaded; `config`: its run's.
+#[must_use]
+pub fn metric_pose_net<'a>(model: &'a ModelSource, config: &TrainConfig) -> Option<&'a Path> {
+    match model {
+        ModelSource::Run { given, .. } => pose_net_is_metric(config).then_some(given.as_path()),
+        ModelSource::Packed { .. } => None,
+    }
+}
+
+/// As [`pose_speeds`], of the PoseNet at a path ([`metric_pose_net`]), with the metres of a data set. One that cannot be loaded is a warning:
+/// depth is judged all the same.
+///
+/// # Errors
+/// An image that cannot be read.
+pub fn pose_speeds_of(
+    (path, set): (&Path, Option<&str>),
+    device: &Device,
+    datasets: &[Dataset],
+    unseen: &Unseen,
+    options: &VerdictOptions,
+) -> Result<Result<Vec<SpeedRow>, VerdictWarning>> {
+    match PosePredictor::load(path, set, device) {
+        Ok(predictor) => pose_speeds(&predictor, datasets, unseen, options).map(Ok),
+        Err(why) => Ok(Err(VerdictWarning::NoPoseNet(why))),
+    }
 }
 
 /// PoseNet's way from each frame that [`super::verdict`] looks at to the one before, against the vehicle's, by speed. Nothing of recordings with

@@ -5,6 +5,7 @@ mod frames;
 mod page;
 mod sections;
 mod tables;
+mod verdict;
 
 pub use frames::ShownFrame;
 pub use page::{HtmlReport, PictureFormat};

@@ -4,22 +4,19 @@
 
 mod adapt;
 mod from_scratch;
-mod page;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use burn::tensor::Device;
-use deepfusion_data::{Dataset, GtKind};
-use deepfusion_eval::{Crop, GroundTruth, Protocol};
-use deepfusion_jobs::evaluation::{
-    Evaluated, Truth, baseline_from_datasets, evaluate_datasets, predict,
-};
-use deepfusion_model::{InputSize, RunFolder, TrainConfig};
+use deepfusion_data::Dataset;
+use deepfusion_eval::IntervalFactors;
+use deepfusion_jobs::demo::{self, DemoFolder, DemoSettings, Shown};
+use deepfusion_jobs::evaluation::Evaluated;
+use deepfusion_model::{RunFolder, TrainConfig};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
 use deepfusion_sim::{Error as SimError, SimConfig, Simulation, write_kitti};
-use deepfusion_train::{Model, Trainer};
+use deepfusion_train::{Device, Model, Trainer};
 use deepfusion_weights::DEFAULT;
 
 use super::recordings::open_samples;
@@ -29,9 +26,6 @@ use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{Progress, clock, say};
 use crate::{devices, engine, interrupt, output};
-
-/// Far from any seed a user is likely to choose for training.
-const TEST_SEED: u64 = 1_000_003;
 
 /// Its name in the message that it was stopped.
 const DEMO: &str = "the demo";
@@ -50,8 +44,9 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let demo = Demo {
         args,
         start: Instant::now(),
+        settings: settings(args),
         device: devices::open(args.device)?,
-        out: output::run_folder(args.out.as_deref(), "demo")?,
+        folder: DemoFolder::new(output::run_folder(args.out.as_deref(), "demo")?),
     };
     match embedded {
         Some(network) => adapt::run(&demo, network),
@@ -59,13 +54,23 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     }
 }
 
+fn settings(args: &DemoArgs) -> DemoSettings {
+    DemoSettings {
+        seed: args.seed,
+        frames: args.frames.map(usize::from),
+        steps: args.steps,
+        size: args.size.map(|size| (size.width, size.height)),
+        compute: args.device.compute(),
+    }
+}
+
 /// What both ways have in common.
 struct Demo<'a> {
     args: &'a DemoArgs,
     start: Instant,
+    settings: DemoSettings,
     device: Device,
-    /// Folder for everything.
-    out: PathBuf,
+    folder: DemoFolder,
 }
 
 impl Demo<'_> {
@@ -73,7 +78,7 @@ impl Demo<'_> {
     fn simulate(&self, name: &str, config: &SimConfig) -> Result<PathBuf> {
         let simulation = Simulation::new(config)?;
         let mut progress = Progress::new("simulating");
-        let out = self.out.join(name);
+        let out = self.folder.join(name);
         let mut listen = |done, total| {
             progress.set(done, total);
             interrupt::flow()
@@ -89,31 +94,6 @@ impl Demo<'_> {
         }
     }
 
-    /// Frames of a drive.
-    fn frames(&self, usual: usize) -> usize {
-        self.args.frames.map_or(usual, usize::from)
-    }
-
-    /// Steps of training.
-    fn steps(&self, usual: usize) -> usize {
-        self.args.steps.unwrap_or(usual)
-    }
-
-    /// Width and height of pictures.
-    fn size(&self, usual: (u32, u32)) -> (u32, u32) {
-        self.args
-            .size
-            .map_or(usual, |size| (size.width, size.height))
-    }
-
-    /// The size of what the network learns from.
-    fn input_size(&self, usual: InputSize) -> InputSize {
-        self.args.size.map_or(usual, |size| InputSize {
-            width: size.width as usize,
-            height: size.height as usize,
-        })
-    }
-
     /// Trains into the folder `model`.
     fn learn(
         &self,
@@ -121,23 +101,32 @@ impl Demo<'_> {
         initialise: impl FnOnce(Model) -> Result<Model, deepfusion_train::Error>,
     ) -> Result<ModelSource> {
         let sets = open_samples(&config)?;
-        let folder = RunFolder::create(&self.model())?;
+        let folder = RunFolder::create(&self.folder.model())?;
         let mut trainer = Trainer::create(config, folder, sets, &self.device, initialise)?;
         train::train(&mut trainer, None)?;
         interrupt::check(DEMO)?;
-        Ok(ModelSource::named(&self.model().join("last.safetensors"))?)
-    }
-
-    fn model(&self) -> PathBuf {
-        self.out.join("model")
-    }
-
-    fn cloud(&self) -> PathBuf {
-        self.out.join("cloud.ply")
+        let checkpoint = self.folder.model().join("last.safetensors");
+        Ok(ModelSource::named(&checkpoint)?)
     }
 
     fn estimator(&self, model: &ModelSource) -> Result<DepthEstimator> {
         engine::load(model, &EngineArgs::on(self.args.device))
+    }
+
+    /// A frame of a drive, and the depth that a network sees in it.
+    fn look(
+        &self,
+        network: (&mut DepthEstimator, &IntervalFactors),
+        drive: &Dataset,
+        frame: usize,
+    ) -> Result<Shown> {
+        interrupt::check(DEMO)?;
+        Ok(Shown::of(network, drive, frame, self.folder.pictures())?)
+    }
+
+    /// Seconds from its start.
+    fn seconds(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
     }
 
     /// Prints what it came to and where it lies.
@@ -145,10 +134,10 @@ impl Demo<'_> {
         let report = &evaluated.report;
         say(&format!(
             "{report}\ndone in {}\nreport  {}\nmodel   {}\ncloud   {}",
-            clock(self.start.elapsed().as_secs_f64()),
+            clock(self.seconds()),
             page.display(),
-            self.model().display(),
-            self.cloud().display(),
+            self.folder.model().display(),
+            self.folder.cloud().display(),
         ));
         if self.args.json {
             output::print_json(report)
@@ -158,29 +147,18 @@ impl Demo<'_> {
     }
 }
 
-/// Measures on the scans of `test`, beside the mean depth of the scans of `train`.
+/// As [`demo::measure`], with its progress; it can be stopped between two frames.
 fn measure(
     estimator: &mut DepthEstimator,
     train: &[Dataset],
     test: &[Dataset],
 ) -> Result<Evaluated> {
-    let protocol = Protocol {
-        crop: Crop::Garg,
-        gt: GroundTruth::Z,
-        ..Protocol::default()
-    };
     let mut progress = Progress::new("evaluating");
-    evaluate_datasets(
+    demo::measure(
+        estimator,
+        train,
         test,
-        &mut Truth::Scans(GtKind::Z),
-        &protocol,
-        Some(baseline_from_datasets(train, GtKind::Z)?),
-        &mut |dataset, frame| {
-            interrupt::check(DEMO)?;
-            let image = dataset.load_image(frame)?;
-            let camera = dataset.intrinsics(frame);
-            Ok(predict(estimator, &image, &camera, true)?)
-        },
+        &mut || interrupt::check(DEMO),
         &mut |done, total| progress.set(done, total),
     )
 }

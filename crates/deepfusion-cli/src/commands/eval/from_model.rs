@@ -1,25 +1,22 @@
 //! A network measured on recordings.
 
-use deepfusion_data::{Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_data::{Dataset, GtKind, OpenOptions};
 use deepfusion_eval::compare::SavedEvaluation;
 use deepfusion_eval::verdict::Verdict;
-use deepfusion_eval::{ArraySet, Prediction, Protocol};
 use deepfusion_hint::count_of;
-use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
+use deepfusion_jobs::evaluation::confidence;
 use deepfusion_jobs::evaluation::{
-    Evaluated, EvaluationRequest, Truth, UsedCheckpoint, baseline_from_arrays,
-    baseline_from_training, check_used, default_crop, evaluate_datasets, expected_frames,
-    has_truth, predict_frame, shown_of_datasets,
+    Evaluated, EvaluationOutcome, EvaluationPage, EvaluationRequest, MeasuredDepth, Measurement,
+    MeasurementRequest, UsedCheckpoint, default_crop, has_truth,
 };
-use deepfusion_jobs::intervals;
 use deepfusion_jobs::recordings::read_split;
 use deepfusion_perception::Reliability;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
-use super::{EvalOutcome, page, verdict, write_points};
+use super::{verdict, write_points};
 use crate::cli::{CameraIntrinsics, EvalArgs};
 use crate::commands::recordings::{open_recordings, open_with_yaw};
-use crate::commands::{clocks, run_report, warnings};
+use crate::commands::{clocks, command_line, warnings};
 use crate::engine;
 use crate::error::CliError;
 use crate::failure::Result;
@@ -34,16 +31,9 @@ struct EvalInputs {
     datasets: Vec<Dataset>,
 }
 
-/// What was measured, and against what.
-struct Measured {
-    protocol: Protocol,
-    truth: Truth,
-    evaluated: Evaluated,
-}
-
 /// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
 /// all of its ground truth counts.
-pub(super) fn outcome(args: &EvalArgs) -> Result<EvalOutcome> {
+pub(super) fn outcome(args: &EvalArgs) -> Result<EvaluationOutcome> {
     let mut inputs = open(args)?;
     let verdict = verdict::of_model(args, &inputs.model, &mut inputs.estimator, &inputs.datasets)?;
     if verdict.is_some() && !with_truth(args, &inputs.datasets) {
@@ -57,7 +47,7 @@ pub(super) fn outcome(args: &EvalArgs) -> Result<EvalOutcome> {
     let reliability = calibrate_confidence(args, &mut inputs, &mut measured)?;
     let without_truth = (reliability.as_deref(), verdict.as_ref());
     write_page(args, &mut inputs, &mut measured, &saved, without_truth)?;
-    Ok(EvalOutcome {
+    Ok(EvaluationOutcome {
         checkpoint: Some(UsedCheckpoint::of(&inputs.estimator, &inputs.model)),
         report: Some(measured.evaluated.report),
         verdict,
@@ -120,73 +110,41 @@ fn with_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
     needs_truth || args.gt.is_some() || has_truth(datasets, args.gt_depth)
 }
 
-/// An image and its prediction, as the arguments want it.
-fn see(
-    args: &EvalArgs,
-    estimator: &mut DepthEstimator,
-    dataset: &Dataset,
-    frame: usize,
-) -> deepfusion_jobs::Result<(RgbImage, Prediction)> {
-    let (correct, how) = (!args.no_focal_correction, args.post_process);
-    predict_frame(estimator, dataset, frame, correct, how)
-}
-
 /// Compares depth with ground truth, beside the mean-depth baseline.
-fn measure(args: &EvalArgs, inputs: &mut EvalInputs) -> Result<Measured> {
+fn measure<'a>(args: &'a EvalArgs, inputs: &mut EvalInputs) -> Result<Measurement<'a>> {
     let EvalInputs {
         estimator,
         options,
         datasets,
         ..
     } = inputs;
-    let expected = expected_frames(options, datasets, args.strict)?;
-    let mut truth = match &args.gt {
-        Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
-        None => Truth::Scans(args.gt_depth),
+    let request = MeasurementRequest {
+        truth: args.gt.as_deref(),
+        baseline: args.trivial.as_deref(),
+        protocol: args.protocol(default_crop(datasets)),
+        focal_correction: !args.no_focal_correction,
+        post_process: args.post_process,
+        strict: args.strict,
     };
-    let baseline = match &args.trivial {
-        Some(path) => Some(baseline_from_arrays(path)?),
-        None => baseline_from_training(estimator.config(), args.gt_depth),
-    };
-    let protocol = args.protocol(default_crop(datasets));
     let mut progress = Progress::new("evaluating");
-    let mut evaluated = evaluate_datasets(
-        datasets,
-        &mut truth,
-        &protocol,
-        baseline,
-        &mut |dataset, frame| {
-            see(args, estimator, dataset, frame).map(|(_, prediction)| prediction)
-        },
-        &mut |done, total| progress.set(done, total),
-    )?;
-    evaluated.report.expected = expected;
-    if let Some(shortfall) = check_used(options, datasets, evaluated.report.n, args.strict)? {
+    let measured = request.measure(estimator, options, datasets, &mut |done, total| {
+        progress.set(done, total);
+    })?;
+    if let Some(shortfall) = &measured.shortfall {
         warnings::warn_once(shortfall.to_string());
     }
-    Ok(Measured {
-        protocol,
-        truth,
-        evaluated,
-    })
+    Ok(measured)
 }
 
-/// Adds whether the network's intervals hold, and calibrates them where that is asked for. They are those of its own prediction alone.
+/// Adds whether the network's intervals hold, and calibrates them where that is asked for.
 fn measure_intervals(
     args: &EvalArgs,
     inputs: &mut EvalInputs,
-    measured: &mut Measured,
+    measured: &mut Measurement,
 ) -> Result<()> {
-    let knows = inputs.estimator.knows_uncertainty();
-    if !knows || args.gt.is_some() || args.post_process.is_some() {
-        return Ok(());
-    }
-    let kept = intervals::measure(
+    let kept = measured.measure_intervals(
         (&inputs.model, &mut inputs.estimator),
         &inputs.datasets,
-        &mut measured.truth,
-        &mut measured.evaluated,
-        (&measured.protocol, !args.no_focal_correction),
         args.calibrate_uncertainty,
     )?;
     if let Some((found, path)) = kept {
@@ -233,7 +191,7 @@ fn request(args: &EvalArgs) -> EvaluationRequest<'_> {
         focal_correction: !args.no_focal_correction,
         post_process: args.post_process,
         program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
-        command: run_report::command(),
+        command: command_line::typed_again(),
     }
 }
 
@@ -241,7 +199,7 @@ fn request(args: &EvalArgs) -> EvaluationRequest<'_> {
 fn calibrate_confidence(
     args: &EvalArgs,
     inputs: &mut EvalInputs,
-    measured: &mut Measured,
+    measured: &mut Measurement,
 ) -> Result<Option<Vec<Reliability>>> {
     let (true, Some(folder)) = (args.calibrate_confidence, inputs.model.folder()) else {
         return Ok(None);
@@ -254,67 +212,39 @@ fn calibrate_confidence(
         !args.no_focal_correction,
         folder,
     )?;
-    Ok(calibrated.map(print_calibrated))
-}
-
-/// Says what the confidence was learned from; gives how it holds.
-fn print_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
-    let Calibrated {
-        confidence,
-        path,
-        by_drive,
-        reliability,
-    } = calibrated;
-    let judged_by = match (confidence.held_out, by_drive) {
-        (0, _) => "none left to judge it by".to_owned(),
-        (n, true) => format!("judged by {n} of other drives"),
-        (n, false) => format!("judged by {n} of another part"),
-    };
-    say(&format!(
-        "confidence learned from {}, {judged_by}, kept as {}",
-        count_of(confidence.frames, "frame"),
-        path.display()
-    ));
-    reliability
+    Ok(calibrated.map(|calibrated| {
+        say(&calibrated.to_string());
+        calibrated.reliability
+    }))
 }
 
 /// Writes the page where `--report` asks for it.
 fn write_page(
     args: &EvalArgs,
     inputs: &mut EvalInputs,
-    measured: &mut Measured,
+    measured: &mut Measurement,
     saved: &SavedEvaluation,
     (reliability, verdict): (Option<&[Reliability]>, Option<&Verdict>),
 ) -> Result<()> {
     let Some(path) = &args.report else {
         return Ok(());
     };
-    let EvalInputs {
-        model,
-        estimator,
-        datasets,
-        ..
-    } = inputs;
-    let Measured {
-        protocol,
-        truth,
-        evaluated,
-    } = measured;
-    let shown = shown_of_datasets(datasets, truth, evaluated, |dataset, frame| {
-        see(args, estimator, dataset, frame)
-    })?;
-    let how = page::how_a_model_was_measured(args, protocol, saved);
-    let mut page = page::of(args, &model.name(), evaluated, &shown, &how)?;
-    if let Some(bins) = reliability {
-        page = run_report::reliability(page, bins);
-    }
-    if let Some(found) = verdict {
-        page = run_report::verdict(page, found);
-    }
-    if let Some(folder) = model.folder() {
-        page = run_report::training(page, folder)?;
-    }
-    page.write(path)?;
+    let shown = measured.shown(&mut inputs.estimator, &inputs.datasets)?;
+    let request = request(args);
+    let page = EvaluationPage {
+        source: MeasuredDepth::Network {
+            model: &inputs.model,
+            request: &request,
+            saved,
+        },
+        protocol: &measured.request.protocol,
+        evaluated: &measured.evaluated,
+        shown: &shown,
+        reliability,
+        verdict,
+        command: &request.command,
+    };
+    page.compose()?.write(path)?;
     say(&format!("report  {}", path.display()));
     Ok(())
 }

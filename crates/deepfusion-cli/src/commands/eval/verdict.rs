@@ -1,21 +1,17 @@
 //! What is said of depth without ground truth.
 
 use deepfusion_data::Dataset;
-use deepfusion_eval::verdict::{NoCertificate, Verdict};
-use deepfusion_jobs::evaluation::UsedCheckpoint;
+use deepfusion_eval::verdict::Verdict;
+use deepfusion_jobs::evaluation::{EvaluationOutcome, UsedCheckpoint};
 use deepfusion_jobs::held_out::unseen_by;
 use deepfusion_jobs::scene::motion_known;
-use deepfusion_jobs::verdict::{Unseen, VerdictOptions, verdict};
+use deepfusion_jobs::verdict::{Unseen, VerdictOptions, VerdictWarning, verdict, verdict_page};
 use deepfusion_model::TrainConfig;
-use deepfusion_render::HtmlReport;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
-use super::EvalOutcome;
 use crate::cli::EvalArgs;
-use crate::commands::{run_report, warnings};
+use crate::commands::{command_line, warnings};
 use crate::failure::Result;
-use crate::model::ModelFacts;
-use crate::output;
 use crate::progress::{Progress, say};
 
 /// Whether no verdict is wanted: it was declined, a split asks for its frames alone, or what is post-processed is no longer what the network
@@ -57,12 +53,20 @@ pub(super) fn of_model(
         (&unseen, &options),
         &mut found,
     )?;
-    if found.no_certificate == Some(NoCertificate::SeenNotKnown) {
-        let warning = "whether training saw these frames is not known, so there is no scale certificate; --assume-unseen takes it that \
-                       it did not";
-        warnings::warn_once(warning.to_owned());
+    if let Some(warning) = VerdictWarning::of(&found) {
+        warnings::warn_once(in_options(&warning));
     }
     Ok(Some(found))
+}
+
+/// A warning with the option that does without what it is about.
+fn in_options(warning: &VerdictWarning) -> String {
+    match warning {
+        VerdictWarning::SeenNotKnown => {
+            format!("{warning}; --assume-unseen takes it that it did not")
+        }
+        other => other.to_string(),
+    }
 }
 
 /// What the run's PoseNet makes of the vehicle's speed.
@@ -74,26 +78,16 @@ fn add_pose_speeds(
     (unseen, options): (&Unseen, &VerdictOptions),
     found: &mut Verdict,
 ) -> Result<()> {
-    use deepfusion_jobs::verdict::{pose_net_is_metric, pose_speeds};
-    use deepfusion_train::PosePredictor;
+    use deepfusion_jobs::verdict::{metric_pose_net, pose_speeds_of};
 
-    let ModelSource::Run { given, .. } = model else {
+    let Some(run) = metric_pose_net(model, config) else {
         return Ok(());
     };
-    if !pose_net_is_metric(config) {
-        return Ok(());
-    }
     let device = crate::devices::open(args.engine.device)?;
-    match PosePredictor::load(given, args.engine.set.as_deref(), &device) {
-        Ok(predictor) => {
-            found.without_truth.pose_speeds = pose_speeds(&predictor, datasets, unseen, options)?;
-        }
-        // Depth is judged all the same.
-        Err(why) => {
-            warnings::warn_once(format!(
-                "PoseNet is not compared with the vehicle's speed: {why}"
-            ));
-        }
+    let pose_net = (run, args.engine.set.as_deref());
+    match pose_speeds_of(pose_net, &device, datasets, unseen, options)? {
+        Ok(speeds) => found.without_truth.pose_speeds = speeds,
+        Err(warning) => warnings::warn_once(in_options(&warning)),
     }
     Ok(())
 }
@@ -116,21 +110,12 @@ pub(super) fn alone(
     model: &ModelSource,
     verdict: Option<Verdict>,
     checkpoint: UsedCheckpoint,
-) -> Result<EvalOutcome> {
+) -> Result<EvaluationOutcome> {
     if let (Some(path), Some(verdict)) = (&args.report, &verdict) {
-        let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
-        let title = format!("Depth judged without ground truth on {}", names.join(", "));
-        let mut page = run_report::verdict(HtmlReport::new(model.name(), title), verdict);
-        if let Some(folder) = model.folder() {
-            page = run_report::training(page, folder)?;
-        }
-        let page = page
-            .section("How it was measured")
-            .command(&run_report::command());
-        page.write(path)?;
+        verdict_page(model, &args.data, verdict, &command_line::typed_again())?.write(path)?;
         say(&format!("report  {}", path.display()));
     }
-    Ok(EvalOutcome {
+    Ok(EvaluationOutcome {
         checkpoint: Some(checkpoint),
         report: None,
         verdict,

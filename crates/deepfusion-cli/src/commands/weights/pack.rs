@@ -1,7 +1,6 @@
 use deepfusion_jobs::packing::{PackOptions, PackedRun, pack_run};
 use deepfusion_weights::MAX_BYTES;
 
-use super::list::WeightsRow;
 use crate::cli::PackArgs;
 use crate::failure::Result;
 use crate::output;
@@ -44,7 +43,7 @@ pub(crate) fn run(args: &PackArgs) -> Result<()> {
         );
     }
     if args.json {
-        return output::print_json(&WeightsRow::from(card));
+        return output::print_json(&card.summary());
     }
     let (card, weights) = (card_path.display(), weights_path.display());
     output::print(&format!("{weights}\n{card}\n"))

@@ -62,6 +62,16 @@ impl Plan {
         })?)
     }
 
+    /// What may be asked of a table that is gone on with: more runs of every row, and where the recordings to train on are now (empty: where
+    /// they were).
+    pub fn go_on_with(&mut self, seeds: u64, data: &[PathBuf]) {
+        self.seeds = self.seeds.max(seeds);
+        if !data.is_empty() {
+            self.config.data.paths = data.to_vec();
+            self.config.make_absolute();
+        }
+    }
+
     /// Keeps it beside the table.
     ///
     /// # Errors

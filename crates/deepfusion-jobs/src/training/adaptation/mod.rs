@@ -18,7 +18,7 @@ use deepfusion_runtime::{DepthEstimator, ModelSource};
 use deepfusion_train::{Device, Trainer};
 
 pub use self::folders::undo;
-pub use self::outcome::Outcome;
+pub use self::outcome::{Outcome, Refusal};
 pub use self::recipe::assumed_camera;
 
 use self::folders::Folders;

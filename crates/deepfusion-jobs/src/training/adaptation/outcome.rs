@@ -49,10 +49,46 @@ impl Outcome {
         }
     }
 
+    /// Why it may not take the given one's place; `None` where it may.
+    #[must_use]
+    pub fn refusal(&self) -> Option<Refusal<'_>> {
+        if self.kept {
+            None
+        } else if self.worse.is_empty() {
+            Some(Refusal::NotJudged)
+        } else {
+            Some(Refusal::Worse(&self.worse))
+        }
+    }
+
     /// Keeps it in the run's folder, wherever that is moved.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)?;
         Ok(write(&folder.join("adapt.json"), text + "\n")?)
+    }
+}
+
+/// Why an adapted network may not take the given one's place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Refusal<'a> {
+    /// These checks became worse.
+    Worse(&'a [WorsenedCheck]),
+    /// No check can be compared.
+    NotJudged,
+}
+
+impl fmt::Display for Refusal<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Worse(checks) => {
+                let checks: Vec<String> = checks.iter().map(ToString::to_string).collect();
+                f.write_str(&checks.join(", "))
+            }
+            Self::NotJudged => {
+                f.write_str("the frames that are held out say nothing about it any more")
+            }
+        }
     }
 }
 
@@ -91,5 +127,22 @@ impl fmt::Display for Outcome {
             scale(&self.before),
             scale(&self.after),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_judged_is_not_kept() {
+        let (before, after) = (Verdict::default(), Verdict::default());
+        let outcome = Outcome::of("street".into(), 9, (before, after));
+        let refusal = outcome.refusal();
+        assert_eq!(refusal, Some(Refusal::NotJudged));
+        assert_eq!(
+            refusal.map(|refusal| refusal.to_string()).as_deref(),
+            Some("the frames that are held out say nothing about it any more")
+        );
     }
 }

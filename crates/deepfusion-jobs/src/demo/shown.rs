@@ -1,4 +1,4 @@
-//! Pictures of a frame for the demo's report, each also a file of its own.
+//! Pictures of a frame for a demo's page, each also a file of its own.
 
 use std::path::{Path, PathBuf};
 
@@ -6,28 +6,19 @@ use deepfusion_data::{Dataset, RgbImage, save_png, write_depth_png};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
-use deepfusion_jobs::intervals;
 use deepfusion_render::{
     CloudView, DepthScale, HtmlReport, PictureFormat, depth_picture, error_picture, render_cloud,
     side_by_side, with_depth_legend,
 };
 use deepfusion_runtime::DepthEstimator;
 
-use super::{DEMO, Demo};
-use crate::failure::Result;
-use crate::interrupt;
-use crate::output;
-
-/// How both ways measure.
-pub(super) const PROTOCOL: &str = "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in metres. \
-    Median-scaled: each image multiplied by median(truth) / median(prediction), as methods without a metric scale need. The \
-    mean-depth baseline predicts each pixel's mean depth over the training streets.";
+use crate::{Result, files, intervals};
 
 /// Points of the cloud reach so far, metres.
 const CLOUD_REACH_M: f32 = 60.0;
 
 /// A frame and the depth that a network sees in it.
-pub(super) struct Shown {
+pub struct Shown {
     number: u64,
     image: RgbImage,
     camera: Intrinsics,
@@ -41,15 +32,16 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// Predicts a frame of a simulated drive.
-    pub(super) fn of(
-        demo: &Demo,
+    /// Predicts a frame of a simulated drive; `factors` are those of the network's intervals. The folder, of the pictures, is made.
+    ///
+    /// # Errors
+    /// A folder that cannot be made, an image or its exact depth that cannot be read, and what the network's engine says.
+    pub fn of(
         (estimator, factors): (&mut DepthEstimator, &IntervalFactors),
         drive: &Dataset,
         frame: usize,
+        folder: PathBuf,
     ) -> Result<Self> {
-        interrupt::check(DEMO)?;
-        let folder = demo.out.join("pictures");
         std::fs::create_dir_all(&folder).map_err(|e| deepfusion_data::Error::file(&folder, e))?;
         let image = drive.load_image(frame)?;
         let camera = drive.intrinsics(frame);
@@ -67,17 +59,15 @@ impl Shown {
         })
     }
 
-    /// The frame's number.
-    pub(super) fn number(&self) -> u64 {
-        self.number
-    }
-
     fn path(&self, what: &str) -> PathBuf {
         self.folder.join(format!("{:010}_{what}.png", self.number))
     }
 
     /// Writes the image beside its depth, and the depth; `mark` is added to the files' names. Returns the first.
-    pub(super) fn write(&self, mark: &str) -> Result<PathBuf> {
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, mark: &str) -> Result<PathBuf> {
         let side = side_by_side(&self.image, &self.depth, &self.scale)?;
         let path = self.path(&format!("side{mark}"));
         save_png(&side, &path)?;
@@ -86,15 +76,33 @@ impl Shown {
     }
 
     /// Writes the point cloud, with how sure the network is of each point.
-    pub(super) fn write_cloud(&self, path: &Path) -> Result<()> {
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_cloud(&self, path: &Path) -> Result<()> {
         let mut cloud = self.cloud()?;
         let sigma = self.sigma.as_ref();
         cloud.sigma =
             sigma.map(|sigma| PointCloud::column(&sigma.data, &self.depth, CLOUD_REACH_M));
         let mut bytes = Vec::new();
         cloud.write_ply(&mut bytes)?;
-        output::write(path, bytes)?;
-        Ok(())
+        Ok(files::write(path, bytes)?)
+    }
+
+    /// The picture of the frame with its targets, in the folder of a run that finds those; `None` where there is none.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn overlay_in(&self, targets: &Path) -> Result<Option<PathBuf>> {
+        let end = format!("{:010}_overlay.png", self.number);
+        let failed = |e| deepfusion_data::Error::file(targets, e);
+        for entry in std::fs::read_dir(targets).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            if path.to_string_lossy().ends_with(&end) {
+                return Ok(Some(path));
+            }
+        }
+        Ok(None)
     }
 
     fn cloud(&self) -> Result<PointCloud> {
@@ -114,7 +122,7 @@ impl Shown {
         Ok(page.picture(&caption, &side, PictureFormat::Jpeg)?)
     }
 
-    /// The exact depth, and where the prediction is wrong.
+    /// The exact depth, and where the prediction is wrong; both are files, too.
     pub(super) fn add_truth_to(&self, page: HtmlReport) -> Result<HtmlReport> {
         let exact = with_depth_legend(&depth_picture(&self.truth, &self.scale), &self.scale);
         save_png(&exact, &self.path("truth"))?;
@@ -122,7 +130,7 @@ impl Shown {
         self.add_error_to(page, "error", "Relative error of the prediction")
     }
 
-    /// Where the prediction is wrong.
+    /// Where the prediction is wrong; `mark` is the file's name.
     pub(super) fn add_error_to(
         &self,
         page: HtmlReport,

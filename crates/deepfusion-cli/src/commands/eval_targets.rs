@@ -1,19 +1,14 @@
 //! `deepfusion eval-targets`: 3D targets against labelled boxes.
 
-mod table;
-
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, OpenOptions, save_png};
-use deepfusion_eval::PostProcess;
 use deepfusion_jobs::evaluation::augmentation;
 use deepfusion_jobs::labelled::{
     DepthSource, EvaluatedFrame, PredictedDepth, TargetEvaluation, is_folder_of,
 };
 use deepfusion_jobs::perception_settings;
-use deepfusion_perception::{ScoringRules, TargetScore};
 use deepfusion_render::box_overlay;
-use serde::Serialize;
 
 use super::warnings;
 use crate::cli::{EvalTargetsArgs, TargetDepth};
@@ -21,20 +16,6 @@ use crate::failure::Result;
 use crate::model::{self, ModelFacts};
 use crate::progress::Progress;
 use crate::{engine, output};
-
-/// The score, and of what.
-#[derive(Debug, Serialize)]
-struct Report {
-    /// `truth`, `lidar` or `predicted`.
-    depth: &'static str,
-    /// How the predictions of each image were combined, where there were several.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    post_process: Option<&'static str>,
-    /// What counted as found.
-    rules: ScoringRules,
-    #[serde(flatten)]
-    score: TargetScore,
-}
 
 /// `deepfusion eval-targets`.
 pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
@@ -69,18 +50,11 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
             })?;
         }
     }
-    let report = Report {
-        depth: evaluation.source().word(),
-        post_process: args.post_process.map(PostProcess::name),
-        rules: ScoringRules::default(),
-        score: evaluation.score(),
-    };
+    let report = evaluation.report(args.post_process);
     if args.json {
         output::print_json(&report)
     } else {
-        let post_process = report.post_process.map(|how| format!(" ({how})"));
-        let depth = format!("{}{}", report.depth, post_process.unwrap_or_default());
-        output::print(&table::text(&depth, &report.score))
+        output::print(&report.to_string())
     }
 }
 

@@ -1,0 +1,154 @@
+//! All that is measured of a network, in words and as JSON.
+
+use std::fmt;
+
+use deepfusion_hint::count_of;
+use deepfusion_model::TrainConfig;
+use deepfusion_runtime::DepthRunner;
+use serde::Serialize;
+
+use super::{IMAGES_PER_REPEAT, Modules, PICTURE_SIZE, Stages, StreetBench};
+use crate::devices::megabytes;
+use crate::{Result, machine};
+
+/// What a network costs, and how fast every stage around it is: its lines for people, and its JSON for scripts.
+#[derive(Debug, Serialize)]
+pub struct BenchReport {
+    /// What runs it.
+    pub engine: &'static str,
+    /// Where.
+    pub device: String,
+    /// Its name.
+    pub network: String,
+    /// Width and height of its input.
+    pub size: [usize; 2],
+    /// That the depth network learns.
+    pub parameters: u64,
+    /// In the depth network's convolutions, for one image.
+    pub multiply_adds: u64,
+    /// Median of each stage.
+    pub stages_ms: Stages,
+    /// From decode to colour, one after another.
+    pub latency_ms: f64,
+    /// Of all stages, overlapped as in a bulk run.
+    pub fps: f64,
+    /// The most memory that the process had.
+    pub peak_rss_mb: Option<f64>,
+    /// The most that the device had.
+    pub peak_device_mb: Option<f64>,
+    /// What each part of the networks costs.
+    pub modules: Modules,
+    /// Least milliseconds of each step of the network, where asked for and known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub profile_ms: Vec<(String, f64)>,
+    /// How often every stage was run.
+    #[serde(skip)]
+    pub repeats: usize,
+}
+
+/// A network to be measured.
+#[derive(Debug, Clone, Copy)]
+pub struct BenchRequest<'a> {
+    /// Its name.
+    pub network: &'a str,
+    /// Its configuration.
+    pub config: &'a TrainConfig,
+    /// The name of what it computes on.
+    pub device: &'a str,
+    /// How often every stage is run, at least once.
+    pub repeats: usize,
+    /// Whether the network's steps are timed, too, by the engine that can.
+    pub profile: bool,
+}
+
+impl BenchRequest<'_> {
+    /// Measures it by what runs it.
+    ///
+    /// # Errors
+    /// A street that cannot be simulated or encoded; what the network's engine says.
+    pub fn measure(self, runner: &mut dyn DepthRunner) -> Result<BenchReport> {
+        let (config, repeats) = (self.config, self.repeats.max(1));
+        let modules = Modules::new(config);
+        let whole = modules.whole();
+        let bench = StreetBench::new(config)?;
+        let stages = bench.stages(runner, repeats)?;
+        let profile_ms = if self.profile {
+            bench.profile(runner, repeats)?
+        } else {
+            Vec::new()
+        };
+        Ok(BenchReport {
+            engine: runner.name(),
+            device: self.device.to_owned(),
+            network: self.network.to_owned(),
+            size: [config.size.width, config.size.height],
+            parameters: whole.parameters,
+            multiply_adds: whole.multiply_adds,
+            modules,
+            latency_ms: stages.sum(),
+            fps: bench.overlapped_fps(runner, repeats)?,
+            peak_rss_mb: machine::peak_rss_mb(),
+            peak_device_mb: runner.peak_device_bytes().map(megabytes),
+            profile_ms,
+            stages_ms: stages,
+            repeats,
+        })
+    }
+}
+
+impl fmt::Display for BenchReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let s = &self.stages_ms;
+        let mut memory = self
+            .peak_rss_mb
+            .map_or("?".into(), |m| format!("{m:.0} MB"));
+        if let Some(on_device) = self.peak_device_mb {
+            memory = format!("{memory}, {on_device:.0} MB on the device");
+        }
+        write!(
+            f,
+            "{} at {}x{}, {:.2} M parameters, {:.2} G multiply-adds, {} engine on {}\n\
+             median of {}, ms\n\
+             decode  {:8.2}   JPEG {}x{}\n\
+             resize  {:8.2}   Lanczos, to a tensor\n\
+             network {:8.2}\n\
+             depth   {:8.2}   disparity to metres\n\
+             cloud   {:8.2}   coloured points\n\
+             targets {:8.2}   boxes and tracks from the picture's true depth\n\
+             colour  {:8.2}   depth as a picture\n\
+             all     {:8.2}   one after another: what an image waits\n\
+             {:.1} frames a second, the stages of {} overlapped; peak memory {memory}\n\
+             \n{}",
+            self.network,
+            self.size[0],
+            self.size[1],
+            self.parameters as f64 / 1e6,
+            self.multiply_adds as f64 / 1e9,
+            self.engine,
+            self.device,
+            count_of(self.repeats, "run"),
+            s.decode,
+            PICTURE_SIZE.0,
+            PICTURE_SIZE.1,
+            s.resize,
+            s.network,
+            s.depth,
+            s.cloud,
+            s.targets,
+            s.colour,
+            self.latency_ms,
+            self.fps,
+            count_of(self.repeats * IMAGES_PER_REPEAT, "image"),
+            self.modules,
+        )?;
+        write_profile(f, &self.profile_ms)
+    }
+}
+
+/// The steps in order, a line each with its share.
+fn write_profile(f: &mut fmt::Formatter<'_>, steps: &[(String, f64)]) -> fmt::Result {
+    let total: f64 = steps.iter().map(|(_, ms)| ms).sum();
+    steps
+        .iter()
+        .try_for_each(|(name, ms)| writeln!(f, "{ms:8.2} {:5.1} %   {name}", 100.0 * ms / total))
+}

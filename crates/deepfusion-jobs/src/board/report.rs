@@ -1,0 +1,187 @@
+//! A calibration as it is reported: JSON, lines, and the file that it becomes.
+
+use std::fmt;
+use std::path::Path;
+
+use deepfusion_calibrate::{Board, Calibration, View};
+use deepfusion_data::camera_info_yaml;
+use deepfusion_geometry::Distortion;
+use deepfusion_hint::count_of;
+use serde::{Serialize, Serializer};
+
+use super::{BoardViews, BoardWarning, LeftOut};
+
+/// Pictures left out that are named; the others are counted.
+const NAMED: usize = 6;
+
+/// What is reported of a calibration: its lines for people, and its JSON for scripts.
+#[derive(Debug, Serialize)]
+pub struct CalibrationReport<'a> {
+    /// The camera.
+    #[serde(flatten)]
+    pub calibration: &'a Calibration,
+    /// What makes it less sure than it could be.
+    #[serde(serialize_with = "in_words")]
+    pub warnings: Vec<BoardWarning>,
+    /// Names of `coefficients`.
+    pub coefficient_names: &'static [&'static str],
+    /// The board.
+    pub board: Board,
+    /// Pictures and frames of videos that were looked at.
+    pub looked_at: usize,
+    /// Those that show no whole board.
+    pub left_out: &'a [LeftOut],
+    /// Frames of videos that show the board where another does already, or less sharply.
+    pub not_picked: usize,
+    /// The calibration's file.
+    pub written: &'a Path,
+    /// Where the board was seen.
+    #[serde(skip)]
+    pub views: &'a [View],
+}
+
+fn in_words<S: Serializer>(warnings: &[BoardWarning], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(warnings.iter().map(ToString::to_string))
+}
+
+impl BoardViews {
+    /// What is reported of the camera that these views gave, with its lens ([`Self::calibrate`]); `written` is the calibration's file.
+    #[must_use]
+    pub fn report<'a>(
+        &'a self,
+        board: &Board,
+        (found, lens): (&'a Calibration, &Distortion),
+        written: &'a Path,
+    ) -> CalibrationReport<'a> {
+        CalibrationReport {
+            calibration: found,
+            warnings: self.warnings(found, lens),
+            coefficient_names: found.model.coefficients(),
+            board: *board,
+            looked_at: self.looked_at,
+            left_out: &self.left_out,
+            not_picked: self.not_picked,
+            written,
+            views: &self.views,
+        }
+    }
+}
+
+impl CalibrationReport<'_> {
+    /// The camera as ROS's camera_info YAML, which says of itself what it was made from.
+    #[must_use]
+    pub fn yaml(&self, name: &str, lens: &Distortion) -> String {
+        let (found, board) = (self.calibration, &self.board);
+        let errors = &found.standard_errors;
+        let comments = [
+            format!(
+                "deepfusion calibrate: {} of a board of {}x{} inner corners, squares of {} m; error {:.3} px (root mean square)",
+                count_of(found.used(), "view"),
+                board.columns,
+                board.rows,
+                board.square_m,
+                found.rms_px
+            ),
+            format!(
+                "standard errors in px: fx {:.3}, fy {:.3}, cx {:.3}, cy {:.3}",
+                errors.fx, errors.fy, errors.cx, errors.cy
+            ),
+        ];
+        camera_info_yaml(name, &found.intrinsics, lens, &comments)
+    }
+
+    /// All that was found: a name and a value each. The name is empty where the value goes on.
+    #[must_use]
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let found = self.calibration;
+        let (k, errors) = (&found.intrinsics, &found.standard_errors);
+        let mut rows = Vec::new();
+        let mut row = |name: &str, what: String| rows.push((name.to_owned(), what));
+        let lens = found.model.label();
+        row("camera", format!("{}x{} pixels, {lens}", k.width, k.height));
+        for (name, value, error) in [
+            ("fx", k.fx, errors.fx),
+            ("fy", k.fy, errors.fy),
+            ("cx", k.cx, errors.cx),
+            ("cy", k.cy, errors.cy),
+        ] {
+            row(name, format!("{value:.3} ± {error:.3} px"));
+        }
+        let lens = found.coefficients.iter().zip(&errors.coefficients);
+        for (name, (value, error)) in self.coefficient_names.iter().zip(lens) {
+            row(name, format!("{value:.5} ± {error:.5}"));
+        }
+        row(
+            "field of view",
+            match found.hfov_deg {
+                Some(degrees) => format!("{degrees:.1} degrees from left to right"),
+                None => "unknown: the lens model ends before the image does".into(),
+            },
+        );
+        let corners = found.used() * self.board.corners();
+        row(
+            "error",
+            format!(
+                "{:.3} px, root mean square of {corners} corners",
+                found.rms_px
+            ),
+        );
+        row("views", self.counted_views());
+        let out = self.without_use();
+        for (name, why) in out.iter().take(NAMED) {
+            row("", format!("left out: {name} ({why})"));
+        }
+        if out.len() > NAMED {
+            row("", format!("left out: {} more", out.len() - NAMED));
+        }
+        let tilts = found.views.iter().filter(|v| v.used);
+        let tilts = tilts.filter_map(|v| v.tilt_deg);
+        let (least, most) = tilts.fold((f64::MAX, 0.0f64), |(a, b), t| (a.min(t), b.max(t)));
+        row("tilt", format!("{least:.0} to {most:.0} degrees"));
+        row(
+            "coverage",
+            format!(
+                "{:.0} % of the image; corners in each ninth of it:",
+                100.0 * found.coverage.share
+            ),
+        );
+        for [left, middle, right] in found.coverage.ninths {
+            row("", format!("{left:6}{middle:6}{right:6}"));
+        }
+        row("written", self.written.display().to_string());
+        rows
+    }
+
+    /// How many views there are, and of what.
+    fn counted_views(&self) -> String {
+        let used = self.calibration.used();
+        let looked_at = format!("{used} used of {} looked at", self.looked_at);
+        if self.not_picked == 0 {
+            return looked_at;
+        }
+        format!(
+            "{looked_at}; {} more show the board as one of these does",
+            self.not_picked
+        )
+    }
+
+    /// The pictures that gave nothing, and why: those that disagree with the others, then those without the board.
+    fn without_use(&self) -> Vec<(&str, String)> {
+        let disagree = self.calibration.views.iter().filter(|v| !v.used);
+        let disagree = disagree.map(|v| match v.rms_px {
+            Some(px) => (v.name.as_str(), format!("{px:.2} px off")),
+            None => (v.name.as_str(), "disagrees with the others".into()),
+        });
+        let left_out = self.left_out.iter();
+        let left_out = left_out.map(|l| (l.name.as_str(), l.why.to_string()));
+        disagree.chain(left_out).collect()
+    }
+}
+
+impl fmt::Display for CalibrationReport<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.rows()
+            .iter()
+            .try_for_each(|(name, what)| writeln!(f, "{name:14}{what}"))
+    }
+}

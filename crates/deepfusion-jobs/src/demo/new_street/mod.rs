@@ -1,0 +1,112 @@
+//! With a network that is there: what it sees zero-shot, on a street it has never seen, and what learning there adds.
+
+mod page;
+mod parts;
+
+use std::path::Path;
+
+use deepfusion_model::{TrainConfig, ViewMotion};
+use deepfusion_nn::ops::{Precision, supports};
+use deepfusion_sim::SimConfig;
+use deepfusion_train::Device;
+
+pub use self::page::{Look, NewStreetPage};
+pub use self::parts::SplitDrive;
+
+use super::DemoSettings;
+use crate::Result;
+use crate::training::Start;
+
+/// Added to the demo's seed. What learning adds differs from street to street: docs/BENCHMARKS.md.
+const STREET_SEED: u64 = 21;
+/// Frames of the drive along the new street, ten a second, and how many of them have a scan.
+const FRAMES: usize = 200;
+const SCAN_EVERY: usize = 5;
+/// Cars that drive there.
+const MOVING_CARS: usize = 6;
+/// Steps of learning, and samples of a step: about two minutes on two cores.
+const STEPS: usize = 60;
+const BATCH: usize = 2;
+/// A network that knows its trade takes smaller steps than one that begins.
+const LEARNING_RATE: f64 = 2e-5;
+
+/// The drive along the new street: by a camera and in a light of its own.
+#[must_use]
+pub fn street(settings: &DemoSettings) -> SimConfig {
+    let usual = SimConfig::default();
+    let (width, height) = settings.size((usual.width, usual.height));
+    SimConfig {
+        seed: settings.seed.wrapping_add(STREET_SEED),
+        frames: settings.frames(FRAMES),
+        width,
+        height,
+        scan_every: SCAN_EVERY,
+        moving_cars: MOVING_CARS,
+        varied: true,
+        ..usual
+    }
+}
+
+/// How the network learns there, from images, speed and yaw rate, on the drive in a folder, of the frames of a split file. `own`: the
+/// configuration of its run, `start`: the network.
+///
+/// # Errors
+/// As [`Start::record_in`].
+pub fn recipe(
+    settings: &DemoSettings,
+    (own, start): (&TrainConfig, &Start),
+    (drive, split): (&Path, &Path),
+    device: &Device,
+) -> Result<TrainConfig> {
+    let precision = if supports(device, Precision::Bf16) {
+        Precision::Bf16
+    } else {
+        Precision::F32
+    };
+    let steps = settings.steps(STEPS);
+    let mut config = TrainConfig {
+        view_motion: ViewMotion::Vehicle,
+        // The views are warped by the vehicle's motion, and nobody asks for another.
+        freeze: vec![TrainConfig::POSE_NET.into()],
+        precision,
+        size: settings.input_size(own.size),
+        batch: BATCH,
+        steps: Some(steps),
+        learning_rate: LEARNING_RATE,
+        seed: settings.seed,
+        validate_every: steps / 2,
+        ..own.preset.config_on(settings.compute)
+    };
+    // Two pictures of one street say little of how pictures are distributed.
+    config.depth_net.encoder.frozen_statistics = true;
+    config.data.paths = vec![drive.to_owned()];
+    config.data.split = Some(split.to_owned());
+    start.record_in(&mut config)?;
+    Ok(config)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_model::Preset;
+
+    #[test]
+    fn it_learns_on_the_first_part_alone() {
+        let settings = DemoSettings {
+            steps: Some(8),
+            size: Some((192, 64)),
+            ..DemoSettings::default()
+        };
+        let drive = (Path::new("street"), Path::new("learned.txt"));
+        let own = Preset::Light.config();
+        let start = (&own, &Start::Nothing);
+        let config = recipe(&settings, start, drive, &Device::flex()).unwrap();
+        assert_eq!(config.data.paths, [drive.0]);
+        assert_eq!(config.data.split.as_deref(), Some(drive.1));
+        assert_eq!((config.size.width, config.size.height), (192, 64));
+        assert_eq!((config.steps, config.validate_every), (Some(8), 4));
+        assert!(config.leaves_pose_net_out());
+        assert_eq!(street(&settings).width, 192);
+        assert_eq!(street(&DemoSettings::default()).frames, FRAMES);
+    }
+}

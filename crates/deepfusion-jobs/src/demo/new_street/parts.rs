@@ -1,0 +1,103 @@
+//! A drive's first part, to learn from, and its last, to be measured on.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use deepfusion_data::{Dataset, OpenOptions, Split};
+
+use super::FRAMES;
+use crate::Result;
+use crate::demo::DemoFolder;
+use crate::recordings::write_split;
+
+/// Of the usual drive, frames that are learned from; those after the gap are measured on.
+const LEARNED: usize = 120;
+const GAP: usize = 5;
+
+/// A drive's first part, to learn from, and its last, to be measured on.
+pub struct SplitDrive {
+    /// The whole drive.
+    pub all: Dataset,
+    /// Its first part.
+    pub learned: Vec<Dataset>,
+    /// Its last.
+    pub measured: Vec<Dataset>,
+    /// Split file of the first.
+    pub learned_split: PathBuf,
+}
+
+impl SplitDrive {
+    /// Divides the drive in a folder; the demo's own gets the split files.
+    ///
+    /// # Errors
+    /// A drive that cannot be opened, and a split file that cannot be written.
+    pub fn of(drive: &Path, folder: &DemoFolder) -> Result<Self> {
+        let all = open(drive, None)?.swap_remove(0);
+        let list = |name: &str, part: Range<usize>| -> Result<PathBuf> {
+            let path = folder.join(name);
+            write_split(&all, part, &path)?;
+            Ok(path)
+        };
+        let frames = all.frames().len();
+        let learned_split = list("learned.txt", learned_of(frames))?;
+        let measured_split = list("measured.txt", measured_of(frames))?;
+        Ok(Self {
+            learned: open(drive, Some(&learned_split))?,
+            measured: open(drive, Some(&measured_split))?,
+            all,
+            learned_split,
+        })
+    }
+
+    /// A frame to be shown, of those that are measured on.
+    #[must_use]
+    pub fn shown_frame(&self) -> usize {
+        let measured = measured_of(self.all.frames().len());
+        measured.start + measured.len() / 3
+    }
+}
+
+fn open(drive: &Path, split: Option<&Path>) -> Result<Vec<Dataset>> {
+    let split = split.map(Split::read).transpose()?;
+    Ok(Dataset::open(
+        drive,
+        &OpenOptions {
+            split,
+            ..OpenOptions::default()
+        },
+    )?)
+}
+
+/// Which of a drive's frames are learned from: as large a part as of the usual drive.
+fn learned_of(frames: usize) -> Range<usize> {
+    0..frames * LEARNED / FRAMES
+}
+
+/// Which are measured on.
+fn measured_of(frames: usize) -> Range<usize> {
+    let gap = (frames * GAP).div_ceil(FRAMES);
+    learned_of(frames).end + gap..frames
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::SCAN_EVERY;
+    use super::*;
+
+    /// A short drive, too, has a scan among the frames that are measured on, and none of these is learned from.
+    #[test]
+    fn every_drive_has_something_to_measure_on() {
+        assert_eq!(
+            (learned_of(FRAMES), measured_of(FRAMES)),
+            (0..120, 125..200)
+        );
+        for frames in 12..=FRAMES {
+            let (learned, mut measured) = (learned_of(frames), measured_of(frames));
+            assert!(learned.end < measured.start, "{frames}");
+            assert!(
+                measured.any(|frame| frame.is_multiple_of(SCAN_EVERY)),
+                "{frames}"
+            );
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! The page of an evaluation: what was found, on which frames best and worst, how it was measured.
+
+use std::path::Path;
+
+use deepfusion_eval::compare::SavedEvaluation;
+use deepfusion_eval::verdict::Verdict;
+use deepfusion_eval::{Crop, GroundTruth, Protocol};
+use deepfusion_perception::Reliability;
+use deepfusion_render::{HtmlReport, ReliabilityBin, ShownFrame};
+use deepfusion_runtime::ModelSource;
+
+use super::{ChosenImage, Evaluated, EvaluationRequest, Standing};
+use crate::{ModelFacts, Result, RunHistory, name_of};
+
+/// What a page of an evaluation shows.
+pub struct EvaluationPage<'a> {
+    /// Whose depth was measured.
+    pub source: MeasuredDepth<'a>,
+    /// How it was compared with ground truth.
+    pub protocol: &'a Protocol,
+    /// What was found.
+    pub evaluated: &'a Evaluated,
+    /// The images that are shown, as [`super::shown_of_datasets`] and [`super::shown_of_arrays`] give them.
+    pub shown: &'a [(ChosenImage, ShownFrame)],
+    /// How a confidence holds that was learned from these images.
+    pub reliability: Option<&'a [Reliability]>,
+    /// What is said of the depth without ground truth.
+    pub verdict: Option<&'a Verdict>,
+    /// The command that makes the page again.
+    pub command: &'a str,
+}
+
+/// Whose depth was measured.
+#[derive(Clone, Copy)]
+pub enum MeasuredDepth<'a> {
+    /// That of a file of arrays.
+    Arrays {
+        /// The file.
+        predictions: &'a Path,
+        /// The file that it was compared with.
+        truth: &'a Path,
+    },
+    /// A network's.
+    Network {
+        /// The network.
+        model: &'a ModelSource,
+        /// How the evaluation was asked for.
+        request: &'a EvaluationRequest<'a>,
+        /// The evaluation as it is kept.
+        saved: &'a SavedEvaluation,
+    },
+}
+
+impl EvaluationPage<'_> {
+    /// The page.
+    ///
+    /// # Errors
+    /// A picture that cannot be encoded; a run's log that is another program's.
+    pub fn compose(&self) -> Result<HtmlReport> {
+        let mut page = self.facts().section("Accuracy");
+        page = self.evaluated.add_to(page);
+        page = add_frames(page, self.shown)?;
+        page = page
+            .section("How it was measured")
+            .properties(&self.how())
+            .command(self.command);
+        if let Some(bins) = self.reliability {
+            page = add_reliability(page, bins);
+        }
+        if let Some(verdict) = self.verdict {
+            page = page.verdict(verdict);
+        }
+        if let MeasuredDepth::Network { model, .. } = self.source
+            && let Some(run) = model.folder()
+        {
+            page = RunHistory::read(run)?.add_to(page);
+        }
+        Ok(page)
+    }
+
+    /// Title and key figures.
+    fn facts(&self) -> HtmlReport {
+        let report = &self.evaluated.report;
+        let number = |v: f64| format!("{v:.3}");
+        let mean_depth_baseline = report
+            .mean_depth_baseline
+            .as_ref()
+            .map(|t| t.unscaled.abs_rel);
+        let (name, on) = match self.source {
+            MeasuredDepth::Arrays { predictions, .. } => (name_of(predictions), String::new()),
+            MeasuredDepth::Network { model, request, .. } => {
+                let names: Vec<_> = request.data.iter().map(|p| name_of(p)).collect();
+                let on = if names.is_empty() {
+                    String::new()
+                } else {
+                    format!(" on {}", names.join(", "))
+                };
+                (model.name(), on)
+            }
+        };
+        let images = match report.expected {
+            Some(expected) => format!("{} of the split's {expected}", report.n),
+            None => report.n.to_string(),
+        };
+        HtmlReport::new(name, format!("Depth measured{on}")).facts(&[
+            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
+            (
+                "Abs Rel, mean-depth baseline",
+                &mean_depth_baseline.map_or("–".into(), number),
+            ),
+            ("scale (1 is metric)", &number(report.scale.median)),
+            (
+                "within 25 %",
+                &format!("{:.1} %", 100.0 * report.unscaled.a1),
+            ),
+            ("images", &images),
+        ])
+    }
+
+    /// How it was measured, row by row.
+    fn how(&self) -> Vec<(String, String)> {
+        let (mut rows, digest) = match self.source {
+            MeasuredDepth::Arrays { predictions, truth } => (
+                vec![
+                    ("predictions", predictions.display().to_string()),
+                    ("ground truth", truth.display().to_string()),
+                ],
+                None,
+            ),
+            MeasuredDepth::Network { request, saved, .. } => (
+                network_rows(request, self.protocol, saved),
+                saved.report.truth_sha256.clone(),
+            ),
+        };
+        rows.extend(protocol_rows(self.protocol));
+        rows.extend(digest.map(|digest| ("SHA-256 of the ground truth", digest)));
+        let named = |(name, value): (&str, String)| (name.to_owned(), value);
+        rows.into_iter().map(named).collect()
+    }
+}
+
+impl Evaluated {
+    /// Adds its tables and charts to a page.
+    #[must_use]
+    pub fn add_to(&self, page: HtmlReport) -> HtmlReport {
+        let report = &self.report;
+        let mut page = page.evaluation(report).range_charts(report);
+        if self.images.len() > 1 {
+            page = page.section("Frame by frame").frame_charts(&self.images);
+        }
+        if let Some(points) = &report.points {
+            page = page.section("Points in space").points(points, &self.points);
+        }
+        page
+    }
+}
+
+/// The best frames, a typical one, with its clouds, and the worst.
+fn add_frames(page: HtmlReport, shown: &[(ChosenImage, ShownFrame)]) -> Result<HtmlReport> {
+    let mut page = page.section("Best and worst frames").note(
+        "By unscaled Abs Rel. Depth is coloured by the logarithm of metres, warm near and cold far; errors are blue where the \
+         prediction is too near, red where it is too far.",
+    );
+    for (chosen, frame) in shown {
+        page = page.frame(frame)?;
+        if chosen.standing == Standing::Median {
+            page = page.clouds(frame)?;
+        }
+    }
+    Ok(page)
+}
+
+/// Whether the depth's confidence keeps its promise, on frames that it was not learned from.
+fn add_reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
+    let bins: Vec<ReliabilityBin> = bins
+        .iter()
+        .map(|bin| ReliabilityBin {
+            confidence: bin.confidence,
+            expected: bin.expected,
+            observed: bin.observed,
+            n: bin.n,
+        })
+        .collect();
+    page.section("How far to trust a pixel").reliability(&bins)
+}
+
+/// How a network was measured.
+fn network_rows(
+    request: &EvaluationRequest<'_>,
+    protocol: &Protocol,
+    saved: &SavedEvaluation,
+) -> Vec<(&'static str, String)> {
+    let m = &saved.measured;
+    let data = request.data.iter().map(|p| p.display().to_string());
+    let truth = match request.truth {
+        Some(path) => path.display().to_string(),
+        None if protocol.gt == GroundTruth::Annotated => "KITTI's annotated depth".into(),
+        None => "the recordings' scans".into(),
+    };
+    let mut rows = vec![("recordings", data.collect::<Vec<_>>().join(", "))];
+    if let Some(split) = request.split {
+        rows.push(("split", split.display().to_string()));
+    }
+    rows.extend([
+        ("ground truth", truth),
+        ("camera", m.camera.clone()),
+        ("checkpoint", saved.model.checkpoint.clone()),
+        ("its SHA-256", saved.model.sha256.clone()),
+        ("engine", m.engine.clone()),
+        (
+            "seen in training",
+            match m.held_out {
+                Some(true) => "no",
+                Some(false) => "yes",
+                None => "not known",
+            }
+            .into(),
+        ),
+        (
+            "correction for the focal length",
+            if m.focal_correction { "on" } else { "off" }.into(),
+        ),
+        ("program", m.program.clone()),
+        ("time (UTC)", m.time.clone()),
+    ]);
+    if let Some(how) = m.post_process {
+        rows.push(("post-processing", how.explained().to_owned()));
+    }
+    rows
+}
+
+/// What the protocol compares.
+fn protocol_rows(protocol: &Protocol) -> [(&'static str, String); 2] {
+    let crop = match protocol.crop {
+        Crop::None => "the whole image",
+        Crop::Garg => "Garg's crop",
+    };
+    [
+        ("compared", crop.to_owned()),
+        (
+            "range",
+            format!("{} to {} m", protocol.min_m, protocol.cap_m),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_eval::{Evaluator, Grid, Prediction};
+
+    #[test]
+    fn a_page_of_arrays_says_what_was_compared() {
+        let protocol = Protocol::default();
+        let mut evaluator = Evaluator::new(protocol.clone()).unwrap();
+        let depth = || Grid::new(2, 1, vec![10.0, 20.0]).unwrap();
+        let prediction = Prediction::Depth(depth());
+        evaluator.add("a", &prediction, &depth()).unwrap();
+        let evaluated = Evaluated {
+            report: evaluator.report().unwrap(),
+            images: evaluator.images().to_vec(),
+            points: Vec::new(),
+            places: Vec::new(),
+        };
+        let page = EvaluationPage {
+            source: MeasuredDepth::Arrays {
+                predictions: Path::new("depth.npz"),
+                truth: Path::new("gt.npz"),
+            },
+            protocol: &protocol,
+            evaluated: &evaluated,
+            shown: &[],
+            reliability: None,
+            verdict: None,
+            command: "deepfusion eval",
+        };
+        let html = page.compose().unwrap().to_html();
+        for text in [
+            "<h1>depth.npz</h1><p>Depth measured</p>",
+            "gt.npz",
+            "the whole image",
+            "<code>deepfusion eval</code>",
+        ] {
+            assert!(html.contains(text), "no `{text}` in {html}");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! What a run says while it learns.
+
+use deepfusion_hint::count_of;
+use deepfusion_train::{LossTerms, TrainEvent};
+
+use crate::dates::clock;
+
+/// An event in a line, for whoever waits for the run; of a step what stands beside its number. Nothing of a panel and of a checkpoint, and of a
+/// warning, which has words of its own.
+#[must_use]
+pub fn event_line(event: &TrainEvent) -> Option<String> {
+    Some(match event {
+        TrainEvent::Started {
+            from_step,
+            steps,
+            samples,
+            validation_samples,
+            mean_displacement_m,
+        } => {
+            let going_on = if *from_step > 0 {
+                format!(", going on after step {from_step}")
+            } else {
+                String::new()
+            };
+            // Images that are learned from by their depth have not moved.
+            let moved = if *mean_displacement_m > 0.0 {
+                format!(", mean displacement {mean_displacement_m:.3} m")
+            } else {
+                String::new()
+            };
+            format!(
+                "{}, {validation_samples} held out{moved}; {}{going_on}",
+                count_of(*samples, "training sample"),
+                count_of(*steps, "step")
+            )
+        }
+        TrainEvent::Step {
+            losses,
+            images_per_second,
+            remaining_s,
+            scale_ratio,
+            ..
+        } => format!(
+            "loss {:.4} ({}){}, {images_per_second:.1} images/s, {} left",
+            losses.total,
+            terms_of_a_step(losses),
+            scale_text(*scale_ratio),
+            clock(*remaining_s)
+        ),
+        TrainEvent::Validated {
+            step,
+            losses,
+            selection,
+            scale_ratio,
+            best,
+        } => format!(
+            "step {step}: held out {selection:.4}{} ({}){}",
+            if *best { ", the best so far" } else { "" },
+            held_out_terms(losses),
+            scale_text(*scale_ratio),
+        ),
+        TrainEvent::Camera { camera, learned } => {
+            let [fx, fy] = learned.focal_px;
+            let spread = match learned.sigma_px {
+                Some([x, y]) => format!("standard deviations {x:.1} and {y:.1}"),
+                None => "not determined by these drives".into(),
+            };
+            format!(
+                "camera learned: fx {fx:.1}, fy {fy:.1} in pixels of {}x{} ({spread}), the principal point in the middle",
+                camera.width, camera.height
+            )
+        }
+        TrainEvent::Panel { .. } | TrainEvent::Saved { .. } | TrainEvent::Warning { .. } => {
+            return None;
+        }
+    })
+}
+
+/// The terms of what a step learned from.
+fn terms_of_a_step(losses: &LossTerms) -> String {
+    let mut terms = Vec::new();
+    if losses.reprojection > 0.0 {
+        terms.push(format!(
+            "reprojection {:.4}, smoothness {:.4}",
+            losses.reprojection, losses.smoothness
+        ));
+        terms.extend(speed_text(losses));
+    }
+    if losses.flow > 0.0 {
+        let moving = 100.0 * losses.moving_share;
+        terms.push(format!("flow {:.4}, moving {moving:.1} %", losses.flow));
+    }
+    if losses.depth > 0.0 {
+        terms.push(format!("depth {:.4}", losses.depth));
+    }
+    terms.join(", ")
+}
+
+/// Nothing where the run has no PoseNet.
+fn speed_text(losses: &LossTerms) -> Option<String> {
+    (losses.speed > 0.0).then(|| format!("speed {:.3} m", losses.speed))
+}
+
+/// Nothing where no network says a scale.
+fn scale_text(ratio: f64) -> String {
+    if ratio.is_finite() {
+        format!(", scale ratio {ratio:.3}")
+    } else {
+        String::new()
+    }
+}
+
+/// What was learned from, of the held-out samples.
+fn held_out_terms(losses: &LossTerms) -> String {
+    let mut terms = Vec::new();
+    if losses.reprojection > 0.0 {
+        terms.push(format!("reprojection {:.4}", losses.reprojection));
+        terms.extend(speed_text(losses));
+    }
+    if losses.depth > 0.0 {
+        terms.push(format!("depth {:.4}", losses.depth));
+    }
+    terms.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_network_says_is_not_printed() {
+        let mut losses = LossTerms {
+            reprojection: 0.125,
+            speed: 0.25,
+            ..LossTerms::default()
+        };
+        assert_eq!(
+            held_out_terms(&losses),
+            "reprojection 0.1250, speed 0.250 m"
+        );
+        assert_eq!(scale_text(1.5), ", scale ratio 1.500");
+        losses.speed = 0.0;
+        assert_eq!(held_out_terms(&losses), "reprojection 0.1250");
+        assert_eq!(scale_text(f64::NAN), "");
+    }
+
+    #[test]
+    fn a_step_says_what_it_learned_and_how_long_it_will_take() {
+        let step = TrainEvent::Step {
+            step: 3,
+            steps: 40,
+            losses: LossTerms {
+                total: 0.5,
+                depth: 0.25,
+                ..LossTerms::default()
+            },
+            learning_rate: 1e-4,
+            images_per_second: 2.0,
+            remaining_s: 75.0,
+            scale_ratio: f64::NAN,
+            gradient_norm: 1.0,
+        };
+        assert_eq!(
+            event_line(&step).as_deref(),
+            Some("loss 0.5000 (depth 0.2500), 2.0 images/s, 1:15 min left")
+        );
+        let saved = TrainEvent::Saved {
+            step: 3,
+            path: "last.safetensors".into(),
+        };
+        assert_eq!(event_line(&saved), None);
+    }
+}

@@ -1,0 +1,48 @@
+//! What a verdict lacks, and why.
+
+use deepfusion_eval::verdict::{NoCertificate, Verdict};
+
+/// What a verdict lacks that one may expect of it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerdictWarning {
+    /// The scale, as training may have seen the frames.
+    #[error("whether training saw these frames is not known, so there is no scale certificate")]
+    SeenNotKnown,
+    /// The speed as PoseNet sees it, as that cannot be loaded.
+    #[cfg(feature = "train")]
+    #[error("PoseNet is not compared with the vehicle's speed: {0}")]
+    NoPoseNet(#[source] deepfusion_train::Error),
+}
+
+impl VerdictWarning {
+    /// That of a verdict without a scale for want of knowing what training saw.
+    #[must_use]
+    pub fn of(verdict: &Verdict) -> Option<Self> {
+        let unknown = verdict.no_certificate == Some(NoCertificate::SeenNotKnown);
+        unknown.then_some(Self::SeenNotKnown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_nobody_knows_is_warned_of() {
+        let of = |why| {
+            let verdict = Verdict {
+                no_certificate: Some(why),
+                ..Verdict::default()
+            };
+            VerdictWarning::of(&verdict).map(|warning| warning.to_string())
+        };
+        assert_eq!(
+            of(NoCertificate::SeenNotKnown).as_deref(),
+            Some(
+                "whether training saw these frames is not known, so there is no scale certificate"
+            )
+        );
+        assert_eq!(of(NoCertificate::AllSeen), None);
+    }
+}
