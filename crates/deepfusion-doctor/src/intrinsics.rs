@@ -200,7 +200,7 @@ mod tests {
             ..KITTI.resized(300, 90)
         };
         assert!(
-            check(&half).findings[0].what.contains("about 29"),
+            check(&half).findings[0].what.to_string().contains("about 29"),
             "{:?}",
             check(&half).findings
         );
