@@ -115,8 +115,10 @@ pub(crate) fn adapt(
         if summary.step < summary.steps {
             return Err(Failure {
                 message: format!(
-                    "stopped after {} of {} steps; what was learned is saved, and not judged",
-                    summary.step, summary.steps
+                    "stopped after {} of {} {}; what was learned is saved, and not judged",
+                    summary.step,
+                    summary.steps,
+                    if summary.steps == 1 { "step" } else { "steps" }
                 ),
                 hint: Some("the same call goes on".into()),
             });

@@ -69,8 +69,8 @@ pub(crate) fn between(a: f64, b: f64) -> f64 {
     turned.min(PI - turned)
 }
 
-/// Places a corner: the point q to which all gradients g of its neighbourhood are at right angles, Σ w g gᵀ (p − q) = 0 over the pixels p
-/// (Förstner and Gülch, 1987; what OpenCV's `cornerSubPix` solves), in a window of `half` pixels to each side. `None` where it
+/// Places a corner: the point q to which all gradients g of its neighbourhood are at right angles, in a window of `half` pixels to each
+/// side. That is Σ w g gᵀ (p − q) = 0 over the pixels p (Förstner and Gülch, 1987; what OpenCV's `cornerSubPix` solves). `None` where it
 /// moves out of that window.
 pub(crate) fn place(image: &GrayImage, start: Vector2<f64>, half: i32) -> Option<Vector2<f64>> {
     let mut at = start;

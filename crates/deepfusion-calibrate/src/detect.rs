@@ -10,7 +10,7 @@ use nalgebra::Vector2;
 /// Longer side that corners are looked for at first, in pixels.
 const LOOKED_AT: u32 = 1280;
 /// Half the window that a corner is placed by: as a share of the way to the next corner, at least and at most in pixels, and at most as
-/// a share of the image's longer side, for large images are seldom as sharp as their pixels.
+/// a share of the image's longer side. Large images are seldom as sharp as their pixels.
 const WINDOW: f64 = 0.3;
 const HALF_WINDOW_PX: (f64, f64) = (3.0, 11.0);
 const HALF_WINDOW: f64 = 0.01;

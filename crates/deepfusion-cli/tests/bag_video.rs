@@ -1,8 +1,8 @@
 //! Bags whose camera is a video stream: a simulated drive's pictures, encoded by the machine's ffmpeg, as messages of each kind.
 //!
-//! What comes back is compared with the pictures that were encoded. Two lossy codecs lie between (x264 at a quantiser of 12, then
-//! JPEGs of ffmpeg's second best quality, both with half the colours): 30 dB is what is lost on these 96×64 pixels at worst, with
-//! some room; a neighbouring picture of the drive is several dB farther away.
+//! What comes back is compared with the pictures that were encoded. Two lossy codecs lie between: x264 at a quantiser of 12, then
+//! JPEGs of ffmpeg's second best quality, both with half the colours. 30 dB is what is lost on these 96×64 pixels at worst, with
+//! some room. A neighbouring picture of the drive is several dB farther away.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

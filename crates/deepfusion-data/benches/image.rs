@@ -1,9 +1,9 @@
 //! From an image file's bytes to the network's numbers: `cargo bench -p deepfusion-data --bench image`.
 //!
-//! The picture is made here, of a KITTI frame's size (1242×375), and left in the folder that
+//! The picture is made here, of a KITTI frame's size (1242×375): JPEG of quality 92 with half the colour resolution
+//! (what KITTI's copies in JPEG usually are) and with all of it, and PNG. It is left in the folder that
 //! `DEEPFUSION_BENCH_DIR` names (default: `deepfusion-bench` among the system's temporary files), so that
-//! `benches/peers/image_to_tensor.py` measures the same files: JPEG of quality 92 with half the colour
-//! resolution (what KITTI's copies in JPEG usually are) and with all of it, and PNG.
+//! `benches/peers/image_to_tensor.py` measures the same files.
 
 #![allow(
     clippy::unwrap_used,

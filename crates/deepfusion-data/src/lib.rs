@@ -1,7 +1,7 @@
 //! Recordings of vehicles as frames, snippets and ground-truth depth.
 //!
 //! [`Dataset::open`] takes a recording of any layout: KITTI raw, odometry and 360, nuScenes, a folder of images or a video with tables
-//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag, with the feature `ros2` (on by default) a ROS 2 bag as MCAP, with
+//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag. A ROS 2 bag needs the feature `ros2` (on by default) as MCAP, and
 //! `ros2-sqlite` as SQLite. [`Dataset::snippets`] gives the training samples with
 //! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
 //! [`Recording`]. Nothing here knows of tensors.

@@ -49,9 +49,9 @@ fn mount(of: &Dataset) -> String {
     )
 }
 
-/// The same drive, once in KITTI's layout and once as a folder with tables, is the same to training: the
-/// images to the bit, motions to the nanosecond of the time stamps and the ten digits of the tables
-/// (1e-9 of some metres, and of angles below 1).
+/// The same drive, once in KITTI's layout and once as a folder with tables, is the same to training. Images are the
+/// same to the bit, motions to the nanosecond of the time stamps and the ten digits of the tables (1e-9 of some
+/// metres, and of angles below 1).
 #[test]
 fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
     let root = tempfile::tempdir().unwrap();

@@ -21,13 +21,13 @@ const EDGE: f64 = 4.0;
 const STANDS: f64 = 0.85;
 /// A part that is this thin is the lens' shade or an encoder's rim, pixels of the small picture.
 const LEAST_DEPTH: usize = 3;
-/// Share of a side that the part may take, percent: of the bottom, where hoods are, and of the others, where a black
+/// Share of a side that the part may take, percent: of the bottom, where hoods are, and of the others. There a black
 /// frame takes all, and a plain sky over houses that lie ahead a sixth, in four seconds of drive up to a half.
 const MOST_BOTTOM: f64 = 15.0;
 const MOST_ELSEWHERE: f64 = 75.0;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {
-    let Some(still) = Still::of(survey) else {
+    let Some(still) = StillParts::of(survey) else {
         let needed = LEAST_FRAMES;
         return Outcome::skipped("bonnet", PicturesSkip::FewInMotion { needed });
     };
@@ -99,7 +99,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
 }
 
 /// What hardly changes over a drive.
-struct Still {
+struct StillParts {
     width: usize,
     height: usize,
     still: Vec<bool>,
@@ -114,7 +114,7 @@ struct Rim {
     depth: usize,
 }
 
-impl Still {
+impl StillParts {
     /// `None` where there are too few frames in motion.
     fn of(survey: &Survey<'_>) -> Option<Self> {
         let moving: Vec<_> = survey

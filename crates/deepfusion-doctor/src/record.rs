@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::{Diagnosis, DriveDiagnosis, Finding, Outcome, Severity, SkipReason, Status};
 
-/// A [`Diagnosis`] with its findings counted and in one list: what `deepfusion doctor --json` prints.
+/// A [`Diagnosis`] with its findings counted and in one list.
 #[derive(Debug, Serialize)]
 pub struct DiagnosisRecord<'a> {
     /// A line for each check.

@@ -29,14 +29,14 @@ pub fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
     };
     let count = dataset.frames().len().saturating_sub(1);
     let mut found = Vec::with_capacity(count);
-    let mut last = Small::read(dataset, 0);
+    let mut last = SmallImage::read(dataset, 0);
     for first in (0..count).step_by(AT_ONCE) {
         let end = (first + AT_ONCE).min(count);
         let read: Vec<_> = (first + 1..end + 1)
             .into_par_iter()
-            .map(|index| Small::read(dataset, index))
+            .map(|index| SmallImage::read(dataset, index))
             .collect();
-        let images: Vec<&Option<Small>> = std::iter::once(&last).chain(&read).collect();
+        let images: Vec<&Option<SmallImage>> = std::iter::once(&last).chain(&read).collect();
         let turns: Vec<_> = (first..end)
             .into_par_iter()
             .filter_map(|earlier| {
@@ -52,12 +52,12 @@ pub fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
 }
 
 /// An image, small and grey, and its camera.
-struct Small {
+struct SmallImage {
     image: GreyImage,
     intrinsics: Intrinsics,
 }
 
-impl Small {
+impl SmallImage {
     /// `None` for an image that cannot be read.
     fn read(dataset: &Dataset, index: usize) -> Option<Self> {
         let k = dataset.intrinsics(index);
@@ -70,7 +70,11 @@ impl Small {
     }
 }
 
-fn turn(ego: &Ego<'_>, (from_s, to_s): (f64, f64), (a, b): (&Small, &Small)) -> Option<SeenTurn> {
+fn turn(
+    ego: &Ego<'_>,
+    (from_s, to_s): (f64, f64),
+    (a, b): (&SmallImage, &SmallImage),
+) -> Option<SeenTurn> {
     let mut vehicle = ego.vehicle_motion(from_s, to_s)?;
     let points = flow(&a.image, &b.image);
     let vehicle_from_cam = ego.cam_from_vehicle.inverse();

@@ -57,7 +57,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let first = first.map(|(number, _, _)| *number);
     outcome.judge_at(Severity::Warning, first, figure, || {
         let reason = FramesReason::Lost {
-            lost,
+            lost: lost as usize,
             rate_hz: 1.0 / usual,
             first: first.unwrap_or(0),
         };

@@ -7,8 +7,8 @@ use crate::statistics::{mean, standard_deviation};
 
 /// A point that was drawn at random among the compared pixels, in the camera's axes (x right, y down, z forward), metres.
 ///
-/// All three places lie on the ray through the pixel's centre, for the ground truth is known by its depth at the pixel:
-/// where in the pixel the LiDAR's beam met the scene is not kept (half a pixel is 0.06 m at 80 m with KITTI's camera).
+/// All three places lie on the ray through the pixel's centre, for the ground truth is known by its depth at the pixel.
+/// Where in the pixel the LiDAR's beam met the scene is not kept (half a pixel is 0.06 m at 80 m with KITTI's camera).
 /// Predictions are clamped to the protocol's range, as for the metrics. Without a camera x and y are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawnPoint {

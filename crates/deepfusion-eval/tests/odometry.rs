@@ -40,7 +40,7 @@ fn track(case: &Value) -> TrackPair {
 
 /// The fixture's rotations have ten digits; NumPy takes them as they are, while a pose is projected onto the
 /// nearest rotation. Over 200 m that moves the end by 200 · 1e-9, and relative to drifts of some metres by
-/// 1e-7; arccos near 1 turns the digits left out, 1e-9, into angles of √(2 · 1e-9) = 4e-5 rad at worst,
+/// 1e-7. The function arccos near 1 turns the digits left out, 1e-9, into angles of √(2 · 1e-9) = 4e-5 rad at worst,
 /// where the angles of whole stretches are 0.04 rad and more: 1e-6 of them. The angles of single pairs,
 /// 0.0035 rad, may be off by 1e-9 / 0.0035², 1e-4 of them.
 #[test]

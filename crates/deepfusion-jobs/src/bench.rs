@@ -18,7 +18,7 @@ use deepfusion_sim::{SimConfig, Simulation};
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
 
-pub use self::modules::Modules;
+pub use self::modules::ModuleCosts;
 pub use self::report::{BenchReport, BenchRequest};
 
 use crate::Result;

@@ -472,7 +472,9 @@ pub enum OtherJob {
 impl std::fmt::Display for OtherJob {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Inputs(others, ours) => write!(f, "{others} other inputs, not these {ours}"),
+            Self::Inputs(others, ours) => {
+                write!(f, "{}, not these {ours}", count_of(*others, "other input"))
+            }
             Self::MadeWith(what) => write!(f, "{what}"),
         }
     }

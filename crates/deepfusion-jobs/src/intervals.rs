@@ -45,7 +45,7 @@ fn write(factors: &IntervalFactors, run: &Path) -> Result<PathBuf> {
     let path = run.join(FILE);
     let text = format!(
         "# The interval of a depth is depth * exp(-q * b) to depth * exp(q * b); b is what the network says, and q stands here for\n\
-         # each level and range of predicted depth. Written by `eval --calibrate-uncertainty`.\n{}",
+         # each level and range of predicted depth. Found by an evaluation.\n{}",
         toml::to_string(factors)?
     );
     files::write(&path, text)?;

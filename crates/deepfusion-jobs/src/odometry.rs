@@ -1,5 +1,7 @@
 //! The pose network's motions, chained, beside the drives' true paths.
 
+mod warning;
+
 use std::path::Path;
 
 use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind};
@@ -9,6 +11,8 @@ use deepfusion_eval::odometry::{
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_render::TopView;
 use deepfusion_train::PosePredictor;
+
+pub use self::warning::OdometryWarning;
 
 use crate::Result;
 use crate::files::write;
@@ -21,19 +25,25 @@ const PAIRS: usize = 8;
 const FOCAL_TOLERANCE: f64 = 0.05;
 
 /// A track for each stretch of the recordings without a gap, and in words what their truth is. `progress` takes the frames seen and in
-/// all. Where a drive's focal length is another than the one trained with there is a warning ([`tracing::warn`]).
+/// all, `warn` by what a drive's path may be wrong.
 ///
 /// # Errors
 /// [`TrackError::TooShort`] where no stretch has two frames; recordings without poses, and images that cannot be read.
 pub fn tracks(
     predictor: &PosePredictor,
     datasets: &[Dataset],
+    warn: &mut dyn FnMut(OdometryWarning),
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(Vec<TrackPair>, &'static str)> {
     let mut stretches = Vec::new();
     let (mut exact, mut integrated, mut tracked) = (0, 0, 0);
     for dataset in datasets {
-        warn_of_focal_length(predictor, dataset);
+        if let Some(ratio) = focal_ratio(predictor, dataset)
+            && (ratio - 1.0).abs() > FOCAL_TOLERANCE
+        {
+            let drive = dataset.name().to_owned();
+            warn(OdometryWarning::OtherFocalLength { drive, ratio });
+        }
         let paths = match exact_paths(dataset)? {
             Some(paths) => {
                 exact += 1;
@@ -160,20 +170,12 @@ fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool
     name
 }
 
-/// A pose network sees pixels: another focal length shows it another motion.
-fn warn_of_focal_length(predictor: &PosePredictor, dataset: &Dataset) {
-    let (Some(train), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
-    else {
-        return;
-    };
+/// A drive's focal length over the one trained with, both at the network's size; `None` where either is not known.
+fn focal_ratio(predictor: &PosePredictor, dataset: &Dataset) -> Option<f64> {
+    let train = predictor.training_camera()?;
+    let frame = *dataset.selected().first()?;
     let size = predictor.config().size;
     let at_network_size = |k: Intrinsics| k.resized(size.width as u32, size.height as u32);
     let here = at_network_size(dataset.intrinsics(frame));
-    let ratio = here.fx / at_network_size(train).fx;
-    if (ratio - 1.0).abs() > FOCAL_TOLERANCE {
-        tracing::warn!(
-            "{}: its focal length is {ratio:.2} times the one trained with, at network size; poses are not corrected for it",
-            dataset.name()
-        );
-    }
+    Some(here.fx / at_network_size(train).fx)
 }

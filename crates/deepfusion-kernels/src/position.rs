@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 /// Wavelengths go from one image to this many (Vaswani et al.).
 const LONGEST: f64 = 10_000.0;
 
-/// The Fourier encoding of pixels (DETR's, as XCiT and Lite-Mono use it): with p = 2π·(i + 1)/n for row or column i of n,
-/// channel k is sin(p / 10,000^(k/m)) for an even k and the cosine of k − 1's angle for an odd one; first m channels of rows,
-/// then m of columns.
+/// The Fourier encoding of pixels (DETR's, as XCiT and Lite-Mono use it): first m channels of rows, then m of columns. With
+/// p = 2π·(i + 1)/n for row or column i of n, channel k is sin(p / 10,000^(k/m)) for an even k and the cosine of k − 1's angle
+/// for an odd one.
 ///
 /// # Shapes
 /// - output: 2·`per_axis` × `height` × `width`

@@ -313,7 +313,7 @@ mod tests {
         assert_eq!(found.camera.map(|k| k.fx), Some(230.4));
         assert_eq!(folder.read_config().unwrap(), config);
 
-        // As `--resume` does.
+        // As a run does that goes on.
         folder
             .write_config(&folder.read_settings().unwrap(), &found)
             .unwrap();

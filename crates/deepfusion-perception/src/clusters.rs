@@ -86,8 +86,8 @@ impl Cluster {
 /// How far two neighbouring pixels of one surface may lie apart in depth.
 ///
 /// On an upright surface seen at a grazing angle, as the side of a car ahead is, depth grows by z²·δ/|x| from
-/// one column to the next (δ: the angle between them, x: the surface's distance to the side); on a level one by
-/// z²·δ/|y| from row to row. The depth's own error grows with z² in metres, thus with z relative to it.
+/// one column to the next (δ: the angle between them, x: the surface's distance to the side). On a level one it
+/// grows by z²·δ/|y| from row to row. The depth's own error grows with z² in metres, thus with z relative to it.
 pub(crate) struct Gaps {
     error: f32,
     step: [f32; 2],

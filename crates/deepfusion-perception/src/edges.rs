@@ -9,7 +9,7 @@ const ROWS: usize = 16;
 /// Marks the pixels of a depth image (row by row) that hang between two surfaces.
 ///
 /// Such a pixel is farther than what is `radius` pixels to one side and nearer than what is as far to the other,
-/// by more than `jump` of its own depth (and 0.3 m) each: a surface that is seen at a grazing angle rises no
+/// by more than `jump` of its own depth (and 0.3 m) each. A surface that is seen at a grazing angle rises no
 /// faster.
 #[must_use]
 pub fn flying_pixels(depth: &[f32], width: usize, radius: usize, jump: f32) -> Vec<bool> {

@@ -1,9 +1,11 @@
+use crate::damage::{BagDamage, FileDamage};
 use crate::mcap::McapFile;
 use crate::metadata;
 use crate::problem::StorageProblem;
 use crate::storage::{self, Storage, hull};
 use deepfusion_rosbag::{
-    Connection, Error, Message, MessageIter, MessageSource, Result, Selection, Time, TopicInfo,
+    Connection, Error, Message, MessageIter, MessageSource, Result, Selection, SourceDamage, Time,
+    TopicInfo,
 };
 use std::collections::VecDeque;
 use std::iter::Peekable;
@@ -150,18 +152,14 @@ impl MessageSource for Ros2Bag {
         self.files.iter().map(|file| file.range()).fold(None, hull)
     }
 
-    fn damage(&self) -> Option<String> {
-        let missing = self
-            .missing
-            .iter()
-            .map(|file| format!("{} is not there", file.display()));
-        let all: Vec<String> = self
-            .files
-            .iter()
-            .filter_map(|file| file.damage())
-            .chain(missing)
+    fn damage(&self) -> Option<SourceDamage> {
+        let unreadable = self.files.iter().filter_map(|file| file.damage());
+        let missing = self.missing.iter().cloned();
+        let files: Vec<FileDamage> = unreadable
+            .map(FileDamage::Unreadable)
+            .chain(missing.map(FileDamage::NotThere))
             .collect();
-        (!all.is_empty()).then(|| all.join("; "))
+        (!files.is_empty()).then(|| SourceDamage::new(BagDamage { files }))
     }
 
     fn messages(&self, selection: Selection) -> Result<MessageIter<'_>> {

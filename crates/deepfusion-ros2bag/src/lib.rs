@@ -13,6 +13,7 @@
 //! need. Without that feature a `.db3` is an [`Error::Feature`](deepfusion_rosbag::Error::Feature).
 
 mod bag;
+mod damage;
 mod mcap;
 mod metadata;
 mod problem;
@@ -21,7 +22,10 @@ mod sqlite;
 mod storage;
 
 pub use bag::{Ros2Bag, is_ros2_bag};
-pub use mcap::{ChunkProblem, RecordProblem};
+pub use damage::{BagDamage, FileDamage};
+pub use mcap::{ChunkProblem, McapDamage, McapProblem, RecordProblem};
 #[cfg(feature = "ros2-sqlite")]
 pub use problem::PackedProblem;
 pub use problem::StorageProblem;
+#[cfg(feature = "ros2-sqlite")]
+pub use sqlite::DatabaseDamage;

@@ -1,16 +1,19 @@
 //! SQLite files (`.db3`), in which every message is a row.
 
+mod damage;
 mod rows;
+
+pub use self::damage::DatabaseDamage;
 
 use crate::problem::StorageProblem;
 use crate::storage::{Channel, MOST_BYTES, Storage, hull};
-use deepfusion_rosbag::{Error, MessageIter, Result, Selection, Time};
+use deepfusion_rosbag::{Error, MessageIter, Result, Selection, SourceDamage, Time};
 use rows::{Key, Rows};
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// A database of messages, open for reading.
 pub(crate) struct SqliteFile {
@@ -22,7 +25,7 @@ pub(crate) struct SqliteFile {
     places: HashMap<i64, usize>,
     /// Every message in time order, if the database cannot order them itself: its index is missing, or it is damaged.
     listed: Option<Vec<Key>>,
-    damage: Option<rusqlite::Error>,
+    damage: Option<Arc<rusqlite::Error>>,
 }
 
 impl SqliteFile {
@@ -50,7 +53,7 @@ impl SqliteFile {
                     .execute_batch("PRAGMA writable_schema = ON")
                     .map_err(failed)?;
                 drop(database);
-                file.damage = Some(e);
+                file.damage = Some(Arc::new(e));
                 file.read_topics().map_err(failed)?;
             }
             other => other.map_err(failed)?,
@@ -108,14 +111,14 @@ impl SqliteFile {
                         return Ok(());
                     }
                     Err(e) if !is_damage(&e) => return Err(failed(&self.path, e)),
-                    Err(e) => self.damage = Some(e),
+                    Err(e) => self.damage = Some(Arc::new(e)),
                 }
                 rows::all(&self.database())
             } else {
                 rows::all(&database)
             }
         };
-        self.damage = self.damage.take().or(broken);
+        self.damage = self.damage.take().or(broken.map(Arc::new));
         let known = keys.into_iter().filter_map(|mut key| {
             key.topic = i64::try_from(*self.places.get(&key.topic)?).ok()?;
             Some(key)
@@ -186,13 +189,10 @@ impl Storage for SqliteFile {
         self.channels.iter().map(|c| c.range).fold(None, hull)
     }
 
-    fn damage(&self) -> Option<String> {
-        let damage = self.damage.as_ref()?;
-        let found = match self.listed.as_ref().map_or(0, Vec::len) {
-            1 => "1 message was found".to_owned(),
-            n => format!("{n} messages were found"),
-        };
-        Some(format!("the database is damaged ({damage}); {found}"))
+    fn damage(&self) -> Option<SourceDamage> {
+        let reason = Arc::clone(self.damage.as_ref()?);
+        let messages = self.listed.as_ref().map_or(0, Vec::len);
+        Some(SourceDamage::new(DatabaseDamage { reason, messages }))
     }
 
     fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a> {

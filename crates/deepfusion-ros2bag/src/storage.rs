@@ -1,6 +1,8 @@
 //! The common interface of both kinds of file.
 
-use deepfusion_rosbag::{Connection, MessageIter, Selection, Serialization, Time, TopicInfo};
+use deepfusion_rosbag::{
+    Connection, MessageIter, Selection, Serialization, SourceDamage, Time, TopicInfo,
+};
 use std::fmt;
 
 /// The largest chunk or message that is read, in bytes: what a damaged or hostile file can make one take.
@@ -17,8 +19,8 @@ pub(crate) trait Storage: fmt::Debug + Send + Sync {
     /// The times of the first and the last message.
     fn range(&self) -> Option<(Time, Time)>;
 
-    /// What of it cannot be read, in a sentence.
-    fn damage(&self) -> Option<String>;
+    /// What of it cannot be read.
+    fn damage(&self) -> Option<SourceDamage>;
 
     /// The messages of the channels that are `wanted`, by place, in time order.
     fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a>;

@@ -2,7 +2,7 @@
 
 use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
-use deepfusion_ros2bag::Ros2Bag;
+use deepfusion_ros2bag::{BagDamage, FileDamage, Ros2Bag};
 use deepfusion_rosbag::{Error, MessageSource, Selection};
 use std::collections::HashSet;
 use std::path::Path;
@@ -50,7 +50,7 @@ fn a_file_that_was_cut_off_is_read_up_to_the_break() {
             let bag = open(folder.path(), "cut.mcap", &whole[..cut]).unwrap();
             let (found, errors) = read(&bag);
             assert_eq!(errors, [] as [String; 0], "{name} at {cut}");
-            let damage = bag.damage().unwrap();
+            let damage = bag.damage().unwrap().to_string();
             assert!(
                 damage.contains("did not finish"),
                 "{name} at {cut}: {damage}"
@@ -101,7 +101,7 @@ fn a_hurt_summary_is_replaced_by_a_scan() {
     // The length of the summary's first record.
     bytes[start + 4] = 0xff;
     let bag = open(folder.path(), "hurt.mcap", &bytes).unwrap();
-    let damage = bag.damage().unwrap();
+    let damage = bag.damage().unwrap().to_string();
     assert!(damage.contains("summary is damaged"), "{damage}");
     assert_eq!(read(&bag).0.len(), 48);
 }
@@ -119,7 +119,7 @@ fn a_database_that_was_cut_off_is_read_up_to_the_break() {
         match open(folder.path(), "cut.db3", &whole[..cut]) {
             Ok(bag) => {
                 let (found, errors) = read(&bag);
-                let damage = bag.damage().unwrap();
+                let damage = bag.damage().unwrap().to_string();
                 assert!(damage.contains("database is damaged"), "{cut}: {damage}");
                 assert!(found.iter().all(|m| all.contains(m)), "{cut}");
                 assert!(errors.len() <= 48, "{cut}: {errors:?}");
@@ -190,7 +190,13 @@ fn what_is_not_read_says_what_to_do() {
     std::fs::copy(reference("sqlite/sqlite.db3"), bag.join("bag_0.db3")).unwrap();
     let opened = Ros2Bag::open(&bag).unwrap();
     assert_eq!(read(&opened).0.len(), 48);
-    assert!(opened.damage().unwrap().contains("bag_1.db3 is not there"));
+    let damage = opened.damage().unwrap();
+    let Some(BagDamage { files }) = damage.downcast_ref::<BagDamage>() else {
+        panic!("{damage}");
+    };
+    assert_eq!(files, &[FileDamage::NotThere(bag.join("bag_1.db3"))]);
+    let said = damage.to_string();
+    assert!(said.ends_with("bag_1.db3 is not there"), "{said}");
     std::fs::write(
         bag.join("metadata.yaml"),
         "rosbag2_bagfile_information: 3\n",

@@ -33,6 +33,7 @@ mod record;
 mod scan;
 mod selection;
 mod source;
+mod source_damage;
 mod time;
 mod topic;
 mod writer;
@@ -52,6 +53,7 @@ pub use problem::{
 };
 pub use scan::{Damage, ScanReason};
 pub use selection::Selection;
+pub use source_damage::SourceDamage;
 pub use time::Time;
 pub use topic::TopicInfo;
 pub use writer::{BagWriter, ConnectionId, WriterOptions};

@@ -18,7 +18,7 @@ const WINDOW: usize = 1 << 16;
 /// Appends what the frames in `stored` hold to `out`, up to `most` bytes in all: more is an error. Memory grows with the
 /// blocks; those before an error stay in `out`.
 pub(crate) fn decompress(stored: &[u8], most: usize, out: &mut Buffer) -> Result<()> {
-    let mut rest = Rest(stored);
+    let mut rest = UnreadBytes(stored);
     while !rest.0.is_empty() {
         let start = out.len();
         let header = Header::read(&mut rest)?;
@@ -44,7 +44,7 @@ struct Block<'a> {
 }
 
 impl Header {
-    fn read(rest: &mut Rest<'_>) -> Result<Self> {
+    fn read(rest: &mut UnreadBytes<'_>) -> Result<Self> {
         if rest.u32()? != MAGIC {
             return Err(DecompressProblem::NoFrame);
         }
@@ -78,7 +78,7 @@ impl Header {
     }
 
     /// The next block; none at the frame's end mark.
-    fn block<'a>(&self, rest: &mut Rest<'a>) -> Result<Option<Block<'a>>> {
+    fn block<'a>(&self, rest: &mut UnreadBytes<'a>) -> Result<Option<Block<'a>>> {
         let length = rest.u32()?;
         if length == 0 {
             return Ok(None);
@@ -119,7 +119,7 @@ impl Header {
         }
     }
 
-    fn check(&self, rest: &mut Rest<'_>, content: &[u8]) -> Result<()> {
+    fn check(&self, rest: &mut UnreadBytes<'_>, content: &[u8]) -> Result<()> {
         if self
             .content_size
             .is_some_and(|size| size != content.len() as u64)
@@ -134,9 +134,9 @@ impl Header {
 }
 
 /// The bytes not read yet.
-struct Rest<'a>(&'a [u8]);
+struct UnreadBytes<'a>(&'a [u8]);
 
-impl<'a> Rest<'a> {
+impl<'a> UnreadBytes<'a> {
     fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let (taken, rest) = self
             .0

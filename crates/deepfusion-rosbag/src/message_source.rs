@@ -1,6 +1,7 @@
 use crate::bag::Bag;
 use crate::message::Message;
 use crate::messages::Messages;
+use crate::source_damage::SourceDamage;
 use crate::topic::TopicInfo;
 use crate::{Result, Selection, Time};
 use std::fmt;
@@ -25,8 +26,8 @@ pub trait MessageSource: fmt::Debug + Send + Sync {
     /// The times of the first and the last message; `None` without any.
     fn time_range(&self) -> Option<(Time, Time)>;
 
-    /// What is wrong with the recording, in a sentence, where not all of it can be read.
-    fn damage(&self) -> Option<String>;
+    /// What is wrong with the recording, where not all of it can be read.
+    fn damage(&self) -> Option<SourceDamage>;
 
     /// The messages that `selection` asks for, in time order, streaming: memory does not grow with the recording.
     ///
@@ -56,8 +57,8 @@ impl MessageSource for Bag {
         self.time_range()
     }
 
-    fn damage(&self) -> Option<String> {
-        self.damage().map(ToString::to_string)
+    fn damage(&self) -> Option<SourceDamage> {
+        self.damage().cloned().map(SourceDamage::new)
     }
 
     fn messages(&self, selection: Selection) -> Result<MessageIter<'_>> {

@@ -77,6 +77,8 @@ impl fmt::Display for Damage {
     }
 }
 
+impl std::error::Error for Damage {}
+
 /// The result of a scan: an index, and the first break.
 pub(crate) struct Scan {
     pub index: Index,

@@ -27,7 +27,7 @@ fn bytes(hex: &str) -> Vec<u8> {
         .collect()
 }
 
-/// The formulas are OpenCV's own in whole numbers, so that nothing is left to tolerate but at the edge of a Bayer pattern: there OpenCV copies what it found
+/// The formulas are OpenCV's own in whole numbers, so that nothing is left to tolerate but at the edge of a Bayer pattern. There OpenCV copies what it found
 /// one pixel further in, while here the missing colours are interpolated from what is there, and the two differ freely on random pixels.
 #[test]
 fn every_encoding_is_what_opencv_makes_of_it() {

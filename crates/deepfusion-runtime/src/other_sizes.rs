@@ -13,20 +13,20 @@ const SIZES_KEPT: usize = 6;
 
 /// Runners for other input sizes, made on demand.
 pub(crate) struct OtherSizes {
-    shared: Arc<Shared>,
+    shared: Arc<SharedSizes>,
     /// Most recently used last.
     made: Vec<(InputSize, Box<dyn DepthRunner>)>,
 }
 
 /// What an estimator and its like on other threads share.
-struct Shared {
+struct SharedSizes {
     make: Box<MakeRunner>,
     /// The first sizes that were asked for. Places are taken in their order and never emptied, so that nobody waits to read them.
-    packed: [OnceLock<Packed>; SIZES_KEPT],
+    packed: [OnceLock<PackedSize>; SIZES_KEPT],
 }
 
 /// What is packed for a size. (Of ONNX Runtime's that is the model's bytes alone.)
-type Packed = (InputSize, Arc<dyn RunnerPlan>);
+type PackedSize = (InputSize, Arc<dyn RunnerPlan>);
 
 type MakeRunner = dyn Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync;
 
@@ -42,7 +42,7 @@ impl OtherSizes {
         make: impl Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync + 'static,
     ) -> Self {
         Self {
-            shared: Arc::new(Shared {
+            shared: Arc::new(SharedSizes {
                 make: Box::new(make),
                 packed: [const { OnceLock::new() }; SIZES_KEPT],
             }),
@@ -81,7 +81,7 @@ impl OtherSizes {
     }
 }
 
-impl Shared {
+impl SharedSizes {
     fn runner(&self, size: InputSize) -> Result<Box<dyn DepthRunner>, Error> {
         let mut packed = self.packed.iter().filter_map(OnceLock::get);
         if let Some((_, plan)) = packed.find(|(of, _)| *of == size) {

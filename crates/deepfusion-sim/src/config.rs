@@ -49,7 +49,7 @@ impl Scene {
         Self::Indoor,
     ];
 
-    /// Its name, as `--scene` takes it.
+    /// Its name, in one word.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -117,7 +117,7 @@ pub enum Sensors {
 }
 
 impl Sensors {
-    /// Its name, as `--sensors` takes it.
+    /// Its name, in one word.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -121,7 +121,7 @@ fn cam_from_imu(date: &Path) -> Se3 {
     cam2_from_cam0 * rigid("calib_velo_to_cam.txt") * rigid("calib_imu_to_velo.txt")
 }
 
-/// Whatever is seen below the horizon is no farther than the road's plane by the camera that is written, and where the road is seen it is there: to the
+/// Whatever is seen below the horizon is no farther than the road's plane by the camera that is written, and where the road is seen it is there. It is so to the
 /// half step of a depth file, and what single precision makes of a ray that nearly misses.
 #[test]
 fn the_road_lies_where_the_written_camera_sees_it() {

@@ -19,7 +19,7 @@ struct Moments {
 
 /// Adam (Kingma and Ba), β₁ = 0.9, β₂ = 0.999, ε = 1e-8, with the gradient clipped by its norm.
 ///
-/// The moments are kept by the parameters' names. On the processor the update is one pass over parameter, gradient and moments; on a GPU
+/// The moments are kept by the parameters' names. On the processor the update is one pass over parameter, gradient and moments. On a GPU
 /// all of them stay there, and a step needs one number from it, the gradient's norm: it decides whether there is a step, and by how much the
 /// gradient is shortened.
 #[derive(Debug, Clone, Default)]

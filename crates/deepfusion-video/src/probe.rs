@@ -25,7 +25,7 @@ pub(crate) struct Probed {
 }
 
 #[derive(Debug, Deserialize)]
-struct Answer {
+struct ProbeAnswer {
     #[serde(default)]
     packets: Vec<Packet>,
     #[serde(default)]
@@ -96,7 +96,7 @@ pub(crate) fn probe(file: &Path) -> Result<Probed> {
 }
 
 fn parse(json: &[u8]) -> std::result::Result<Probed, AnswerProblem> {
-    let answer: Answer = serde_json::from_slice(json)?;
+    let answer: ProbeAnswer = serde_json::from_slice(json)?;
     let stream = answer.streams.first();
     let stream = stream.ok_or(AnswerProblem::NoStream)?;
     let (Some(width), Some(height)) = (stream.width, stream.height) else {

@@ -11,7 +11,7 @@ pub const FORMAT_VERSION: u32 = 1;
 pub struct Card {
     /// [`FORMAT_VERSION`].
     pub format_version: u32,
-    /// Its name, as for `--model`.
+    /// Its name, by which it is asked for.
     pub name: String,
     /// SHA-256 of `NAME.safetensors`, in hexadecimal.
     pub sha256: String,
@@ -44,7 +44,7 @@ pub struct Card {
     /// Evaluations of the checkpoint before it was packed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    /// The calibration of the network's uncertainty, as found by `eval --calibrate-uncertainty`.
+    /// The calibration of the network's uncertainty, as an evaluation found it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<toml::Table>,
     /// The ranges for int8, as found by `weights calibrate`.

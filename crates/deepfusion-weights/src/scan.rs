@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The two files of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pair {
-    /// Its name, as for `--model`: the files' name without the ending.
+    /// Its name, by which it is asked for: the files' name without the ending.
     pub name: String,
     /// `NAME.toml`.
     pub card: PathBuf,
@@ -71,7 +71,7 @@ impl std::fmt::Display for ScanError {
     }
 }
 
-/// Whether this is a valid network name: letters a to z, digits and dashes, a letter first. `none` is reserved for `--init none`.
+/// Whether this is a valid network name: letters a to z, digits and dashes, a letter first. `none` is reserved: it asks for no network.
 pub(crate) fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(plain) && name != "none"

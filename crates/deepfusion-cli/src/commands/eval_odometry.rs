@@ -2,7 +2,7 @@ use std::path::Path;
 
 use deepfusion_data::OpenOptions;
 use deepfusion_eval::odometry::{OdometryReport, PoseFile, TrackPair};
-use deepfusion_jobs::odometry::{tracks, write_track};
+use deepfusion_jobs::odometry::{OdometryWarning, tracks, write_track};
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
 
@@ -59,7 +59,8 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_aimed(&args.data, &options)?;
     let mut progress = Progress::new("following");
-    let found = tracks(&predictor, &datasets, &mut |done, total| {
+    let mut warn = |warning: OdometryWarning| tracing::warn!("{warning}");
+    let found = tracks(&predictor, &datasets, &mut warn, &mut |done, total| {
         progress.set(done, total);
     });
     let (tracks, truth) = found?;

@@ -41,16 +41,18 @@ pub enum DataWarning {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_rosbag::SourceDamage;
 
     /// One of each kind: what a kind says itself is tested beside it.
     #[test]
     fn a_warning_says_what_its_kind_says() {
+        let ends_early = SourceDamage::new(std::io::Error::other("it ends early"));
         let warnings: [DataWarning; 6] = [
             CameraWarning::LensCorrected.into(),
             MountWarning::LidarUnknown.into(),
             TimesWarning::VideoUntimed.into(),
             MotionWarning::NoCourseRates.into(),
-            IncompleteWarning::Damaged("it ends early".into()).into(),
+            IncompleteWarning::Damaged(ends_early).into(),
             DataWarning::Other("its gyroscope was warm".into()),
         ];
         let said = [

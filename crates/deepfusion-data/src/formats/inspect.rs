@@ -102,7 +102,10 @@ fn inspect_layout(
         distance_m: sum(drives.iter().map(|one| one.drive.distance_m)),
         duration_s: sum(drives.iter().map(|one| one.drive.duration_s)),
         drives: drives.into_iter().map(|one| one.drive).collect(),
-        unreadable: unreadable.into_iter().map(Unread::listed).collect(),
+        unreadable: unreadable
+            .into_iter()
+            .map(UnopenedRecording::listed)
+            .collect(),
     })
 }
 
@@ -110,9 +113,9 @@ fn inspect_layout(
 #[derive(Default)]
 struct InspectedDrives {
     drives: Vec<InspectedDrive>,
-    unreadable: Vec<Unread>,
+    unreadable: Vec<UnopenedRecording>,
     /// Those with which nothing is wrong but that they have no images.
-    without_images: Vec<Unread>,
+    without_images: Vec<UnopenedRecording>,
 }
 
 impl InspectedDrives {
@@ -125,7 +128,7 @@ impl InspectedDrives {
             }
             Err(error) => error,
         };
-        let unread = Unread {
+        let unread = UnopenedRecording {
             path,
             recording,
             error,
@@ -147,7 +150,7 @@ impl InspectedDrives {
         }
         let lack_images = self.unreadable.is_empty();
         self.unreadable.append(&mut self.without_images);
-        let mut reasons = self.unreadable.iter().map(Unread::reason);
+        let mut reasons = self.unreadable.iter().map(UnopenedRecording::reason);
         let first = reasons.next();
         if lack_images || reasons.all(|reason| Some(reason) == first) {
             let first = self.unreadable.into_iter().next();
@@ -161,13 +164,13 @@ impl InspectedDrives {
 }
 
 /// A recording that was not opened.
-struct Unread {
+struct UnopenedRecording {
     path: PathBuf,
     recording: Layout,
     error: Error,
 }
 
-impl Unread {
+impl UnopenedRecording {
     /// As [`Dataset::open`] leaves recordings out: drives without images of the camera, and bags that give none.
     fn lacks_images(&self) -> bool {
         match self.error {
@@ -208,7 +211,7 @@ fn inspect_all(path: &Path, layout: Layout, options: &OpenOptions) -> InspectedD
     }
     if found.drives.is_empty() && found.unreadable.is_empty() {
         for unread in std::mem::take(&mut found.without_images) {
-            let Unread {
+            let UnopenedRecording {
                 path,
                 recording,
                 error,

@@ -2,7 +2,7 @@
 
 use super::files::folders;
 use super::kitti::{self, Drive, drive_around, find_drives};
-use super::neighbours::{Wanted, unread};
+use super::neighbours::{NeighbourSearch, unread};
 use super::{bag, comma, folder, found_instead, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
 use crate::{
@@ -229,7 +229,7 @@ impl Layout {
             return None;
         }
         let used = self.used(&folder);
-        let wanted = Wanted {
+        let wanted = NeighbourSearch {
             used: &used,
             // A folder's own, or left out by its `dataset.toml`.
             videos: !matches!(self, Self::Comma(_) | Self::Folder(_) | Self::Video(_)),

@@ -25,7 +25,7 @@ const OUTPUT_FILM: &str = "_video.mp4";
 
 /// What is looked for in a recording's folder.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted<'a> {
+pub(crate) struct NeighbourSearch<'a> {
     /// Files and folders that are read.
     pub(crate) used: &'a [PathBuf],
     /// Whether a video is another recording.
@@ -36,7 +36,7 @@ pub(crate) struct Wanted<'a> {
 
 /// The names of what looks like recordings in a folder, in their order. It is judged by names alone: among them there may be a hundred
 /// thousand images.
-pub(crate) fn unread(folder: &Path, wanted: Wanted) -> Vec<String> {
+pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();

@@ -14,11 +14,13 @@ pub enum FramesReason {
     },
     /// Frames are missing.
     #[error(
-        "{lost:.0} frames are missing at {rate_hz:.1} frames a second, the first before frame {first}: pairs across a gap are left out or move further than others"
+        "{} {} missing at {rate_hz:.1} frames a second, the first before frame {first}: pairs across a gap are left out or move further than others",
+        count_of(*lost, "frame"),
+        if *lost == 1 { "is" } else { "are" }
     )]
     Lost {
         /// How many.
-        lost: f64,
+        lost: usize,
         /// The camera's usual rate, 1/s.
         rate_hz: f64,
         /// The number of the first frame that has a gap before it.
@@ -74,6 +76,11 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_times_is_said() {
+        let lost = |lost| FramesReason::Lost {
+            lost,
+            rate_hz: 10.04,
+            first: 31,
+        };
         let unknown = |stretches| FramesReason::UnknownMotion {
             unknown_s: 1.64,
             stretches,
@@ -85,11 +92,12 @@ mod tests {
                 "its time stamp is 0.100 s before the frame before",
             ),
             (
-                FramesReason::Lost {
-                    lost: 12.0,
-                    rate_hz: 10.04,
-                    first: 31,
-                },
+                lost(1),
+                "1 frame is missing at 10.0 frames a second, the first before frame 31: pairs across a gap are left out or move further \
+                 than others",
+            ),
+            (
+                lost(12),
                 "12 frames are missing at 10.0 frames a second, the first before frame 31: pairs across a gap are left out or move further \
                  than others",
             ),

@@ -24,7 +24,7 @@ pub struct Evaluation {
 /// What is known of where an evaluation comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Origin {
-    /// Nothing: plain `eval --json`.
+    /// Nothing: the file is a plain [`Report`](crate::Report).
     Plain,
     /// A file of a run's folder.
     Saved {
@@ -38,7 +38,7 @@ pub enum Origin {
 }
 
 impl Evaluation {
-    /// Reads what was given: run folders (all their evaluations), saved evaluations, and files that `eval --json` printed.
+    /// Reads what was given: run folders (all their evaluations), saved evaluations, and files that hold a plain [`Report`](crate::Report).
     /// Rows of the same name are told apart by their paths and checkpoints.
     ///
     /// # Errors

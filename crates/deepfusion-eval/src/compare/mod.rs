@@ -1,7 +1,7 @@
 //! Evaluations side by side, the field's published tables, and which rows cannot be right.
 //!
 //! A [`SavedEvaluation`] is what `eval` leaves in a run's folder; [`Evaluation::collect`] reads such files, whole run folders
-//! and the plain output of `eval --json`. [`run_tables`] sorts them by what they were measured on, so that no table mixes
+//! and plain [`Report`](crate::Report)s. [`run_tables`] sorts them by what they were measured on, so that no table mixes
 //! protocols or images; [`published_tables`] are the field's, quoted with their places. Every row goes through
 //! [`plausibility::check`]. The tables come as [text](Tables::to_text), [CSV](Tables::to_csv), [LaTeX](Tables::to_latex), and as
 //! a section of an HTML page through `deepfusion-render`.

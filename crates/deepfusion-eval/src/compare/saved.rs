@@ -22,7 +22,7 @@ pub struct SavedEvaluation {
     pub measured: MeasuredOn,
     /// The weights that were measured.
     pub model: ModelFile,
-    /// What `eval --json` prints.
+    /// The result.
     pub report: Report,
     /// Each image's scores, in order.
     pub images: Vec<FrameScore>,

@@ -27,7 +27,10 @@ pub enum TrackError {
     },
     /// Files with times of which too few agree.
     #[error(
-        "{name}: only {matched} of {predicted} predicted times are within {within_s} s of one of the {truth} true ones"
+        "{name}: only {matched} of {} {} within {within_s} s of {}",
+        count_of(*predicted, "predicted time"),
+        if *matched == 1 || *predicted == 1 { "is" } else { "are" },
+        one_of(*truth)
     )]
     Times {
         /// The predicted file.
@@ -41,6 +44,15 @@ pub enum TrackError {
         /// How near two times must be, in seconds.
         within_s: f64,
     },
+}
+
+/// One of so many true times.
+fn one_of(truth: usize) -> String {
+    if truth == 1 {
+        "the true one".to_owned()
+    } else {
+        format!("one of the {truth} true ones")
+    }
 }
 
 impl Hint for TrackError {

@@ -28,9 +28,9 @@ use crate::{Grid, Prediction, Protocol};
 pub struct ImageSharpness {
     /// How far depth boundaries are from their place; `None` where the truth has none.
     pub boundary: Option<BoundaryError>,
-    /// Of the pixels within two of a jump of the true depth (a neighbour more than 1.25 times deeper), the share whose
-    /// predicted depth is between the least and the greatest true depth of the 5×5 pixels around and more than 10 % from
-    /// each of them; `None` where the truth has no jump.
+    /// Of the pixels within two of a jump of the true depth (a neighbour more than 1.25 times deeper), the share that
+    /// hangs between two depths; `None` where the truth has no jump. Such a pixel's predicted depth is between the least
+    /// and the greatest true depth of the 5×5 pixels around, and more than 10 % from each of them.
     pub flying_share: Option<f64>,
 }
 

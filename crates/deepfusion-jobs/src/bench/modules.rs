@@ -8,12 +8,12 @@ use serde::{Serialize, Serializer};
 /// The depth network's parts in the order in which they run, and the pose network, which only trains: a table for people, and for scripts a
 /// list.
 #[derive(Debug, Clone)]
-pub struct Modules {
+pub struct ModuleCosts {
     depth: Vec<ModuleCost>,
     pose: ModuleCost,
 }
 
-impl Modules {
+impl ModuleCosts {
     /// Those of a configuration.
     #[must_use]
     pub fn new(config: &TrainConfig) -> Self {
@@ -37,7 +37,7 @@ impl Modules {
 
 /// A part of the networks, as scripts read it.
 #[derive(Serialize)]
-struct Module<'a> {
+struct ModuleRecord<'a> {
     name: &'a str,
     /// Numbers that are learned.
     parameters: u64,
@@ -50,7 +50,7 @@ struct Module<'a> {
     values_mb: f64,
 }
 
-impl<'a> From<&'a ModuleCost> for Module<'a> {
+impl<'a> From<&'a ModuleCost> for ModuleRecord<'a> {
     fn from(cost: &'a ModuleCost) -> Self {
         Self {
             name: &cost.name,
@@ -62,13 +62,13 @@ impl<'a> From<&'a ModuleCost> for Module<'a> {
     }
 }
 
-impl Serialize for Modules {
+impl Serialize for ModuleCosts {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.all().map(Module::from))
+        serializer.collect_seq(self.all().map(ModuleRecord::from))
     }
 }
 
-impl fmt::Display for Modules {
+impl fmt::Display for ModuleCosts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn the_papers_parts_are_all_there_and_add_up() {
-        let modules = Modules::new(&Preset::Paper.config());
+        let modules = ModuleCosts::new(&Preset::Paper.config());
         let table = modules.to_string();
         for part in [
             "encoder.stem",

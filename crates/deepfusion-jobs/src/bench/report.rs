@@ -7,7 +7,7 @@ use deepfusion_model::TrainConfig;
 use deepfusion_runtime::DepthRunner;
 use serde::Serialize;
 
-use super::{IMAGES_PER_REPEAT, Modules, PICTURE_SIZE, Stages, StreetBench};
+use super::{IMAGES_PER_REPEAT, ModuleCosts, PICTURE_SIZE, Stages, StreetBench};
 use crate::devices::megabytes;
 use crate::{Result, machine};
 
@@ -37,7 +37,7 @@ pub struct BenchReport {
     /// The most that the device had.
     pub peak_device_mb: Option<f64>,
     /// What each part of the networks costs.
-    pub modules: Modules,
+    pub modules: ModuleCosts,
     /// Least milliseconds of each step of the network, where asked for and known.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile_ms: Vec<(String, f64)>,
@@ -68,7 +68,7 @@ impl BenchRequest<'_> {
     /// A street that cannot be simulated or encoded; what the network's engine says.
     pub fn measure(self, runner: &mut dyn DepthRunner) -> Result<BenchReport> {
         let (config, repeats) = (self.config, self.repeats.max(1));
-        let modules = Modules::new(config);
+        let modules = ModuleCosts::new(config);
         let whole = modules.whole();
         let bench = StreetBench::new(config)?;
         let stages = bench.stages(runner, repeats)?;

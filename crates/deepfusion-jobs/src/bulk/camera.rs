@@ -198,7 +198,7 @@ impl CameraFrom {
     }
 }
 
-/// How far a principal point may lie from the middle of the image, as a share of its side, in both axes and the same way: numbers of an
+/// How far a principal point may lie from the middle of the image, as a share of its side, in both axes and the same way. Numbers of an
 /// image half as large again are 0.25 off, those of a cut image in one axis alone.
 const MOST_OFF: f64 = 0.2;
 

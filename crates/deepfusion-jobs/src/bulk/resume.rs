@@ -96,8 +96,8 @@ impl BulkJob<'_> {
 
     /// The sidecar of an image that is done; `None` where there is work to do.
     ///
-    /// Files that this job did not make, or made of an image that has changed since, are an error, or with `--overwrite` work
-    /// to do. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
+    /// Files that this job did not make, or made of an image that has changed since, are an error, or work to do
+    /// where they may be overwritten. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
     /// when it was killed. Done means that every output's length and checksum are those in the sidecar.
     fn finished(&self, input: &Input, begun: bool) -> Result<Option<Sidecar>> {
         let path = sidecar_path(self.folder, &input.name);

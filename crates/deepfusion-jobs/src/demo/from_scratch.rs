@@ -7,7 +7,7 @@ use deepfusion_render::HtmlReport;
 use deepfusion_sim::SimConfig;
 
 use super::measure::PROTOCOL;
-use super::{DemoSettings, Shown};
+use super::{DemoSettings, ShownPrediction};
 use crate::dates::clock;
 use crate::evaluation::Evaluated;
 use crate::{Result, RunHistory};
@@ -97,7 +97,7 @@ pub struct FromScratchPage<'a> {
     /// How it measures on the street never seen.
     pub evaluated: &'a Evaluated,
     /// What it sees there; the first frame with its truth and its cloud.
-    pub shown: &'a [Shown],
+    pub shown: &'a [ShownPrediction],
     /// Of the whole demo.
     pub seconds: f64,
     /// The folder of the run that learned.

@@ -8,8 +8,8 @@ pub mod from_scratch;
 mod measure;
 pub mod new_street;
 mod settings;
-mod shown;
+mod shown_prediction;
 
 pub use self::measure::measure;
 pub use self::settings::{DemoFolder, DemoSettings};
-pub use self::shown::Shown;
+pub use self::shown_prediction::ShownPrediction;

@@ -10,7 +10,7 @@ use crate::Result;
 
 /// One operation as another process prints it.
 #[derive(Debug, Serialize, Deserialize)]
-struct Answer {
+struct OperationAnswer {
     operation: String,
     forward: f64,
     backward: Option<f64>,
@@ -38,7 +38,7 @@ pub fn checks_from(device: &Device, first: &str) -> impl Iterator<Item = Operati
 /// [`crate::Error::Json`].
 pub fn answer_line(check: &OperationCheck) -> Result<String> {
     // JSON knows no infinity.
-    let answer = Answer {
+    let answer = OperationAnswer {
         operation: check.operation.into(),
         forward: check.forward.min(f64::MAX),
         backward: check.backward.map(|error| error.min(f64::MAX)),
@@ -57,7 +57,7 @@ pub(super) fn answered<'a, E>(
     let mut rest = asked;
     for line in printed {
         let start = line.find("{\"operation\"").unwrap_or(line.len());
-        let Ok(answer) = serde_json::from_str::<Answer>(&line[start..]) else {
+        let Ok(answer) = serde_json::from_str::<OperationAnswer>(&line[start..]) else {
             continue;
         };
         let [(operation, needed_by), others @ ..] = rest else {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::devices::ComputeDevice;
 
-/// What was found of a device: what `deepfusion doctor --device … --json` prints.
+/// What was found of a device.
 #[derive(Debug, Serialize)]
 pub struct DeviceCheckRecord {
     /// The device.

@@ -59,7 +59,7 @@ impl Confidence {
         let path = run.join(FILE);
         let text = format!(
             "# Expected relative error of a depth = constant + gradient * (local gradient of disparity) + flip * (disagreement\n\
-             # with the mirrored image); confidence = exp(-error). Written by `eval --calibrate-confidence`.\n{}",
+             # with the mirrored image); confidence = exp(-error). Found by an evaluation.\n{}",
             toml::to_string(self)?
         );
         write(&path, text)?;

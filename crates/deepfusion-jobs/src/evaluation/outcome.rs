@@ -21,7 +21,7 @@ pub struct EvaluationOutcome {
 
 /// Its JSON.
 #[derive(Serialize)]
-struct Fields<'a> {
+struct OutcomeRecord<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     checkpoint: Option<&'a UsedCheckpoint>,
     #[serde(flatten)]
@@ -37,7 +37,7 @@ impl Serialize for EvaluationOutcome {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let verdict = self.verdict.as_ref();
         let certificate = verdict.and_then(|verdict| verdict.scale_certificate.as_ref());
-        Fields {
+        OutcomeRecord {
             checkpoint: self.checkpoint.as_ref(),
             report: self.report.as_ref(),
             certificate: certificate.filter(|_| self.report.is_none()),

@@ -75,7 +75,16 @@ impl fmt::Display for TargetReport {
             score.velocities,
             share(score.motion_accuracy)
         )?;
-        writeln!(f, "identities   {:>8} switches\n", score.identity_switches)?;
+        writeln!(
+            f,
+            "identities   {:>8} {}\n",
+            score.identity_switches,
+            if score.identity_switches == 1 {
+                "switch"
+            } else {
+                "switches"
+            }
+        )?;
         for range in &score.ranges {
             writeln!(
                 f,

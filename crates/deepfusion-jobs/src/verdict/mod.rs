@@ -91,7 +91,7 @@ pub fn verdict(
 ) -> Result<Verdict> {
     let plan = plan(datasets, unseen, options.blocks);
     let total = plan.frames();
-    let mut gathered = Gathered::default();
+    let mut gathered = GatheredEvidence::default();
     let mut done = 0;
     for block in &plan.blocks {
         let dataset = &datasets[block.dataset];
@@ -112,8 +112,9 @@ pub fn verdict(
     Ok(verdict)
 }
 
+/// What the frames looked at so far say, block by block and all together.
 #[derive(Default)]
-struct Gathered {
+struct GatheredEvidence {
     blocks: Vec<BlockScale>,
     points: Vec<(f64, f64)>,
     speeds: Vec<(f64, f64)>,
@@ -122,7 +123,7 @@ struct Gathered {
     flip: Vec<f64>,
 }
 
-impl Gathered {
+impl GatheredEvidence {
     fn add(&mut self, evidence: &FrameEvidence, speed_mps: f64) {
         self.speeds
             .extend(evidence.log_way.map(|log| (speed_mps, log)));

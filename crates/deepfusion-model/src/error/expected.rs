@@ -1,5 +1,7 @@
 //! What a setting must be, and what it is instead.
 
+use deepfusion_hint::count_of;
+
 /// What a setting must be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -150,7 +152,7 @@ pub enum FoundSetting {
     #[error("some")]
     Something,
     /// So many of the data sets have it.
-    #[error("{with} of {of} sets")]
+    #[error("{with} of {}", count_of(*of, "set"))]
     SomeSets {
         /// How many.
         with: usize,

@@ -144,7 +144,7 @@ impl Default for SimulatedConfig {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataSetConfig {
-    /// What `--data-set` calls it.
+    /// By what name the set is chosen.
     pub name: String,
     /// Drive folders, date folders or KITTI roots.
     pub paths: Vec<PathBuf>,

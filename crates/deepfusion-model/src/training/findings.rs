@@ -14,7 +14,7 @@ const TABLE: &str = "findings";
 
 /// What a run found out from its data when it began. Nobody sets it, and without it the networks' outputs mean no metres.
 ///
-/// It is the table `[findings]` of the run's `config.toml`; as a configuration (`train --config`) that file means its
+/// It is the table `[findings]` of the run's `config.toml`; as a configuration for another run that file means its
 /// settings alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -99,10 +99,11 @@ impl Default for FlowLossConfig {
     }
 }
 
-/// Which pixels count as moving by themselves, and so are taken out of the rigid reprojection: those that
-/// the flow explains better than the rigid warp by `margin`, while the two flows differ by more than
-/// `min_flow_px` and `min_flow_share`, and the flow leaves the epipolar line by `min_epipolar_px` or goes along
-/// it `min_parallax_ratio` times as far as the depth says, or as little. Neither limit set: neither is asked.
+/// Which pixels count as moving by themselves, and so are taken out of the rigid reprojection.
+///
+/// Those are pixels that the flow explains better than the rigid warp by `margin`, while the two flows differ by
+/// more than `min_flow_px` and `min_flow_share`. The flow also has to leave the epipolar line by `min_epipolar_px`, or
+/// go along it `min_parallax_ratio` times as far as the depth says, or as little. Neither limit set: neither is asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MovingConfig {

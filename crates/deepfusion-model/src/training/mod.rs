@@ -1,4 +1,4 @@
-//! Everything that decides a training run, as one struct: the command line, `--config` and a run's `config.toml` say the same.
+//! Everything that decides a training run, as one struct: the command line, a configuration file and a run's `config.toml` say the same.
 //! What a run finds out from its data is another: [`TrainFindings`].
 
 mod assumed_camera;

@@ -79,7 +79,7 @@ pub struct Augmentation {
     /// the batches have the run's own size, the others in turns one of these.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<InputSize>,
-    /// Other sizes of video's images, for a network that is to be used by several predictions (`--post-process multi-scale`): half of the
+    /// Other sizes of video's images, for a network that is to predict each image at several scales: half of the
     /// batches have the run's own size, the others in turns one of these. Only with `canonical_focal_px`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub video_sizes: Vec<InputSize>,
@@ -137,7 +137,7 @@ pub struct DataConfig {
     pub sets: Vec<DataSetConfig>,
 }
 
-/// Everything that decides a training run. One struct serves the command line, the `--config` file
+/// Everything that decides a training run. One struct serves the command line, a configuration file
 /// and the checkpoint; it is stored beside the run as `config.toml`, with what the run found out ([`crate::TrainFindings`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -198,7 +198,7 @@ pub struct TrainConfig {
     /// as its runner says.
     #[serde(default)]
     pub precision: Precision,
-    /// The weights to begin from, as `--init` takes them: a path, or with `init_sha256` the name of a network that the program carries.
+    /// The weights to begin from: a path, or with `init_sha256` the name of a network that the program carries.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init: Option<PathBuf>,
     /// SHA-256 of the embedded network's weights, so that a repeated run notices that it would begin from others.

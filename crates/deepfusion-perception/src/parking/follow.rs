@@ -3,14 +3,14 @@
 use super::View;
 use super::car::car;
 use super::row::{Parked, Row};
-use super::segments::Standing;
+use super::segments::ObstaclePoints;
 use crate::Detection;
 
 /// Weight of a car found by its row for the row's continuation, in sightings.
 const FOUND: f32 = 2.0;
 
 /// Follows a row from its near to its far end: each car that is visible enough updates the row's direction.
-pub(super) fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
+pub(super) fn follow(row: &mut Row, standing: &ObstaclePoints, view: &View) -> Vec<Detection> {
     let mut found = Vec::new();
     let mut done = f32::NEG_INFINITY;
     loop {

@@ -22,7 +22,7 @@ use follow::follow;
 use nalgebra::Vector3;
 use remembered::{RememberedCar, distance, heading, merge, on_ground, parked};
 use row::{Heading, Parked, Row};
-use segments::Standing;
+use segments::ObstaclePoints;
 
 /// From this share of a detection's pixels, or of the smaller footprint, within a car of a row, it is part of that car:
 /// that is likelier than another object in the car's place.
@@ -125,9 +125,9 @@ impl Parking {
             let (alone, others): (Vec<_>, Vec<_>) =
                 open.into_iter().partition(|d| stands_alone(d, &view));
             open = others;
-            let standing = Standing::find(&view, kept.iter().chain(&alone));
+            let standing = ObstaclePoints::find(&view, kept.iter().chain(&alone));
             let (rows, found) = follow_all(rows, &lane, &standing, &view);
-            let explained = Explained::of(&found, &view);
+            let explained = ExplainedByRows::of(&found, &view);
             let in_row = |d: &Detection| rows.iter().any(|row| row.holds(d.place.middle));
             open.retain(|d| !(in_row(d) && explained.covers(d)));
             for car in found {
@@ -143,14 +143,14 @@ impl Parking {
     }
 }
 
-/// What the cars of rows explain: their footprints and their pixels.
-struct Explained<'a> {
+/// What the cars of rows explain of an image: their footprints and their pixels.
+struct ExplainedByRows<'a> {
     cars: &'a [Detection],
     pixels: Vec<bool>,
     width: usize,
 }
 
-impl<'a> Explained<'a> {
+impl<'a> ExplainedByRows<'a> {
     fn of(cars: &'a [Detection], view: &View) -> Self {
         let width = view.rays.x.len();
         let mut pixels = vec![false; view.depth.len()];
@@ -188,7 +188,7 @@ fn believed(cars: &[Parked]) -> Vec<Row> {
 fn follow_all(
     rows: Vec<Row>,
     lane: &[Heading],
-    standing: &Standing,
+    standing: &ObstaclePoints,
     view: &View,
 ) -> (Vec<Row>, Vec<Detection>) {
     let mut followed: Vec<Row> = Vec::with_capacity(rows.len());

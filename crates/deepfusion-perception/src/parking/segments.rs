@@ -52,11 +52,11 @@ struct Point {
 }
 
 /// The obstacle points, without what reaches the ceiling.
-pub(super) struct Standing {
+pub(super) struct ObstaclePoints {
     points: Vec<Point>,
 }
 
-impl Standing {
+impl ObstaclePoints {
     /// Finds them in an image, leaving out the pixels of `others`, which are known not to be parked.
     pub(super) fn find<'a>(view: &View, others: impl Iterator<Item = &'a Detection>) -> Self {
         let width = view.rays.x.len();
@@ -289,7 +289,7 @@ mod tests {
     use crate::parking::scene::Scene;
 
     /// What is seen between two places on a row 6 m to the right, so deep across it, metres.
-    fn standing(pieces: &[[f32; 3]]) -> Standing {
+    fn standing(pieces: &[[f32; 3]]) -> ObstaclePoints {
         let mut points = Vec::new();
         for [from, to, deep] in pieces {
             let steps = ((to - from) / 0.05) as usize;
@@ -302,7 +302,7 @@ mod tests {
                 });
             }
         }
-        Standing { points }
+        ObstaclePoints { points }
     }
 
     fn row() -> Row {
@@ -360,7 +360,7 @@ mod tests {
                 pixel: i,
             }
         });
-        let standing = Standing {
+        let standing = ObstaclePoints {
             points: points.collect(),
         };
         let parts = standing.segments(&row(), [6.0, 20.0], &scene.view());

@@ -2,6 +2,7 @@
 
 use super::record::{ChunkHead, Fields, MESSAGE_HEAD, MessageHead, RecordProblem, op, record};
 use crate::storage::MOST_BYTES;
+use deepfusion_hint::count_of;
 use deepfusion_rosbag::Time;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -15,7 +16,11 @@ pub enum ChunkProblem {
     #[error("its head is cut off")]
     HeadCut,
     /// Its end is missing.
-    #[error("{missing} of its {stored} bytes are missing")]
+    #[error(
+        "{missing} of its {} {} missing",
+        count_of(*stored, "byte"),
+        if *missing == 1 { "is" } else { "are" }
+    )]
     Cut {
         /// How many bytes are missing.
         missing: u64,
@@ -23,7 +28,7 @@ pub enum ChunkProblem {
         stored: u64,
     },
     /// It is larger than a chunk may be.
-    #[error("{size} bytes unpacked, at most {MOST_BYTES} are read")]
+    #[error("{} unpacked, at most {MOST_BYTES} are read", count_of(*size, "byte"))]
     TooLarge {
         /// How many bytes it has unpacked.
         size: u64,
@@ -41,7 +46,7 @@ pub enum ChunkProblem {
     #[error("cannot be unpacked: {0}")]
     Unpack(#[source] io::Error),
     /// It has another length than its head says.
-    #[error("{bytes} bytes unpacked, its head says {stated}")]
+    #[error("{} unpacked, its head says {stated}", count_of(*bytes, "byte"))]
     Length {
         /// How many bytes came out.
         bytes: u64,

@@ -1,9 +1,10 @@
 //! A file's summary, which is at its end.
 
 use super::chunk::{self, indexed_times, walk};
+use super::damage::McapProblem;
 use super::definitions::Definitions;
 use super::record::{Fields, MAGIC, TAIL, op, record};
-use super::{ChunkInfo, Damage, Index};
+use super::{ChunkInfo, Index};
 use crate::storage::hull;
 use deepfusion_rosbag::Time;
 
@@ -20,14 +21,14 @@ struct Statistics {
 struct Indexes(Vec<(u16, u64)>);
 
 /// The index from the summary; else the file has to be scanned, for what is wrong with the summary, if anything is.
-pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<Damage>> {
+pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<McapProblem>> {
     let tail = bytes.len().checked_sub(TAIL);
     let (Some(tail), true) = (tail, bytes.ends_with(MAGIC)) else {
-        return Err(Some(Damage::NoSummary));
+        return Err(Some(McapProblem::NoSummary));
     };
     let footer = match record(bytes, tail) {
         Ok(Some(footer)) if footer.op == op::FOOTER => footer,
-        _ => return Err(Some(Damage::End)),
+        _ => return Err(Some(McapProblem::End)),
     };
     let start = Fields(footer.content).u64().unwrap_or_default();
     if start == 0 {
@@ -37,13 +38,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<Damage>> {
     let (mut chunks, mut indexes, mut statistics) = (Vec::new(), Vec::new(), None);
     let mut at = usize::try_from(start).unwrap_or(usize::MAX);
     if at >= tail {
-        return Err(Some(Damage::SummaryPlace));
+        return Err(Some(McapProblem::SummaryPlace));
     }
     while at < tail {
         let found = match record(&bytes[..tail], at) {
             Ok(Some(found)) => found,
             Ok(None) => break,
-            Err(cut) => return Err(Some(Damage::SummaryCut(cut.problem()))),
+            Err(cut) => return Err(Some(McapProblem::SummaryCut(cut.problem()))),
         };
         let sound = match found.op {
             op::SCHEMA | op::CHANNEL => definitions.add(found.op, found.content).is_some(),
@@ -62,7 +63,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<Damage>> {
             _ => true,
         };
         if !sound {
-            return Err(Some(Damage::SummaryRecord { at }));
+            return Err(Some(McapProblem::SummaryRecord { at }));
         }
         at = found.end();
     }

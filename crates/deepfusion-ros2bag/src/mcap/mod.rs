@@ -3,6 +3,7 @@
 //! The reader is our own: the `mcap` crate copies every chunk and stops at the first problem.
 
 mod chunk;
+mod damage;
 mod definitions;
 mod index;
 mod messages;
@@ -13,7 +14,8 @@ use crate::problem::StorageProblem;
 use crate::storage::{Channel, Storage, hull};
 pub use chunk::ChunkProblem;
 use chunk::Entry;
-use deepfusion_rosbag::{Error, MessageIter, Result, Selection, Time};
+pub use damage::{McapDamage, McapProblem};
+use deepfusion_rosbag::{Error, MessageIter, Result, Selection, SourceDamage, Time};
 use memmap2::Mmap;
 use record::MAGIC;
 pub use record::RecordProblem;
@@ -26,6 +28,7 @@ pub(crate) struct McapFile {
     path: PathBuf,
     bytes: Bytes,
     index: Index,
+    damage: Option<SourceDamage>,
 }
 
 enum Bytes {
@@ -42,28 +45,7 @@ struct Index {
     chunks: Vec<ChunkInfo>,
     /// Messages outside of chunks, in time order, by place in the file.
     loose: Vec<Entry>,
-    damage: Vec<Damage>,
-}
-
-/// What is wrong with a file that was scanned.
-#[derive(Debug, thiserror::Error)]
-enum Damage {
-    #[error("the recorder did not finish the file, it has no summary")]
-    NoSummary,
-    #[error("the file's end is damaged")]
-    End,
-    #[error("the summary is damaged: it begins behind its end")]
-    SummaryPlace,
-    #[error("the summary is damaged: {0}")]
-    SummaryCut(RecordProblem),
-    #[error("the summary is damaged: the record at byte {at}")]
-    SummaryRecord { at: usize },
-    #[error("the definition at byte {at} is cut off")]
-    Definition { at: usize },
-    #[error(transparent)]
-    Record(RecordProblem),
-    #[error("the chunk at byte {at}: {problem}")]
-    Chunk { at: usize, problem: ChunkProblem },
+    problems: Vec<McapProblem>,
 }
 
 /// A chunk.
@@ -98,14 +80,19 @@ impl McapFile {
             path: path.to_owned(),
             bytes,
             index: Index::default(),
+            damage: None,
         };
         if !opened.bytes().starts_with(MAGIC) {
             return Err(StorageProblem::NotMcap.of(path));
         }
         opened.index = match index::read(opened.bytes()) {
             Ok(index) => index,
-            Err(damage) => scan::read(opened.bytes(), damage),
+            Err(problem) => scan::read(opened.bytes(), problem),
         };
+        let problems = std::mem::take(&mut opened.index.problems);
+        if !problems.is_empty() {
+            opened.damage = Some(SourceDamage::new(McapDamage { problems }));
+        }
         Ok(opened)
     }
 
@@ -127,9 +114,8 @@ impl Storage for McapFile {
         channels.fold(None, hull)
     }
 
-    fn damage(&self) -> Option<String> {
-        let damage: Vec<String> = self.index.damage.iter().map(Damage::to_string).collect();
-        (!damage.is_empty()).then(|| damage.join("; "))
+    fn damage(&self) -> Option<SourceDamage> {
+        self.damage.clone()
     }
 
     fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a> {

@@ -2,6 +2,8 @@
 //!
 //! All numbers are little-endian; a string is its length (u32) and its bytes.
 
+use deepfusion_hint::count_of;
+
 /// The file's first and last bytes.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// What a record is, and its length.
@@ -54,7 +56,7 @@ pub(super) struct TruncatedRecord<'a> {
 #[non_exhaustive]
 pub enum RecordProblem {
     /// Its end is missing.
-    #[error("the record at byte {at} (type {op:#04x}) lacks {missing} bytes")]
+    #[error("the record at byte {at} (type {op:#04x}) lacks {}", count_of(*missing, "byte"))]
     Cut {
         /// Where it begins.
         at: usize,

@@ -1,20 +1,21 @@
 //! A file without a usable summary, read from the front to its end or its break.
 
 use super::chunk::{self, Entry, walk};
+use super::damage::McapProblem;
 use super::definitions::Definitions;
 use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, RecordProblem, op, record};
-use super::{ChunkInfo, Damage, Index};
+use super::{ChunkInfo, Index};
 use deepfusion_rosbag::Time;
 
 /// The index by going through the file; `summary` is what is wrong with its summary, `None` if nothing is, but that it does not say
 /// everything.
-pub(super) fn read(bytes: &[u8], summary: Option<Damage>) -> Index {
+pub(super) fn read(bytes: &[u8], summary: Option<McapProblem>) -> Index {
     let mut scan = Scan {
         bytes,
         definitions: Definitions::default(),
         chunks: Vec::new(),
         loose: Vec::new(),
-        damage: summary.into_iter().collect(),
+        problems: summary.into_iter().collect(),
     };
     scan.go();
     let mut index = Index {
@@ -22,7 +23,7 @@ pub(super) fn read(bytes: &[u8], summary: Option<Damage>) -> Index {
         places: scan.definitions.places,
         chunks: scan.chunks,
         loose: scan.loose,
-        damage: scan.damage,
+        problems: scan.problems,
     };
     index.loose.sort_by_key(|m| (m.time, m.range.start));
     index
@@ -33,7 +34,7 @@ struct Scan<'a> {
     definitions: Definitions,
     chunks: Vec<ChunkInfo>,
     loose: Vec<Entry>,
-    damage: Vec<Damage>,
+    problems: Vec<McapProblem>,
 }
 
 impl Scan<'_> {
@@ -58,7 +59,7 @@ impl Scan<'_> {
                     if cut.op == Some(op::CHUNK) {
                         self.chunk(cut.start, cut.start + cut.content.len(), at);
                     }
-                    self.damage.push(Damage::Record(cut.problem()));
+                    self.problems.push(McapProblem::Record(cut.problem()));
                     return;
                 }
             }
@@ -67,7 +68,7 @@ impl Scan<'_> {
 
     fn define(&mut self, op: u8, content: &[u8], at: usize) {
         if self.definitions.add(op, content).is_none() {
-            self.damage.push(Damage::Definition { at });
+            self.problems.push(McapProblem::Definition { at });
         }
     }
 
@@ -81,7 +82,7 @@ impl Scan<'_> {
             }
             None => {
                 let short = RecordProblem::ShortMessage { at };
-                self.damage.push(Damage::Record(short));
+                self.problems.push(McapProblem::Record(short));
             }
         }
     }
@@ -102,7 +103,7 @@ impl Scan<'_> {
         let (content, problem) = chunk::open(&bytes[from..to]);
         let walk = walk(content.bytes());
         for problem in problem.into_iter().chain(walk.broken) {
-            self.damage.push(Damage::Chunk { at, problem });
+            self.problems.push(McapProblem::Chunk { at, problem });
         }
         for (op, content) in &walk.definitions {
             self.define(*op, content, at);

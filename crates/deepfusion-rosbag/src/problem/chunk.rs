@@ -2,13 +2,18 @@
 
 use super::decompress::DecompressProblem;
 use crate::compression::Compression;
+use deepfusion_hint::count_of;
 
 /// Why a chunk cannot be read, or not all of it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChunkProblem {
     /// It is the last of a file that was cut off.
-    #[error("the last chunk should have {stated} bytes, {left} are there")]
+    #[error(
+        "the last chunk should have {}, {left} {} there",
+        count_of(*stated, "byte"),
+        if *left == 1 { "is" } else { "are" }
+    )]
     Cut {
         /// How many bytes it should have.
         stated: usize,
@@ -28,7 +33,7 @@ pub enum ChunkProblem {
         name: String,
     },
     /// It is stored without compression, and its header says another length.
-    #[error("{bytes} bytes, its header says {stated}")]
+    #[error("{}, its header says {stated}", count_of(*bytes, "byte"))]
     StoredLength {
         /// Its length.
         bytes: usize,
@@ -36,7 +41,7 @@ pub enum ChunkProblem {
         stated: usize,
     },
     /// It takes more memory than is allowed.
-    #[error("{bytes} bytes decompressed, the limit is {limit} (max_chunk_bytes)")]
+    #[error("{} decompressed, the limit is {limit} (max_chunk_bytes)", count_of(*bytes, "byte"))]
     Limit {
         /// How many bytes it has decompressed, as its header says.
         bytes: usize,
@@ -44,7 +49,7 @@ pub enum ChunkProblem {
         limit: usize,
     },
     /// It decompresses to less than its header says.
-    #[error("{bytes} bytes decompressed, its header says {stated}")]
+    #[error("{} decompressed, its header says {stated}", count_of(*bytes, "byte"))]
     Length {
         /// How many bytes came out.
         bytes: usize,

@@ -1,5 +1,6 @@
 //! Why a chunk's content cannot be decompressed.
 
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// Why a chunk's content cannot be decompressed.
@@ -7,13 +8,13 @@ use std::fmt;
 #[non_exhaustive]
 pub enum DecompressProblem {
     /// It is longer than it may be.
-    #[error("more than the {most} bytes expected")]
+    #[error("more than the {} expected", count_of(*most, "byte"))]
     TooLong {
         /// How many bytes it may have.
         most: usize,
     },
     /// A block is longer than it may be, or damaged so that it seems to be.
-    #[error("broken, or more than the {most} bytes expected")]
+    #[error("broken, or more than the {} expected", count_of(*most, "byte"))]
     BrokenOrTooLong {
         /// How many bytes the content may have.
         most: usize,

@@ -1,6 +1,7 @@
 //! How an index contradicts its bag.
 
 use crate::Time;
+use deepfusion_hint::count_of;
 use std::fmt;
 
 /// How the index contradicts the bag.
@@ -30,7 +31,11 @@ pub enum IndexProblem {
         at: u64,
     },
     /// A chunk's list of connections has another length than it should.
-    #[error("{count} connections of 8 bytes, but {bytes} bytes")]
+    #[error(
+        "{} of 8 bytes, but {}",
+        count_of(*count, "connection"),
+        count_of(*bytes, "byte")
+    )]
     Connections {
         /// How many connections there should be.
         count: usize,
@@ -50,7 +55,11 @@ pub enum IndexProblem {
         connection: u32,
     },
     /// A chunk's index data is of another number of messages than the index says.
-    #[error("index data of {count} messages in {bytes} bytes, the index says {promised}")]
+    #[error(
+        "index data of {} in {}, the index says {promised}",
+        count_of(*count, "message"),
+        count_of(*bytes, "byte")
+    )]
     Data {
         /// How many messages it says to have.
         count: usize,

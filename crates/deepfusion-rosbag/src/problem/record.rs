@@ -89,7 +89,9 @@ impl fmt::Display for RecordPart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::HeaderLength => f.write_str("a record's header length"),
-            Self::Header { bytes } => write!(f, "a record's header of {bytes} bytes"),
+            Self::Header { bytes } => {
+                write!(f, "a record's header of {}", count_of(*bytes, "byte"))
+            }
             Self::DataLength => f.write_str("a record's data length"),
         }
     }

@@ -77,8 +77,8 @@ impl Lens {
 /// from 35° to 60° or from 90° to 110°. Half of the pictures, nine in ten of those of rooms, are ones of another aspect
 /// ratio that were squeezed to this size ([`squeeze`]). Apart from that fy is fx, within 1 % in two of three cameras
 /// and within 3 % in the others. The principal point is off the middle by normal draws of 1.5 % of the width and 5 % of
-/// the height; in one of five of the pictures that were not squeezed by up to 20 % of the height, as where a picture
-/// was cut from a taller one.
+/// the height. In one of five of the pictures that were not squeezed it is off by up to 20 % of the height, as where a
+/// picture was cut from a taller one.
 pub(super) fn lens(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: bool) -> Lens {
     let field = match rng.random_range(0..20) {
         0..=13 => normal(rng, if indoors { 64.0 } else { 78.0 }, 8.0, 1.78),

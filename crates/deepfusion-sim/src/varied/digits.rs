@@ -40,7 +40,7 @@ mod tests {
     use serde_json::json;
 
     #[derive(Serialize)]
-    struct Part {
+    struct Numbers {
         share: f32,
         gains: [f32; 2],
         grain: Option<f32>,
@@ -48,15 +48,15 @@ mod tests {
     }
 
     #[derive(Serialize)]
-    struct Whole {
+    struct WithNumbers {
         #[serde(serialize_with = "in_few_digits")]
-        part: Part,
+        part: Numbers,
     }
 
     #[test]
     fn a_value_has_the_digits_of_a_text() {
-        let whole = Whole {
-            part: Part {
+        let whole = WithNumbers {
+            part: Numbers {
                 share: 0.3,
                 gains: [1.1, 2.0],
                 grain: Some(0.0125),

@@ -327,7 +327,7 @@ impl Comparison {
     /// more from one float32 to another (measured 1.6e-3 where PyTorch's is 4e-4).
     ///
     /// More is allowed of the pose network's first convolution on the larger images. A value that rounding puts on the other side of
-    /// its ReLU moves what lies before it and hardly a norm: one in `layer1` (in double precision they come as near to 0 as 8e-7 of
+    /// its ReLU moves what lies before it and hardly a norm. One in `layer1` (in double precision they come as near to 0 as 8e-7 of
     /// their root mean square) moves that convolution's by 1.1e-2, half of them by 2.6e-3, its norm by 4e-4. PyTorch's float32 leaves
     /// that value where it is.
     fn allowed_of_values(&self, name: &str, width: usize) -> (f32, f32) {

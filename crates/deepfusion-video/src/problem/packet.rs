@@ -1,6 +1,6 @@
 //! Why a packet of a stream cannot be decoded.
 
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 
 /// Why a packet cannot be decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,7 +34,11 @@ pub enum PacketProblem {
         said: String,
     },
     /// The stream has fewer packets than when it was opened.
-    #[error("the stream ends here, {counted} packets were counted when it was opened")]
+    #[error(
+        "the stream ends here, {} {} counted when it was opened",
+        count_of(*counted, "packet"),
+        if *counted == 1 { "was" } else { "were" }
+    )]
     Ended {
         /// How many there were.
         counted: usize,

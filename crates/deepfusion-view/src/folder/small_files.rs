@@ -16,16 +16,16 @@ const MOST_JSON_BYTES: u64 = 16 << 20;
 /// What the small files of a frame say, and what is wrong with them.
 #[derive(Default)]
 pub(crate) struct SmallFiles {
-    pub sidecar: Option<Small<PredictionRecord>>,
+    pub sidecar: Option<ReadFile<PredictionRecord>>,
     /// Without the targets that cannot be drawn.
-    pub targets: Option<Small<FrameRecord>>,
+    pub targets: Option<ReadFile<FrameRecord>>,
     pub problems: Vec<FrameProblem>,
     /// Whether a file is not whole: a frame that comes.
     pub unfinished: bool,
 }
 
 /// A file as it stands, for the page, and what it says.
-pub(crate) struct Small<T> {
+pub(crate) struct ReadFile<T> {
     pub json: Value,
     pub record: T,
 }
@@ -36,12 +36,12 @@ impl SmallFiles {
         let mut files = Self::default();
         files.sidecar = files.json(folder, entry.sidecar.as_ref()).map(|json| {
             let record = files.record(entry.sidecar.as_ref(), &json);
-            Small { json, record }
+            ReadFile { json, record }
         });
         files.targets = files.json(folder, entry.targets.as_ref()).map(|mut json| {
             files.without_undrawable(&mut json);
             let record = files.record(entry.targets.as_ref(), &json);
-            Small { json, record }
+            ReadFile { json, record }
         });
         files
     }

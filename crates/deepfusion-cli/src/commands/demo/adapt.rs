@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use deepfusion_jobs::ModelFacts;
-use deepfusion_jobs::demo::new_street::{Look, NewStreetPage, SplitDrive, recipe, street};
+use deepfusion_jobs::demo::new_street::{NewStreetPage, SplitDrive, StreetResult, recipe, street};
 use deepfusion_jobs::training::Start;
 use deepfusion_runtime::ModelSource;
 use deepfusion_weights::{DEFAULT, Shipped};
@@ -85,11 +85,11 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     second.write("_learned")?;
     let overlay = first.overlay_in(&targets)?;
     let page = NewStreetPage {
-        zero_shot: Look {
+        zero_shot: StreetResult {
             shown: &first,
             evaluated: &zero_shot,
         },
-        learned: Look {
+        learned: StreetResult {
             shown: &second,
             evaluated: &learned,
         },

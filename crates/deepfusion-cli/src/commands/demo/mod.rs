@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use deepfusion_data::Dataset;
 use deepfusion_eval::IntervalFactors;
-use deepfusion_jobs::demo::{self, DemoFolder, DemoSettings, Shown};
+use deepfusion_jobs::demo::{self, DemoFolder, DemoSettings, ShownPrediction};
 use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_model::{RunFolder, TrainConfig};
 use deepfusion_runtime::DepthEstimator;
@@ -119,9 +119,14 @@ impl Demo<'_> {
         network: (&mut DepthEstimator, &IntervalFactors),
         drive: &Dataset,
         frame: usize,
-    ) -> Result<Shown> {
+    ) -> Result<ShownPrediction> {
         interrupt::check(DEMO)?;
-        Ok(Shown::of(network, drive, frame, self.folder.pictures())?)
+        Ok(ShownPrediction::of(
+            network,
+            drive,
+            frame,
+            self.folder.pictures(),
+        )?)
     }
 
     /// Seconds from its start.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use deepfusion_hint::count_of;
 use deepfusion_jobs::machine::{InstructionSet, Machine};
 
 use crate::devices::Backend;
@@ -38,7 +39,8 @@ fn text(machine: &Machine) -> String {
     } else {
         simd.join(", ")
     };
-    line("processor", format!("{} threads; {simd}", machine.cores));
+    let threads = count_of(machine.cores, "thread");
+    line("processor", format!("{threads}; {simd}"));
     let (free, total) = (
         gigabytes(machine.memory_free_mb),
         gigabytes(machine.memory_total_mb),

@@ -2,6 +2,7 @@
 
 use crate::DatasetKind;
 use deepfusion_hint::count_of;
+use deepfusion_rosbag::SourceDamage;
 use std::path::{Path, PathBuf};
 
 /// What of a recording, or of the folder in which it lies, is left out, is not there or cannot be read.
@@ -61,9 +62,9 @@ pub enum IncompleteWarning {
         /// How many messages came before its first key frame.
         messages: u64,
     },
-    /// A bag is damaged: how, in the words of [`deepfusion_rosbag::MessageSource::damage`].
+    /// A bag is damaged: what its reader found ([`deepfusion_rosbag::MessageSource::damage`]).
     #[error("the bag is damaged: {0}")]
-    Damaged(String),
+    Damaged(SourceDamage),
     /// Messages or chunks of a bag cannot be read.
     #[error("{}", unreadable(*parts, first))]
     Unreadable {

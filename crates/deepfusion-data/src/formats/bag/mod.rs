@@ -1,8 +1,11 @@
 //! ROS bags with a camera and a vehicle's sensors, such as UMAD's.
 //!
-//! The way of a bag: `source` (its reader: whatever is a [`deepfusion_rosbag::MessageSource`]) → `topics` (which is which, by message type) → `sensors` (speed, steering and IMU as a motion) and
-//! `index` (when images and scans were taken) → `open`, which puts these together with the `camera` to a `recording` (a [`crate::Recording`]). That reads an `image`, of a `video` stream a frame, or
-//! of its `scans` a `scan`, when it is asked for, with the points that its `dynamic` topic lists. Where the sensors are its `frames` say, as `mounts`; what a bag cannot say stands in a file beside it: `config`, which `write_config` writes.
+//! The way of a bag: `source` → `topics` → `sensors` and `index` → `open`. `source` is its reader, whatever is a
+//! [`deepfusion_rosbag::MessageSource`]. `topics` says which is which, by message type; `sensors` makes speed, steering and IMU a motion;
+//! `index` says when images and scans were taken. `open` puts these together with the `camera` to a `recording` (a [`crate::Recording`]).
+//! That reads an `image`, of a `video` stream a frame, or of its `scans` a `scan`, when it is asked for, with the points that its `dynamic`
+//! topic lists. Where the sensors are its `frames` say, as `mounts`. What a bag cannot say stands in a file beside it: `config`, which
+//! `write_config` writes.
 
 mod camera;
 mod can;

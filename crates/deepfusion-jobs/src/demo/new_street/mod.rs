@@ -10,7 +10,7 @@ use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_sim::SimConfig;
 use deepfusion_train::Device;
 
-pub use self::page::{Look, NewStreetPage};
+pub use self::page::{NewStreetPage, StreetResult};
 pub use self::parts::SplitDrive;
 
 use super::DemoSettings;

@@ -5,16 +5,16 @@ use std::path::Path;
 use deepfusion_render::{HtmlReport, PictureFormat};
 
 use crate::dates::clock;
-use crate::demo::Shown;
+use crate::demo::ShownPrediction;
 use crate::demo::measure::PROTOCOL;
 use crate::evaluation::Evaluated;
 use crate::{Result, RunHistory};
 
-/// What a network sees in a frame, and how it measures on all of them.
+/// How a network does on the street: what it sees in a frame, and how it measures on all of them.
 #[derive(Clone, Copy)]
-pub struct Look<'a> {
+pub struct StreetResult<'a> {
     /// The frame.
-    pub shown: &'a Shown,
+    pub shown: &'a ShownPrediction,
     /// All frames.
     pub evaluated: &'a Evaluated,
 }
@@ -22,10 +22,10 @@ pub struct Look<'a> {
 /// What the page shows.
 pub struct NewStreetPage<'a> {
     /// The network as it was given.
-    pub zero_shot: Look<'a>,
+    pub zero_shot: StreetResult<'a>,
     /// What it learned; the same frame.
-    pub learned: Look<'a>,
-    /// The picture of the frame with its targets ([`Shown::overlay_in`]).
+    pub learned: StreetResult<'a>,
+    /// The picture of the frame with its targets ([`ShownPrediction::overlay_in`]).
     pub overlay: Option<&'a Path>,
     /// From the first image to its depth, milliseconds.
     pub first_ms: f64,

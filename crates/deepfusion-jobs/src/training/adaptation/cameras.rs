@@ -14,8 +14,8 @@ const MEASURED_ON: usize = 3;
 /// Most cameras: a fleet has few kinds of them.
 const MOST: usize = 16;
 
-/// The cameras of the drives, each once: the lens as recorded, pitch and roll by the mounting's calibration where there is one, and the
-/// height by the motion of the road in the images ([`road_camera_height`]; the middle one of up to three drives), where they show it.
+/// The cameras of the drives, each once: the lens as recorded, pitch and roll by the mounting's calibration where there is one. The
+/// height is by the motion of the road in the images ([`road_camera_height`]; the middle one of up to three drives), where they show it.
 ///
 /// # Errors
 /// An image that cannot be read.

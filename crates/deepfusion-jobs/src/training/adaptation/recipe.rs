@@ -158,7 +158,7 @@ fn learn_at_several_sizes(config: &mut TrainConfig, simulated: bool) {
     }
 }
 
-/// Sizes near those of `--post-process multi-scale` that the encoder takes and that hardly squeeze the image.
+/// Sizes near those at which an image is predicted at several scales, that the encoder takes and that hardly squeeze the image.
 fn sizes_around(own: InputSize) -> Vec<InputSize> {
     let aspect = |size: &InputSize| size.width as f64 / size.height as f64;
     let side = |side: usize, scale: f64| 32 * (side as f64 * scale / 32.0).round() as usize;

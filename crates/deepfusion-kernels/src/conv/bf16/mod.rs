@@ -2,7 +2,7 @@
 //! (AVX512-BF16) are fast at.
 //!
 //! Both multiply pairs. For the forward pass and the input gradient the numbers of two neighbouring channels are one
-//! 32-bit word of the tile's planes, and a step of the product sums a tap over up to sixteen such pairs; for the weight
+//! 32-bit word of the tile's planes, and a step of the product sums a tap over up to sixteen such pairs. For the weight
 //! gradient two neighbouring pixels are a word, and a step sums sixteen of those.
 
 #[cfg(target_arch = "x86_64")]

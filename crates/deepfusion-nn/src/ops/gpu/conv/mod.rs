@@ -7,9 +7,9 @@
 //! | gradient of the input | input channels | input pixels of all images | weights that read a channel |
 //! | gradient of the weights | output channels | weights of a channel | output pixels of all images |
 //!
-//! A group of 256 threads computes a tile: both factors are brought to shared memory some terms at a time and multiplied there, in single
-//! precision (`factors`, `products`) or on tensor cores (`quads`, `tensor_cores`), for which the tensors are rounded to bf16 and arranged
-//! before (`rounded`).
+//! A group of 256 threads computes a tile: both factors are brought to shared memory some terms at a time and multiplied there. That is in
+//! single precision (`factors`, `products`) or on tensor cores (`quads`, `tensor_cores`), for which the tensors are rounded to bf16 and
+//! arranged before (`rounded`).
 
 mod factors;
 mod products;

@@ -18,7 +18,7 @@ use crate::{Result, files, intervals};
 const CLOUD_REACH_M: f32 = 60.0;
 
 /// A frame and the depth that a network sees in it.
-pub struct Shown {
+pub struct ShownPrediction {
     number: u64,
     image: RgbImage,
     camera: Intrinsics,
@@ -31,7 +31,7 @@ pub struct Shown {
     folder: PathBuf,
 }
 
-impl Shown {
+impl ShownPrediction {
     /// Predicts a frame of a simulated drive; `factors` are those of the network's intervals. The folder, of the pictures, is made.
     ///
     /// # Errors
