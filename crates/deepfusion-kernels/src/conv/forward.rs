@@ -55,34 +55,12 @@ pub fn conv2d(
     if out.is_empty() {
         return;
     }
-    let out = SharedMut::new(room(out));
-    let (height, width) = (shape.out_height(), shape.out_width());
-    let sum = winograd::Sum {
-        source: Image {
-            values: x,
-            images: shape.batch,
-            channels: shape.in_channels,
-            size: (shape.in_height, shape.in_width),
-            padding: shape.padding,
-            reflect: shape.reflect,
-        },
-        out: (height, width),
-        rows: shape.out_channels,
-        kernels: Kernels {
-            values: weight,
-            strides: (shape.taps(), shape.kernel_area()),
-            turned: false,
-        },
-        bias,
-    };
+    let out = room(out);
+    let sum = winograd_sum(shape, x, weight, bias);
     if shape.is_plain_3x3() && sum.pays() {
-        return sum.run(|image, channel, (y, x), values| {
-            let at = ((image * shape.out_channels + channel) * height + y) * width + x;
-            // SAFETY: every line is written once.
-            let to = unsafe { out.slice(at, values.len()) };
-            filled(to, values.iter().copied());
-        });
+        return by_winograd(shape, &sum, out);
     }
+    let out = SharedMut::new(out);
     let row_floats = shape.in_channels * shape.stride * (shape.in_width + 2 * shape.padding)
         + shape.out_channels * (shape.out_width() + 2);
     let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
@@ -109,6 +87,48 @@ pub fn conv2d(
     with_scratch(shape.out_channels * row, |prepared| {
         arithmetic.prepare(weights, prepared);
         run(prepared);
+    });
+}
+
+/// A convolution of 3×3 with a margin of one pixel, as Winograd's form takes it.
+pub(super) fn winograd_sum<'a>(
+    shape: &ConvShape,
+    x: &'a [f32],
+    weight: &'a [f32],
+    bias: Option<&'a [f32]>,
+) -> winograd::Sum<'a> {
+    winograd::Sum {
+        source: Image {
+            values: x,
+            images: shape.batch,
+            channels: shape.in_channels,
+            size: (shape.in_height, shape.in_width),
+            padding: shape.padding,
+            reflect: shape.reflect,
+        },
+        out: (shape.out_height(), shape.out_width()),
+        rows: shape.out_channels,
+        kernels: Kernels {
+            values: weight,
+            strides: (shape.taps(), shape.kernel_area()),
+            turned: false,
+        },
+        bias,
+    }
+}
+
+pub(super) fn by_winograd(
+    shape: &ConvShape,
+    sum: &winograd::Sum<'_>,
+    out: &mut [MaybeUninit<f32>],
+) {
+    let (height, width) = sum.out;
+    let out = SharedMut::new(out);
+    sum.run(|image, channel, (y, x), values| {
+        let at = ((image * shape.out_channels + channel) * height + y) * width + x;
+        // SAFETY: `run` gives each line once, and no two overlap.
+        let to = unsafe { out.slice(at, values.len()) };
+        filled(to, values.iter().copied());
     });
 }
 

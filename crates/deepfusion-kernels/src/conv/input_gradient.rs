@@ -46,8 +46,9 @@ pub fn conv2d_backward_input(
     if grad_x.is_empty() {
         return;
     }
-    if shape.is_plain_3x3() && by_winograd(shape, weight, grad_out, grad_x) {
-        return;
+    let sum = winograd_sum(shape, weight, grad_out);
+    if shape.is_plain_3x3() && sum.pays() {
+        return by_winograd(shape, &sum, grad_x);
     }
     // Elsewhere every value is written exactly once.
     if shape.stride > 1 || shape.reflect || grad_out.is_empty() {
@@ -66,17 +67,16 @@ pub fn conv2d_backward_input(
     });
 }
 
-/// The gradient by Winograd's form; false, and nothing done, where that would be slower.
-fn by_winograd(
+/// The gradient of a convolution of 3×3 with a margin of one pixel, as Winograd's form takes it: every pixel gathers from
+/// the outputs that it went into.
+pub(super) fn winograd_sum<'a>(
     shape: &ConvShape,
-    weight: &[f32],
-    grad_out: &[f32],
-    grad_x: &mut [MaybeUninit<f32>],
-) -> bool {
-    let (height, width) = (shape.in_height, shape.in_width);
+    weight: &'a [f32],
+    grad_out: &'a [f32],
+) -> winograd::Sum<'a> {
     // Mirrored, the margin's gradient belongs to pixels of the image; in a padding of zeros nobody needs it.
     let margin = if shape.reflect { shape.padding } else { 0 };
-    let sum = winograd::Sum {
+    winograd::Sum {
         source: Image {
             values: grad_out,
             images: shape.batch,
@@ -85,29 +85,32 @@ fn by_winograd(
             padding: shape.padding + margin,
             reflect: false,
         },
-        out: (height + 2 * margin, width + 2 * margin),
+        out: (shape.in_height + 2 * margin, shape.in_width + 2 * margin),
         rows: shape.in_channels,
-        // Every pixel gathers from the outputs that it went into.
         kernels: Kernels {
             values: weight,
             strides: (shape.kernel_area(), shape.taps()),
             turned: true,
         },
         bias: None,
-    };
-    if !sum.pays() {
-        return false;
     }
+}
+
+pub(super) fn by_winograd(
+    shape: &ConvShape,
+    sum: &winograd::Sum<'_>,
+    grad_x: &mut [MaybeUninit<f32>],
+) {
+    let (height, width) = (shape.in_height, shape.in_width);
     let plane = |image: usize, channel: usize| image * shape.in_channels + channel;
     let to = SharedMut::new(grad_x);
     let write = |plane: usize, (y, x): (usize, usize), values: &[f32]| {
-        // SAFETY: every line is written once.
+        // SAFETY: `run` gives each line once, and no two overlap.
         let to = unsafe { to.slice((plane * height + y) * width + x, values.len()) };
         filled(to, values.iter().copied());
     };
     if !shape.reflect {
-        sum.run(|image, channel, at, values| write(plane(image, channel), at, values));
-        return true;
+        return sum.run(|image, channel, at, values| write(plane(image, channel), at, values));
     }
     let margins = Margins::new((height, width));
     with_scratch(shape.batch * shape.in_channels * margins.len(), |kept| {
@@ -119,7 +122,7 @@ fn by_winograd(
                 values,
                 |y, x, values| write(plane, (y, x), values),
                 |at, values| {
-                    // SAFETY: every value of the margin is written once.
+                    // SAFETY: as above; a line's pieces have places of their own.
                     let to = unsafe { kept.slice(plane * margins.len() + at, values.len()) };
                     to.copy_from_slice(values);
                 },
@@ -139,7 +142,6 @@ fn by_winograd(
                 margins.fold(kept, to);
             });
     });
-    true
 }
 
 /// With reflection, what it adds to must have been cleared.

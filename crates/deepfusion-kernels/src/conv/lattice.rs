@@ -270,6 +270,7 @@ pub(super) fn inside(i: usize, padding: usize, n: usize, reflect: bool) -> Optio
     if i < padding {
         return (padding - i < n).then(|| padding - i);
     }
-    // Past the mirrored margin there is only slack, which no pixel reads.
+    // Past the mirrored margin there is only slack. No pixel's sum has it, but the rounding of Winograd's tiles has: it must be
+    // finite.
     (2 * (n - 1)).checked_sub(i - padding)
 }

@@ -62,21 +62,10 @@ pub fn conv2d_backward_weight(
         grad_weight.copy_from_slice(&sum_over(&tiles, shape.weight_len(), || (), add));
         return;
     }
-    let winograd = WeightGradient {
-        source: Image {
-            values: x,
-            images: shape.batch,
-            channels: shape.in_channels,
-            size: (shape.in_height, shape.in_width),
-            padding: shape.padding,
-            reflect: shape.reflect,
-        },
-        grad_out,
-        outputs: shape.out_channels,
-        out: (shape.out_height(), shape.out_width()),
-    };
+    let winograd = winograd(shape, x, grad_out);
     if shape.is_plain_3x3() && winograd.pays() {
-        return by_winograd(shape, &winograd, grad_weight);
+        let many = shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS;
+        return by_winograd(shape, &winograd, many, grad_weight);
     }
     let arithmetic = Arithmetic::of(shape);
     let to = SharedMut::new(grad_weight);
@@ -129,9 +118,36 @@ pub fn conv2d_backward_weight(
     write(shape, all.clone(), &total, &to);
 }
 
-fn by_winograd(shape: &ConvShape, gradient: &WeightGradient, grad_weight: &mut [f32]) {
+/// The gradient of kernels of 3×3 with a margin of one pixel, as Winograd's form takes it.
+pub(super) fn winograd<'a>(
+    shape: &ConvShape,
+    x: &'a [f32],
+    grad_out: &'a [f32],
+) -> WeightGradient<'a> {
+    WeightGradient {
+        source: Image {
+            values: x,
+            images: shape.batch,
+            channels: shape.in_channels,
+            size: (shape.in_height, shape.in_width),
+            padding: shape.padding,
+            reflect: shape.reflect,
+        },
+        grad_out,
+        outputs: shape.out_channels,
+        out: (shape.out_height(), shape.out_width()),
+    }
+}
+
+/// With `many` weights every task sums a group of channels over all tiles, else all weights over its own tiles.
+pub(super) fn by_winograd(
+    shape: &ConvShape,
+    gradient: &WeightGradient<'_>,
+    many: bool,
+    grad_weight: &mut [f32],
+) {
     let to = SharedMut::new(grad_weight);
-    if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS {
+    if many {
         let groups = split(shape.in_channels, TASKS);
         return gradient.by_channels(groups, |channels, sum| write(shape, channels, sum, &to));
     }

@@ -1,8 +1,6 @@
 //! From planar images to tiles and back.
 
-use super::tiles::Run;
-use super::transform::{deinterleave, interleave};
-use super::{IN, OUT};
+use super::tiles::{IN, OUT, Run};
 use crate::conv::lattice::inside;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -215,5 +213,22 @@ impl Margins {
                 plane[y * width + x] += value;
             }
         }
+    }
+}
+
+/// `to[j][t] = line[4·t + j]` for all t.
+#[inline(always)]
+fn deinterleave(line: &[f32], [a, b, c, d]: [&mut [f32]; 4]) {
+    for ((((px, a), b), c), d) in line.as_chunks::<4>().0.iter().zip(a).zip(b).zip(c).zip(d) {
+        (*a, *b, *c, *d) = (px[0], px[1], px[2], px[3]);
+    }
+}
+
+/// `line[4·t + j] = from[j][t]` for all t.
+#[inline(always)]
+fn interleave([a, b, c, d]: [&[f32]; 4], line: &mut [f32]) {
+    let px = line.as_chunks_mut::<4>().0.iter_mut();
+    for ((((px, a), b), c), d) in px.zip(a).zip(b).zip(c).zip(d) {
+        *px = [*a, *b, *c, *d];
     }
 }

@@ -1,14 +1,21 @@
 //! 3×3 sums at stride 1 by Winograd's F(4×4, 3×3): 36 products for 16 outputs instead of 144.
 //!
+//! Here are the forward pass and the input's gradient; [`weight_gradient`] is the third. Rounding is some four times that of
+//! plain sums.
+//!
 //! Y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs Y (Lavin and Gray, "Fast
 //! Algorithms for Convolutional Neural Networks", 2016). The sums of ⊙ over channels are 36 matrix products, whose
 //! columns are tiles: images stay planar. A tile's sums do not depend on what it is computed with, so neither threads
 //! nor tasks change a bit.
 
+mod backward_transform;
 mod image;
 mod tiles;
 mod transform;
 mod weight_gradient;
+
+#[cfg(test)]
+mod tests;
 
 pub(super) use image::{Image, Margins};
 pub(super) use weight_gradient::WeightGradient;
@@ -19,18 +26,11 @@ use crate::send_ptr::SharedMut;
 use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
-use tiles::{Grid, Run};
+use tiles::{AREA, Grid, Run};
 use transform::{TransformInputs, TransformKernels, TransformOutputs};
 
-/// Outputs of a tile along one side.
-const OUT: usize = 4;
-/// Inputs of a tile along one side.
-const IN: usize = 6;
-/// Products of a tile.
-const AREA: usize = IN * IN;
-/// Tiles of a batch below which the transformed weights, four times as many, cost more than products less.
+/// Tiles of a batch below which transforming the kernels, which become four times as many, costs more than it saves.
 const FEWEST_TILES: usize = 64;
-
 /// Kernels below which moving values takes as long as multiplying them.
 const FEWEST_KERNELS: usize = 512;
 
@@ -57,20 +57,24 @@ pub(super) struct Kernels<'a> {
 }
 
 impl Sum<'_> {
-    /// Whether this form is faster than plain sums.
+    /// Whether this form is faster than plain sums, by `benches/conv.rs`. It depends on the number of images, so that an
+    /// image alone and the same in a batch may differ by rounding.
     pub(super) fn pays(&self) -> bool {
-        let (height, width) = self.out;
-        let tiles = Grid::new(self.source.images, self.out).count();
-        let plain = 9 * self.source.images * height * width;
+        let grid = Grid::new(self.source.images, self.out);
         self.source.channels.is_multiple_of(LANES)
             && self.rows * self.source.channels >= FEWEST_KERNELS
-            && tiles >= FEWEST_TILES
-            && 2 * AREA * tiles <= plain
+            && grid.count() >= FEWEST_TILES
+            && grid.saves_half(self.out)
     }
 
-    /// Calls `write` with every row of outputs: image, output channel, row, first column and values.
+    /// Calls `write` with all outputs, line by line: image, output channel, row and first column, values. No two lines
+    /// overlap, and together they are the whole output.
+    ///
+    /// # Panics
+    /// When the input channels are no whole vectors.
     pub(super) fn run(&self, write: impl Fn(usize, usize, (usize, usize), &[f32]) + Sync) {
         let channels = self.source.channels;
+        assert!(channels.is_multiple_of(LANES), "whole vectors of channels");
         with_scratch(AREA * self.rows * channels, |weights| {
             self.transform_kernels(weights);
             let grid = Grid::new(self.source.images, self.out);
@@ -180,7 +184,7 @@ impl Sum<'_> {
                     });
                     for (product, values) in transformed.iter().enumerate() {
                         let at = (product * rows + row) * channels + first;
-                        // SAFETY: each task writes the rows of its own.
+                        // SAFETY: whole vectors (asserted in `run`), so that each task writes its own rows alone.
                         unsafe { to.slice(at, LANES) }.copy_from_slice(values);
                     }
                 }

@@ -1,9 +1,14 @@
 //! How outputs are cut into tiles of 4×4, and these into tasks.
 
-use super::{AREA, OUT};
-use crate::conv::product::padded;
+use crate::conv::product::{LANES, padded};
 use std::ops::{Range, RangeInclusive};
 
+/// Outputs of a tile along one side.
+pub(super) const OUT: usize = 4;
+/// Inputs of a tile along one side.
+pub(super) const IN: usize = 6;
+/// Products of a tile.
+pub(super) const AREA: usize = IN * IN;
 /// Transformed inputs and products of a part of the tiles, in floats: they stay near the core.
 const PART_FLOATS: usize = 300_000;
 /// Tiles of a part: at least as many as make reading the transformed weights pay.
@@ -58,7 +63,13 @@ impl Grid {
         tasks
     }
 
-    /// All tiles in parts of whole rows, where a tile takes `channels` transformed values of each product.
+    /// Whether tiles, those that reach beyond an edge included, take at most half of the products of plain sums.
+    pub(super) fn saves_half(self, (height, width): (usize, usize)) -> bool {
+        2 * AREA * self.count() <= 9 * self.images * height * width
+    }
+
+    /// All tiles in parts, where a tile takes `channels` transformed values of each product: whole rows of tiles, or
+    /// pieces of rows that are longer than a part.
     pub(super) fn parts(self, channels: usize) -> Vec<Range<usize>> {
         let all = self.count();
         let most = (PART_FLOATS / (AREA * channels)).clamp(*PART_TILES.start(), *PART_TILES.end());
@@ -67,8 +78,8 @@ impl Grid {
             let tiles = rows * self.across;
             (padded(tiles) * 1000 / tiles, usize::MAX - rows)
         };
-        let rows = (1..=most / self.across).min_by_key(waste).unwrap_or(1);
-        let size = rows * self.across;
+        let rows = (1..=most / self.across).min_by_key(waste);
+        let size = rows.map_or(most / LANES * LANES, |rows| rows * self.across);
         (0..all)
             .step_by(size)
             .map(|first| first..(first + size).min(all))

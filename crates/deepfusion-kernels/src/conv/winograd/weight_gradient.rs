@@ -1,10 +1,10 @@
 //! The weight gradient by the same products: ∂g = Gᵀ [ Σ (A ∂Y Aᵀ) ⊙ (Bᵀ d B) ] G, the transpose of the forward form.
-//! The sums over tiles are 36 matrix products.
+//! The sums over tiles are 36 matrix products. Parts and groups are cut by sizes alone, and added in order.
 
+use super::backward_transform::{TransformGradients, TransformTaps};
 use super::image::Image;
-use super::tiles::{Grid, Run};
-use super::transform::{TransformGradients, TransformInputs, TransformTaps};
-use super::{AREA, OUT};
+use super::tiles::{AREA, Grid, OUT, Run};
+use super::transform::TransformInputs;
 use crate::conv::product::{LANES, PixelProduct, padded};
 use crate::conv::transpose::transpose;
 use crate::scratch::with_scratch;
@@ -14,6 +14,8 @@ use std::ops::Range;
 
 /// Tiles of a batch below which plain sums are as fast.
 const FEWEST_TILES: usize = 32;
+/// Input channels below which transforming the output gradients takes as long as the products.
+const FEWEST_CHANNELS: usize = 8;
 
 /// A weight gradient as sums over the tiles of a batch.
 #[derive(Clone, Copy)]
@@ -35,11 +37,12 @@ struct Part<'a> {
 }
 
 impl WeightGradient<'_> {
-    /// Whether this form is faster than plain sums.
+    /// Whether this form is faster than plain sums, by `benches/conv.rs`.
     pub(in crate::conv) fn pays(&self) -> bool {
-        let tiles = self.grid().count();
-        let plain = 9 * self.source.images * self.out.0 * self.out.1;
-        tiles >= FEWEST_TILES && 2 * AREA * tiles <= plain
+        let grid = self.grid();
+        self.source.channels >= FEWEST_CHANNELS
+            && grid.count() >= FEWEST_TILES
+            && grid.saves_half(self.out)
     }
 
     /// Tiles in parts, each of which is transformed at once.
