@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use crate::device;
 use crate::error::{Failure, raise};
 use crate::interrupt::interruptible;
-use crate::train::{Listener, Warnings};
+use crate::train::{Listener, Warnings, warning_of};
 
 /// What was asked for, as `deepfusion/_adapt.py` arranges it.
 #[derive(FromPyObject)]
@@ -103,11 +103,13 @@ pub(crate) fn adapt(
                 "the given network may have learned from the frames that are held out here: the figures before may be optimistic".into(),
             );
         }
+        let mut of_start = Vec::new();
         let mut trainer = adaptation.trainer(
             &mut quiet,
             &mut |warning| warnings.add(warning),
-            &mut |_| (),
+            &mut |start| of_start.extend(warning_of(&start)),
         )?;
+        warnings.others.append(&mut of_start);
         listener.warn(&warnings);
         listener.keep_log(&trainer)?;
         let summary = trainer.run(&mut |event| listener.hear(event, stop))?;

@@ -5,7 +5,7 @@ use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
-use deepfusion::jobs::training::{RunLog, Start};
+use deepfusion::jobs::training::{RunLog, Start, StartReport};
 use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
 use deepfusion::train::{Control, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
 use numpy::ndarray::{Array2, Array3};
@@ -135,6 +135,14 @@ impl Warnings {
     }
 }
 
+/// What may not be meant of the weights to start from.
+pub(crate) fn warning_of(start: &StartReport) -> Option<String> {
+    match start {
+        StartReport::OtherMeaning(warning) => Some(warning.to_string()),
+        _ => None,
+    }
+}
+
 /// The trainer that is asked for.
 fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Failure> {
     let place = device::named(&asked.device)?;
@@ -177,7 +185,11 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
         folder,
         sets,
         &device,
-        |model| start.initialise(model, &device, &mut |_| ()),
+        |model| {
+            start.initialise(model, &device, &mut |start| {
+                warnings.others.extend(warning_of(&start));
+            })
+        },
     )?)
 }
 

@@ -208,6 +208,13 @@ pub(crate) enum CliError {
         /// In what.
         worse: String,
     },
+    /// An adapted network that cannot be compared with the one it began from.
+    #[cfg(feature = "train")]
+    #[error("not kept: {}; laid aside as {}", deepfusion_jobs::training::adaptation::Refusal::NotJudged, path.display())]
+    NothingJudged {
+        /// Where it lies.
+        path: PathBuf,
+    },
     /// Work that was stopped and has nothing to go on with.
     #[error("{what} was stopped before it was done")]
     Ended {
@@ -314,6 +321,10 @@ impl Reportable for CliError {
             Self::Refused { .. } => Some(
                 "the given network is the better one here; more drives, fewer --steps or a smaller --learning-rate may change that".into(),
             ),
+            #[cfg(feature = "train")]
+            Self::NothingJudged { .. } => Some(
+                "give longer drives with a speed, or more of them with --held-out SHARE; fewer --steps or a smaller --learning-rate change less".into(),
+            ),
             Self::Ended { .. } => Some("start it again, into another folder".into()),
             Self::LiveAlone { .. } => Some("start one run for each source, each with a folder of its own".into()),
             Self::Terminal => Some("… | deepfusion … -, or give a camera or an address instead of -".into()),
@@ -392,5 +403,15 @@ mod tests {
         assert_eq!(said(0, 1), "stopped: 0 of 1 image is done");
         assert_eq!(said(1, 5), "stopped: 1 of 5 images is done");
         assert_eq!(said(2, 5), "stopped: 2 of 5 images are done");
+    }
+
+    #[cfg(feature = "train")]
+    #[test]
+    fn what_cannot_be_judged_is_not_called_worse() {
+        let path = "mine.refused".into();
+        assert_eq!(
+            CliError::NothingJudged { path }.to_string(),
+            "not kept: the frames that are held out say nothing about it any more; laid aside as mine.refused"
+        );
     }
 }

@@ -278,6 +278,19 @@ mod tests {
     }
 
     #[test]
+    fn an_engine_that_refuses_another_size_has_the_hint_of_its_own_problem() {
+        use deepfusion_runtime::{EngineProblem, Error as RuntimeError};
+        let hint = |problem: Error| {
+            let problem = EngineProblem::Runner(Box::new(problem));
+            Failure::from(RuntimeError::engine("other size", problem)).hint()
+        };
+        let fused = RuntimeError::engine("fused", deepfusion_infer::Error::NoBf16);
+        let fused = hint(fused.into()).unwrap();
+        assert!(fused.contains("`--engine burn` runs every"), "{fused}");
+        assert!(hint(Error::OnlyOrt).is_some_and(|hint| hint.contains("--ort-lib")));
+    }
+
+    #[test]
     fn a_difference_names_its_option() {
         let error = Error::Stale {
             path: "a.json".into(),

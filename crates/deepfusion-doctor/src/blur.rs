@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::PicturesReason;
-use super::remedy::PicturesRemedy;
 use super::skip::PicturesSkip;
 use super::survey::Survey;
 
@@ -24,9 +23,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let mut outcome = Outcome::new("blur");
     let usual = median(seen.iter().map(|s| s.1).collect());
     let whole = Figure::new("sharpness", usual, "", Limit::AtLeast(LEAST));
-    outcome.judge(Severity::Warning, whole, || {
-        (PicturesReason::Soft, PicturesRemedy::Focus)
-    });
+    outcome.judge(Severity::Warning, whole, || PicturesReason::Soft);
     let blurred: Vec<u64> = seen
         .iter()
         .filter(|(_, sharpness)| *sharpness < BLURRED * usual)
@@ -36,12 +33,11 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let figure = Figure::new("blurred frames", share, "%", Limit::AtMost(MOST));
     let first = blurred.first().copied();
     outcome.judge_at(Severity::Warning, first, figure, || {
-        let reason = PicturesReason::Blurred {
+        PicturesReason::Blurred {
             blurred: blurred.len(),
             frames: seen.len(),
             first: blurred[0],
-        };
-        (reason, PicturesRemedy::HoldStill)
+        }
     });
     outcome
 }

@@ -5,7 +5,6 @@ use super::clock_offset::{rates, settled};
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
-use super::remedy::Remedy;
 use super::skip::ClockSkip;
 use super::survey::Survey;
 use deepfusion_motion::{OffsetConfig, Signal, TimeOffset};
@@ -33,13 +32,10 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         "s",
         Limit::Within(-limit, limit),
     );
-    outcome.judge(Severity::Error, figure, || {
-        let camera_ahead_s = survey.dataset.camera_ahead_s() - value;
-        let reason = MotionReason::ClockOffset {
-            vehicle_minus_camera_s: value,
-            std_error_s: error,
-        };
-        (reason, Remedy::ClockOffset { camera_ahead_s })
+    outcome.judge(Severity::Error, figure, || MotionReason::ClockOffset {
+        vehicle_minus_camera_s: value,
+        std_error_s: error,
+        camera_ahead_s: survey.dataset.camera_ahead_s() - value,
     });
     outcome
 }

@@ -3,7 +3,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::FramesReason;
-use super::remedy::FramesRemedy;
 use super::skip::FramesSkip;
 use super::survey::Survey;
 use deepfusion_data::Frame;
@@ -39,13 +38,10 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let share = 100.0 * repeated.len() as f64 / f64::from(compared);
     let figure = Figure::new("repeated frames", share, "%", Limit::AtMost(MOST));
     let first = repeated.first().copied();
-    outcome.judge_at(Severity::Error, first, figure, || {
-        let reason = FramesReason::Repeated {
-            repeated: repeated.len(),
-            frames: compared,
-            first: repeated[0],
-        };
-        (reason, FramesRemedy::RemoveRepeated)
+    outcome.judge_at(Severity::Error, first, figure, || FramesReason::Repeated {
+        repeated: repeated.len(),
+        frames: compared,
+        first: repeated[0],
     });
     outcome
 }

@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
-use super::remedy::MotionRemedy;
 use super::shared_error::SharedError;
 use super::skip::MotionSkip;
 use deepfusion_data::Dataset;
@@ -35,13 +34,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         "",
         LEAST_SHARE,
     );
-    outcome.judge(Severity::Warning, figure, || {
-        let reason = MotionReason::DynamicAndSlow {
-            listed: agreement.listed,
-            in_scan: agreement.in_scan,
-            fast: agreement.both,
-        };
-        (reason, MotionRemedy::DynamicTopic)
+    outcome.judge(Severity::Warning, figure, || MotionReason::DynamicAndSlow {
+        listed: agreement.listed,
+        in_scan: agreement.in_scan,
+        fast: agreement.both,
     });
     let figure = Figure::new(
         "share of the points that move by radial velocity that are dynamic points",
@@ -50,11 +46,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         LEAST_SHARE,
     );
     outcome.judge(Severity::Warning, figure, || {
-        let reason = MotionReason::FastAndUnlisted {
+        MotionReason::FastAndUnlisted {
             fast: agreement.fast,
             listed: agreement.both,
-        };
-        (reason, MotionRemedy::RadialVelocities)
+        }
     });
     outcome
 }

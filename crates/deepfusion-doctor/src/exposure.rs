@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::PicturesReason;
-use super::remedy::PicturesRemedy;
 use super::skip::PicturesSkip;
 use super::survey::Survey;
 
@@ -40,14 +39,13 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         let first = jumps.first().map(|jump| jump.0);
         outcome.judge_at(Severity::Warning, first, figure, || {
             let (first, first_ratio) = jumps[0];
-            let reason = PicturesReason::BrightnessJumps {
+            PicturesReason::BrightnessJumps {
                 jumps: jumps.len(),
                 neighbours,
                 more_than: JUMP,
                 first,
                 first_ratio,
-            };
-            (reason, PicturesRemedy::FixExposure)
+            }
         });
     }
     let typical = |of: fn(&super::image_quality::ImageQuality) -> f64| {
@@ -59,17 +57,13 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         "%",
         Limit::AtMost(MOST_DARK),
     );
-    outcome.judge(Severity::Warning, dark, || {
-        (PicturesReason::Dark, PicturesRemedy::ExposeLonger)
-    });
+    outcome.judge(Severity::Warning, dark, || PicturesReason::Dark);
     let white = Figure::new(
         "white pixels",
         typical(|l| l.white),
         "%",
         Limit::AtMost(MOST_WHITE),
     );
-    outcome.judge(Severity::Warning, white, || {
-        (PicturesReason::White, PicturesRemedy::ExposeShorter)
-    });
+    outcome.judge(Severity::Warning, white, || PicturesReason::White);
     outcome
 }

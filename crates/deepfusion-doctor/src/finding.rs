@@ -1,7 +1,6 @@
 //! What a check says: a figure against its limit, and, where it does not hold, what is wrong and what to do.
 
 use super::reason::FindingReason;
-use super::remedy::Remedy;
 use super::skip::SkipReason;
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -57,8 +56,8 @@ pub struct Finding {
     pub figure: Option<Figure>,
     /// What is wrong, and what it does to a training; in JSON a sentence.
     pub what: FindingReason,
-    /// What to do about it; in JSON a sentence.
-    pub remedy: Remedy,
+    /// What to do about it: [`FindingReason::remedy`], or a program's own words.
+    pub remedy: String,
 }
 
 /// How a check came out.
@@ -153,34 +152,26 @@ impl Outcome {
         }
     }
 
-    /// Notes a figure; where it does not hold, `what` and its remedy become a finding.
-    pub(crate) fn judge<W: Into<FindingReason>, R: Into<Remedy>>(
+    /// Notes a figure; where it does not hold, `what` becomes a finding.
+    pub(crate) fn judge<W: Into<FindingReason>>(
         &mut self,
         severity: Severity,
         figure: Figure,
-        what: impl FnOnce() -> (W, R),
+        what: impl FnOnce() -> W,
     ) {
         self.judge_at(severity, None, figure, what);
     }
 
     /// The same of a figure that comes from single frames: the first of them, to look at.
-    pub(crate) fn judge_at<W: Into<FindingReason>, R: Into<Remedy>>(
+    pub(crate) fn judge_at<W: Into<FindingReason>>(
         &mut self,
         severity: Severity,
         frame: Option<u64>,
         figure: Figure,
-        what: impl FnOnce() -> (W, R),
+        what: impl FnOnce() -> W,
     ) {
         if !figure.holds() {
-            let (what, remedy) = what();
-            self.findings.push(Finding {
-                severity,
-                check: self.check,
-                frame,
-                figure: Some(figure.clone()),
-                what: what.into(),
-                remedy: remedy.into(),
-            });
+            self.push(severity, frame, Some(figure.clone()), what().into());
         }
         self.measured.push(figure);
     }
@@ -191,15 +182,24 @@ impl Outcome {
         severity: Severity,
         frame: Option<u64>,
         what: impl Into<FindingReason>,
-        remedy: impl Into<Remedy>,
+    ) {
+        self.push(severity, frame, None, what.into());
+    }
+
+    fn push(
+        &mut self,
+        severity: Severity,
+        frame: Option<u64>,
+        figure: Option<Figure>,
+        what: FindingReason,
     ) {
         self.findings.push(Finding {
             severity,
             check: self.check,
             frame,
-            figure: None,
-            what: what.into(),
-            remedy: remedy.into(),
+            figure,
+            remedy: what.remedy(),
+            what,
         });
     }
 }

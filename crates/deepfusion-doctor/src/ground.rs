@@ -2,11 +2,9 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::{CameraReason, RoadAngle};
-use super::remedy::{CameraRemedy, Remedy};
 use super::skip::CameraSkip;
 use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
 use deepfusion_geometry::DepthMap;
-use deepfusion_hint::Hint;
 use nalgebra::{Matrix3, Vector3};
 
 /// Frames looked at.
@@ -49,12 +47,9 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             Ok(None) => {}
             Err(error) => {
                 let mut outcome = Outcome::new("ground");
-                let remedy = error
-                    .hint()
-                    .map_or(CameraRemedy::CopyAgain.into(), Remedy::Hint);
                 let number = dataset.frames()[frame].number;
                 let what = CameraReason::Depth(error.into());
-                outcome.find(Severity::Warning, Some(number), what, remedy);
+                outcome.find(Severity::Warning, Some(number), what);
                 return outcome;
             }
         }
@@ -101,20 +96,17 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     ];
     for (quantity, value, angle, most) in angles {
         let figure = Figure::new(quantity, value, "degrees", Limit::Within(-most, most));
-        outcome.judge(Severity::Warning, figure, || {
-            let reason = CameraReason::RoadTurned {
-                frames: planes.len(),
-                by_deg: value.abs(),
-                angle,
-            };
-            (reason, CameraRemedy::Mount { angle })
+        outcome.judge(Severity::Warning, figure, || CameraReason::RoadTurned {
+            frames: planes.len(),
+            by_deg: value.abs(),
+            angle,
         });
     }
     let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
     let figure = Figure::new("camera above the measured road", height, "m", limit);
     outcome.judge(Severity::Warning, figure, || {
-        let reason = CameraReason::Height { height_m: height };
-        (reason, CameraRemedy::DepthUnit)
+        let height_m = height;
+        CameraReason::Height { height_m }
     });
     outcome
 }

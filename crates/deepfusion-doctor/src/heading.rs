@@ -7,8 +7,7 @@
 use super::epipolar::{self, EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::no_heading::NoHeading;
-use super::reason::{CameraReason, CentreCoordinate, HeadingAngle};
-use super::remedy::CameraRemedy;
+use super::reason::{CameraReason, HeadingAngle};
 use super::skip::{CameraSkip, UnsureHeading};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Heading};
@@ -79,13 +78,12 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     };
     let k = &survey.dataset.intrinsics(0);
     let mut outcome = Outcome::new("heading");
-    let (cx, cy) = (CentreCoordinate::Cx, CentreCoordinate::Cy);
     let axes = [
-        ("pitch of the way ahead", 0, k.fy, cy, HeadingAngle::Pitch),
-        ("yaw of the way ahead", 1, k.fx, cx, HeadingAngle::Yaw),
+        ("pitch of the way ahead", 0, k.fy, HeadingAngle::Pitch),
+        ("yaw of the way ahead", 1, k.fx, HeadingAngle::Yaw),
     ];
     let mut unsure = Vec::new();
-    for (quantity, axis, focal, coordinate, angle) in axes {
+    for (quantity, axis, focal, angle) in axes {
         let off_deg = found.off[axis].to_degrees();
         let std_error_deg = found.std_error[axis].to_degrees();
         if std_error_deg > SURE_DEG {
@@ -105,18 +103,13 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         let figure = Figure::new(quantity, off_deg, "degrees", Limit::Within(-limit, limit));
         outcome.judge(severity, figure, || {
             let pixels = focal * found.off[axis].tan();
-            let reason = CameraReason::Heading {
+            CameraReason::Heading {
                 angle,
                 off_deg,
                 std_error_deg,
-            };
-            let remedy = CameraRemedy::Heading {
-                angle,
-                coordinate,
                 // v grows downward, the angle upward.
-                by_px: if axis == 0 { -pixels } else { pixels },
-            };
-            (reason, remedy)
+                centre_by_px: if axis == 0 { -pixels } else { pixels },
+            }
         });
     }
     if outcome.measured.is_empty() {

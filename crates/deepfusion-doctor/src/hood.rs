@@ -6,7 +6,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::{ImageSide, PicturesReason};
-use super::remedy::PicturesRemedy;
 use super::skip::PicturesSkip;
 use super::survey::Survey;
 
@@ -73,26 +72,14 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
             "% of the side",
             Limit::AtMost(most),
         );
-        outcome.judge(Severity::Warning, figure, || {
-            let pixels = (rim.depth as f64 * scale).ceil() as u32;
-            let last_of = |size: u32| size.saturating_sub(pixels + 1);
-            let remedy = match side {
-                ImageSide::Bottom => PicturesRemedy::CutBottom {
-                    last_row: last_of(k.height),
-                },
-                ImageSide::Top => PicturesRemedy::CutTop { rows: pixels },
-                ImageSide::Left => PicturesRemedy::CutLeft { columns: pixels },
-                ImageSide::Right => PicturesRemedy::CutRight {
-                    last_column: last_of(k.width),
-                },
-            };
-            let share = rim.share;
-            let reason = PicturesReason::StillRim {
-                side,
-                pixels,
-                share,
-            };
-            (reason, remedy)
+        outcome.judge(Severity::Warning, figure, || PicturesReason::StillRim {
+            side,
+            pixels: (rim.depth as f64 * scale).ceil() as u32,
+            share: rim.share,
+            across: match side {
+                ImageSide::Bottom | ImageSide::Top => k.height,
+                ImageSide::Left | ImageSide::Right => k.width,
+            },
         });
     }
     outcome

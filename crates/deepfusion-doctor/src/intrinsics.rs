@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::{CameraReason, CentreCoordinate};
-use super::remedy::CameraRemedy;
 use deepfusion_geometry::Intrinsics;
 
 /// Widths of view of cameras on cars, degrees. KITTI's is 81, UMAD's 49, the simulator's 81.
@@ -50,23 +49,17 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
     outcome.judge(
         Severity::Error,
         Figure::new("width of view", view, "degrees", VIEW_DEG),
-        || {
-            let reason = CameraReason::View {
-                fx: k.fx,
-                view_deg: view,
-                width: k.width,
-            };
-            (reason, CameraRemedy::Calibrate)
+        || CameraReason::View {
+            fx: k.fx,
+            view_deg: view,
+            width: k.width,
         },
     );
     let ratio = k.fx / k.fy;
     outcome.judge(
         Severity::Warning,
         Figure::new("fx / fy", ratio, "", RATIO),
-        || {
-            let reason = CameraReason::PixelShape { fx: k.fx, fy: k.fy };
-            (reason, CameraRemedy::ScaleEach)
-        },
+        || CameraReason::PixelShape { fx: k.fx, fy: k.fy },
     );
     let off = |c: f64, size: f64| 100.0 * (c - 0.5 * (size - 1.0)) / size;
     let (off_x, off_y) = (off(k.cx, width), off(k.cy, height));
@@ -85,27 +78,18 @@ pub(super) fn check(k: &Intrinsics) -> Outcome {
     for (quantity, coordinate, value, off, size) in both {
         let figure = Figure::new(quantity, off, "% of the size", limit);
         outcome.judge(severity, figure, || match other {
-            Some((w, h)) => (
-                CameraReason::OtherSize {
-                    coordinate,
-                    value,
-                    size,
-                    other: [w, h],
-                    image: [k.width, k.height],
-                },
-                CameraRemedy::OwnSize {
-                    x: width / f64::from(w),
-                    y: height / f64::from(h),
-                },
-            ),
-            None => (
-                CameraReason::OffCentre {
-                    coordinate,
-                    value,
-                    size,
-                },
-                CameraRemedy::LookUp,
-            ),
+            Some((w, h)) => CameraReason::OtherSize {
+                coordinate,
+                value,
+                size,
+                other: [w, h],
+                image: [k.width, k.height],
+            },
+            None => CameraReason::OffCentre {
+                coordinate,
+                value,
+                size,
+            },
         });
     }
     outcome
@@ -188,8 +172,7 @@ mod tests {
             "{what}"
         );
         assert!(
-            finding.remedy.to_string().contains("0.52")
-                || finding.remedy.to_string().contains("0.515"),
+            finding.remedy.contains("0.52") || finding.remedy.contains("0.515"),
             "{}",
             finding.remedy
         );
@@ -200,7 +183,10 @@ mod tests {
             ..KITTI.resized(300, 90)
         };
         assert!(
-            check(&half).findings[0].what.to_string().contains("about 29"),
+            check(&half).findings[0]
+                .what
+                .to_string()
+                .contains("about 29"),
             "{:?}",
             check(&half).findings
         );

@@ -2,8 +2,8 @@
 //!
 //! [`doctor`] opens a recording and lets one check after the other look at it. A check measures a figure and compares
 //! it with a limit; what does not keep to it is a [`Finding`] with a remedy. The limits are such that the clean drives
-//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them. What is wrong ([`FindingReason`]),
-//! what to do ([`Remedy`]) and why a check could not look ([`SkipReason`]) are types, and sentences as text and in JSON.
+//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them. What is wrong ([`FindingReason`], which
+//! knows what to do about it) and why a check could not look ([`SkipReason`]) are types, and sentences as text and in JSON.
 
 mod blur;
 mod camera_ahead;
@@ -29,7 +29,6 @@ mod parallax;
 mod plots;
 mod reason;
 mod record;
-mod remedy;
 mod seen_turns;
 mod shared_error;
 mod skip;
@@ -57,9 +56,6 @@ pub use reason::{
     LogReason, MotionReason, OpeningReason, PicturesReason, RoadAngle,
 };
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
-pub use remedy::{
-    CameraRemedy, FramesRemedy, LogRemedy, MotionRemedy, OpeningRemedy, PicturesRemedy, Remedy,
-};
 pub use seen_turns::seen_turns;
 pub use shared_error::SharedError;
 pub use skip::{
@@ -70,7 +66,6 @@ pub use summary::CheckSummary;
 use deepfusion_data::{
     Cameras, ClockOffset, Dataset, DatasetKind, Error, Inspection, OpenOptions, Result,
 };
-use deepfusion_hint::Hint;
 use deepfusion_motion::TimeOffset;
 use serde::Serialize;
 use std::path::Path;
@@ -109,13 +104,17 @@ impl Diagnosis {
     /// Of a recording that cannot be opened: why, and what to do about it, in a program's own words.
     #[must_use]
     pub fn unopened(why: String, remedy: Option<String>) -> Self {
-        Self::not_opened(FindingReason::Words(why), remedy.map(Remedy::Words))
+        let unopened = Self::not_opened(FindingReason::Words(why));
+        match remedy {
+            Some(remedy) => unopened.reworded(|finding| finding.remedy.clone_from(&remedy)),
+            None => unopened,
+        }
     }
 
-    fn not_opened(why: FindingReason, remedy: Option<Remedy>) -> Self {
+    fn not_opened(why: FindingReason) -> Self {
         let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
         let skipped = |check: &&'static str| Outcome::skipped(check, SkipReason::NotOpened);
-        let failed = std::iter::once(opening::failed(why, remedy));
+        let failed = std::iter::once(opening::failed(why));
         Self {
             recording: failed.chain(others.map(skipped)).collect(),
             drives: Vec::new(),
@@ -194,8 +193,7 @@ pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
         ..OpenOptions::default()
     };
     doctor_with(path, &options).unwrap_or_else(|error| {
-        let remedy = error.hint().map(Remedy::Hint);
-        Diagnosis::not_opened(OpeningReason::Recording(error.into()).into(), remedy)
+        Diagnosis::not_opened(OpeningReason::Recording(error.into()).into())
     })
 }
 

@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::MotionReason;
-use super::remedy::MotionRemedy;
 use super::shared_error::SharedError;
 use super::skip::MotionSkip;
 use deepfusion_data::{Dataset, LidarMotion};
@@ -52,12 +51,9 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         "",
         RATIO,
     );
-    outcome.judge(Severity::Error, figure, || {
-        let reason = MotionReason::LidarSpeed {
-            factor: ratio,
-            scans: moving.len(),
-        };
-        (reason, MotionRemedy::SpeedOrSign)
+    outcome.judge(Severity::Error, figure, || MotionReason::LidarSpeed {
+        factor: ratio,
+        scans: moving.len(),
     });
     let limit = Limit::Within(-MOST_SIDEWAYS_DEG, MOST_SIDEWAYS_DEG);
     let figure = Figure::new(
@@ -68,14 +64,13 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     );
     outcome.judge(Severity::Warning, figure, || {
         let left_deg = sideways;
-        let reason = MotionReason::LidarSideways { left_deg };
-        (reason, MotionRemedy::LidarYaw)
+        MotionReason::LidarSideways { left_deg }
     });
     let limit = Limit::Within(-MOST_UPWARD_DEG, MOST_UPWARD_DEG);
     let figure = Figure::new("the LiDAR climbs by", upward, "degrees", limit);
     outcome.judge(Severity::Warning, figure, || {
-        let reason = MotionReason::LidarUpward { up_deg: upward };
-        (reason, MotionRemedy::LidarPitch)
+        let up_deg = upward;
+        MotionReason::LidarUpward { up_deg }
     });
     outcome
 }

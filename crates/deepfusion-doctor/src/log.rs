@@ -2,12 +2,10 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::LogReason;
-use super::remedy::{LogRemedy, Remedy};
 use super::skip::LogSkip;
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
-use deepfusion_hint::Hint;
-use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, may_hold_log, read};
+use deepfusion_logs::{Clock, DriveLog, Error, ReadOptions, may_hold_log, read};
 use std::path::Path;
 
 /// Names of the files that are looked at as logs where they are no recording.
@@ -44,9 +42,8 @@ pub fn doctor_log(path: &Path, options: &ReadOptions) -> Diagnosis {
     let recording = match read(path, options) {
         Ok(log) => outcomes(path, &log),
         Err(error) => {
-            let remedy = remedy(&error);
             let why = LogReason::Unreadable(error.into());
-            vec![opening::failed(why.into(), remedy)]
+            vec![opening::failed(why.into())]
         }
     };
     Diagnosis {
@@ -65,12 +62,7 @@ pub(super) fn within(path: &Path) -> Vec<Outcome> {
         // The camera's own track without a fix is worth a word; a video of another camera is not.
         Some(Err(Error::NoGps { why, .. })) => {
             let mut outcome = Outcome::new("log");
-            outcome.find(
-                Severity::Warning,
-                None,
-                LogReason::NoSpeed(why),
-                Remedy::OtherLog,
-            );
+            outcome.find(Severity::Warning, None, LogReason::NoSpeed(why));
             vec![outcome]
         }
         _ => Vec::new(),
@@ -90,15 +82,6 @@ fn outcomes(path: &Path, log: &DriveLog) -> Vec<Outcome> {
     ]
 }
 
-/// What to do about a log that cannot be read.
-fn remedy(error: &Error) -> Option<Remedy> {
-    match error {
-        Error::Signal { .. } => Some(Remedy::Signal),
-        Error::Column { .. } => error.hint().map(Remedy::Columns),
-        _ => error.hint().map(Remedy::Hint),
-    }
-}
-
 /// What it is, and what it still needs.
 fn opened(path: &Path, log: &DriveLog) -> Outcome {
     let mut outcome = Outcome::new("log");
@@ -106,14 +89,11 @@ fn opened(path: &Path, log: &DriveLog) -> Outcome {
         Severity::Note,
         None,
         LogReason::Holds {
+            log: path.to_owned(),
             format: log.format,
             speeds: log.speeds.len(),
             yaw_rates: log.yaw_rates.len(),
             notes: log.notes.clone(),
-        },
-        Remedy::Import {
-            log: path.to_owned(),
-            video: log.format != Format::Gpmf,
         },
     );
     outcome
@@ -131,7 +111,7 @@ fn rate(log: &DriveLog) -> Outcome {
     let figure = Figure::new("speeds", hz, "/s", Limit::AtLeast(LEAST_HZ));
     outcome.judge(Severity::Warning, figure, || {
         let every_s = hz.recip();
-        (LogReason::Sparse { every_s }, LogRemedy::LogOften)
+        LogReason::Sparse { every_s }
     });
     outcome
 }
@@ -142,7 +122,7 @@ fn gaps(log: &DriveLog) -> Outcome {
     let figure = Figure::new("longest gap", longest, "s", Limit::AtMost(MOST_GAP_S));
     outcome.judge(Severity::Warning, figure, || {
         let longest_s = longest;
-        (LogReason::Gap { longest_s }, LogRemedy::BridgeGap)
+        LogReason::Gap { longest_s }
     });
     outcome
 }
@@ -153,7 +133,7 @@ fn moving(log: &DriveLog) -> Outcome {
     let figure = Figure::new("fastest", fastest, "m/s", Limit::AtMost(MOST_MPS));
     outcome.judge(Severity::Error, figure, || {
         let fastest_mps = fastest;
-        (LogReason::TooFast { fastest_mps }, Remedy::SpeedUnit)
+        LogReason::TooFast { fastest_mps }
     });
     let moving = log.speeds.iter().filter(|s| s.mps.abs() > MOVING_MPS);
     let share = 100.0 * moving.count() as f64 / log.speeds.len().max(1) as f64;
@@ -165,7 +145,7 @@ fn moving(log: &DriveLog) -> Outcome {
     };
     outcome.judge(severity, figure, || {
         let moving_percent = share;
-        (LogReason::Standing { moving_percent }, LogRemedy::LogDrive)
+        LogReason::Standing { moving_percent }
     });
     outcome
 }
@@ -189,7 +169,7 @@ fn sure(log: &DriveLog) -> Outcome {
     );
     outcome.judge(Severity::Warning, figure, || {
         let sigma_percent = share;
-        (LogReason::Unsure { sigma_percent }, Remedy::VehicleSpeed)
+        LogReason::Unsure { sigma_percent }
     });
     outcome
 }
@@ -202,14 +182,12 @@ fn turns(log: &DriveLog) -> Outcome {
         outcome.measured.push(figure);
         return outcome;
     }
-    let from_positions = !log.course_rates.is_empty();
-    let what = if from_positions {
-        LogReason::CourseAlone
-    } else {
+    let what = if log.course_rates.is_empty() {
         LogReason::NoTurns
+    } else {
+        LogReason::CourseAlone
     };
-    let remedy = Remedy::Turns { from_positions };
-    outcome.find(Severity::Note, None, what, remedy);
+    outcome.find(Severity::Note, None, what);
     outcome
 }
 
@@ -222,7 +200,6 @@ fn clock(log: &DriveLog) -> Outcome {
         Clock::LocalDate => (Severity::Warning, LogReason::LocalDates),
         Clock::TimeOfDay | Clock::Free => (Severity::Warning, LogReason::NoDates),
     };
-    let remedy = Remedy::StartOfVideo(log.clock);
-    outcome.find(severity, None, what, remedy);
+    outcome.find(severity, None, what);
     outcome
 }

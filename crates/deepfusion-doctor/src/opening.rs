@@ -2,10 +2,8 @@
 
 use super::finding::{Outcome, Severity};
 use super::reason::{FindingReason, OpeningReason};
-use super::remedy::{OpeningRemedy, Remedy};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Error, Result};
-use deepfusion_hint::Hint;
 
 pub(super) const CHECK: &str = "opening";
 /// Pairs slower than this do not train.
@@ -20,10 +18,9 @@ pub(super) fn pairs(dataset: &Dataset) -> Result<usize> {
 }
 
 /// Of a recording that cannot be opened.
-pub(super) fn failed(why: FindingReason, remedy: Option<Remedy>) -> Outcome {
+pub(super) fn failed(why: FindingReason) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
-    let remedy = remedy.unwrap_or(OpeningRemedy::Correct.into());
-    outcome.find(Severity::Error, None, why, remedy);
+    outcome.find(Severity::Error, None, why);
     outcome
 }
 
@@ -36,13 +33,9 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
             Severity::Error,
             Some(*number),
             OpeningReason::Image(problem.clone()),
-            OpeningRemedy::CopyOrLeaveOut,
         );
     }
     if let Err(error) = pairs(survey.dataset) {
-        let remedy = error
-            .hint()
-            .map_or(OpeningRemedy::KnownMotion.into(), Remedy::Hint);
         let harmless = matches!(
             error,
             Error::OneFrame { .. } | Error::Standing { .. } | Error::NoPairs { .. }
@@ -55,7 +48,7 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         };
         let problem = error.into();
         let what = OpeningReason::NoPair { left_out, problem };
-        outcome.find(severity, None, what, remedy);
+        outcome.find(severity, None, what);
     }
     if survey.dataset.track().is_some() && !survey.dataset.yaw_known() {
         outcome.find(
@@ -66,7 +59,6 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
             } else {
                 OpeningReason::NoTurns
             },
-            OpeningRemedy::RecordTurns,
         );
     }
     for warning in survey.dataset.warnings() {
@@ -76,15 +68,7 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         } else {
             Severity::Note
         };
-        let remedy = if damaged {
-            OpeningRemedy::RepairBag
-        } else if survey.dataset.passed_over() == Some(warning) {
-            OpeningRemedy::OwnPath
-        } else {
-            OpeningRemedy::SayOtherwise
-        };
-        let what = OpeningReason::from(warning.clone());
-        outcome.find(severity, None, what, remedy);
+        outcome.find(severity, None, OpeningReason::from(warning.clone()));
     }
     outcome
 }

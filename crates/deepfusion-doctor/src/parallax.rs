@@ -3,7 +3,6 @@
 use super::epipolar::{EpipolarPair, YawTrust};
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::PicturesReason;
-use super::remedy::PicturesRemedy;
 use super::skip::PicturesSkip;
 use super::survey::Survey;
 
@@ -33,8 +32,6 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         "px a frame",
         Limit::AtLeast(LEAST_PX),
     );
-    outcome.judge(Severity::Warning, figure, || {
-        (PicturesReason::LittleParallax, PicturesRemedy::FurtherApart)
-    });
+    outcome.judge(Severity::Warning, figure, || PicturesReason::LittleParallax);
     outcome
 }

@@ -16,6 +16,9 @@ pub use self::pictures::{ImageSide, PicturesReason};
 
 use serde::{Serialize, Serializer};
 
+/// What to do about what cannot be opened, where nothing better is known.
+const CORRECT: &str = "correct what the message names";
+
 /// What is wrong with a recording, and what it does to a training.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -43,6 +46,22 @@ pub enum FindingReason {
     Words(String),
 }
 
+impl FindingReason {
+    /// What to do about it, in the library's words.
+    #[must_use]
+    pub fn remedy(&self) -> String {
+        match self {
+            Self::Opening(reason) => reason.remedy(),
+            Self::Frames(reason) => reason.remedy().to_owned(),
+            Self::Camera(reason) => reason.remedy(),
+            Self::Motion(reason) => reason.remedy(),
+            Self::Pictures(reason) => reason.remedy(),
+            Self::Log(reason) => reason.remedy(),
+            Self::Words(_) => CORRECT.to_owned(),
+        }
+    }
+}
+
 /// As its text.
 impl Serialize for FindingReason {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -54,7 +73,7 @@ impl Serialize for FindingReason {
 mod tests {
     use super::*;
 
-    /// One of each kind: what a kind says itself is tested beside it.
+    /// One of each kind, with what to do about it: what a kind says itself is tested beside it.
     #[test]
     fn a_reason_says_what_its_kind_says() {
         let reasons: [FindingReason; 7] = [
@@ -76,9 +95,19 @@ mod tests {
             "dates without a zone, taken for UTC: hours off where they are local",
             "its gyroscope was warm",
         ];
-        for (reason, said) in reasons.into_iter().zip(said) {
+        let remedies = [
+            "record an inertial unit or the steering angle",
+            "sort the frames by time, or correct the time stamps",
+            "rename image_02 to image_03 and the other way round",
+            "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)",
+            "expose longer, or leave the darkest drives out",
+            "say the log's time zone; pictures and speeds show what is left between the clocks",
+            "correct what the message names",
+        ];
+        for ((reason, said), remedy) in reasons.into_iter().zip(said).zip(remedies) {
             assert_eq!(reason.to_string(), said);
             assert_eq!(serde_json::to_value(&reason).unwrap(), said);
+            assert_eq!(reason.remedy(), remedy);
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
-use super::remedy::MotionRemedy;
 use super::shared_error::SharedError;
 use super::skip::MotionSkip;
 use deepfusion_data::{
@@ -36,15 +35,10 @@ fn by_road(dataset: &Dataset, outcome: &mut Outcome) {
     let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
     let figure = Figure::new("camera height by the road's motion", height_m, "m", limit);
     outcome.judge(Severity::Error, figure, || {
-        let warning = SpeedWarning {
+        MotionReason::Road(SpeedWarning {
             implied_height_m: height_m,
             pairs,
-        };
-        let remedy = match warning.likely_unit() {
-            Some(unit) => MotionRemedy::DivideSpeeds { unit },
-            None => MotionRemedy::SpeedOrFocalLength,
-        };
-        (MotionReason::Road(warning), remedy)
+        })
     });
 }
 
@@ -77,12 +71,9 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
     }
     let ratio = by_poses / by_speeds;
     let figure = Figure::new("way by the poses over way by the speeds", ratio, "", RATIO);
-    outcome.judge(Severity::Error, figure, || {
-        let reason = MotionReason::Poses {
-            by_poses_m: by_poses,
-            by_speeds_m: by_speeds,
-            depth_factor: 1.0 / ratio,
-        };
-        (reason, MotionRemedy::SpeedFactor)
+    outcome.judge(Severity::Error, figure, || MotionReason::Poses {
+        by_poses_m: by_poses,
+        by_speeds_m: by_speeds,
+        depth_factor: 1.0 / ratio,
     });
 }

@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::FramesReason;
-use super::remedy::FramesRemedy;
 use super::skip::FramesSkip;
 use deepfusion_data::Dataset;
 
@@ -34,13 +33,12 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let from = longest.map(|(from, _)| from);
     outcome.judge_at(Severity::Warning, from, figure, || {
         let (from, to) = longest.unwrap_or_default();
-        let reason = FramesReason::Standing {
+        FramesReason::Standing {
             standing,
             pairs: stands.len(),
             from,
             to,
-        };
-        (reason, FramesRemedy::CutStanding)
+        }
     });
     outcome
 }

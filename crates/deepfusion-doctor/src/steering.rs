@@ -2,7 +2,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
-use super::remedy::MotionRemedy;
 use super::skip::MotionSkip;
 use deepfusion_data::{Dataset, MotionModel};
 
@@ -43,11 +42,9 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         "",
         FACTOR,
     );
-    outcome.judge(Severity::Warning, figure, || {
-        let remedy = MotionRemedy::Wheelbase {
-            factor: 1.0 / factor,
-        };
-        (MotionReason::Steering { turning_s, factor }, remedy)
+    outcome.judge(Severity::Warning, figure, || MotionReason::Steering {
+        turning_s,
+        factor,
     });
     outcome
 }

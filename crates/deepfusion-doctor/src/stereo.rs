@@ -3,7 +3,6 @@
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::flow::flow;
 use super::reason::CameraReason;
-use super::remedy::CameraRemedy;
 use super::shared_error::SharedError;
 use super::skip::CameraSkip;
 use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions, Result, grey_image};
@@ -58,9 +57,7 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
         "px of 320",
         Limit::AtLeast(0.0),
     );
-    outcome.judge(Severity::Error, figure, || {
-        (CameraReason::Swapped, CameraRemedy::Rename)
-    });
+    outcome.judge(Severity::Error, figure, || CameraReason::Swapped);
     outcome
 }
 

@@ -3,7 +3,6 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::reason::FramesReason;
-use super::remedy::FramesRemedy;
 use super::skip::FramesSkip;
 use deepfusion_data::Dataset;
 
@@ -32,7 +31,6 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             Severity::Error,
             Some(*number),
             FramesReason::Backwards { by_s: -apart },
-            FramesRemedy::SortFrames,
         );
     }
     let usual = median(
@@ -55,13 +53,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let share = 100.0 * lost / (lost + frames.len() as f64);
     let figure = Figure::new("lost frames", share, "%", Limit::AtMost(MOST_LOST));
     let first = first.map(|(number, _, _)| *number);
-    outcome.judge_at(Severity::Warning, first, figure, || {
-        let reason = FramesReason::Lost {
-            lost: lost as usize,
-            rate_hz: 1.0 / usual,
-            first: first.unwrap_or(0),
-        };
-        (reason, FramesRemedy::FindLostFrames)
+    outcome.judge_at(Severity::Warning, first, figure, || FramesReason::Lost {
+        lost: lost as usize,
+        rate_hz: 1.0 / usual,
+        first: first.unwrap_or(0),
     });
     unknown_motion(dataset, &mut outcome);
     outcome
@@ -99,11 +94,10 @@ fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
         Limit::AtMost(MOST_UNKNOWN),
     );
     outcome.judge_at(Severity::Warning, first, figure, || {
-        let reason = FramesReason::UnknownMotion {
+        FramesReason::UnknownMotion {
             unknown_s: unknown,
             stretches,
             first: first.unwrap_or(0),
-        };
-        (reason, FramesRemedy::FindLostSpeeds)
+        }
     });
 }

@@ -6,7 +6,6 @@
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
-use super::remedy::MotionRemedy;
 use super::skip::MotionSkip;
 use nalgebra::Vector3;
 
@@ -53,20 +52,12 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
         Limit::AtLeast(0.5),
     );
     let mirrored = correlation < -0.5;
-    let (severity, reason, remedy) = if mirrored {
-        (
-            Severity::Error,
-            MotionReason::Mirrored,
-            MotionRemedy::Mirror,
-        )
+    let (severity, reason) = if mirrored {
+        (Severity::Error, MotionReason::Mirrored)
     } else {
-        (
-            Severity::Warning,
-            MotionReason::TurnsUnrelated,
-            MotionRemedy::CompareTimes,
-        )
+        (Severity::Warning, MotionReason::TurnsUnrelated)
     };
-    outcome.judge(severity, figure, || (reason, remedy));
+    outcome.judge(severity, figure, || reason);
     if correlation >= SURE {
         let figure = Figure::new(
             "turns in the picture over the vehicle's",
@@ -76,10 +67,7 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
         );
         outcome.judge(Severity::Error, figure, || {
             let factor = slope;
-            (
-                MotionReason::TurnsFactor { factor },
-                MotionRemedy::FocalLength { factor },
-            )
+            MotionReason::TurnsFactor { factor }
         });
     }
     outcome
@@ -129,7 +117,6 @@ mod tests {
             panic!("{outcome:?}")
         };
         assert_eq!(finding.severity, Severity::Error);
-        let remedy = finding.remedy.to_string();
-        assert!(remedy.contains("negate the yaw rate"), "{remedy}");
+        assert!(finding.remedy.contains("negate the yaw rate"));
     }
 }

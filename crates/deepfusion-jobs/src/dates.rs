@@ -1,4 +1,4 @@
-//! Times of the calendar (UTC), for names and cards; how long something takes, for people.
+//! Times of the calendar (UTC), for names and cards.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -17,20 +17,6 @@ pub fn day(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let stamp = stamp(seconds);
     format!("{}-{}-{}", &stamp[..4], &stamp[4..6], &stamp[6..8])
-}
-
-/// Seconds as minutes and seconds, or hours and minutes: `1:15 min`, `2 h 02 min`.
-#[must_use]
-pub fn clock(seconds: f64) -> String {
-    if !seconds.is_finite() {
-        return "?".into();
-    }
-    let s = seconds.max(0.0).round() as u64;
-    if s >= 3600 {
-        format!("{} h {:02} min", s / 3600, s / 60 % 60)
-    } else {
-        format!("{}:{:02} min", s / 60, s % 60)
-    }
 }
 
 /// Seconds since 1970 as `YYYYMMDD-HHMMSS`, UTC, by counting days through the 400-year cycle of the calendar.
@@ -76,12 +62,5 @@ mod tests {
         }
         let leap_day = UNIX_EPOCH + std::time::Duration::from_secs(951_827_696);
         assert_eq!(day(leap_day), "2000-02-29");
-    }
-
-    #[test]
-    fn times_read_well() {
-        assert_eq!(clock(75.4), "1:15 min");
-        assert_eq!(clock(7_320.0), "2 h 02 min");
-        assert_eq!(clock(f64::NAN), "?");
     }
 }

@@ -634,7 +634,7 @@ impl Hint for Error {
             #[cfg(feature = "train")]
             Self::ReadBack { source, .. }
             | Self::CheckNotStarted { source }
-            | Self::CheckNotEnded { source } => Some(system_hint(source.kind()).into()),
+            | Self::CheckNotEnded { source } => system_hint(source.kind()).map(Into::into),
             #[cfg(feature = "train")]
             Self::Deviates { .. } => {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())
@@ -658,9 +658,9 @@ impl Hint for Error {
             ),
             Self::Picture(image::ImageError::IoError(source))
             | Self::Npy(ndarray_npy::WriteNpyError::Io(source)) => {
-                Some(system_hint(source.kind()).into())
+                system_hint(source.kind()).map(Into::into)
             }
-            Self::Json(error) => error.io_error_kind().map(|kind| system_hint(kind).into()),
+            Self::Json(error) => error.io_error_kind().and_then(system_hint).map(Into::into),
             Self::Pattern(_)
             | Self::Picture(_)
             | Self::Shape(_)

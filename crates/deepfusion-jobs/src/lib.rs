@@ -58,6 +58,7 @@ pub mod demo;
 #[cfg(feature = "train")]
 pub mod device_check;
 pub mod devices;
+pub mod duration;
 pub mod engine;
 mod error;
 pub mod evaluation;

@@ -171,7 +171,7 @@ impl Hint for Error {
                 std::io::ErrorKind::PermissionDenied => {
                     Some(format!("no permission to {action} there"))
                 }
-                kind => Some(system_hint(kind).into()),
+                kind => system_hint(kind).map(Into::into),
             },
             Self::NotToml { .. } => None,
             Self::Checkpoint { .. } => Some("use the version of the program that wrote it".into()),
@@ -234,6 +234,12 @@ pub enum SettingProblem {
         key: String,
         /// How many elements it has.
         length: usize,
+    },
+    /// A name in a list that has no elements.
+    #[error("`{key}` is a list without elements: it is set as a whole first")]
+    NameInEmptyList {
+        /// The list.
+        key: String,
     },
     /// A place that is none.
     #[error("`{part}`: a place in a list is a number in brackets, such as [0]")]

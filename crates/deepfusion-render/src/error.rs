@@ -54,7 +54,7 @@ impl Hint for Error {
             Self::Data(inner) => inner.hint(),
             Self::Log { .. } => Some("it should be the log.csv of a run's folder".into()),
             Self::Encode(image::ImageError::IoError(source)) => {
-                Some(system_hint(source.kind()).into())
+                system_hint(source.kind()).map(Into::into)
             }
             Self::Size { .. } | Self::Encode(_) => None,
         }

@@ -101,7 +101,7 @@ impl DepthEstimator {
     }
 
     /// An estimator for another thread: it shares the weights, those of input sizes yet to come as well, and has its own buffers. The fused engine's
-    /// weights are shared as they are packed, for the first six further input sizes; each session of ONNX Runtime packs its own.
+    /// weights are shared as they are packed, for the first 24 further input sizes; each session of ONNX Runtime packs its own.
     ///
     /// # Errors
     /// As [`DepthRunner::another`].

@@ -7,9 +7,12 @@ use deepfusion_model::InputSize;
 
 use crate::{DepthRunner, Error, RunnerPlan};
 
-/// Number of other input sizes for which an estimator keeps runners, and for which what is packed is shared; each camera needs one, or as many as
-/// [`crate::Augmentation::scales`].
+/// Number of other input sizes for which an estimator keeps runners; each camera needs one, or as many as [`crate::Augmentation::scales`].
 const SIZES_KEPT: usize = 6;
+
+/// Number of other input sizes for which what is packed is shared. More than an estimator keeps, as these places are never emptied: four times
+/// [`SIZES_KEPT`] is four cameras at six scales.
+const SIZES_SHARED: usize = 24;
 
 /// Runners for other input sizes, made on demand.
 pub(crate) struct OtherSizes {
@@ -22,7 +25,7 @@ pub(crate) struct OtherSizes {
 struct SharedSizes {
     make: Box<MakeRunner>,
     /// The first sizes that were asked for. Places are taken in their order and never emptied, so that nobody waits to read them.
-    packed: [OnceLock<PackedSize>; SIZES_KEPT],
+    packed: [OnceLock<PackedSize>; SIZES_SHARED],
 }
 
 /// What is packed for a size. (Of ONNX Runtime's that is the model's bytes alone.)
@@ -44,7 +47,7 @@ impl OtherSizes {
         Self {
             shared: Arc::new(SharedSizes {
                 make: Box::new(make),
-                packed: [const { OnceLock::new() }; SIZES_KEPT],
+                packed: [const { OnceLock::new() }; SIZES_SHARED],
             }),
             made: Vec::new(),
         }
@@ -163,17 +166,17 @@ mod tests {
             Ok(Box::new(Idle))
         });
         let mut second = first.another().unwrap();
-        let sizes = SIZES_KEPT + 2;
+        let sizes = SIZES_SHARED + 2;
         for number in 0..sizes {
             first.runner(size(number)).unwrap();
         }
         assert_eq!(packed.load(Ordering::Relaxed), sizes);
         // Beyond, each thread packs for itself, and keeps what it used last.
-        for number in (0..sizes).chain(SIZES_KEPT..sizes) {
+        for number in (0..sizes).chain(SIZES_SHARED..sizes) {
             second.runner(size(number)).unwrap();
         }
         assert_eq!(packed.load(Ordering::Relaxed), sizes + 2);
-        // The first two went from the list of the first thread, not from what is shared.
+        // The first went from the list of the first thread, not from what is shared.
         first.runner(size(0)).unwrap();
         assert_eq!(packed.load(Ordering::Relaxed), sizes + 2);
     }

@@ -109,7 +109,7 @@ impl Hint for Error {
             Self::Encode {
                 source: image::ImageError::IoError(source),
                 ..
-            } => Some(system_hint(source.kind()).to_owned()),
+            } => system_hint(source.kind()).map(Into::into),
             Self::Encode { .. } => None,
         }
     }

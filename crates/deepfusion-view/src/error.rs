@@ -167,7 +167,7 @@ impl Hint for Error {
                 Some("give two folders of predictions, or two of training runs".into())
             }
             Self::NoFrames { .. } => Some("give a folder of predictions or of targets".into()),
-            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::File { source, .. } => system_hint(source.kind()).map(Into::into),
             Self::Content { .. } | Self::Stopped { .. } => None,
             #[cfg(feature = "rerun")]
             Self::Encoding { .. } => None,

@@ -78,7 +78,7 @@ pub(crate) struct AblateArgs {
     /// Whose motion the views are synthesised with [default: posenet; with --config the file's].
     #[arg(long, value_parser = names::view_motion(), value_name = "MOTION", conflicts_with = "resume")]
     pub view_motion: Option<ViewMotion>,
-    /// Any key of the configuration, as `loss.smoothness=0.01` or `data.sets[0].learn=depth` (`deepfusion config show` prints them all); may be repeated.
+    /// Any key of the configuration, as `loss.smoothness=0.01` (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "resume")]
     pub set: Vec<String>,
     /// Which cameras.

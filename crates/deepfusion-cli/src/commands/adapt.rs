@@ -4,7 +4,7 @@ use std::path::Path;
 
 use deepfusion_jobs::training::Pace;
 use deepfusion_jobs::training::adaptation::{
-    AdaptSettings, Adaptation, Outcome, assumed_camera, require_new, undo,
+    AdaptSettings, Adaptation, Outcome, Refusal, assumed_camera, require_new, undo,
 };
 use deepfusion_model::SimulatedCamera;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
@@ -133,10 +133,14 @@ fn report(args: &AdaptArgs, outcome: Outcome) -> Result<()> {
         }
         output::print(&text)?;
     }
-    let Some(refusal) = outcome.refusal() else {
-        return Ok(());
+    let path = outcome.run.clone();
+    let error = match outcome.refusal() {
+        None => return Ok(()),
+        Some(Refusal::NotJudged) => CliError::NothingJudged { path },
+        Some(refusal) => {
+            let worse = refusal.to_string();
+            CliError::Refused { path, worse }
+        }
     };
-    let worse = refusal.to_string();
-    let path = outcome.run;
-    Err(CliError::Refused { path, worse }.into())
+    Err(error.into())
 }

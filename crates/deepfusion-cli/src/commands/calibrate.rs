@@ -48,7 +48,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     let (found, lens) = seen.calibrate(&board, args.model())?;
     let report = seen.report(&board, (&found, &lens), &args.out);
     let name = output::name_of(args.inputs[0].as_ref());
-    output::write(&args.out, report.yaml(&name, &lens))?;
+    output::write(&args.out, report.yaml(&name))?;
     if let Some(path) = &args.report {
         report.page(&command_line::typed_again())?.write(path)?;
         say(&format!("report    {}", path.display()));

@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 
-use deepfusion_jobs::live::{Feed, LiveLimits};
+use deepfusion_jobs::live::{Feed, LiveEnd, LiveLimits};
 use deepfusion_video::Address;
 
 use crate::cli::LiveArgs;
@@ -35,4 +35,13 @@ pub(super) fn open(address: &Address, args: &LiveArgs) -> Result<Feed> {
         stop: interrupt::asked,
     };
     Ok(Feed::open(address, &until)?)
+}
+
+/// Warns where a source's end may be a loss.
+pub(super) fn warn_of_end(address: &Address, ending: &Result<LiveEnd>) {
+    if matches!(ending, Ok(LiveEnd::Closed)) {
+        tracing::warn!(
+            "{address}: the other side closed the stream: whether it was over or is lost cannot be seen"
+        );
+    }
 }

@@ -9,7 +9,7 @@ use deepfusion_train::{Control, TrainEvent};
 
 use crate::failure::{Failure, Result};
 use crate::interrupt;
-use crate::progress::{Progress, clock, say};
+use crate::progress::{Progress, duration_text, say};
 
 /// How often a line has the losses where there is no bar.
 const LINE_EVERY: Duration = Duration::from_secs(20);
@@ -94,7 +94,7 @@ fn how_long(estimate: &TimeEstimate) -> String {
     };
     let mut line = format!(
         "about {} from here: {} of {pace}",
-        clock(estimate.total_s()),
+        duration_text(estimate.total_s()),
         count_of(estimate.steps, "step")
     );
     let choices = estimate.choices.iter().map(|(choice, total_s)| {
@@ -102,7 +102,7 @@ fn how_long(estimate: &TimeEstimate) -> String {
             OtherSetting::Size(size) => format!("--size {}x{}", size.width, size.height),
             OtherSetting::Preset(preset) => format!("--preset {preset}"),
         };
-        format!("{option} about {}", clock(*total_s))
+        format!("{option} about {}", duration_text(*total_s))
     });
     let choices: Vec<String> = choices.collect();
     if !choices.is_empty() {

@@ -15,7 +15,7 @@ use crate::allocator;
 use crate::cli::{Size, TrainArgs};
 use crate::error::CliError;
 use crate::failure::Result;
-use crate::progress::{clock, say};
+use crate::progress::{duration_text, say};
 use crate::{devices, interrupt, output};
 
 /// `deepfusion train`.
@@ -81,20 +81,21 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     output::print(&format!("{}\n", trainer.folder().display()))
 }
 
-/// Prints what a run starts from.
+/// Prints what a run starts from, and warns of what may not be meant.
 pub(super) fn print_start(start: StartReport) {
-    say(&start.to_string());
+    match start {
+        StartReport::OtherMeaning(warning) => tracing::warn!("{warning}"),
+        start => say(&start.to_string()),
+    }
 }
 
 /// As [`print_start`], where an option chooses otherwise.
 fn print_default_start(start: StartReport) {
-    let embedded = matches!(start, StartReport::Packed { path: None, .. });
-    let hint = if embedded {
-        " (--init none starts from nothing)"
+    if matches!(start, StartReport::Packed { path: None, .. }) {
+        say(&format!("{start} (--init none starts from nothing)"));
     } else {
-        ""
-    };
-    say(&format!("{start}{hint}"));
+        print_start(start);
+    }
 }
 
 /// A preset takes PoseNet's pose because that is how its network was published, and the recordings know better.
@@ -125,7 +126,7 @@ pub(super) fn train(trainer: &mut Trainer, pace: Option<Pace>) -> Result<TrainSu
         },
         summary.step,
         count_of(summary.steps, "step"),
-        clock(summary.seconds),
+        duration_text(summary.seconds),
         if summary.skipped > 0 {
             format!(
                 ", {} skipped for a gradient that was not finite",

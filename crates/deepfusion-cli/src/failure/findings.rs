@@ -1,32 +1,29 @@
-//! What the command line says of the doctor's findings: the library names a remedy, this the options that do it.
+//! What the command line says of the doctor's findings: the library says what to do, this which options do it.
 
-use deepfusion_doctor::{Diagnosis, FindingReason, Remedy};
-use deepfusion_logs::Clock;
+use deepfusion_doctor::{Diagnosis, FindingReason, LogReason, MotionReason};
+use deepfusion_hint::Hint;
+use deepfusion_logs::{Error, Format};
 
 /// A diagnosis whose findings name the command's options, as `deepfusion doctor` prints them and its JSON has them.
 #[must_use]
 pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.reworded(|finding| {
-        if let Some(words) = remedy(&finding.remedy) {
-            if let Some(what) = what(&finding.remedy) {
-                finding.what = FindingReason::Words(what.to_owned());
-            }
-            finding.remedy = Remedy::Words(words);
+        if let Some(words) = remedy(&finding.what) {
+            finding.remedy = words;
+        }
+        if let Some(words) = what(&finding.what) {
+            finding.what = FindingReason::Words(words.to_owned());
         }
     })
 }
 
 /// What is wrong, where that speaks of options.
-fn what(remedy: &Remedy) -> Option<&'static str> {
-    match remedy {
-        Remedy::Turns {
-            from_positions: false,
-        } => Some(
+fn what(reason: &FindingReason) -> Option<&'static str> {
+    match reason {
+        FindingReason::Log(LogReason::NoTurns) => Some(
             "nothing says how the vehicle turned: --view-motion vehicle cannot train, and --clock-offset auto has changes of speed alone to go by",
         ),
-        Remedy::Turns {
-            from_positions: true,
-        } => Some(
+        FindingReason::Log(LogReason::CourseAlone) => Some(
             "turns are known from positions alone: enough for --clock-offset auto on a few minutes with bends, not for --view-motion vehicle",
         ),
         _ => None,
@@ -34,39 +31,49 @@ fn what(remedy: &Remedy) -> Option<&'static str> {
 }
 
 /// What to do, where an option does it.
-fn remedy(remedy: &Remedy) -> Option<String> {
-    const AUTO: &str = "data import --clock-offset auto measures what is left between the clocks";
-    Some(match remedy {
-        Remedy::OtherLog => {
-            "switch the camera's GPS on and wait for its fix; or bring another log: deepfusion data import LOG --video FILE --out DRIVE".into()
-        }
-        Remedy::Signal => "give --dbc FILE and --speed Message.Signal".into(),
-        Remedy::Columns(hint) => format!("{hint}: --time COLUMN --speed COLUMN --unit km/h"),
-        Remedy::SpeedUnit => "say the unit: --unit km/h (m/s, mph, knots)".into(),
-        Remedy::VehicleSpeed => {
-            "drive faster or longer, or log the vehicle's own speed: OBD, CAN (--dbc FILE --speed Message.Signal)".into()
-        }
-        Remedy::Import { log, video } => format!(
-            "deepfusion data import {}{} --out DRIVE, with the camera as --hfov DEGREES, --intrinsics or --calibration (deepfusion calibrate \
-             measures it); then deepfusion doctor DRIVE",
-            log.display(),
-            if *video { " --video FILE" } else { "" }
-        ),
-        Remedy::Turns { .. } => {
-            "--view-motion posenet or distance need no turns; a second log with a gyroscope brings them: deepfusion data import LOG GYROSCOPE …".into()
-        }
-        Remedy::StartOfVideo(Clock::LocalDate) => {
-            format!("deepfusion data import … --zone +02:00; {AUTO}")
-        }
-        Remedy::StartOfVideo(Clock::TimeOfDay | Clock::Free) => {
-            format!("deepfusion data import … --start TIME says it; {AUTO}")
-        }
-        Remedy::StartOfVideo(_) => AUTO.into(),
-        Remedy::ClockOffset { camera_ahead_s } => format!(
+fn remedy(reason: &FindingReason) -> Option<String> {
+    match reason {
+        FindingReason::Log(reason) => of_log(reason),
+        FindingReason::Motion(MotionReason::ClockOffset { camera_ahead_s, .. }) => Some(format!(
             "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given (--clock-offset auto measures it \
              again on opening). Better: one clock for all (PTP, trigger)",
             1e3 * camera_ahead_s
+        )),
+        _ => None,
+    }
+}
+
+fn of_log(reason: &LogReason) -> Option<String> {
+    const AUTO: &str = "data import --clock-offset auto measures what is left between the clocks";
+    Some(match reason {
+        LogReason::NoSpeed(_) => {
+            "switch the camera's GPS on and wait for its fix; or bring another log: deepfusion data import LOG --video FILE --out DRIVE".into()
+        }
+        LogReason::Unreadable(error) => match error.error() {
+            Error::Signal { .. } => "give --dbc FILE and --speed Message.Signal".into(),
+            Error::Column { problem, .. } => {
+                let hint = problem.hint()?;
+                format!("{hint}: --time COLUMN --speed COLUMN --unit km/h")
+            }
+            _ => return None,
+        },
+        LogReason::TooFast { .. } => "say the unit: --unit km/h (m/s, mph, knots)".into(),
+        LogReason::Unsure { .. } => {
+            "drive faster or longer, or log the vehicle's own speed: OBD, CAN (--dbc FILE --speed Message.Signal)".into()
+        }
+        LogReason::Holds { log, format, .. } => format!(
+            "deepfusion data import {}{} --out DRIVE, with the camera as --hfov DEGREES, --intrinsics or --calibration (deepfusion calibrate \
+             measures it); then deepfusion doctor DRIVE",
+            log.display(),
+            // A GoPro's log is in its video.
+            if *format == Format::Gpmf { "" } else { " --video FILE" }
         ),
+        LogReason::NoTurns | LogReason::CourseAlone => {
+            "--view-motion posenet or distance need no turns; a second log with a gyroscope brings them: deepfusion data import LOG GYROSCOPE …".into()
+        }
+        LogReason::LocalDates => format!("deepfusion data import … --zone +02:00; {AUTO}"),
+        LogReason::NoDates => format!("deepfusion data import … --start TIME says it; {AUTO}"),
+        LogReason::Dates => AUTO.into(),
         _ => return None,
     })
 }
@@ -74,32 +81,48 @@ fn remedy(remedy: &Remedy) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_doctor::SharedError;
+    use deepfusion_logs::{ColumnProblem, NoGps, SignalProblem};
 
     #[test]
     fn every_remedy_that_an_option_does_names_it() {
-        for named in [
-            Remedy::OtherLog,
-            Remedy::Signal,
-            Remedy::Columns("say which".into()),
-            Remedy::SpeedUnit,
-            Remedy::VehicleSpeed,
-            Remedy::Import {
+        let unreadable = |error: Error| LogReason::Unreadable(SharedError::from(error));
+        let of_log = [
+            LogReason::NoSpeed(NoGps::NoFix),
+            unreadable(Error::Signal {
+                path: "drive.asc".into(),
+                problem: SignalProblem::NoDbc,
+            }),
+            unreadable(Error::Column {
+                path: "drive.csv".into(),
+                problem: ColumnProblem::NoTime,
+                columns: Vec::new(),
+            }),
+            LogReason::TooFast { fastest_mps: 99.0 },
+            LogReason::Unsure { sigma_percent: 8.2 },
+            LogReason::Holds {
                 log: "drive.gpx".into(),
-                video: true,
+                format: Format::Gpx,
+                speeds: 13,
+                yaw_rates: 0,
+                notes: Vec::new(),
             },
-            Remedy::Turns {
-                from_positions: true,
-            },
-            Remedy::StartOfVideo(Clock::Free),
-            Remedy::StartOfVideo(Clock::LocalDate),
-            Remedy::StartOfVideo(Clock::Date),
-            Remedy::ClockOffset {
-                camera_ahead_s: 0.12,
-            },
-        ] {
-            assert!(!named.to_string().contains(" --"), "{named}");
-            assert!(remedy(&named).unwrap().contains("--"), "{named}");
+            LogReason::NoTurns,
+            LogReason::CourseAlone,
+            LogReason::LocalDates,
+            LogReason::NoDates,
+            LogReason::Dates,
+        ];
+        let clock = MotionReason::ClockOffset {
+            vehicle_minus_camera_s: -0.12,
+            std_error_s: 0.004,
+            camera_ahead_s: 0.12,
+        };
+        let of_log = of_log.into_iter().map(FindingReason::from);
+        for reason in of_log.chain([clock.into()]) {
+            assert!(!reason.remedy().contains(" --"), "{reason}");
+            assert!(remedy(&reason).unwrap().contains("--"), "{reason}");
         }
-        assert_eq!(remedy(&Remedy::Words("log a drive".into())), None);
+        assert_eq!(remedy(&FindingReason::Words("log a drive".into())), None);
     }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use deepfusion_data::{CalibrationSource, DatasetKind};
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
+use deepfusion_runtime::EngineProblem;
 
 use super::{Exit, Reportable};
 
@@ -357,7 +358,7 @@ impl Reportable for deepfusion_runtime::Error {
                     known => format!("{WROTE}, or an embedded network: {}", known.join(", ")),
                 })
             }
-            Self::Engine { reason, .. } => Some(reason.hint().unwrap_or(
+            Self::Engine { reason, .. } => Some(of_engine(reason).unwrap_or(
                 "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
                  every network on every device"
                     .into(),
@@ -371,6 +372,20 @@ impl Reportable for deepfusion_runtime::Error {
             Self::Onnx(error) => error.remedy(),
             _ => self.hint(),
         }
+    }
+}
+
+/// What an engine's problem says of its own.
+fn of_engine(problem: &EngineProblem) -> Option<String> {
+    match problem {
+        EngineProblem::Fused(error) => error.remedy(),
+        EngineProblem::Onnx(error) => error.remedy(),
+        EngineProblem::Runner(error) => {
+            let error: &(dyn std::error::Error + 'static) = &**error;
+            let ours = error.downcast_ref::<deepfusion_jobs::Error>();
+            ours.map_or_else(|| problem.hint(), Reportable::remedy)
+        }
+        other => other.hint(),
     }
 }
 
@@ -507,13 +522,13 @@ foreign!(clap::Error, toml::de::Error, toml::ser::Error);
 
 impl Reportable for std::io::Error {
     fn remedy(&self) -> Option<String> {
-        Some(system_hint(self.kind()).into())
+        system_hint(self.kind()).map(Into::into)
     }
 }
 
 impl Reportable for serde_json::Error {
     fn remedy(&self) -> Option<String> {
-        self.io_error_kind()
-            .map(|reason| system_hint(reason).into())
+        let reason = self.io_error_kind();
+        reason.and_then(system_hint).map(Into::into)
     }
 }

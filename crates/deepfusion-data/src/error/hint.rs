@@ -9,8 +9,8 @@ use std::io::ErrorKind;
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::NoSuchPath { .. } => system_hint(ErrorKind::NotFound),
-            Self::File { source, .. } => system_hint(source.kind()),
+            Self::NoSuchPath { .. } => return system_hint(ErrorKind::NotFound).map(Into::into),
+            Self::File { source, .. } => return system_hint(source.kind()).map(Into::into),
             Self::UnknownLayout { .. } if self.needs_ros2() => {
                 "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }

@@ -2,6 +2,7 @@
 
 use crate::shared_error::SharedError;
 use deepfusion_data::Error;
+use deepfusion_hint::Hint;
 use std::fmt;
 
 /// What is wrong with a camera's numbers, and with its place on the vehicle.
@@ -70,6 +71,8 @@ pub enum CameraReason {
         off_deg: f64,
         /// The standard error of that, degrees.
         std_error_deg: f64,
+        /// By how much the principal point is off, pixels, if the mount is right.
+        centre_by_px: f64,
     },
     /// The measured depth of a frame cannot be read.
     #[error(transparent)]
@@ -97,6 +100,56 @@ pub enum CameraReason {
     /// The two cameras are the wrong way round.
     #[error("what camera 2 sees lies further right in camera 3: the two are swapped")]
     Swapped,
+}
+
+impl CameraReason {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> String {
+        let text = match self {
+            Self::View { .. } => {
+                "calibrate at the size of these images; a focal length in millimetres has to be divided by the size of a pixel"
+            }
+            Self::PixelShape { .. } => {
+                "where the images were resized, scale fx by the new width over the old, fy by the heights"
+            }
+            Self::OtherSize { other, image, .. } => {
+                let times = |axis: usize| f64::from(image[axis]) / f64::from(other[axis]);
+                return format!(
+                    "give the matrix of the images' own size: fx and cx times {:.4}, fy and cy times {:.4}",
+                    times(0),
+                    times(1)
+                );
+            }
+            Self::OffCentre { .. } => {
+                "look it up again; where the images were cut, subtract the cut from cx and cy, else calibrate anew"
+            }
+            Self::Heading {
+                angle,
+                centre_by_px,
+                ..
+            } => {
+                let coordinate = angle.coordinate();
+                return format!(
+                    "correct the camera's {angle} on the vehicle by that angle, or, if the mount is right, {coordinate} by {centre_by_px:+.0} px"
+                );
+            }
+            Self::Depth(error) => {
+                return error
+                    .hint()
+                    .unwrap_or_else(|| "copy the recording again".to_owned());
+            }
+            Self::RoadTurned { angle, .. } => {
+                return format!(
+                    "correct the {angle} of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle"
+                );
+            }
+            Self::Height { .. } => {
+                "see the unit of the depth (metres, millimetres, 1/256 m) and the LiDAR's place on the camera"
+            }
+            Self::Swapped => "rename image_02 to image_03 and the other way round",
+        };
+        text.to_owned()
+    }
 }
 
 /// A coordinate of the principal point.
@@ -127,6 +180,14 @@ pub enum HeadingAngle {
 }
 
 impl HeadingAngle {
+    /// The coordinate of the principal point that looks the same where it is off.
+    fn coordinate(self) -> CentreCoordinate {
+        match self {
+            Self::Pitch => CentreCoordinate::Cy,
+            Self::Yaw => CentreCoordinate::Cx,
+        }
+    }
+
     /// Where something is that is off by so much: up and to the right are positive.
     fn side(self, off: f64) -> &'static str {
         match (self, off > 0.0) {
@@ -222,6 +283,7 @@ mod tests {
                 angle,
                 off_deg,
                 std_error_deg: 0.11,
+                centre_by_px: 0.0,
             };
             assert_eq!(
                 reason.to_string(),
@@ -229,6 +291,48 @@ mod tests {
                     "driving straight, the camera heads 2.0 ± 0.1 degrees further {side} than its mount says"
                 )
             );
+        }
+    }
+
+    #[test]
+    fn by_how_much_to_correct_is_said() {
+        let heading = |angle, centre_by_px| CameraReason::Heading {
+            angle,
+            off_deg: 2.04,
+            std_error_deg: 0.11,
+            centre_by_px,
+        };
+        let of_another_size = CameraReason::OtherSize {
+            coordinate: CentreCoordinate::Cx,
+            value: 609.56,
+            size: 640,
+            other: [1242, 375],
+            image: [640, 192],
+        };
+        let turned = CameraReason::RoadTurned {
+            frames: 8,
+            by_deg: 3.04,
+            angle: RoadAngle::Roll,
+        };
+        for (reason, remedy) in [
+            (
+                of_another_size,
+                "give the matrix of the images' own size: fx and cx times 0.5153, fy and cy times 0.5120",
+            ),
+            (
+                heading(HeadingAngle::Yaw, 12.3),
+                "correct the camera's yaw on the vehicle by that angle, or, if the mount is right, cx by +12 px",
+            ),
+            (
+                heading(HeadingAngle::Pitch, -12.3),
+                "correct the camera's pitch on the vehicle by that angle, or, if the mount is right, cy by -12 px",
+            ),
+            (
+                turned,
+                "correct the roll of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle",
+            ),
+        ] {
+            assert_eq!(reason.remedy(), remedy);
         }
     }
 

@@ -70,6 +70,27 @@ pub enum FramesReason {
     },
 }
 
+impl FramesReason {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> &'static str {
+        match self {
+            Self::Backwards { .. } => "sort the frames by time, or correct the time stamps",
+            Self::Lost { .. } => {
+                "find out where the recorder drops frames (disk, network, queue length), or cut the recording there"
+            }
+            Self::UnknownMotion { .. } => {
+                "find out where the recorder drops messages of the speed, or cut the recording there"
+            }
+            Self::Repeated { .. } => {
+                "record at the camera's own rate, and remove the repeated frames (time stamps and all)"
+            }
+            Self::Standing { .. } => {
+                "cut the standing parts out, or see whether the speed signal drops out"
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

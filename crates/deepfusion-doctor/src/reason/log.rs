@@ -1,8 +1,9 @@
 //! What is wrong with a log of speeds by itself, or is to be known of it.
 
 use crate::shared_error::SharedError;
-use deepfusion_hint::count_of;
+use deepfusion_hint::{Hint, count_of};
 use deepfusion_logs::{Error, Format, LogNote, NoGps};
+use std::path::PathBuf;
 
 /// What is wrong with a log of speeds by itself, or is to be known of it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -22,6 +23,8 @@ pub enum LogReason {
         together(notes)
     )]
     Holds {
+        /// The log.
+        log: PathBuf,
         /// What kind of log it is.
         format: Format,
         /// How many speeds it has.
@@ -93,6 +96,55 @@ pub enum LogReason {
     NoDates,
 }
 
+impl LogReason {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> String {
+        let text = match self {
+            Self::Unreadable(error) => {
+                let hint = error.hint().unwrap_or_else(|| super::CORRECT.to_owned());
+                return match error.error() {
+                    Error::Column { .. } => format!("{hint}, and the speed's unit"),
+                    _ => hint,
+                };
+            }
+            Self::NoSpeed(_) => {
+                "switch the camera's GPS on and wait for its fix; or bring another log beside the video"
+            }
+            Self::Holds { log, format, .. } => {
+                // A GoPro's log is in its video.
+                let beside = match format {
+                    Format::Gpmf => "",
+                    _ => " with its video",
+                };
+                let log = log.display();
+                return format!(
+                    "make a drive of {log}{beside} and the camera; then examine the drive"
+                );
+            }
+            Self::Sparse { .. } => "log at 1 Hz or more; an OBD reader or CAN gives ten a second",
+            Self::Gap { .. } => {
+                "max_gap_s in dataset.toml bridges it in a straight line, where the vehicle did not stop in between"
+            }
+            Self::TooFast { .. } => "say the unit of speed (m/s, km/h, mph, knots)",
+            Self::Standing { .. } => "log a drive",
+            Self::Unsure { .. } => {
+                "drive faster or longer, or log the vehicle's own speed: OBD, CAN"
+            }
+            Self::CourseAlone | Self::NoTurns => {
+                "poses by the network or by the distance driven need no turns; a second log with a gyroscope brings them"
+            }
+            Self::Dates => "pictures and speeds show what is left between the clocks",
+            Self::LocalDates => {
+                "say the log's time zone; pictures and speeds show what is left between the clocks"
+            }
+            Self::NoDates => {
+                "say when the first frame was taken, on the log's clock; pictures and speeds show what is left between the clocks"
+            }
+        };
+        text.to_owned()
+    }
+}
+
 fn together(notes: &[LogNote]) -> String {
     let notes: Vec<String> = notes.iter().map(LogNote::to_string).collect();
     notes.join("; ")
@@ -111,6 +163,7 @@ mod tests {
         ];
         let said = [notes[0].to_string(), notes[1].to_string()].join("; ");
         let holds = LogReason::Holds {
+            log: "drive.csv".into(),
             format: Format::Table,
             speeds: 13,
             yaw_rates: 1,
@@ -119,6 +172,10 @@ mod tests {
         assert_eq!(
             holds.to_string(),
             format!("table with 13 speeds and 1 yaw rate: {said}")
+        );
+        assert_eq!(
+            holds.remedy(),
+            "make a drive of drive.csv with its video and the camera; then examine the drive"
         );
     }
 

@@ -97,6 +97,8 @@ pub enum MotionReason {
         vehicle_minus_camera_s: f64,
         /// The standard error of that, seconds.
         std_error_s: f64,
+        /// How far the camera's clock is ahead in all, with what the recording says of it already, seconds.
+        camera_ahead_s: f64,
     },
     /// The pictures turn the other way.
     #[error(
@@ -117,6 +119,65 @@ pub enum MotionReason {
         /// How many times the vehicle's turns the picture's are.
         factor: f64,
     },
+}
+
+impl MotionReason {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> String {
+        let text = match self {
+            Self::Road(warning) => match warning.likely_unit() {
+                Some(unit) => {
+                    return format!(
+                        "divide the speeds: they seem to be in {unit} (speed_unit says so for tables and bare numbers)"
+                    );
+                }
+                None => "see the speed signal's unit and factor, and the camera's focal length",
+            },
+            Self::Poses { .. } => {
+                "see the speed signal's unit and factor (km/h is 3.6, a worn tyre 1.02)"
+            }
+            Self::LidarSpeed { .. } => {
+                "see the speed signal's unit and factor (km/h is 3.6), and lidar.receding for the sign of the radial velocities"
+            }
+            Self::LidarSideways { .. } => {
+                "correct the yaw of cam_from_lidar or of cam_from_vehicle by that angle"
+            }
+            Self::LidarUpward { .. } => {
+                "correct the pitch of cam_from_lidar or of cam_from_vehicle by that angle"
+            }
+            Self::DynamicAndSlow { .. } => {
+                "topics.dynamic names the topic; its points must be the LiDAR's, in its axes and at its times; lidar.moving_mps may be too high"
+            }
+            Self::FastAndUnlisted { .. } => {
+                "see lidar.over_ground and lidar.velocity_field; lidar.moving_mps may be lower than the driver's threshold"
+            }
+            Self::Steering { factor, .. } => {
+                return format!(
+                    "multiply vehicle.wheelbase_m by {:.2}, or vehicle.steering_ratio if that is the wrong one",
+                    1.0 / factor
+                );
+            }
+            Self::ClockOffset { camera_ahead_s, .. } => {
+                return format!(
+                    "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one \
+                     clock for all (PTP, trigger)",
+                    1e3 * camera_ahead_s
+                );
+            }
+            Self::Mirrored => {
+                "mirror the images back, or negate the yaw rate (positive is to the left, z up)"
+            }
+            Self::TurnsUnrelated => {
+                "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)"
+            }
+            Self::TurnsFactor { factor } => {
+                return format!(
+                    "calibrate at the size of these images; fx and fy times {factor:.2} would fit"
+                );
+            }
+        };
+        text.to_owned()
+    }
 }
 
 #[cfg(test)]
@@ -195,6 +256,7 @@ mod tests {
         let offset = |vehicle_minus_camera_s| MotionReason::ClockOffset {
             vehicle_minus_camera_s,
             std_error_s: 0.0041,
+            camera_ahead_s: -vehicle_minus_camera_s,
         };
         for (reason, said) in [
             (
@@ -223,6 +285,48 @@ mod tests {
             ),
         ] {
             assert_eq!(reason.to_string(), said);
+        }
+    }
+
+    #[test]
+    fn what_to_multiply_by_is_said() {
+        let road = |implied_height_m| {
+            let pairs = 12;
+            MotionReason::Road(SpeedWarning {
+                implied_height_m,
+                pairs,
+            })
+        };
+        let steering = MotionReason::Steering {
+            turning_s: 12.3,
+            factor: 1.52,
+        };
+        let clock = MotionReason::ClockOffset {
+            vehicle_minus_camera_s: -0.12,
+            std_error_s: 0.0041,
+            camera_ahead_s: 0.12,
+        };
+        let km_h = road(1.6 * 3.6);
+        for (reason, remedy) in [
+            (
+                km_h,
+                "divide the speeds: they seem to be in km/h (speed_unit says so for tables and bare numbers)",
+            ),
+            (
+                steering,
+                "multiply vehicle.wheelbase_m by 0.66, or vehicle.steering_ratio if that is the wrong one",
+            ),
+            (
+                MotionReason::TurnsFactor { factor: 0.8 },
+                "calibrate at the size of these images; fx and fy times 0.80 would fit",
+            ),
+            (
+                clock,
+                "clock.camera_ahead_s = 0.120 in the file beside the recording, or a clock offset of 120 ms given. Better: one clock for all \
+                 (PTP, trigger)",
+            ),
+        ] {
+            assert_eq!(reason.remedy(), remedy);
         }
     }
 }

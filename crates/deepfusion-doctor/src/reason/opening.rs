@@ -1,7 +1,8 @@
 //! What of a recording cannot be read, or is taken for granted.
 
 use crate::shared_error::SharedError;
-use deepfusion_data::{DataWarning, Error};
+use deepfusion_data::{DataWarning, Error, IncompleteWarning};
+use deepfusion_hint::Hint;
 
 /// What of a recording cannot be read, or is taken for granted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -37,6 +38,35 @@ pub enum OpeningReason {
     /// What opening it warns of.
     #[error(transparent)]
     Warning(#[from] DataWarning),
+}
+
+impl OpeningReason {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> String {
+        let text = match self {
+            Self::Recording(error) => {
+                return error.hint().unwrap_or_else(|| super::CORRECT.to_owned());
+            }
+            Self::Image(_) => "copy the recording again, or leave the frame out",
+            Self::NoPair { problem, .. } => {
+                let known = "training needs pairs of frames with a known motion";
+                return problem.hint().unwrap_or_else(|| known.to_owned());
+            }
+            Self::NoTurns | Self::CourseAlone => "record an inertial unit or the steering angle",
+            Self::Warning(DataWarning::Incomplete(
+                IncompleteWarning::Damaged(_) | IncompleteWarning::Unreadable { .. },
+            )) => {
+                "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
+            }
+            Self::Warning(DataWarning::Incomplete(IncompleteWarning::PassedOver { .. })) => {
+                "give what is to be read as well by its own path"
+            }
+            Self::Warning(_) => {
+                "see that it is so, or say otherwise in the file beside the recording"
+            }
+        };
+        text.to_owned()
+    }
 }
 
 #[cfg(test)]

@@ -67,7 +67,47 @@ pub enum PicturesReason {
         pixels: u32,
         /// Along which share of the side.
         share: f64,
+        /// How far the image reaches from that side to the other, pixels.
+        across: u32,
     },
+}
+
+impl PicturesReason {
+    /// What to do about it.
+    pub(super) fn remedy(&self) -> String {
+        let text = match self {
+            Self::LittleParallax => {
+                "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or drives at more speed"
+            }
+            Self::BrightnessJumps { .. } => {
+                "fix the camera's exposure and gain, or let them change slowly; record anew"
+            }
+            Self::Dark => "expose longer, or leave the darkest drives out",
+            Self::White => "expose shorter",
+            Self::Soft => {
+                "focus the lens, clean the windscreen, expose shorter; enlarged pictures train as well at half their size"
+            }
+            Self::Blurred { .. } => "expose shorter, fix the mount, or leave these frames out",
+            Self::StillRim {
+                side,
+                pixels,
+                across,
+                ..
+            } => {
+                let last = across.saturating_sub(pixels + 1);
+                let keep = match side {
+                    ImageSide::Bottom => format!("rows 0 to {last}"),
+                    ImageSide::Top => format!("rows from {pixels}, and subtract {pixels} from cy"),
+                    ImageSide::Left => {
+                        format!("columns from {pixels}, and subtract {pixels} from cx")
+                    }
+                    ImageSide::Right => format!("columns 0 to {last}"),
+                };
+                return format!("cut them off: keep {keep}");
+            }
+        };
+        text.to_owned()
+    }
 }
 
 /// A side of an image.
@@ -116,6 +156,7 @@ mod tests {
             side,
             pixels: 14,
             share: 0.993,
+            across: 96,
         };
         for (reason, said) in [
             (
@@ -160,6 +201,36 @@ mod tests {
             ),
         ] {
             assert_eq!(reason.to_string(), said);
+        }
+    }
+
+    #[test]
+    fn what_to_cut_off_is_said() {
+        let rim = |side, across| PicturesReason::StillRim {
+            side,
+            pixels: 12,
+            share: 0.99,
+            across,
+        };
+        for (reason, remedy) in [
+            (
+                rim(ImageSide::Bottom, 94),
+                "cut them off: keep rows 0 to 81",
+            ),
+            (
+                rim(ImageSide::Top, 94),
+                "cut them off: keep rows from 12, and subtract 12 from cy",
+            ),
+            (
+                rim(ImageSide::Left, 320),
+                "cut them off: keep columns from 12, and subtract 12 from cx",
+            ),
+            (
+                rim(ImageSide::Right, 320),
+                "cut them off: keep columns 0 to 307",
+            ),
+        ] {
+            assert_eq!(reason.remedy(), remedy);
         }
     }
 }

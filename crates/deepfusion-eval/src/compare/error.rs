@@ -95,8 +95,8 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::NoSuchPath { .. } => Some(system_hint(ErrorKind::NotFound).into()),
-            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::NoSuchPath { .. } => system_hint(ErrorKind::NotFound).map(Into::into),
+            Self::File { source, .. } => system_hint(source.kind()).map(Into::into),
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or an evaluation as JSON".into(),
             ),

@@ -38,6 +38,9 @@ pub struct CalibrationReport<'a> {
     /// Where the board was seen.
     #[serde(skip)]
     pub views: &'a [View],
+    /// The camera's lens.
+    #[serde(skip)]
+    pub lens: &'a Distortion,
 }
 
 fn in_words<S: Serializer>(warnings: &[BoardWarning], serializer: S) -> Result<S::Ok, S::Error> {
@@ -50,7 +53,7 @@ impl BoardViews {
     pub fn report<'a>(
         &'a self,
         board: &Board,
-        (found, lens): (&'a Calibration, &Distortion),
+        (found, lens): (&'a Calibration, &'a Distortion),
         written: &'a Path,
     ) -> CalibrationReport<'a> {
         CalibrationReport {
@@ -63,6 +66,7 @@ impl BoardViews {
             not_picked: self.not_picked,
             written,
             views: &self.views,
+            lens,
         }
     }
 }
@@ -70,7 +74,7 @@ impl BoardViews {
 impl CalibrationReport<'_> {
     /// The camera as ROS's camera_info YAML, which says of itself what it was made from.
     #[must_use]
-    pub fn yaml(&self, name: &str, lens: &Distortion) -> String {
+    pub fn yaml(&self, name: &str) -> String {
         let (found, board) = (self.calibration, &self.board);
         let errors = &found.standard_errors;
         let comments = [
@@ -87,7 +91,7 @@ impl CalibrationReport<'_> {
                 errors.fx, errors.fy, errors.cx, errors.cy
             ),
         ];
-        camera_info_yaml(name, &found.intrinsics, lens, &comments)
+        camera_info_yaml(name, &found.intrinsics, self.lens, &comments)
     }
 
     /// All that was found: a name and a value each. The name is empty where the value goes on.

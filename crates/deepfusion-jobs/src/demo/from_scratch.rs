@@ -8,7 +8,7 @@ use deepfusion_sim::SimConfig;
 
 use super::measure::PROTOCOL;
 use super::{DemoSettings, ShownPrediction};
-use crate::dates::clock;
+use crate::duration::duration_text;
 use crate::evaluation::Evaluated;
 use crate::{Result, RunHistory};
 
@@ -151,7 +151,7 @@ impl FromScratchPage<'_> {
                 "within 25 %",
                 &format!("{:.1} %", 100.0 * report.unscaled.a1),
             ),
-            ("time", &clock(self.seconds)),
+            ("time", &duration_text(self.seconds)),
         ])
     }
 }

@@ -1,16 +1,14 @@
 //! Whether a device computes what the processor does, in processes that its driver may end.
 //!
-//! [`check_device`] computes every operation of [`deepfusion_train::device_check`] and reports each as a [`DeviceCheckEvent`]. A GPU's driver
-//! may end the process that uses it, or hang. So other processes do the work, which print each operation of [`checks_from`] as its
-//! [`answer_line`]; where one ends or is silent, the next begins behind the operation that it was at.
+//! [`check_device`] computes every operation of [`deepfusion_train::device_check`] and reports each as soon as it is done. A GPU's driver may end
+//! the process that uses it, or hang. So other processes do the work, which print each operation of [`checks_from`] as its [`answer_line`]; where
+//! one ends or is silent, the next begins behind the operation that it was at.
 
 mod answer;
-mod event;
 mod patient_lines;
 mod record;
 mod supervisor;
 
 pub use self::answer::{answer_line, checks_from};
-pub use self::event::DeviceCheckEvent;
 pub use self::record::{DeviceCheckRecord, OperationRecord};
 pub use self::supervisor::check_device;

@@ -9,7 +9,6 @@ use deepfusion_train::device_check::{
 };
 
 use super::answer::answered;
-use super::event::DeviceCheckEvent;
 use super::patient_lines::PatientLines;
 use crate::devices::{Backend, ComputeDevice};
 use crate::{Error, Result};
@@ -27,20 +26,18 @@ pub fn check_device<E: From<Error>>(
     chosen: ComputeDevice,
     device: &Device,
     mut program: impl FnMut(&str) -> Result<Command, E>,
-    mut report: impl FnMut(&DeviceCheckEvent) -> Result<(), E>,
+    mut report: impl FnMut(&OperationCheck) -> Result<(), E>,
 ) -> Result<DeviceCheck, E> {
     let mut found = DeviceCheck::default();
-    let mut pass_on = |event: DeviceCheckEvent| -> Result<(), E> {
-        report(&event)?;
-        if let DeviceCheckEvent::Checked(check) = event {
-            found.operations.push(check);
-        }
+    let mut pass_on = |check: OperationCheck| -> Result<(), E> {
+        report(&check)?;
+        found.operations.push(check);
         Ok(())
     };
     if chosen.backend == Backend::Cpu {
         for (operation, _) in operations() {
             if let Some(check) = check_operation(operation, device) {
-                pass_on(DeviceCheckEvent::Checked(check))?;
+                pass_on(check)?;
             }
         }
     } else {
@@ -56,18 +53,17 @@ fn supervise<E: From<Error>>(
     asked: &[(&'static str, NeededBy)],
     limit: Duration,
     program: &mut impl FnMut(&str) -> Result<Command, E>,
-    report: &mut impl FnMut(DeviceCheckEvent) -> Result<(), E>,
+    report: &mut impl FnMut(OperationCheck) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut rest = asked;
     while let Some(&(first, _)) = rest.first() {
-        report(DeviceCheckEvent::Started { operation: first })?;
         let mut process = Process::start(program(first)?)?;
         let (mut failed, mut hangs) = (false, false);
         if let Some(printed) = process.child.stdout.take() {
             let mut lines = PatientLines::of(printed, limit);
             rest = answered(&mut lines, rest, |check| {
                 failed = check.failure.is_some();
-                report(DeviceCheckEvent::Checked(check))
+                report(check)
             })?;
             hangs = lines.gave_up();
         }
@@ -79,19 +75,19 @@ fn supervise<E: From<Error>>(
         };
         if let ([(operation, needed_by), others @ ..], false) = (rest, failed) {
             rest = others;
-            report(DeviceCheckEvent::Checked(OperationCheck {
+            report(OperationCheck {
                 operation,
                 needed_by: *needed_by,
                 forward: f64::INFINITY,
                 backward: None,
                 failure: Some(why),
-            }))?;
+            })?;
         }
     }
     Ok(())
 }
 
-/// A process that does not outlive who started it.
+/// A process that is ended when this is dropped.
 struct Process {
     child: Child,
 }
@@ -156,11 +152,14 @@ mod tests {
         format!("echo '{}'", answer_line(&check).unwrap())
     }
 
+    fn shell(script: &str) -> Command {
+        let mut shell = Command::new("sh");
+        shell.arg("-c").arg(script);
+        shell
+    }
+
     /// Where processes began, and what came of each operation.
-    type Seen = (
-        Vec<&'static str>,
-        Vec<(&'static str, Option<OperationFailure>)>,
-    );
+    type Seen = (Vec<String>, Vec<(&'static str, Option<OperationFailure>)>);
 
     /// What is seen of processes that run a shell's script, by the operation that they begin with.
     fn seen(
@@ -170,15 +169,11 @@ mod tests {
     ) -> Seen {
         let (mut started, mut checked) = (Vec::new(), Vec::new());
         let mut program = |first: &str| -> Result<Command> {
-            let mut shell = Command::new("sh");
-            shell.arg("-c").arg(script(first));
-            Ok(shell)
+            started.push(first.to_owned());
+            Ok(shell(&script(first)))
         };
-        let mut report = |event: DeviceCheckEvent| -> Result<()> {
-            match event {
-                DeviceCheckEvent::Started { operation } => started.push(operation),
-                DeviceCheckEvent::Checked(check) => checked.push((check.operation, check.failure)),
-            }
+        let mut report = |check: OperationCheck| -> Result<()> {
+            checked.push((check.operation, check.failure));
             Ok(())
         };
         supervise(asked, limit, &mut program, &mut report).unwrap();
@@ -219,25 +214,31 @@ mod tests {
     }
 
     #[test]
-    fn who_is_told_may_stop_it() {
+    fn who_is_told_may_stop_it_and_its_process_is_gone() {
+        let folder = tempfile::tempdir().unwrap();
+        let number = folder.path().join("process");
         let mut program = |_: &str| -> Result<Command> {
-            let mut shell = Command::new("sh");
-            let script = format!("{}; exec sleep 600", answer("a", None));
-            shell.arg("-c").arg(script);
-            Ok(shell)
+            let (number, answer) = (number.display(), answer("a", None));
+            Ok(shell(&format!(
+                "echo $$ > '{number}'; {answer}; exec sleep 600"
+            )))
         };
-        let mut report = |event: DeviceCheckEvent| match event {
-            DeviceCheckEvent::Started { .. } => Ok(()),
-            DeviceCheckEvent::Checked(_) => Err(Error::NoCamera),
-        };
+        let mut report = |_: OperationCheck| -> Result<()> { Err(Error::NoCamera) };
         let stopped = supervise(&ASKED, PATIENT, &mut program, &mut report);
         assert!(matches!(stopped, Err(Error::NoCamera)), "{stopped:?}");
+        let number = std::fs::read_to_string(&number).unwrap();
+        let lives = |number: &str| {
+            let mut signal = shell(&format!("kill -0 {}", number.trim()));
+            signal.stderr(Stdio::null()).status().unwrap().success()
+        };
+        assert!(lives(&std::process::id().to_string()));
+        assert!(!lives(&number), "{number}");
     }
 
     #[test]
     fn a_program_that_is_not_there_is_an_error() {
         let mut program = |_: &str| -> Result<Command> { Ok(Command::new("/no/such/program")) };
-        let mut report = |_: DeviceCheckEvent| -> Result<()> { Ok(()) };
+        let mut report = |_: OperationCheck| -> Result<()> { Ok(()) };
         let failed = supervise(&ASKED, PATIENT, &mut program, &mut report);
         assert!(
             matches!(failed, Err(Error::CheckNotStarted { .. })),

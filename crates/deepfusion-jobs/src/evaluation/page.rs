@@ -9,15 +9,13 @@ use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, ReliabilityBin, ShownFrame};
 use deepfusion_runtime::ModelSource;
 
-use super::{ChosenImage, Evaluated, EvaluationRequest, Standing};
+use super::{ChosenImage, Evaluated, EvaluationRequest, MeasurementRequest, Standing};
 use crate::{ModelFacts, Result, RunHistory, name_of};
 
 /// What a page of an evaluation shows.
 pub struct EvaluationPage<'a> {
     /// Whose depth was measured.
     pub source: MeasuredDepth<'a>,
-    /// How it was compared with ground truth.
-    pub protocol: &'a Protocol,
     /// What was found.
     pub evaluated: &'a Evaluated,
     /// The images that are shown, as [`super::shown_of_datasets`] and [`super::shown_of_arrays`] give them.
@@ -26,8 +24,6 @@ pub struct EvaluationPage<'a> {
     pub reliability: Option<&'a [Reliability]>,
     /// What is said of the depth without ground truth.
     pub verdict: Option<&'a Verdict>,
-    /// The command that makes the page again.
-    pub command: &'a str,
 }
 
 /// Whose depth was measured.
@@ -39,6 +35,10 @@ pub enum MeasuredDepth<'a> {
         predictions: &'a Path,
         /// The file that it was compared with.
         truth: &'a Path,
+        /// How it was compared.
+        protocol: &'a Protocol,
+        /// The command that makes the page again.
+        command: &'a str,
     },
     /// A network's.
     Network {
@@ -63,7 +63,7 @@ impl EvaluationPage<'_> {
         page = page
             .section("How it was measured")
             .properties(&self.how())
-            .command(self.command);
+            .command(self.command());
         if let Some(bins) = self.reliability {
             page = add_reliability(page, bins);
         }
@@ -117,22 +117,37 @@ impl EvaluationPage<'_> {
         ])
     }
 
+    /// The command that makes the page again.
+    fn command(&self) -> &str {
+        match self.source {
+            MeasuredDepth::Arrays { command, .. } => command,
+            MeasuredDepth::Network { request, .. } => &request.command,
+        }
+    }
+
     /// How it was measured, row by row.
     fn how(&self) -> Vec<(String, String)> {
-        let (mut rows, digest) = match self.source {
-            MeasuredDepth::Arrays { predictions, truth } => (
+        let (mut rows, protocol, digest) = match self.source {
+            MeasuredDepth::Arrays {
+                predictions,
+                truth,
+                protocol,
+                ..
+            } => (
                 vec![
                     ("predictions", predictions.display().to_string()),
                     ("ground truth", truth.display().to_string()),
                 ],
+                protocol,
                 None,
             ),
             MeasuredDepth::Network { request, saved, .. } => (
-                network_rows(request, self.protocol, saved),
+                network_rows(request, saved),
+                &request.measurement.protocol,
                 saved.report.truth_sha256.clone(),
             ),
         };
-        rows.extend(protocol_rows(self.protocol));
+        rows.extend(protocol_rows(protocol));
         rows.extend(digest.map(|digest| ("SHA-256 of the ground truth", digest)));
         let named = |(name, value): (&str, String)| (name.to_owned(), value);
         rows.into_iter().map(named).collect()
@@ -187,12 +202,14 @@ fn add_reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
 /// How a network was measured.
 fn network_rows(
     request: &EvaluationRequest<'_>,
-    protocol: &Protocol,
     saved: &SavedEvaluation,
 ) -> Vec<(&'static str, String)> {
     let m = &saved.measured;
     let data = request.data.iter().map(|p| p.display().to_string());
-    let truth = match request.truth {
+    let MeasurementRequest {
+        truth, protocol, ..
+    } = &request.measurement;
+    let truth = match truth {
         Some(path) => path.display().to_string(),
         None if protocol.gt == GroundTruth::Annotated => "KITTI's annotated depth".into(),
         None => "the recordings' scans".into(),
@@ -266,13 +283,13 @@ mod tests {
             source: MeasuredDepth::Arrays {
                 predictions: Path::new("depth.npz"),
                 truth: Path::new("gt.npz"),
+                protocol: &protocol,
+                command: "deepfusion eval",
             },
-            protocol: &protocol,
             evaluated: &evaluated,
             shown: &[],
             reliability: None,
             verdict: None,
-            command: "deepfusion eval",
         };
         let html = page.compose().unwrap().to_html();
         for text in [

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Cameras, Dataset};
-use deepfusion_eval::PostProcess;
 use deepfusion_eval::compare::{FrameScore, MeasuredOn, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
-use super::Evaluated;
+use super::{Evaluated, MeasurementRequest};
 use crate::held_out::learned_from_none;
 use crate::recordings::camera_word;
 use crate::{ModelFacts, Result, dates, name_of};
@@ -19,18 +18,14 @@ pub struct EvaluationRequest<'a> {
     pub data: &'a [PathBuf],
     /// The split file, if any.
     pub split: Option<&'a Path>,
-    /// The file of ground truth, if any; else the recordings' scans.
-    pub truth: Option<&'a Path>,
+    /// What depth is compared with, and how.
+    pub measurement: MeasurementRequest<'a>,
     /// Which cameras.
     pub camera: Cameras,
     /// The numbers that the network is computed in.
     pub precision: Precision,
     /// Which of the data sets that the run learned its metres are of.
     pub set: Option<&'a str>,
-    /// Whether depth is corrected for another focal length than the one trained on.
-    pub focal_correction: bool,
-    /// Of which predictions of an image the mean was taken (test-time augmentation).
-    pub post_process: Option<PostProcess>,
     /// The program that evaluates, with its version.
     pub program: String,
     /// What was typed.
@@ -43,7 +38,7 @@ impl EvaluationRequest<'_> {
     /// # Errors
     /// A checkpoint, or a run's findings, that cannot be read.
     pub fn saved(
-        self,
+        &self,
         model: &ModelSource,
         estimator: &DepthEstimator,
         datasets: &[Dataset],
@@ -54,20 +49,20 @@ impl EvaluationRequest<'_> {
             measured: MeasuredOn {
                 data: self.data.iter().map(|path| absolute(path)).collect(),
                 split: self.split.map(absolute),
-                gt: self.truth.map(absolute),
+                gt: self.measurement.truth.map(absolute),
                 camera: camera_word(self.camera).into(),
                 engine: format!("{} {}", estimator.engine(), self.precision.name()),
                 set: self.set.map(str::to_owned),
-                focal_correction: self.focal_correction,
-                post_process: self.post_process,
+                focal_correction: self.measurement.focal_correction,
+                post_process: self.measurement.post_process,
                 held_out: learned_from_none(
                     model,
                     estimator.config(),
                     datasets,
                     &evaluated.places,
                 )?,
-                program: self.program,
-                command: self.command,
+                program: self.program.clone(),
+                command: self.command.clone(),
                 time: dates::now(),
             },
             model: ModelFile {

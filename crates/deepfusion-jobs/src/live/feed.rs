@@ -17,6 +17,8 @@ const ASK_EVERY: Duration = Duration::from_millis(100);
 pub enum LiveEnd {
     /// The stream was over.
     Stream,
+    /// The other side closed the connection in good order: whether the stream was over or is lost cannot be seen.
+    Closed,
     /// As many frames, or as long, as were asked for.
     Enough,
     /// It was asked to stop.
@@ -28,7 +30,7 @@ impl LiveEnd {
     #[must_use]
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Stream => "the stream ended",
+            Self::Stream | Self::Closed => "the stream ended",
             Self::Enough => "as many as were asked for",
             Self::Stopped => "stopped",
         }
@@ -74,16 +76,6 @@ impl Feed {
         })
     }
 
-    /// A connection that was closed in good order is an end, and may be a loss.
-    fn warn_of_end(&self) {
-        let address = self.source.address();
-        if !address.is_stdin() {
-            tracing::warn!(
-                "{address}: the other side closed the stream: whether it was over or is lost cannot be seen"
-            );
-        }
-    }
-
     /// The whole run's figures; `None` where nothing came.
     #[must_use]
     pub fn summary(&self) -> Option<String> {
@@ -108,8 +100,11 @@ impl Feed {
                 }
                 NextFrame::NotYet => {}
                 NextFrame::Ended => {
-                    self.warn_of_end();
-                    return Ok(Err(LiveEnd::Stream));
+                    return Ok(Err(if self.source.address().is_stdin() {
+                        LiveEnd::Stream
+                    } else {
+                        LiveEnd::Closed
+                    }));
                 }
             }
         }
@@ -125,8 +120,8 @@ fn seconds(s: f64) -> Duration {
 /// latency, in milliseconds; `say` gets a line on how it goes, now and then. One result may wait for the writer: beyond that the network
 /// waits, the source's frames are skipped, and none is late.
 ///
-/// What was processed is written, also where the source is lost: its error comes after that. A connection that the other side closed in good
-/// order is a warning ([`tracing::warn`]).
+/// What was processed is written, also where the source is lost: its error comes after that. Where the other side closed the connection
+/// ([`LiveEnd::Closed`]), that may be a loss, too.
 ///
 /// # Errors
 /// Those of the source, of `process` and of `write`.

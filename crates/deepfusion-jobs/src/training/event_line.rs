@@ -3,7 +3,7 @@
 use deepfusion_hint::count_of;
 use deepfusion_train::{LossTerms, TrainEvent};
 
-use crate::dates::clock;
+use crate::duration::duration_text;
 
 /// An event in a line, for whoever waits for the run; of a step what stands beside its number. Nothing of a panel and of a checkpoint, and of a
 /// warning, which has words of its own.
@@ -45,7 +45,7 @@ pub fn event_line(event: &TrainEvent) -> Option<String> {
             losses.total,
             terms_of_a_step(losses),
             scale_text(*scale_ratio),
-            clock(*remaining_s)
+            duration_text(*remaining_s)
         ),
         TrainEvent::Validated {
             step,

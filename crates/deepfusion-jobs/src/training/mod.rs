@@ -5,6 +5,7 @@ pub mod ablation;
 pub mod adaptation;
 mod asked_recordings;
 mod event_line;
+mod other_meaning;
 mod plan;
 pub mod resume;
 mod run_log;
@@ -14,6 +15,7 @@ mod time_estimate;
 
 pub use asked_recordings::AskedRecordings;
 pub use event_line::event_line;
+pub use other_meaning::OtherMeaning;
 pub use plan::{RunLength, TrainingPlan, leaves_turns_unused};
 pub use run_log::RunLog;
 pub use start::{SettingsOfMean, Start, StartReport};

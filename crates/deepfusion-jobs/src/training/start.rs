@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_model::weights::{Weights, read_bytes};
 use deepfusion_model::{
-    CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder,
-    TrainConfig, TrainFindings,
+    CheckpointKind, DepthNetConfig, Error as ModelError, RunFolder, TrainConfig, TrainFindings,
 };
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_runtime::{
@@ -16,6 +15,7 @@ use deepfusion_runtime::{
 use deepfusion_train::{Checkpoints, Device, Error as TrainError, Model};
 use deepfusion_weights::Shipped;
 
+use super::OtherMeaning;
 use crate::held_out::is_run;
 use crate::{Error, Result};
 
@@ -59,6 +59,8 @@ pub enum StartReport<'a> {
         /// Parts that begin with the seed's weights.
         new: Vec<&'static str>,
     },
+    /// A warning: what may not be meant of the weights that come next.
+    OtherMeaning(OtherMeaning),
 }
 
 impl fmt::Display for StartReport<'_> {
@@ -91,6 +93,7 @@ impl fmt::Display for StartReport<'_> {
                 write!(f, "starts from {}", checkpoint.display())?;
                 new
             }
+            Self::OtherMeaning(warning) => return write!(f, "{warning}"),
         };
         match new.as_slice() {
             [] => Ok(()),
@@ -325,7 +328,7 @@ impl Start {
         Ok(())
     }
 
-    /// The model with the weights to start from; `report` is called with what they are. What may not be meant is a warning ([`tracing::warn`]).
+    /// The model with the weights to start from; `report` is called with what they are, and before that with what may not be meant of them.
     ///
     /// # Errors
     /// As [`Checkpoints::load_networks`]; [`TrainError::Model`] for weights of another architecture.
@@ -342,7 +345,10 @@ impl Start {
                 Ok(model)
             }
             Self::Packed { network, path } => {
-                warn_of_other_meaning(&unpacked_config(network)?, model.config(), true);
+                let theirs = unpacked_config(network)?;
+                for warning in OtherMeaning::all(&theirs, model.config(), true) {
+                    report(StartReport::OtherMeaning(warning));
+                }
                 let weights = unpacked_weights(network)?;
                 let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
                 model.depth_net = depth_net;
@@ -363,7 +369,10 @@ impl Start {
                     return Ok(model);
                 };
                 let learned = !folder.read_state(kind)?.encoders_only;
-                warn_of_other_meaning(&folder.read_config()?, model.config(), learned);
+                let theirs = folder.read_config()?;
+                for warning in OtherMeaning::all(&theirs, model.config(), learned) {
+                    report(StartReport::OtherMeaning(warning));
+                }
                 let device = device.clone().autodiff();
                 let (model, new) = folder.load_networks(kind, model.config(), &device)?;
                 let checkpoint = folder.checkpoint_path(kind);
@@ -389,55 +398,6 @@ fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
 fn unpacked_weights(network: &Shipped) -> Result<Weights, ModelError> {
     let origin = &network.card.name;
     Ok(read_bytes(origin, &network.bytes)?)
-}
-
-/// Weights may fit a network that reads images or says depths in another way than the one they were learned in. Where the encoders
-/// alone have learned, there are no depths yet.
-fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned: bool) {
-    let of = |config: &TrainConfig| config.depth_net.encoder.normalisation;
-    let (was, is) = (of(theirs), of(own));
-    if was != is {
-        let name = |n: InputNormalisation| format!("{n:?}").to_lowercase();
-        tracing::warn!(
-            "the weights to start from were learned on images normalised as {}, this configuration has {}: \
-             set depth_net.encoder.normalisation={} to keep what they know",
-            name(was),
-            name(is),
-            name(was)
-        );
-    }
-    let refined = |config: &TrainConfig| {
-        let net = &config.depth_net;
-        net.r_msfm.as_ref().map(|_| net.initial_depth_m)
-    };
-    if let (true, Some(was), Some(is)) = (depth_learned, refined(theirs), refined(own))
-        && was != is
-    {
-        let word = |metres: Option<f64>| {
-            metres.map_or("the middle of the range".into(), |m| format!("{m} m"))
-        };
-        tracing::warn!(
-            "the weights to start from refine {}, this configuration {} (depth_net.initial_depth_m): they have to learn that anew",
-            word(was),
-            word(is)
-        );
-    }
-    // A range that a data set names is meant.
-    let own_range = own.data.sets.iter().any(|set| set.range.is_some());
-    let one_range = theirs.data.sets.len() <= 1 && !own_range;
-    let (was, is) = (theirs.factors(0).0, own.factors(0).0);
-    if depth_learned && one_range && was != is {
-        tracing::warn!(
-            "the weights to start from say depths of {} to {} m, this configuration of {} to {} m: \
-             set depth_net.range.min_m={} and depth_net.range.max_m={} to keep their metres",
-            was.min_m,
-            was.max_m,
-            is.min_m,
-            is.max_m,
-            was.min_m,
-            was.max_m
-        );
-    }
 }
 
 /// Whether one network's weights are the other's, and mean the same depths.

@@ -165,6 +165,9 @@ mod tests {
             "size.width=320",
             "depth_net.initial_depth_m=none",
             "init=none",
+            "assumed_camera=none",
+            "assumed_camera.hfov_deg=none",
+            "depth_net.disp_net.base_width=none",
             "depth_net.hce.min_width=16",
         ] {
             config.set(assignment).unwrap();
@@ -206,6 +209,7 @@ mod tests {
             ("size[0]=64", "no list"),
             ("frames.first=1", "such as frames[0]"),
             ("frames[*]=1", "number in brackets"),
+            ("data.sets.learn=depth", "a list without elements"),
             ("frames[0]=far", "far"),
         ];
         for (assignment, reason) in of_lists {

@@ -12,8 +12,8 @@ enum Step<'a> {
     Place(usize),
 }
 
-/// Puts a value where `key` says; without one, takes away what is there. Tables on the way are made where they are missing, elements of lists
-/// are not. A name that no configuration has is left to whoever reads the whole.
+/// Puts a value where `key` says; without one, takes away what is there. Tables on the way to a value are made where they are missing, elements
+/// of lists are not. A name that no configuration has is left to whoever reads the whole.
 ///
 /// # Errors
 /// Where there is no such place.
@@ -32,20 +32,28 @@ pub(super) fn put(
         at = match (*step, next) {
             (Step::Name(name), Some(next)) => {
                 let table = table(at, way)?;
-                if let Step::Place(place) = *next
-                    && !table.contains_key(name)
-                {
-                    // A list without elements may be left out.
-                    let list = &steps[..=done];
-                    return Err(if is_known(list) {
-                        SettingProblem::BeyondList {
-                            key: written(list),
-                            place,
-                            length: 0,
+                if !table.contains_key(name) {
+                    let here = &steps[..=done];
+                    match (known(here), *next) {
+                        // A list without elements may be left out.
+                        (Some(Known::List), Step::Place(place)) => {
+                            return Err(SettingProblem::BeyondList {
+                                key: written(here),
+                                place,
+                                length: 0,
+                            });
                         }
-                    } else {
-                        no_such_key()
-                    });
+                        (Some(Known::List), Step::Name(_)) => return Err(name_in_list(here, 0)),
+                        (Some(_), Step::Place(_)) => {
+                            return Err(SettingProblem::NoList { key: written(here) });
+                        }
+                        (None, Step::Place(_)) => return Err(no_such_key()),
+                        _ => {}
+                    }
+                    // Nothing is there to be taken away, and no table is made for it.
+                    if value.is_none() {
+                        return known(&steps).map(|_| ()).ok_or_else(no_such_key);
+                    }
                 }
                 let missing = || Value::Table(Table::new());
                 table.entry(name).or_insert_with(missing)
@@ -55,7 +63,7 @@ pub(super) fn put(
                 let table = table(at, way)?;
                 let Some(value) = value else {
                     let was_there = table.remove(name).is_some();
-                    return if was_there || is_known(&steps) {
+                    return if was_there || known(&steps).is_some() {
                         Ok(())
                     } else {
                         Err(no_such_key())
@@ -97,10 +105,7 @@ fn steps(key: &str) -> Result<Vec<Step<'_>>, SettingProblem> {
 fn table<'a>(at: &'a mut Value, way: &[Step<'_>]) -> Result<&'a mut Table, SettingProblem> {
     match at {
         Value::Table(table) => Ok(table),
-        Value::Array(list) => Err(SettingProblem::NameInList {
-            key: written(way),
-            length: list.len(),
-        }),
+        Value::Array(list) => Err(name_in_list(way, list.len())),
         _ => Err(SettingProblem::NoTable { key: written(way) }),
     }
 }
@@ -122,15 +127,40 @@ fn element<'a>(
         })
 }
 
+/// A name where a list has places.
+fn name_in_list(way: &[Step<'_>], length: usize) -> SettingProblem {
+    let key = written(way);
+    if length == 0 {
+        SettingProblem::NameInEmptyList { key }
+    } else {
+        SettingProblem::NameInList { key, length }
+    }
+}
+
 /// A way as it is written, with its places.
 fn written(way: &[Step<'_>]) -> String {
     text(way, |place| format!("[{place}]"))
 }
 
-/// Whether a configuration may have this.
-fn is_known(way: &[Step<'_>]) -> bool {
+/// What a configuration may have in a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Known {
+    Table,
+    List,
+    Value,
+}
+
+/// What a configuration may have there, if anything.
+fn known(way: &[Step<'_>]) -> Option<Known> {
     let key = text(way, |_| "[]".to_owned());
-    crate::config_keys().iter().any(|known| known.key == key)
+    let keys = crate::config_keys();
+    if let Some(known) = keys.iter().find(|known| known.key == key) {
+        let is_list = known.kind.starts_with("list");
+        return Some(if is_list { Known::List } else { Known::Value });
+    }
+    // Tables are no keys of their own.
+    let is_table = keys.iter().any(|known| known.table() == key);
+    is_table.then_some(Known::Table)
 }
 
 fn text(way: &[Step<'_>], place: impl Fn(usize) -> String) -> String {
@@ -173,8 +203,25 @@ mod tests {
         assert_eq!(set, Value::Table(toml::from_str(expected).unwrap()));
         put(&mut set, "data.sets[1].learn", None).unwrap();
         assert_eq!(set["data"]["sets"][1].get("learn"), None);
-        // One that is optional, and not there.
-        put(&mut set, "data.sets[0].range", None).unwrap();
+    }
+
+    #[test]
+    fn what_is_optional_and_not_there_can_be_taken_away() {
+        let mut same = config();
+        for key in [
+            "data.sets[0].range",
+            "data.sets[0].range.min_m",
+            "assumed_camera",
+            "assumed_camera.hfov_deg",
+            "depth_net.disp_net.base_width",
+        ] {
+            put(&mut same, key, None).unwrap();
+            assert_eq!(same, config(), "{key}");
+        }
+        assert_eq!(
+            said("assumed_camera.hfov", None),
+            "there is no key `assumed_camera.hfov`"
+        );
     }
 
     #[test]
@@ -207,6 +254,14 @@ mod tests {
         assert_eq!(
             said("data.sets.name", value()),
             "`data.sets` is a list of 2 elements: say which, such as data.sets[0]"
+        );
+        assert_eq!(
+            said("augmentation.sizes.width", value()),
+            "`augmentation.sizes` is a list without elements: it is set as a whole first"
+        );
+        assert_eq!(
+            said("assumed_camera[0]", value()),
+            "`assumed_camera` is no list"
         );
         assert_eq!(
             said("data.camera.name", value()),

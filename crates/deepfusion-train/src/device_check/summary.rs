@@ -133,6 +133,7 @@ mod tests {
             assert_eq!(found.wrong(), usize::from(!all_right));
         }
     }
+
     #[test]
     fn what_to_do_without_follows_from_what_differs() {
         let of = |wrong: &[(NeededBy, bool)]| checks(wrong).good_for();

@@ -40,7 +40,9 @@ pub(super) fn run(demo: &Demo) -> Result<()> {
         look.write("")?;
         shown.push(look);
     }
-    shown[0].write_cloud(&demo.folder.cloud())?;
+    if let Some(first) = shown.first() {
+        first.write_cloud(&demo.folder.cloud())?;
+    }
     let page = FromScratchPage {
         evaluated: &evaluated,
         shown: &shown,

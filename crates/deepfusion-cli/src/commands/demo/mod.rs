@@ -24,7 +24,7 @@ use super::train;
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::error::CliError;
 use crate::failure::Result;
-use crate::progress::{Progress, clock, say};
+use crate::progress::{Progress, duration_text, say};
 use crate::{devices, engine, interrupt, output};
 
 /// Its name in the message that it was stopped.
@@ -139,7 +139,7 @@ impl Demo<'_> {
         let report = &evaluated.report;
         say(&format!(
             "{report}\ndone in {}\nreport  {}\nmodel   {}\ncloud   {}",
-            clock(self.seconds()),
+            duration_text(self.seconds()),
             page.display(),
             self.folder.model().display(),
             self.folder.cloud().display(),

@@ -3,9 +3,7 @@
 use std::io::{self, Write};
 use std::process::Command;
 
-use deepfusion_jobs::device_check::{
-    DeviceCheckEvent, DeviceCheckRecord, answer_line, check_device, checks_from,
-};
+use deepfusion_jobs::device_check::{DeviceCheckRecord, answer_line, check_device, checks_from};
 use deepfusion_train::device_check::{DeviceUse, NeededBy, OperationCheck, TOLERANCE};
 
 use crate::devices::{self, ComputeDevice};
@@ -23,9 +21,12 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
             "", "forward", "backward"
         ))?;
     }
-    let report = |event: &DeviceCheckEvent| match event {
-        DeviceCheckEvent::Checked(check) if !json => output::print(&line(check)),
-        _ => Ok(()),
+    let report = |check: &OperationCheck| {
+        if json {
+            Ok(())
+        } else {
+            output::print(&line(check))
+        }
     };
     let found = check_device(chosen, &device, |first| again(chosen, first), report)?;
     if json {

@@ -43,10 +43,12 @@ pub(super) fn outcome(args: &EvalArgs) -> Result<EvaluationOutcome> {
     let mut measured = measure(args, &mut inputs)?;
     measure_intervals(args, &mut inputs, &mut measured)?;
     write_points(args, &measured.evaluated)?;
-    let saved = keep(args, &inputs, &measured.evaluated)?;
+    let request = request(args, &measured);
+    let saved = keep(&request, &inputs, &measured.evaluated)?;
     let reliability = calibrate_confidence(args, &mut inputs, &mut measured)?;
     let without_truth = (reliability.as_deref(), verdict.as_ref());
-    write_page(args, &mut inputs, &mut measured, &saved, without_truth)?;
+    let as_kept = (&request, &saved);
+    write_page(args, &mut inputs, &mut measured, as_kept, without_truth)?;
     Ok(EvaluationOutcome {
         checkpoint: Some(UsedCheckpoint::of(&inputs.estimator, &inputs.model)),
         report: Some(measured.evaluated.report),
@@ -159,14 +161,18 @@ fn measure_intervals(
 }
 
 /// Keeps what was found beside the run.
-fn keep(args: &EvalArgs, inputs: &EvalInputs, evaluated: &Evaluated) -> Result<SavedEvaluation> {
+fn keep(
+    request: &EvaluationRequest<'_>,
+    inputs: &EvalInputs,
+    evaluated: &Evaluated,
+) -> Result<SavedEvaluation> {
     let EvalInputs {
         model,
         estimator,
         datasets,
         ..
     } = inputs;
-    let saved = request(args).saved(model, estimator, datasets, evaluated)?;
+    let saved = request.saved(model, estimator, datasets, evaluated)?;
     match model.folder().map(|folder| saved.write(folder)) {
         Some(Ok(path)) => say(&format!("kept as {}", path.display())),
         // A run on a disk that cannot be written is measured all the same.
@@ -179,17 +185,15 @@ fn keep(args: &EvalArgs, inputs: &EvalInputs, evaluated: &Evaluated) -> Result<S
     Ok(saved)
 }
 
-/// How a network is measured, as its evaluation keeps it.
-fn request(args: &EvalArgs) -> EvaluationRequest<'_> {
+/// How a network was measured, as its evaluation keeps it.
+fn request<'a>(args: &'a EvalArgs, measured: &Measurement<'a>) -> EvaluationRequest<'a> {
     EvaluationRequest {
         data: &args.data,
         split: args.split.as_deref(),
-        truth: args.gt.as_deref(),
+        measurement: measured.request.clone(),
         camera: args.camera,
         precision: args.engine.precision,
         set: args.engine.set.as_deref(),
-        focal_correction: !args.no_focal_correction,
-        post_process: args.post_process,
         program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
         command: command_line::typed_again(),
     }
@@ -223,26 +227,23 @@ fn write_page(
     args: &EvalArgs,
     inputs: &mut EvalInputs,
     measured: &mut Measurement,
-    saved: &SavedEvaluation,
+    (request, saved): (&EvaluationRequest<'_>, &SavedEvaluation),
     (reliability, verdict): (Option<&[Reliability]>, Option<&Verdict>),
 ) -> Result<()> {
     let Some(path) = &args.report else {
         return Ok(());
     };
     let shown = measured.shown(&mut inputs.estimator, &inputs.datasets)?;
-    let request = request(args);
     let page = EvaluationPage {
         source: MeasuredDepth::Network {
             model: &inputs.model,
-            request: &request,
+            request,
             saved,
         },
-        protocol: &measured.request.protocol,
         evaluated: &measured.evaluated,
         shown: &shown,
         reliability,
         verdict,
-        command: &request.command,
     };
     page.compose()?.write(path)?;
     say(&format!("report  {}", path.display()));

@@ -65,13 +65,16 @@ fn from_arrays(
     if let Some(path) = &args.report {
         let shown = shown_of_arrays((&mut predicted, &of_kind), &mut known, &evaluated)?;
         let page = EvaluationPage {
-            source: MeasuredDepth::Arrays { predictions, truth },
-            protocol: &protocol,
+            source: MeasuredDepth::Arrays {
+                predictions,
+                truth,
+                protocol: &protocol,
+                command: &command_line::typed_again(),
+            },
             evaluated: &evaluated,
             shown: &shown,
             reliability: None,
             verdict: None,
-            command: &command_line::typed_again(),
         };
         page.compose()?.write(path)?;
         say(&format!("report  {}", path.display()));

@@ -8,7 +8,7 @@ use deepfusion_records::FrameRecord;
 use deepfusion_video::Address;
 
 use crate::cli::PerceiveArgs;
-use crate::commands::live::open;
+use crate::commands::live::{open, warn_of_end};
 use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
@@ -29,6 +29,7 @@ pub(super) fn run(
     };
     let way = StraightWay::new(args.speed);
     let seen = live::perceive(job, finder, way, (address, &mut feed), found, say)?;
+    warn_of_end(address, &seen.ending);
     if let Some(figures) = feed.summary() {
         let ended = seen.ending.as_ref();
         say(&format!(

@@ -9,7 +9,7 @@ use deepfusion_video::Address;
 
 use super::{check_watched, job, print_videos};
 use crate::cli::{PredictArgs, Shard};
-use crate::commands::live::open;
+use crate::commands::live::{open, warn_of_end};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::say;
@@ -42,6 +42,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
         }
     };
     let seen = live::predict(&job, &mut estimator, address, &mut feed, written, say);
+    warn_of_end(address, &seen.ending);
     if let Some(figures) = feed.summary() {
         let ended = seen.ending.as_ref();
         say(&format!(

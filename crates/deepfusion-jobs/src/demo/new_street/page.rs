@@ -4,9 +4,9 @@ use std::path::Path;
 
 use deepfusion_render::{HtmlReport, PictureFormat};
 
-use crate::dates::clock;
 use crate::demo::ShownPrediction;
 use crate::demo::measure::PROTOCOL;
+use crate::duration::duration_text;
 use crate::evaluation::Evaluated;
 use crate::{Result, RunHistory};
 
@@ -93,7 +93,7 @@ impl NewStreetPage<'_> {
             ),
             ("scale (1 is metric)", &number(after.scale.median)),
             ("first image to depth", &format!("{:.0} ms", self.first_ms)),
-            ("time", &clock(self.seconds)),
+            ("time", &duration_text(self.seconds)),
         ])
     }
 }
