@@ -116,6 +116,6 @@ mod tests {
         );
         assert!(initial.contains("this configuration 33 m"), "{initial}");
         assert!(range.contains("to 60 m"), "{range}");
-        assert_eq!(said(false), [images.clone()]);
+        assert_eq!(said(false), std::slice::from_ref(images));
     }
 }
