@@ -28,7 +28,10 @@ fn shapes() -> Vec<(&'static str, ConvShape)> {
         ("layer2 3x3/2", layer((64, 128), (24, 80), 3, 2, false)),
         ("layer2 3x3", layer((128, 128), (12, 40), 3, 1, false)),
         ("layer3 3x3", layer((256, 256), (6, 20), 3, 1, false)),
-        ("decoder 512-256 6x20", layer((512, 256), (6, 20), 3, 1, true)),
+        (
+            "decoder 512-256 6x20",
+            layer((512, 256), (6, 20), 3, 1, true),
+        ),
         ("decoder 256-128", layer((256, 128), (12, 40), 3, 1, true)),
         ("layer4 3x3", layer((512, 512), (3, 10), 3, 1, false)),
         ("layer4 1x1/2", layer((256, 512), (6, 20), 1, 2, false)),
