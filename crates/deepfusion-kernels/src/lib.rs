@@ -27,6 +27,7 @@ mod slot;
 mod smoothness;
 mod upsample;
 mod warp;
+pub mod winograd;
 
 #[cfg(test)]
 mod noise;

@@ -130,28 +130,11 @@ impl FromScratchPage<'_> {
 
     /// Title and key figures.
     fn facts(&self) -> HtmlReport {
-        let report = &self.evaluated.report;
-        let number = |v: f64| format!("{v:.3}");
-        let mean_depth_baseline = report
-            .mean_depth_baseline
-            .as_ref()
-            .map(|t| t.unscaled.abs_rel);
-        HtmlReport::new(
+        let page = HtmlReport::new(
             "DeepFusion: metric depth from one camera and a speed signal",
             "Learned from scratch on six simulated streets from images, speed and yaw rate, without any depth label; measured on another",
-        )
-        .facts(&[
-            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
-            (
-                "Abs Rel, mean-depth baseline",
-                &mean_depth_baseline.map_or("-".into(), number),
-            ),
-            ("scale (1 is metric)", &number(report.scale.median)),
-            (
-                "within 25 %",
-                &format!("{:.1} %", 100.0 * report.unscaled.a1),
-            ),
-            ("time", &duration_text(self.seconds)),
-        ])
+        );
+        let time = duration_text(self.seconds);
+        self.evaluated.add_key_figures(page, ("time", &time))
     }
 }

@@ -81,11 +81,6 @@ impl EvaluationPage<'_> {
     /// Title and key figures.
     fn facts(&self) -> HtmlReport {
         let report = &self.evaluated.report;
-        let number = |v: f64| format!("{v:.3}");
-        let mean_depth_baseline = report
-            .mean_depth_baseline
-            .as_ref()
-            .map(|t| t.unscaled.abs_rel);
         let (name, on) = match self.source {
             MeasuredDepth::Arrays { predictions, .. } => (name_of(predictions), String::new()),
             MeasuredDepth::Network { model, request, .. } => {
@@ -102,19 +97,8 @@ impl EvaluationPage<'_> {
             Some(expected) => format!("{} of the split's {expected}", report.n),
             None => report.n.to_string(),
         };
-        HtmlReport::new(name, format!("Depth measured{on}")).facts(&[
-            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
-            (
-                "Abs Rel, mean-depth baseline",
-                &mean_depth_baseline.map_or("–".into(), number),
-            ),
-            ("scale (1 is metric)", &number(report.scale.median)),
-            (
-                "within 25 %",
-                &format!("{:.1} %", 100.0 * report.unscaled.a1),
-            ),
-            ("images", &images),
-        ])
+        let page = HtmlReport::new(name, format!("Depth measured{on}"));
+        self.evaluated.add_key_figures(page, ("images", &images))
     }
 
     /// The command that makes the page again.
@@ -155,6 +139,22 @@ impl EvaluationPage<'_> {
 }
 
 impl Evaluated {
+    /// Adds its key figures to a page, and one more that is named.
+    pub(crate) fn add_key_figures(&self, page: HtmlReport, more: (&str, &str)) -> HtmlReport {
+        let report = &self.report;
+        let number = |v: f64| format!("{v:.3}");
+        let baseline = report.mean_depth_baseline.as_ref();
+        let baseline = baseline.map_or("–".into(), |b| number(b.unscaled.abs_rel));
+        let within = format!("{:.1} %", 100.0 * report.unscaled.a1);
+        page.facts(&[
+            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
+            ("Abs Rel, mean-depth baseline", &baseline),
+            ("scale (1 is metric)", &number(report.scale.median)),
+            ("within 25 %", &within),
+            more,
+        ])
+    }
+
     /// Adds its tables and charts to a page.
     #[must_use]
     pub fn add_to(&self, page: HtmlReport) -> HtmlReport {

@@ -98,14 +98,7 @@ pub(super) fn winograd_sum<'a>(
     bias: Option<&'a [f32]>,
 ) -> winograd::Sum<'a> {
     winograd::Sum {
-        source: Image {
-            values: x,
-            images: shape.batch,
-            channels: shape.in_channels,
-            size: (shape.in_height, shape.in_width),
-            padding: shape.padding,
-            reflect: shape.reflect,
-        },
+        source: Image::of(shape, x),
         out: (shape.out_height(), shape.out_width()),
         rows: shape.out_channels,
         kernels: Kernels {

@@ -49,13 +49,24 @@ fn products(s: &ConvShape, mut visit: impl FnMut(usize, usize, usize)) {
     }
 }
 
-/// Rounding grows with the number of summed products: about ε·√n·|term|, with room. Winograd's form subtracts sums that
-/// are larger than the result, and is exact to some hundred ε of a typical value.
-pub(super) fn assert_close(ours: &[f32], exact: &[f64], tolerance: f64, what: &str) {
+/// How exact a pass must be.
+#[derive(Clone, Copy)]
+pub(super) enum Form {
+    /// Rounding grows with the number of summed products: about ε·√n·|term|, with room.
+    Plain,
+    /// Sums that are larger than the result are subtracted: exact to some hundred ε of a typical value.
+    Winograd,
+}
+
+pub(super) fn assert_close(ours: &[f32], exact: &[f64], form: Form, what: &str) {
     let typical = (exact.iter().map(|b| b * b).sum::<f64>() / exact.len().max(1) as f64).sqrt();
     for (i, (a, b)) in ours.iter().zip(exact).enumerate() {
+        let most = match form {
+            Form::Plain => 2e-5 * (1.0 + b.abs()),
+            Form::Winograd => 5e-5 * (1.0 + b.abs()).max(typical),
+        };
         assert!(
-            (f64::from(*a) - b).abs() < tolerance * (1.0 + b.abs()).max(typical),
+            (f64::from(*a) - b).abs() < most,
             "{what}[{i}]: {a} instead of {b}"
         );
     }
@@ -123,21 +134,21 @@ fn all_passes(s: &ConvShape) -> [Vec<f32>; 4] {
 fn check(s: &ConvShape) {
     let [x, w, b, g] = inputs(s);
     let exact = Exact::of(s);
-    // Where a pass takes Winograd's form, its tolerance.
-    let by_form = |pays: bool| if s.is_plain_3x3() && pays { 5e-5 } else { 2e-5 };
+    let form = |pays: bool| {
+        if s.is_plain_3x3() && pays {
+            Form::Winograd
+        } else {
+            Form::Plain
+        }
+    };
     let [y, gx, gw, gb] = all_passes(s);
     let pays = forward::winograd_sum(s, &x, &w, Some(&b)).pays();
-    assert_close(&y, &exact.output, by_form(pays), "output");
+    assert_close(&y, &exact.output, form(pays), "output");
     let pays = input_gradient::winograd_sum(s, &w, &g).pays();
-    assert_close(&gx, &exact.input_gradient, by_form(pays), "input gradient");
+    assert_close(&gx, &exact.input_gradient, form(pays), "input gradient");
     let pays = weight_gradient::winograd(s, &x, &g).pays();
-    assert_close(
-        &gw,
-        &exact.weight_gradient,
-        by_form(pays),
-        "weight gradient",
-    );
-    assert_close(&gb, &exact.bias_gradient, 2e-5, "bias gradient");
+    assert_close(&gw, &exact.weight_gradient, form(pays), "weight gradient");
+    assert_close(&gb, &exact.bias_gradient, Form::Plain, "bias gradient");
 }
 
 proptest! {

@@ -125,14 +125,7 @@ pub(super) fn winograd<'a>(
     grad_out: &'a [f32],
 ) -> WeightGradient<'a> {
     WeightGradient {
-        source: Image {
-            values: x,
-            images: shape.batch,
-            channels: shape.in_channels,
-            size: (shape.in_height, shape.in_width),
-            padding: shape.padding,
-            reflect: shape.reflect,
-        },
+        source: Image::of(shape, x),
         grad_out,
         outputs: shape.out_channels,
         out: (shape.out_height(), shape.out_width()),

@@ -1,8 +1,8 @@
 //! The transforms of the weight gradient: of output gradients, and of sums of products to taps.
 
-use super::tiles::{AREA, IN, OUT};
 use super::transform::{load, store};
 use crate::conv::product::LANES;
+use crate::winograd::{AREA, IN, OUT};
 use pulp::{Simd, WithSimd};
 
 /// A m along one axis: the transpose of the outputs' Aᵀ.

@@ -1,8 +1,12 @@
 //! From planar images to tiles and back.
 
-use super::tiles::{IN, OUT, Run};
+use super::tiles::Run;
+use super::transform::TransformInputs;
+use crate::conv::ConvShape;
 use crate::conv::lattice::inside;
+use crate::winograd::{AREA, IN, OUT};
 use pulp::{Arch, Simd, WithSimd};
+use std::ops::Range;
 
 /// The images that are summed over, N×C×H×W.
 #[derive(Debug, Clone, Copy)]
@@ -18,22 +22,49 @@ pub(in crate::conv) struct Image<'a> {
     pub(in crate::conv) reflect: bool,
 }
 
-impl Image<'_> {
+impl<'a> Image<'a> {
+    /// A convolution's input.
+    pub(in crate::conv) fn of(shape: &ConvShape, values: &'a [f32]) -> Self {
+        Self {
+            values,
+            images: shape.batch,
+            channels: shape.in_channels,
+            size: (shape.in_height, shape.in_width),
+            padding: shape.padding,
+            reflect: shape.reflect,
+        }
+    }
+
     /// Floats of a buffer for one line of a run's inputs, or of its outputs.
     pub(super) fn line_len(&self, runs: &[Run]) -> usize {
         let tiles = runs.iter().map(|run| run.tiles).max().unwrap_or(0);
         OUT * (tiles + 1)
     }
 
-    /// Copies a channel's inputs of all tiles: `to[(6·row + column)·pitch + tile]`.
-    pub(super) fn gather(
+    /// Bᵀ d B of the inputs of all tiles of some channels: `to[((channel − first)·36 + product)·tiles + tile]`, where `tiles` are
+    /// whole vectors. `plain` has room for a channel's inputs, `line` for [`Self::line_len`].
+    pub(super) fn transform(
         &self,
-        channel: usize,
+        channels: Range<usize>,
         runs: &[Run],
-        line: &mut [f32],
+        tiles: usize,
+        (plain, line): (&mut [f32], &mut [f32]),
         to: &mut [f32],
-        pitch: usize,
     ) {
+        for (channel, to) in channels.zip(to.chunks_exact_mut(AREA * tiles)) {
+            self.gather(channel, runs, line, plain, tiles);
+            Arch::new().dispatch(TransformInputs {
+                from: plain,
+                pitch: tiles,
+                tiles,
+                to,
+                to_pitch: tiles,
+            });
+        }
+    }
+
+    /// Copies a channel's inputs of all tiles: `to[(6·row + column)·pitch + tile]`.
+    fn gather(&self, channel: usize, runs: &[Run], line: &mut [f32], to: &mut [f32], pitch: usize) {
         Arch::new().dispatch(Gather {
             image: self,
             channel,

@@ -23,11 +23,12 @@ pub(super) use weight_gradient::WeightGradient;
 use super::product::{LANES, TapProduct, padded};
 use crate::scratch::with_scratch;
 use crate::send_ptr::SharedMut;
+use crate::winograd::AREA;
 use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
-use tiles::{AREA, Grid, Run};
-use transform::{TransformInputs, TransformKernels, TransformOutputs};
+use tiles::{Grid, Run};
+use transform::{TransformKernels, TransformOutputs};
 
 /// Tiles of a batch below which transforming the kernels, which become four times as many, costs more than it saves.
 const FEWEST_TILES: usize = 64;
@@ -112,16 +113,9 @@ impl Sum<'_> {
             let (inputs, buffer) = buffer.split_at_mut(lens[0]);
             let (products, buffer) = buffer.split_at_mut(lens[1]);
             let (plain, line) = buffer.split_at_mut(lens[2]);
-            for (channel, to) in inputs.chunks_exact_mut(AREA * tiles).enumerate() {
-                self.source.gather(channel, runs, line, plain, tiles);
-                Arch::new().dispatch(TransformInputs {
-                    from: plain,
-                    pitch: tiles,
-                    tiles,
-                    to,
-                    to_pitch: tiles,
-                });
-            }
+            let room = (&mut *plain, &mut *line);
+            self.source
+                .transform(0..channels, runs, tiles, room, inputs);
             let offsets: Vec<usize> = (0..channels).map(|c| c * AREA * tiles).collect();
             for product in 0..AREA {
                 let weights = &weights[(product * self.rows + rows.start) * channels..];

@@ -1,14 +1,9 @@
 //! How outputs are cut into tiles of 4×4, and these into tasks.
 
 use crate::conv::product::{LANES, padded};
+use crate::winograd::{AREA, OUT};
 use std::ops::{Range, RangeInclusive};
 
-/// Outputs of a tile along one side.
-pub(super) const OUT: usize = 4;
-/// Inputs of a tile along one side.
-pub(super) const IN: usize = 6;
-/// Products of a tile.
-pub(super) const AREA: usize = IN * IN;
 /// Transformed inputs and products of a part of the tiles, in floats: they stay near the core.
 const PART_FLOATS: usize = 300_000;
 /// Tiles of a part: at least as many as make reading the transformed weights pay.

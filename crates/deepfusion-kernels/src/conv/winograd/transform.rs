@@ -1,7 +1,7 @@
 //! The transforms of inputs, kernels and outputs, on vectors of values that belong to neighbouring tiles or channels.
 
-use super::tiles::{AREA, IN, OUT};
 use crate::conv::product::LANES;
+use crate::winograd::{AREA, IN, OUT, input_axis, output_axis};
 use pulp::{Simd, WithSimd};
 
 /// Reads a vector.
@@ -22,40 +22,6 @@ pub(super) unsafe fn load<S: Simd>(from: *const f32, at: usize) -> S::f32s {
 pub(super) unsafe fn store<S: Simd>(to: *mut f32, at: usize, value: S::f32s) {
     // SAFETY: the caller's promise.
     unsafe { to.add(at).cast::<S::f32s>().write_unaligned(value) }
-}
-
-/// Bᵀ d along one axis.
-#[inline(always)]
-fn input_axis<S: Simd>(simd: S, d: [S::f32s; IN]) -> [S::f32s; IN] {
-    let by = |factor: f32| simd.splat_f32s(factor);
-    let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
-    let even = madd(by(-4.0), d[2], d[4]);
-    let odd = madd(by(-4.0), d[1], d[3]);
-    let far_even = simd.sub_f32s(d[4], d[2]);
-    let far_odd = simd.sub_f32s(d[3], d[1]);
-    [
-        madd(by(4.0), d[0], madd(by(-5.0), d[2], d[4])),
-        simd.add_f32s(even, odd),
-        simd.sub_f32s(even, odd),
-        madd(by(2.0), far_odd, far_even),
-        madd(by(-2.0), far_odd, far_even),
-        madd(by(4.0), d[1], madd(by(-5.0), d[3], d[5])),
-    ]
-}
-
-/// Aᵀ m along one axis.
-#[inline(always)]
-fn output_axis<S: Simd>(simd: S, m: [S::f32s; IN]) -> [S::f32s; OUT] {
-    let by = |factor: f32| simd.splat_f32s(factor);
-    let (near, near_odd) = (simd.add_f32s(m[1], m[2]), simd.sub_f32s(m[1], m[2]));
-    let (far, far_odd) = (simd.add_f32s(m[3], m[4]), simd.sub_f32s(m[3], m[4]));
-    let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
-    [
-        simd.add_f32s(simd.add_f32s(m[0], near), far),
-        madd(by(2.0), far_odd, near_odd),
-        madd(by(4.0), far, near),
-        simd.add_f32s(madd(by(8.0), far_odd, near_odd), m[5]),
-    ]
 }
 
 /// G g along one axis.
