@@ -36,14 +36,14 @@ pub(super) fn put(
                     let here = &steps[..=done];
                     match (known(here), *next) {
                         // A list without elements may be left out.
-                        (Some(Known::List), Step::Place(place)) => {
+                        (Some(KeyKind::List), Step::Place(place)) => {
                             return Err(SettingProblem::BeyondList {
                                 key: written(here),
                                 place,
                                 length: 0,
                             });
                         }
-                        (Some(Known::List), Step::Name(_)) => return Err(name_in_list(here, 0)),
+                        (Some(KeyKind::List), Step::Name(_)) => return Err(name_in_list(here, 0)),
                         (Some(_), Step::Place(_)) => {
                             return Err(SettingProblem::NoList { key: written(here) });
                         }
@@ -144,23 +144,27 @@ fn written(way: &[Step<'_>]) -> String {
 
 /// What a configuration may have in a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Known {
+enum KeyKind {
     Table,
     List,
     Value,
 }
 
 /// What a configuration may have there, if anything.
-fn known(way: &[Step<'_>]) -> Option<Known> {
+fn known(way: &[Step<'_>]) -> Option<KeyKind> {
     let key = text(way, |_| "[]".to_owned());
     let keys = crate::config_keys();
     if let Some(known) = keys.iter().find(|known| known.key == key) {
         let is_list = known.kind.starts_with("list");
-        return Some(if is_list { Known::List } else { Known::Value });
+        return Some(if is_list {
+            KeyKind::List
+        } else {
+            KeyKind::Value
+        });
     }
     // Tables are no keys of their own.
     let is_table = keys.iter().any(|known| known.table() == key);
-    is_table.then_some(Known::Table)
+    is_table.then_some(KeyKind::Table)
 }
 
 fn text(way: &[Step<'_>], place: impl Fn(usize) -> String) -> String {

@@ -31,7 +31,7 @@ pub(in crate::conv) struct WeightGradient<'a> {
 }
 
 /// Neighbouring tiles, and their output gradients transformed: `values[p·pitch + t·outputs + o]`.
-struct Part<'a> {
+struct TileBlock<'a> {
     runs: Vec<Run>,
     tiles: usize,
     values: &'a [f32],
@@ -85,7 +85,7 @@ impl WeightGradient<'_> {
                 rest = after;
             }
             let transformed = rooms.into_par_iter();
-            let parts: Vec<Part> = transformed.map(|(t, room)| self.part(t, room)).collect();
+            let parts: Vec<TileBlock> = transformed.map(|(t, room)| self.part(t, room)).collect();
             groups.into_par_iter().for_each(|channels| {
                 with_scratch(self.sum_len(channels.len()), |sums| {
                     self.summed(channels.clone(), sums, |add| parts.iter().for_each(add));
@@ -109,7 +109,7 @@ impl WeightGradient<'_> {
     }
 
     /// Transforms the output gradients of some tiles into `values`.
-    fn part<'a>(&self, tiles: &Range<usize>, values: &'a mut [f32]) -> Part<'a> {
+    fn part<'a>(&self, tiles: &Range<usize>, values: &'a mut [f32]) -> TileBlock<'a> {
         let runs = self.grid().runs(tiles.clone());
         let (outputs, pitch) = (padded(self.outputs), self.pitch(tiles.len()));
         let longest = runs.iter().map(|run| run.tiles).max().unwrap_or(0);
@@ -127,7 +127,7 @@ impl WeightGradient<'_> {
                 });
             }
         });
-        Part {
+        TileBlock {
             runs,
             tiles: tiles.len(),
             values,
@@ -160,7 +160,7 @@ impl WeightGradient<'_> {
         &self,
         channels: Range<usize>,
         to: &mut [f32],
-        each: impl FnOnce(&mut dyn FnMut(&Part)),
+        each: impl FnOnce(&mut dyn FnMut(&TileBlock)),
     ) {
         let outputs = padded(self.outputs);
         let pitch = channels.len() * outputs;
@@ -179,7 +179,7 @@ impl WeightGradient<'_> {
     }
 
     /// Adds a part's products to `sums`, products × channels × outputs.
-    fn add(&self, part: &Part, channels: Range<usize>, sums: &mut [f32]) {
+    fn add(&self, part: &TileBlock, channels: Range<usize>, sums: &mut [f32]) {
         let (tiles, outputs) = (padded(part.tiles), padded(self.outputs));
         let lens = [
             AREA * tiles * channels.len(),
