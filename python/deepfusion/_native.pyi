@@ -47,11 +47,12 @@ class Prediction:
         """H x W metres at the image's size; 0 outside of what the network looked at. One array, made once."""
     @property
     def sigma(self) -> NDArray[np.float32] | None:
-        """Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated. One array, made once."""
+        """Standard deviation of `depth` in metres, H x W, stretched by what was found for the network, as `deepfusion predict` writes it; None of
+        a network that does not say. One array, made once."""
     @property
     def confidence(self) -> NDArray[np.float32] | None:
         """How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
-        None of a network that does not say. Not calibrated. One array, made once."""
+        None of a network that does not say. Stretched as `sigma`. One array, made once."""
     @property
     def disparity(self) -> NDArray[np.float32]:
         """1/m, at the network's size. One array, made once."""

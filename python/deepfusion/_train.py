@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _native
-from ._native import DeepFusionError, Model
+from ._native import Model
 from .distributed import Workers
 
 TrainEvent = dict[str, Any]
@@ -81,13 +81,19 @@ def _toml(value: Any) -> str:
     raise TypeError(f"config: {value!r} is nothing that a configuration can hold")
 
 
-def _settings(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    """A table's values, one `key=value` each with dots between tables."""
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """A table's values, each with its key, dots between tables."""
     for key, value in table.items():
         if isinstance(value, Mapping):
-            yield from _settings(value, f"{prefix}{key}.")
+            yield from _flat(value, f"{prefix}{key}.")
         else:
-            yield f"{prefix}{key}={'none' if value is None else _toml(value)}"
+            yield f"{prefix}{key}", value
+
+
+def _settings(table: Mapping[str, Any]) -> Iterator[str]:
+    """A table's values, one `key=value` each."""
+    for key, value in _flat(table):
+        yield f"{key}={'none' if value is None else _toml(value)}"
 
 
 def _paths(given: str | PathLike[str] | Sequence[str | PathLike[str]] | None) -> list[str]:
@@ -121,7 +127,8 @@ def train(
 
     The run goes to `out`, new or empty (by default runs/train-TIME), and starts from `init`: a run, a checkpoint, the name of an
     embedded network or "none"; by default the embedded network that is built as the preset is, if there is one. With `resume=True` the
-    run in `out` goes on; `config` as a dict may then change what it says, and is left out otherwise.
+    run in `out` goes on: `config` as a dict may then make it longer (`steps`, `epochs`), and `data` say where its recordings are now; what
+    contradicts the run is an error.
 
     `workers` are several processes that learn one network together, as `deepfusion.distributed` connects them: each calls `train` with
     the same arguments, `batch` and `accumulate` are each one's own, and worker 0 validates and writes the run. K workers learn what one
@@ -145,11 +152,6 @@ def train(
             raise ValueError("resume: out is the run that goes on")
         out = Path("runs") / time.strftime("train-%Y%m%d-%H%M%S", time.gmtime())
     out = Path(out)
-    leads = workers is None or workers.rank == 0
-    if leads and not resume and out.exists() and any(out.iterdir()):
-        error = DeepFusionError(f"{out}: is not empty")
-        error.hint = "choose another folder, empty this one first, or go on with the run in it (resume=True)"
-        raise error
     asked = {
         "config": config,
         "settings": settings,

@@ -7,6 +7,7 @@ use std::thread;
 
 use deepfusion::DepthEstimator;
 use deepfusion::data::RgbImage;
+use deepfusion::eval::IntervalFactors;
 use deepfusion::geometry::Intrinsics;
 use deepfusion::jobs::bulk::pipeline::Threads;
 use deepfusion::runtime::{Augmentation, PreparedImage, Preparer};
@@ -24,6 +25,7 @@ pub(crate) struct BulkRequest {
     pub focal_correction: bool,
     pub crop: bool,
     pub augmentation: Augmentation,
+    pub factors: Arc<IntervalFactors>,
 }
 
 /// Where an image's prediction is waited for.
@@ -37,6 +39,13 @@ struct LoadedImage {
     answer: Answer,
 }
 
+/// What an image came to.
+enum Waiting {
+    For(Receiver<Result<Prediction, Failure>>),
+    /// It is none, or its iterator failed.
+    Wrong(PyErr),
+}
+
 /// The predictions of many images, in their order.
 #[pyclass(module = "deepfusion")]
 pub(crate) struct Predictions {
@@ -44,7 +53,7 @@ pub(crate) struct Predictions {
     /// None once the images have ended.
     to_read: Option<Sender<(Source, Answer)>>,
     /// In the images' order. Nobody waits for the lock: it makes what may be used by one thread a part of what Python may share.
-    waiting: Mutex<VecDeque<Receiver<Result<Prediction, Failure>>>>,
+    waiting: Mutex<VecDeque<Waiting>>,
     /// How many images may be on their way.
     ahead: usize,
 }
@@ -52,18 +61,20 @@ pub(crate) struct Predictions {
 impl Predictions {
     /// The threads end when this goes.
     pub(crate) fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
-        let readers = Threads::for_this_machine().before;
+        // For as many cores as rayon takes: of a large machine a worker may be given one alone.
+        let readers = Threads::for_cores(rayon::current_num_threads()).before;
         let (to_read, images) = channel::<(Source, Answer)>();
         let (to_network, read) = sync_channel::<LoadedImage>(readers);
         let (to_finish, seen) = sync_channel(2);
         let images = Arc::new(Mutex::new(images));
         let preparer = estimator.augmented(request.augmentation).map_err(raise)?;
         let settings = (request.intrinsics, request.focal_correction, request.crop);
+        let factors = request.factors.clone();
         for _ in 0..readers {
             let (images, to_network) = (Arc::clone(&images), to_network.clone());
             spawn(move || read_images(&images, &to_network, preparer, settings))?;
         }
-        spawn(move || see(estimator, &read, &to_finish))?;
+        spawn(move || see(estimator, &factors, &read, &to_finish))?;
         spawn(move || {
             for (prediction, answer) in seen {
                 let prediction: Prediction = prediction;
@@ -91,12 +102,19 @@ impl Predictions {
                 self.to_read = None;
                 break;
             };
-            let source = Source::of(&image?)?;
+            // What is no image is raised at its turn: those before it are on their way.
+            let source = match image.and_then(|image| Source::of(&image)) {
+                Ok(source) => source,
+                Err(error) => {
+                    waiting.push_back(Waiting::Wrong(error));
+                    continue;
+                }
+            };
             let (answer, prediction) = channel();
             if to_read.send((source, answer)).is_err() {
                 return Err(PyRuntimeError::new_err("the threads that read have ended"));
             }
-            waiting.push_back(prediction);
+            waiting.push_back(Waiting::For(prediction));
         }
         Ok(())
     }
@@ -114,6 +132,10 @@ impl Predictions {
         let waiting = waiting.unwrap_or_else(PoisonError::into_inner);
         let Some(next) = waiting.pop_front() else {
             return Ok(None);
+        };
+        let next = match next {
+            Waiting::For(prediction) => prediction,
+            Waiting::Wrong(error) => return Err(error),
         };
         let prediction = py.detach(move || next.recv());
         py.check_signals()?;
@@ -160,6 +182,7 @@ fn read_images(
 
 fn see(
     mut estimator: DepthEstimator,
+    factors: &Arc<IntervalFactors>,
     read: &Receiver<LoadedImage>,
     to_finish: &SyncSender<(Prediction, Answer)>,
 ) {
@@ -173,7 +196,7 @@ fn see(
         match deepfusion_cli::in_pool(|| estimator.infer(&prepared)) {
             Err(error) => drop(answer.send(Err(error.into()))),
             Ok(prediction) => {
-                let prediction = Prediction::new(prediction, image, camera);
+                let prediction = Prediction::new(prediction, image, camera, Arc::clone(factors));
                 if to_finish.send((prediction, answer)).is_err() {
                     return;
                 }

@@ -11,6 +11,11 @@ pyo3::create_exception!(
     "What went wrong, with the file, frame or field; `hint` says what to do about it."
 );
 
+/// Gives the class a `hint` of None, for exceptions that nobody gives one.
+pub(crate) fn set_default_hint(py: Python<'_>) -> PyResult<()> {
+    py.get_type::<DeepFusionError>().setattr("hint", py.None())
+}
+
 /// What went wrong and what to do about it, before the interpreter is at hand.
 pub(crate) struct Failure {
     pub message: String,

@@ -41,7 +41,9 @@ impl Stop {
     }
 }
 
-/// Does `work` without the interpreter on a thread in rayon's pool, while this thread asks for signals. After Ctrl-C `work` is asked to
+/// Does `work` without the interpreter on a thread of a pool of its own, while this thread asks for signals. In the pool that predictions
+/// share one of them, waiting for its parts, could take up a whole training meanwhile, and a listener that predicts would wait for a thread
+/// that its own training holds. After Ctrl-C `work` is asked to
 /// stop, is waited for, and KeyboardInterrupt raised.
 pub(crate) fn interruptible<R: Send>(
     py: Python<'_>,
@@ -54,7 +56,7 @@ pub(crate) fn interruptible<R: Send>(
             let worker = thread::Builder::new().spawn_scoped(scope, move || {
                 // Dropped at the end, however that comes.
                 let _done = done;
-                deepfusion_cli::in_pool(|| work(stop))
+                deepfusion_cli::in_own_pool(|| work(stop))
             })?;
             let mut interrupted = None;
             while let Err(RecvTimeoutError::Timeout) = end.recv_timeout(PERIOD) {

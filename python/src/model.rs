@@ -1,15 +1,17 @@
 //! Trained networks and what they say of an image.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use deepfusion::data::{RgbImage, load_photo};
-use deepfusion::eval::PostProcess;
+use deepfusion::eval::{IntervalFactors, PostProcess};
 use deepfusion::geometry::cloud::PointCloud;
 use deepfusion::geometry::{DepthMap, Intrinsics};
+use deepfusion::jobs::ModelFacts;
 use deepfusion::jobs::devices::ComputeDevice;
 use deepfusion::jobs::engine::EngineSettings;
 use deepfusion::jobs::evaluation::augmentation;
+use deepfusion::jobs::intervals::sigma;
 use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -51,13 +53,15 @@ pub(crate) fn load(
     };
     let open = move || -> Result<_, Failure> {
         let place = device::named(&device)?;
-        let network = ModelSource::named(&model)?.load(data_set.as_deref())?;
+        let source = ModelSource::named(&model)?;
+        let network = source.load(data_set.as_deref())?;
         let engine = EngineSettings {
             precision,
             ..EngineSettings::on(place)
         };
         let estimator = engine.load(network).map_err(device::failure)?;
-        Ok(Model::new(estimator, place))
+        let factors = Arc::new(source.interval_factors()?);
+        Ok(Model::new(estimator, place, factors))
     };
     // Large weights are read, and packed or moved to a GPU: that can take a while.
     Ok(abandonable(py, open)??)
@@ -68,13 +72,20 @@ pub(crate) fn load(
 pub(crate) struct Model {
     estimator: Mutex<DepthEstimator>,
     device: ComputeDevice,
+    /// By which what it says of its own error is stretched.
+    factors: Arc<IntervalFactors>,
 }
 
 impl Model {
-    fn new(estimator: DepthEstimator, device: ComputeDevice) -> Self {
+    fn new(
+        estimator: DepthEstimator,
+        device: ComputeDevice,
+        factors: Arc<IntervalFactors>,
+    ) -> Self {
         Self {
             estimator: Mutex::new(estimator),
             device,
+            factors,
         }
     }
 
@@ -126,7 +137,8 @@ impl Model {
         };
         // The lock is taken without the interpreter's: another thread that holds it may be waiting for that.
         let (prediction, image, camera) = py.detach(work)?;
-        Ok(Prediction::new(prediction, image, camera))
+        let factors = Arc::clone(&self.factors);
+        Ok(Prediction::new(prediction, image, camera, factors))
     }
 
     /// The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
@@ -148,6 +160,7 @@ impl Model {
             focal_correction,
             crop: !stretch,
             augmentation: augmentation_named(post_process)?,
+            factors: Arc::clone(&self.factors),
         };
         let own = py.detach(|| self.with(|estimator| estimator.another()));
         Predictions::begin(request, own.map_err(raise)?)
@@ -157,7 +170,7 @@ impl Model {
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
         let another = py.detach(|| self.with(|estimator| estimator.another()));
         let another = another.map_err(raise)?;
-        Ok(Self::new(another, self.device))
+        Ok(Self::new(another, self.device, Arc::clone(&self.factors)))
     }
 
     /// Width and height trained with.
@@ -237,6 +250,7 @@ impl Source {
             numpy.call_method1("from_dlpack", (image,))?
         } else if image.hasattr("convert")? {
             // PIL's way, which others have as well.
+            let image = upright(image)?;
             let rgb = image.call_method1("convert", ("RGB",))?;
             numpy.call_method1("asarray", (rgb,))?
         } else {
@@ -268,6 +282,16 @@ impl Source {
     }
 }
 
+/// A PIL image of a file whose EXIF says how the camera was held, turned as a file's own pixels are.
+fn upright<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = image.py();
+    if !image.hasattr("getexif")? {
+        return Ok(image.clone());
+    }
+    py.import("PIL.ImageOps")?
+        .call_method1("exif_transpose", (image,))
+}
+
 fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
     let [height, width, channels] = [0, 1, 2].map(|axis| array.shape()[axis]);
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
@@ -295,6 +319,7 @@ pub(crate) struct Prediction {
     prediction: deepfusion::Prediction,
     image: RgbImage,
     camera: Option<Intrinsics>,
+    factors: Arc<IntervalFactors>,
     /// Each made once: whoever asks again gets the same array.
     depth: PyOnceLock<Plane>,
     sigma: PyOnceLock<Option<Plane>>,
@@ -310,17 +335,26 @@ impl Prediction {
         prediction: deepfusion::Prediction,
         image: RgbImage,
         camera: Option<Intrinsics>,
+        factors: Arc<IntervalFactors>,
     ) -> Self {
         Self {
             made: Mutex::new(None),
             prediction,
             image,
             camera,
+            factors,
             depth: PyOnceLock::new(),
             sigma: PyOnceLock::new(),
             confidence: PyOnceLock::new(),
             disparity: PyOnceLock::new(),
         }
+    }
+
+    /// Depth, and its standard deviation as the command has it.
+    fn stretched_sigma(&self) -> Option<(DepthMap, DepthMap)> {
+        let depth = self.prediction.depth();
+        let sigma = sigma(&self.prediction, &depth, &self.factors)?;
+        Some((depth, sigma))
     }
 
     /// With its depth made already.
@@ -347,17 +381,23 @@ impl Prediction {
         Ok(array.clone_ref(py))
     }
 
-    /// Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated. One array, made once.
+    /// Standard deviation of `depth` in metres, H x W, stretched by what was found for the network, as `deepfusion predict` writes it; None of
+    /// a network that does not say. One array, made once.
     #[getter]
     fn sigma(&self, py: Python<'_>) -> PyResult<Option<Plane>> {
-        once(py, &self.sigma, || self.prediction.sigma())
+        once(py, &self.sigma, || {
+            self.stretched_sigma().map(|(_, sigma)| sigma)
+        })
     }
 
     /// How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
-    /// None of a network that does not say. Not calibrated. One array, made once.
+    /// None of a network that does not say. Stretched as `sigma`. One array, made once.
     #[getter]
     fn confidence(&self, py: Python<'_>) -> PyResult<Option<Plane>> {
-        once(py, &self.confidence, || self.prediction.confidence())
+        once(py, &self.confidence, || {
+            let (depth, sigma) = self.stretched_sigma()?;
+            Some(deepfusion::Prediction::confidence_of(&depth, &sigma))
+        })
     }
 
     /// 1/m, at the network's size. One array, made once.

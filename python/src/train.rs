@@ -5,6 +5,7 @@ use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
+use deepfusion::jobs::training::resume::{MovedRecordings, ResumeRequest, go_on_with};
 use deepfusion::jobs::training::{RunLog, Start, StartReport};
 use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
 use deepfusion::train::{Control, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
@@ -46,6 +47,27 @@ struct PythonWorkers {
 }
 
 impl PythonWorkers {
+    /// Fails where another worker could not begin: who waited for its gradients would wait for ever. One that could not itself fails
+    /// with its own error.
+    fn all_begun(&self, own: bool) -> Result<(), Failure> {
+        let mut failed = [if own { 0.0 } else { 1.0 }];
+        let summed = self.another().sum(&mut failed);
+        match summed {
+            Ok(()) if own && failed[0] > 0.0 => Err(Failure {
+                message: format!(
+                    "worker {} of {}: another worker could not begin",
+                    self.rank, self.count
+                ),
+                hint: Some("its own error says why".into()),
+            }),
+            Err(error) if own => Err(Failure {
+                message: format!("worker {} of {}: {error}", self.rank, self.count),
+                hint: None,
+            }),
+            _ => Ok(()),
+        }
+    }
+
     fn another(&self) -> Box<dyn Workers> {
         Box::new(Self {
             rank: self.rank,
@@ -87,12 +109,11 @@ pub(crate) fn train<'py>(
     deepfusion_cli::keep_memory();
     let outcome = interruptible(py, |stop| -> Result<_, Failure> {
         let mut warnings = Warnings::default();
-        let mut trainer = opened(&asked, &mut warnings)?;
-        listener.warn(&warnings);
-        // The first worker's log is of all of them.
-        if asked.workers.as_ref().is_none_or(|w| w.rank == 0) {
-            listener.keep_log(&trainer)?;
+        let begun = begin(&asked, &mut warnings, &mut listener);
+        if let Some(workers) = &asked.workers {
+            workers.all_begun(begun.is_ok())?;
         }
+        let mut trainer = begun?;
         let listen = &mut |event| listener.hear(event, stop);
         let summary = trainer.run(listen)?;
         Ok((summary, warnings.skipped))
@@ -116,6 +137,21 @@ pub(crate) fn train<'py>(
     figures.set_item("scale_ratio", scale_ratio)?;
     figures.set_item("skipped_drives", skipped)?;
     Ok(figures)
+}
+
+/// The trainer that is asked for, and what is said of it before its first step.
+fn begin(
+    asked: &TrainRequest,
+    warnings: &mut Warnings,
+    listener: &mut Listener,
+) -> Result<Trainer, Failure> {
+    let trainer = opened(asked, warnings)?;
+    listener.warn(warnings);
+    // The first worker's log is of all of them.
+    if asked.workers.as_ref().is_none_or(|w| w.rank == 0) {
+        listener.keep_log(&trainer)?;
+    }
+    Ok(trainer)
 }
 
 /// What may not be meant of the recordings.
@@ -155,19 +191,24 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
     let mut warn = |warning| warnings.add(warning);
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
-        let mut config = folder.read_settings()?;
-        for assignment in &asked.settings {
-            config.set(assignment)?;
-        }
-        choose_data(&mut config, asked)?;
+        let config = go_on_with(&folder.read_settings()?, &asked.to_resume(place.compute())?)?;
         config.validate()?;
         let sets = open_samples(&config, &mut |_, _| (), &mut warn)?;
+        let settings = config.clone();
+        let trainer = Trainer::resume_among(workers, config, folder.clone(), sets, &device)?;
+        // Only settings with which the run goes on.
         if leads {
-            folder.write_config(&config, &folder.read_findings()?)?;
+            folder.write_config(&settings, &folder.read_findings()?)?;
         }
-        return Ok(Trainer::resume_among(
-            workers, config, folder, sets, &device,
-        )?);
+        return Ok(trainer);
+    }
+    if leads && holds_something(&asked.out) {
+        return Err(Failure {
+            message: format!("{}: is not empty", asked.out.display()),
+            hint: Some(
+                "choose another folder, empty this one first, or go on with the run in it (resume=True)".into(),
+            ),
+        });
     }
     let (mut config, is_preset) = configuration(asked, place.compute())?;
     let start = Start::of(asked.init.as_deref(), &config, is_preset)?;
@@ -193,12 +234,60 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
     )?)
 }
 
+/// Whether there is anything at a path but an empty folder.
+fn holds_something(path: &Path) -> bool {
+    match std::fs::read_dir(path) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(_) => path.exists(),
+    }
+}
+
+impl TrainRequest {
+    /// What is asked of a run that goes on, by the command's rules: it may be made longer, and its recordings may have moved.
+    fn to_resume(&self, compute: Compute) -> Result<ResumeRequest, Failure> {
+        let mut request = ResumeRequest {
+            moved: MovedRecordings {
+                data: self.data.clone(),
+                validation: self.validation.clone(),
+                ..MovedRecordings::default()
+            },
+            init: self.init.clone(),
+            ..ResumeRequest::default()
+        };
+        match preset_named(&self.config) {
+            // What is asked where nothing is.
+            Some(Preset::Tiny) => {}
+            Some(preset) => request.preset = Some(preset),
+            None => {
+                let file = TrainConfig::read_over_preset(&self.config, compute)?;
+                request.file = Some((self.config.clone(), Box::new(file)));
+            }
+        }
+        if let Some(camera) = &self.camera {
+            request.assignments.push(format!("data.camera={camera:?}"));
+        }
+        for assignment in &self.settings {
+            let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
+            match (key, value.parse()) {
+                ("steps", Ok(steps)) => request.steps = Some(steps),
+                ("epochs", Ok(epochs)) => request.epochs = Some(epochs),
+                _ => request.assignments.push(assignment.clone()),
+            }
+        }
+        Ok(request)
+    }
+}
+
+/// The preset of this name.
+fn preset_named(name: &Path) -> Option<Preset> {
+    let mut all = Preset::ALL.into_iter();
+    all.find(|preset| Path::new(preset.name()) == name)
+}
+
 /// The configuration that is asked for, and whether it is a preset's: no file then says what the run starts from. A preset's sizes follow
 /// what it is trained on.
 fn configuration(asked: &TrainRequest, compute: Compute) -> Result<(TrainConfig, bool), Failure> {
-    let preset = Preset::ALL
-        .into_iter()
-        .find(|preset| Path::new(preset.name()) == asked.config);
+    let preset = preset_named(&asked.config);
     let mut config = match preset {
         Some(preset) => preset.config_on(compute),
         None if asked.config.extension().is_none() && !asked.config.exists() => {
@@ -258,6 +347,8 @@ pub(crate) struct Listener {
     log: Option<RunLog>,
     /// What went wrong in it: training stops, and this is raised.
     pub raised: Option<PyErr>,
+    /// It answered False, whatever the event was: training stops where its listener is next asked.
+    ends: bool,
     losses: Option<LossTerms>,
     validation: Option<LossTerms>,
     scale_ratio: Option<f64>,
@@ -269,6 +360,7 @@ impl Listener {
             callback,
             log: None,
             raised: None,
+            ends: false,
             losses: None,
             validation: None,
             scale_ratio: None,
@@ -295,8 +387,14 @@ impl Listener {
 
     pub(crate) fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
         match self.handle(event) {
-            Ok(true) if !stop.asked() && self.raised.is_none() => Control::Continue,
-            Ok(_) => Control::Stop,
+            Ok(goes_on) => {
+                self.ends |= !goes_on;
+                if self.ends || stop.asked() || self.raised.is_some() {
+                    Control::Stop
+                } else {
+                    Control::Continue
+                }
+            }
             Err(error) => {
                 self.raised.get_or_insert(error);
                 Control::Stop

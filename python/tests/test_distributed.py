@@ -40,6 +40,11 @@ WORKER = """
 """
 
 
+TAKES_THE_PLACE = """def listen(event):
+    if event["event"] == "started" and workers.rank == 0:
+        os.makedirs(os.path.join(out, "last.safetensors", "taken"))"""
+
+
 @pytest.fixture(scope="module")
 def street(tmp_path_factory):
     return deepfusion.simulate(tmp_path_factory.mktemp("shared-street"), frames=16, seed=3, size=(320, 96))
@@ -91,6 +96,27 @@ def test_a_worker_that_dies_ends_the_run_and_it_is_gone_on_with(street, alone, t
     assert done.returncode == 0, done.stderr
     assert printed[0]["step"] == 4
     assert printed[0]["losses"] == pytest.approx(alone[2:], rel=1e-4)
+
+
+def test_a_worker_that_cannot_begin_ends_the_others(street, alone, tmp_path):
+    """Worker 0 alone looks whether the folder is empty."""
+    command = mpiexec()
+    out = tmp_path / "run"
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    done, printed = launched(command, street, out, "mpi")
+    assert done.returncode != 0 and printed == []
+    assert "is not empty" in done.stderr and "another worker could not begin" in done.stderr
+
+
+def test_a_worker_that_cannot_save_ends_the_others(street, alone, tmp_path):
+    """Worker 0 alone validates and saves: here its checkpoint's place is taken."""
+    command = mpiexec()
+    out = tmp_path / "run"
+    words = ["-c", textwrap.dedent(WORKER).replace("def listen(event):", TAKES_THE_PLACE), street, out, "mpi", "new", 0, json.dumps(SMALL)]
+    done = subprocess.run([*command, sys.executable, *map(str, words)], capture_output=True, text=True, timeout=300)
+    assert done.returncode != 0 and "{" not in done.stdout
+    assert "last.safetensors" in done.stderr and "another" in done.stderr
 
 
 def test_torch_connects_them_too(street, alone, tmp_path):

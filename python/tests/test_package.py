@@ -82,6 +82,50 @@ def test_how_far_to_trust_a_pixel(drive, model):
     assert model.predict(frame.image, frame.intrinsics).confidence is None
 
 
+def test_how_sure_it_is_is_the_commands(drive, tmp_path):
+    """`street` has factors that stretch what it says of its own error."""
+    command = os.environ.get("DEEPFUSION") or str(Path(sysconfig.get_path("scripts")) / "deepfusion")
+    frame = deepfusion.Dataset(drive)[0]
+    out = tmp_path / "sure"
+    subprocess.run([command, "predict", drive, "--model", "street", "--save", "sigma,confidence", "--out", out, "--quiet"], check=True)
+    seen = deepfusion.load("street").predict(frame.image, frame.intrinsics)
+    for what, ours in [("sigma", seen.sigma), ("confidence", seen.confidence)]:
+        assert np.array_equal(np.load(sorted(out.glob(f"*_{what}.npy"))[0]), ours), what
+
+
+def test_what_is_no_image_is_raised_at_its_turn(drive, model):
+    frame = deepfusion.Dataset(drive)[0]
+    predictions = model.predict_many([frame.image, frame.image, 7, frame.image], frame.intrinsics)
+    assert next(predictions).depth.shape == next(predictions).depth.shape
+    with pytest.raises(TypeError, match="image"):
+        next(predictions)
+    assert len(list(predictions)) == 1
+
+    def failing():
+        yield frame.image
+        raise KeyError("gone")
+
+    predictions = model.predict_many(failing(), frame.intrinsics)
+    next(predictions)
+    with pytest.raises(KeyError, match="gone"):
+        next(predictions)
+
+
+def test_a_phones_picture_is_upright(drive, model, tmp_path):
+    """EXIF's orientation 6: held upright, the pixels lie on their side."""
+    picture = Image.fromarray(deepfusion.Dataset(drive)[0].image)
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    file = tmp_path / "upright.jpg"
+    picture.save(file, exif=exif, quality=95)
+    from_file = model.predict(file, (300, 300, 60, 200))
+    with Image.open(file) as opened:
+        from_pil = model.predict(opened, (300, 300, 60, 200))
+    assert from_file.depth.shape == from_pil.depth.shape == (picture.width, picture.height)
+    # Decoders differ by a step of a byte.
+    assert np.median(np.abs(np.log(from_file.depth / from_pil.depth))) < 0.02
+
+
 def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
     frame = deepfusion.Dataset(drive)[1]
     expected = model.predict(frame.image, frame.intrinsics).depth
@@ -131,6 +175,7 @@ def test_the_metrics_are_the_fields():
 
 
 def test_errors_say_what_to_do(drive, model, tmp_path):
+    assert deepfusion.DeepFusionError("somebody's own").hint is None
     with pytest.raises(deepfusion.DeepFusionError) as caught:
         deepfusion.load("no-such-network")
     assert "no-such-network" in str(caught.value) and "street" in caught.value.hint

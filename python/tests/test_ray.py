@@ -1,6 +1,8 @@
 """The work of a cluster, on one machine with two workers."""
 
+import io
 import json
+import math
 import os
 import re
 import shutil
@@ -9,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from pathlib import Path
 
 import deepfusion
@@ -20,6 +23,8 @@ ray = pytest.importorskip("ray")
 pytest.importorskip("ray.data")
 
 import deepfusion.ray as cluster  # noqa: E402
+import fsspec  # noqa: E402
+from deepfusion.ray import _fleet, _predict, _storage, _train, _tune  # noqa: E402
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -164,8 +169,9 @@ def _actors():
                 continue
 
 
-def test_an_object_store(street, tmp_path, monkeypatch):
-    """Inputs and outputs in S3, played by moto's server on this machine."""
+@pytest.fixture
+def bucket():
+    """The bucket `fleet` in S3, played by moto's server on this machine: its file system, and the options that find it."""
     moto = pytest.importorskip("moto.server")
     s3fs = pytest.importorskip("s3fs")
     server = moto.ThreadedMotoServer(ip_address="127.0.0.1", port=0)
@@ -174,19 +180,139 @@ def test_an_object_store(street, tmp_path, monkeypatch):
         host, port = server.get_host_and_port()
         options = {"key": "a", "secret": "b", "client_kwargs": {"endpoint_url": f"http://{host}:{port}"}}
         fs = s3fs.S3FileSystem(**options)
+        # All servers of a process have the same buckets.
+        urllib.request.urlopen(urllib.request.Request(f"http://{host}:{port}/moto-api/reset", method="POST")).close()
         fs.mkdir("fleet")
-        fs.put(str(street / "left"), "fleet/images", recursive=True)
-        job = dict(intrinsics=CAMERA, save=["npy"], workers=1, storage_options=options)
-        summary = cluster.predict("s3://fleet/images", "tiny", "s3://fleet/depth", **job)
-        assert (summary.done, summary.kept, summary.failed) == (3, 0, [])
-        fs.invalidate_cache()
-        with fs.open("fleet/depth/1_depth.npy") as file:
-            depth = np.load(file)
-        assert np.array_equal(depth, deepfusion.load("tiny").predict(street / "left" / "1.png", CAMERA).depth)
-        again = cluster.predict("s3://fleet/images/*.png", "tiny", "s3://fleet/depth", **job)
-        assert (again.done, again.kept, again.failed) == (0, 3, [])
+        yield fs, options
     finally:
         server.stop()
+
+
+def test_an_object_store(street, bucket):
+    fs, options = bucket
+    fs.put(str(street / "left"), "fleet/images", recursive=True)
+    job = dict(intrinsics=CAMERA, save=["npy"], workers=1, storage_options=options)
+    summary = cluster.predict("s3://fleet/images", "tiny", "s3://fleet/depth", **job)
+    assert (summary.done, summary.kept, summary.failed) == (3, 0, [])
+    fs.invalidate_cache()
+    with fs.open("fleet/depth/1_depth.npy") as file:
+        depth = np.load(file)
+    assert np.array_equal(depth, deepfusion.load("tiny").predict(street / "left" / "1.png", CAMERA).depth)
+    again = cluster.predict("s3://fleet/images/*.png", "tiny", "s3://fleet/depth", **job)
+    assert (again.done, again.kept, again.failed) == (0, 3, [])
+
+
+@pytest.fixture
+def memory():
+    """An object store in this process, empty."""
+    fs = fsspec.filesystem("memory")
+    fs.store.clear()
+    yield fs
+    fs.store.clear()
+
+
+def worker(output, **others):
+    """One of a job that saves arrays, in this process."""
+    job = dict(id=output, model="tiny", precision="f32", data_set=None, intrinsics=CAMERA, focal_correction=True, stretch=False,
+               post_process=None, save=("npy",), overwrite=False, threads=1, options={}, weights=None, device="cpu", gpus=0)  # fmt: skip
+    return _predict._Worker(_predict._Job(output=output, **(job | others)))
+
+
+def test_no_sidecar_of_before_vouches_for_a_depth_that_replaces_its_own(street, memory, monkeypatch):
+    monkeypatch.setenv("RAYON_NUM_THREADS", "1")
+    image = str(street / "left" / "0.png")
+    row = {"image": np.array([image]), "name": np.array(["0"])}
+
+    def depth():
+        return np.load(io.BytesIO(memory.cat_file("/depth/0_depth.npy")))
+
+    assert worker("memory://depth")(row)["outcome"] == ["done"]
+    first, write = depth(), _storage.Folder.write
+
+    def dies(self, name, data):
+        """As a worker that is killed before it writes the sidecar."""
+        if name.endswith(".json"):
+            raise OSError("killed")
+        write(self, name, data)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(_storage.Folder, "write", dies)
+        other = worker("memory://depth", id="b", intrinsics=(150.0, 150.0, 96.0, 32.0), overwrite=True)(row)
+    assert other["outcome"] == ["failed"] and depth().shape == first.shape and not np.array_equal(depth(), first)
+    assert worker("memory://depth", id="c")(row)["outcome"] == ["done"]
+    assert np.array_equal(depth(), first)
+    assert worker("memory://depth", id="d")(row)["outcome"] == ["kept"]
+
+
+def test_whatever_a_file_system_raises_is_one_images_failure(street, memory, monkeypatch):
+    monkeypatch.setenv("RAYON_NUM_THREADS", "1")
+    memory.put(str(street / "left"), "/images", recursive=True)
+    get = type(memory).get_file
+
+    def fails(self, path, *arguments, **options):
+        if path.endswith("1.png"):
+            # No OSError, as those of botocore are none.
+            raise RuntimeError("reset by peer")
+        return get(self, path, *arguments, **options)
+
+    monkeypatch.setattr(type(memory), "get_file", fails)
+    urls = [f"memory://images/{i}.png" for i in range(3)]
+    answer = worker("memory://depth")({"image": np.array(urls), "name": np.array(["0", "1", "2"])})
+    assert answer["outcome"] == ["done", "failed", "done"] and "reset by peer" in answer["why"][1]
+
+
+def test_a_folder_of_an_embedded_networks_name_is_meant_where_it_holds_a_run(street, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tiny").mkdir()
+    (tmp_path / "tiny" / "0.png").write_bytes((street / "left" / "0.png").read_bytes())
+    for name in ["tiny", "tiny/", Path("tiny")]:
+        assert _storage.network(name) == _storage.start(name) == "tiny"
+    assert _storage.weights_mark("tiny", {}) is None
+    assert cluster.predict(street / "left", "tiny", "depth", intrinsics=CAMERA, workers=1).done == 3
+    assert _storage.network("./tiny") == _storage.network("tiny/../tiny") == str(tmp_path / "tiny")
+    assert (_storage.start(None), _storage.start("none"), _storage.network("s3://runs/tiny")) == (None, "none", "s3://runs/tiny")
+    for left in ["config.toml", "best.safetensors"]:
+        (tmp_path / "tiny" / left).touch()
+        assert _storage.network("tiny") == _storage.start(Path("tiny")) == str(tmp_path / "tiny")
+        (tmp_path / "tiny" / left).unlink()
+
+
+def test_what_a_worker_cannot_load_ends_the_job_with_the_reason(street, tmp_path, monkeypatch):
+    with pytest.raises(ValueError, match="int4"):
+        cluster.predict(street, "tiny", tmp_path, precision="int4")
+    # As on a machine whose processor cannot tell.
+    monkeypatch.setattr(_predict, "_check", lambda *_: None)
+    with pytest.raises(deepfusion.DeepFusionError) as expected:
+        deepfusion.load("tiny", data_set="nowhere")
+    begun = time.monotonic()
+    with pytest.raises(deepfusion.DeepFusionError) as found:
+        cluster.predict(street, "tiny", tmp_path, data_set="nowhere", workers=2)
+    assert (str(found.value), found.value.hint) == (str(expected.value), expected.value.hint)
+    assert time.monotonic() - begun < 60
+
+
+def test_this_machines_processor_need_not_compute_as_the_workers_do(monkeypatch):
+    load, asked = deepfusion.load, []
+
+    def lacks(model, *, precision="f32", **options):
+        asked.append(precision)
+        if precision != "f32":
+            raise deepfusion.DeepFusionError(f"engine `fused`: {precision} needs a processor with more; this one has it not")
+        return load(model, **options)
+
+    monkeypatch.setattr(deepfusion, "load", lacks)
+    for precision in ["bf16", "int8"]:
+        _predict._check("tiny", precision, None, ["npy"], None)
+    assert asked == ["f32", "f32", "int8"]
+
+    def uncalibrated(model, *, precision="f32", **options):
+        if precision == "int8":
+            raise deepfusion.DeepFusionError("int8: the network was not calibrated")
+        return load(model, **options)
+
+    monkeypatch.setattr(deepfusion, "load", uncalibrated)
+    with pytest.raises(deepfusion.DeepFusionError, match="calibrated"):
+        _predict._check("tiny", "int8", None, ["npy"], None)
 
 
 def test_a_fleet_is_looked_at(tmp_path):
@@ -201,6 +327,59 @@ def test_a_fleet_is_looked_at(tmp_path):
     looked = cluster.doctor(drives)
     assert [row["report"] for row in looked] == [deepfusion.doctor(drive) for drive in drives]
     assert looked[0]["frames"] == 4
+
+
+def test_a_fleets_recording_comes_with_what_lies_beside_it(tmp_path, bucket):
+    fs, options = bucket
+    drive = deepfusion.simulate(tmp_path / "kitti", frames=4, seed=3, size=(192, 64))
+    fs.put(str(drive), f"fleet/2011_09_26/{drive.name}", recursive=True)
+    for file in drive.parent.glob("calib_*.txt"):
+        fs.put_file(str(file), f"fleet/2011_09_26/{file.name}")
+    url = f"s3://fleet/2011_09_26/{drive.name}"
+    here, there = (cluster.doctor([path], storage_options=options)[0] for path in (drive, url))
+    assert there["failed"] is None and there["findings"] == here["findings"] and there["frames"] == 4
+    assert cluster.inspect([url], storage_options=options)[0]["usable_pairs"] == 3
+
+
+def test_what_belongs_to_a_recording_is_known_by_its_name(memory, monkeypatch):
+    monkeypatch.setattr(_storage, "_MOST_BESIDE", 100)
+    for name in ["drive.mp4", "drive.toml", "drive.csv", "dataset.toml", "calibration.yml", "other.mp4", "other.toml", "deep/dataset.toml"]:
+        memory.pipe_file(f"/fleet/{name}", b"x")
+    memory.pipe_file("/fleet/drive.bag", bytes(100))
+    memory.pipe_file("/fleet/bag/metadata.yaml", b"x")
+    memory.pipe_file("/fleet/bag.toml", b"x")
+    memory.pipe_file("/alone.mp4", b"x")
+
+    def fetched(url):
+        with _storage.Sources({}).local_recording(url) as path:
+            return Path(path).name, sorted(str(file.relative_to(Path(path).parent)) for file in Path(path).parent.rglob("*.*"))
+
+    shared = ["bag.toml", "calibration.yml", "dataset.toml"]
+    assert fetched("memory://fleet/drive.mp4") == ("drive.mp4", sorted([*shared, "drive.csv", "drive.mp4", "drive.toml"]))
+    assert fetched("memory://fleet/bag/") == ("bag", sorted([*shared, "bag/metadata.yaml"]))
+    assert fetched("memory://alone.mp4") == ("alone.mp4", ["alone.mp4"])
+
+
+def test_a_recording_that_cannot_be_looked_at_leaves_the_others(tmp_path, monkeypatch):
+    monkeypatch.setenv("RAYON_NUM_THREADS", "3")
+    drive = str(deepfusion.simulate(tmp_path / "drive", frames=4, seed=3, size=(192, 64)))
+
+    def silent(path):
+        raise RuntimeError
+
+    monkeypatch.setitem(_fleet._EMPTY, silent, {"frames": None})
+    assert _fleet._look(silent, drive, {}) == {"recording": drive, "frames": None, "failed": "RuntimeError"}
+    assert os.environ["RAYON_NUM_THREADS"] == "1"
+
+    def dies(look, url, options):
+        if url.endswith("bad"):
+            os._exit(1)
+        return {"recording": url, "frames": 4, "failed": None}
+
+    monkeypatch.setattr(_fleet, "_look", dies)
+    rows = cluster.inspect([drive, tmp_path / "bad", drive])
+    assert [row["frames"] for row in rows] == [4, None, 4]
+    assert rows[1]["recording"] == str(tmp_path / "bad") and rows[1]["failed"] and rows[1]["layout"] is None
 
 
 SMALL = {"preset": "tiny", "steps": 2, "batch": 2, "size": {"width": 64, "height": 64}, "validation_share": 0.3}
@@ -223,8 +402,39 @@ def test_trials_of_a_setting(tmp_path):
     assert deepfusion.load(trials[0].path).step > 0
     assert f"smoothness = {trials[0].settings['loss.smoothness']}" in (trials[0].path / "config.toml").read_text()
 
-    rows = cluster.ablate({"all": {}, "no smoothness": {"loss.smoothness": 0.0}}, drive, seeds=[1], config=SMALL, out=tmp_path / "rows", init="none")
-    assert list(rows) == ["all", "no smoothness"] and all(len(tried) == 1 for tried in rows.values())
+    wanted = {"all": {}, "no smoothness": {"loss": {"smoothness": 0.0}}, "wrong": {"loss.no_such": 1}}
+    config = {**SMALL, "loss": {"speed": 0.125}}
+    rows = cluster.ablate(wanted, drive, seeds=[1], config=config, out=tmp_path / "rows", init="none")
+    assert list(rows) == list(wanted) and all(len(tried) == 1 for tried in rows.values())
+    (whole,), (without,), (wrong,) = rows.values()
+    assert (whole.row, whole.settings) == ("all", {"seed": 1}) and whole.error is None
+    assert (without.row, without.settings) == ("no smoothness", {"loss.smoothness": 0.0, "seed": 1})
+    assert wrong.selection is None and "no_such" in wrong.error and wrong.settings == {"loss.no_such": 1, "seed": 1}
+    written = (without.path / "config.toml").read_text()
+    assert "smoothness = 0.0" in written and "speed = 0.125" in written
+
+
+def test_settings_are_merged_key_by_key():
+    fixed = {"preset": "tiny", "loss": {"speed": 0.2, "smoothness": 0.1}, "camera": {"fx": 1.0}}
+    assert _tune.merged(fixed, {"loss": {"smoothness": 0}, "camera": None}) == {
+        "preset": "tiny", "loss.speed": 0.2, "loss.smoothness": 0, "camera.fx": 1.0, "camera": None,
+    }  # fmt: skip
+    assert _tune.merged({"loss": {"speed": 0.2}}, {"loss.speed": 0.3}) == _tune.merged({"loss.speed": 0.2}, {"loss": {"speed": 0.3}})
+
+
+def test_what_is_not_finite_is_worst():
+    nan, inf = math.nan, math.inf
+    best = None
+    for value, expected in [(nan, None), (0.5, 0.5), (nan, 0.5), (-inf, 0.5), (0.75, 0.5), (0.25, 0.25)]:
+        best = _tune.lower(best, value)
+        assert best == expected
+
+    def order(mode, *values):
+        trials = [_tune.Trial({}, None, None, None, {} if value is None else {"figure": value}, None, str(value)) for value in values]
+        return [trial.row for trial in _tune.best_first(trials, "figure", mode)]
+
+    assert order("min", nan, 2.0, None, 1.0, inf, 3) == ["1.0", "2.0", "3", "nan", "None", "inf"]
+    assert order("max", 1.0, nan, 2.0, -inf, None, 3) == ["3", "2.0", "1.0", "nan", "-inf", "None"]
 
 
 def training_workers():
@@ -267,6 +477,56 @@ def test_a_network_is_learned_by_two_workers_though_one_is_killed(tmp_path):
     steps = [int(line[0]) for line in lines if line[1] == "train"]
     assert steps[-1] == 40
     assert run.losses["total"] == pytest.approx(alone.losses["total"], rel=1e-3)
+
+
+def test_a_run_begins_again_where_a_worker_dies_before_the_first_checkpoint(tmp_path):
+    pytest.importorskip("torch")
+    pytest.importorskip("ray.train.torch")
+    street = deepfusion.simulate(tmp_path / "street", frames=10, seed=3, size=(192, 64))
+    out = tmp_path / "shared"
+    killed = []
+
+    def kill_one():
+        log = out / "log.csv"
+        while not killed:
+            begun = log.exists() and ",train," in log.read_text()
+            workers = training_workers() if begun and not (out / "last.safetensors").exists() else []
+            if workers:
+                killed.append({file.name for file in out.iterdir()})
+                os.kill(workers[-1], signal.SIGKILL)
+            time.sleep(0.002)
+
+    killer = threading.Thread(target=kill_one, daemon=True)
+    killer.start()
+    run = cluster.train({**SMALL, "steps": 40, "batch": 1}, street, out=out, workers=2, init="none")
+    assert killed and {"config.toml", "log.csv", "panels"} <= killed[0] and run.step == 40
+    lines = [line.split(",") for line in (out / "log.csv").read_text().splitlines()]
+    assert [int(line[0]) for line in lines if line[1] == "train"] == list(range(1, 41))
+    assert len(list(out.glob("events.out.tfevents*"))) == 1
+
+
+def test_only_what_a_run_left_that_had_just_begun_is_removed(tmp_path):
+    out = tmp_path / "run"
+    _train._check_begun(out)
+    (out / "panels").mkdir(parents=True)
+    left = {"config.toml": "steps = 2\n[findings.camera]\nfx = 1.0\n", "log.csv": "step,split,total\n", "panels/000001.png": "",
+            "events.out.tfevents.1795936607.deepfusion.2034": "", ".last.safetensors.2034-0123456789abcdef.partial": ""}  # fmt: skip
+    for name, text in left.items():
+        (out / name).write_text(text)
+    _train._check_begun(out)
+    others = {"config.toml": "mine = 1", "log.csv": "time,speed", "notes.txt": "", "best.safetensors": "", "panels/me.png": ""}
+    for name, text in others.items():
+        (out / name).write_text(text)
+        # Nothing is started, and nothing is lost.
+        with pytest.raises(deepfusion.DeepFusionError, match=re.escape(name)) as caught:
+            cluster.train(SMALL, tmp_path / "nowhere", out=out)
+        assert "another folder" in caught.value.hint
+        assert (out / name).read_text() == text and all((out / one).exists() for one in left)
+        if name in left:
+            (out / name).write_text(left[name])
+        else:
+            (out / name).unlink()
+    _train._check_begun(out)
 
 
 def test_what_computes_is_checked_before_anything_starts(street, tmp_path):

@@ -92,6 +92,52 @@ def test_what_a_callback_raises_is_raised(street, tmp_path):
     assert deepfusion.load(out).step == 1, "and the run is saved"
 
 
+def test_false_stops_whatever_the_event_is(street, tmp_path):
+    out = tmp_path / "early"
+    stopped = deepfusion.train(
+        {**SMALL, "steps": 50, "validate_every": 2}, street, lambda e: e["event"] != "validated", out=out, init="none"
+    )
+    assert stopped.stopped and stopped.step == 3
+
+
+def test_a_run_goes_on_with_its_own_settings(run, street, tmp_path):
+    """As the command has it: a run may be made longer, and what contradicts it leaves it as it was."""
+    out = tmp_path / "run"
+    shutil.copytree(run[0].path, out)
+    before = (out / "config.toml").read_text()
+    for config, options in [
+        ({"depth_net.encoder.depth": "resnet50"}, {}),
+        ({"batch": 8}, {}),
+        ({"loss": {"smoothness": 0.0}}, {}),
+        ("light", {}),
+        ({}, {"init": "street"}),
+    ]:
+        with pytest.raises(deepfusion.DeepFusionError) as caught:
+            deepfusion.train(config, out=out, resume=True, **options)
+        assert caught.value.hint, caught.value
+        assert (out / "config.toml").read_text() == before
+    longer = deepfusion.train({"steps": 4}, street, out=out, resume=True)
+    assert longer.step == longer.steps == 4
+
+
+def test_a_callback_may_predict(street, tmp_path):
+    """With a single thread as well: Ray gives each worker one."""
+    code = """
+        import sys, deepfusion
+        model, seen = deepfusion.load("tiny"), []
+        frame = deepfusion.Dataset(sys.argv[1])[0]
+        def listen(event):
+            if event["event"] == "step":
+                seen.append(len(list(model.predict_many([frame.image] * 3, frame.intrinsics))))
+                model.predict(frame.image, frame.intrinsics)
+        config = {"preset": "tiny", "steps": 2, "batch": 1, "size": {"width": 64, "height": 64}, "validation_share": 0.2}
+        deepfusion.train(config, sys.argv[1], listen, out=sys.argv[2], init="none")
+        assert seen == [3, 3]
+    """
+    words = [sys.executable, "-c", textwrap.dedent(code), str(street), str(tmp_path / "run")]
+    subprocess.run(words, check=True, timeout=120, env={**os.environ, "RAYON_NUM_THREADS": "1"})
+
+
 def test_the_interpreter_is_free_meanwhile(street, tmp_path):
     counted = []
     done = threading.Event()

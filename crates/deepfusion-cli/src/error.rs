@@ -158,7 +158,7 @@ pub(crate) enum CliError {
         hint: Option<String>,
     },
     /// Nothing but what was written there before.
-    #[error("{input}: no image that is not an output of this program in the folder of the outputs")]
+    #[error("{input}: no image but outputs of this program")]
     OutputsAlone {
         /// What was given.
         input: String,
@@ -201,7 +201,7 @@ pub(crate) enum CliError {
     },
     /// An adapted network that is worse than the one it began from.
     #[cfg(feature = "train")]
-    #[error("not kept: on the frames that are held out it became worse: {worse}; laid aside as {}", path.display())]
+    #[error("not kept: on the frames that are held out it became worse: {worse}; moved to {}", path.display())]
     Refused {
         /// Where it lies.
         path: PathBuf,
@@ -210,7 +210,7 @@ pub(crate) enum CliError {
     },
     /// An adapted network that cannot be compared with the one it began from.
     #[cfg(feature = "train")]
-    #[error("not kept: {}; laid aside as {}", deepfusion_jobs::training::adaptation::Refusal::NotJudged, path.display())]
+    #[error("not kept: {}; moved to {}", deepfusion_jobs::training::adaptation::Refusal::NotJudged, path.display())]
     NothingJudged {
         /// Where it lies.
         path: PathBuf,
@@ -231,7 +231,7 @@ pub(crate) enum CliError {
     #[error("standard input is a terminal: no stream is piped in")]
     Terminal,
     /// A part of a live source.
-    #[error("a live source cannot be shared among shards: nothing is there to be counted yet")]
+    #[error("a live source cannot be split into shards: its number of frames is not known")]
     LiveShard,
     /// An option of live sources for files.
     #[error("`{option}` is for live sources, and these inputs are files")]
@@ -411,7 +411,7 @@ mod tests {
         let path = "mine.refused".into();
         assert_eq!(
             CliError::NothingJudged { path }.to_string(),
-            "not kept: the frames that are held out say nothing about it any more; laid aside as mine.refused"
+            "not kept: the held-out frames can no longer judge it; moved to mine.refused"
         );
     }
 }

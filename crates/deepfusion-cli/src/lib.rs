@@ -59,15 +59,27 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// As large as the main thread's: the graph of a backward pass is deep.
+const STACK_BYTES: usize = 8 << 20;
+
 /// Runs `work` on one of rayon's threads: its parallel operations then start at once, where the main
 /// thread would hand each of them over and sleep. A training step has a great many of them.
 pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
-    /// As large as the main thread's: the graph of a backward pass is deep.
-    const STACK_BYTES: usize = 8 << 20;
     let pool = rayon::ThreadPoolBuilder::new().stack_size(STACK_BYTES);
     // A pool that exists already has the default stack, which release builds do not need.
     pool.build_global().ok();
     rayon::scope(|_| work())
+}
+
+/// As [`in_pool`], on the threads of a pool that nothing else uses and that ends with `work`; in the common one where there can be no other.
+pub fn in_own_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    match rayon::ThreadPoolBuilder::new()
+        .stack_size(STACK_BYTES)
+        .build()
+    {
+        Ok(pool) => pool.install(work),
+        Err(_) => in_pool(work),
+    }
 }
 
 /// The words after the program's name.

@@ -128,6 +128,40 @@ fn a_fisheye_lens_is_measured() {
     );
 }
 
+/// The camera does not depend on the squares' size, and has a file by default.
+#[test]
+fn a_board_is_enough() {
+    let root = folder("brown", 0, 9);
+    let at = root.path();
+    let sized = json(
+        at,
+        &format!("calibrate pictures {BOARD} --out sized.yaml --json"),
+    );
+    let plain = json(at, "calibrate pictures --board 9x6 --json");
+    for key in ["fx", "fy", "cx", "cy"] {
+        let expected = sized["intrinsics"][key].as_f64().unwrap();
+        close(&plain["intrinsics"][key], expected, 1e-3);
+    }
+    let read = |name: &str| fs::read_to_string(at.join(name)).unwrap();
+    assert!(read("sized.yaml").contains("squares of 0.025 m"));
+    assert!(!read("camera.yaml").contains("squares"));
+}
+
+/// A file that says a size no image has: nothing is set aside for it.
+#[test]
+fn a_file_for_giant_images_is_an_error() {
+    let root = folder("brown", 0, 1);
+    let at = root.path();
+    let file = "image_width: 4000000000\nimage_height: 4000000000\ncamera_matrix: {rows: 3, cols: 3, data: [4e9, 0, 2e9, 0, 4e9, 2e9, 0, 0, 1]}\n\
+                distortion_model: plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [-0.01, 0, 0, 0, 0]}\n";
+    fs::write(at.join("giant.yaml"), file).unwrap();
+    fails(
+        at,
+        "predict --model tiny pictures/00.jpg --calib giant.yaml --out depth",
+        &["giant.yaml", "4000000000x4000000000", "400x300"],
+    );
+}
+
 #[test]
 fn what_goes_wrong_is_an_error_with_a_hint() {
     let few = folder("brown", 0, 4);

@@ -46,6 +46,23 @@ fn help_texts() {
     }
 }
 
+/// What `config show` prints is a run's `config.toml`, and is read as one.
+#[test]
+fn a_run_shows_what_it_learned_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let show = |args: &[&str]| in_folder(folder.path(), &[&["config", "show"], args].concat());
+    let of_preset = show(&["light", "--set", "batch=7"]);
+    std::fs::create_dir(folder.path().join("run")).unwrap();
+    std::fs::write(folder.path().join("run/config.toml"), &of_preset.stdout).unwrap();
+    let of_run = show(&["run"]);
+    assert_eq!((of_run.code, &of_run.stdout), (0, &of_preset.stdout));
+    let changed = show(&["run", "--set", "batch=8"]);
+    assert!(changed.stdout.contains("batch = 8"), "{}", changed.stdout);
+    let nothing = show(&["nowhere"]);
+    assert_eq!(nothing.code, 2);
+    assert!(nothing.stderr.contains("lite-mono"), "{}", nothing.stderr);
+}
+
 #[test]
 fn alone_it_says_what_it_can_do() {
     let run = deepfusion(&[]);

@@ -579,7 +579,7 @@ fn both_cameras_are_each_others_view() {
     fails(
         at,
         "simulate --format bag --stereo 0.5 --frames 2 --out bag",
-        &["stereo_baseline_m", "one camera"],
+        &["--stereo", "one camera"],
     );
     assert!(!at.join("bag").exists());
 }

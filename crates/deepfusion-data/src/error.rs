@@ -488,8 +488,9 @@ pub enum Error {
     },
     /// No pair is left, for the reasons counted.
     #[error(
-        "{drive}: no pair of frames can be used: of {targets} frames, {no_neighbour} lack a neighbour \
-         at offsets {offsets:?}{}, {bad_time} have time stamps that do not increase, {no_motion} are not covered by the speeds (oxts, speed.csv)",
+        "{drive}: no pair of frames can be used: of {}, {no_neighbour} without a neighbour \
+         at offsets {offsets:?}{}, {bad_time} with time stamps that do not increase, {no_motion} not covered by the speeds (oxts, speed.csv)",
+        count_of(*targets, "frame"),
         a_step(*frame_distance_m)
     )]
     NoPairs {

@@ -464,6 +464,25 @@ fn a_twist_s_speed_is_scaled_like_any_other() {
     );
 }
 
+/// Publishers write NaN where they know no turn: always, or now and then.
+#[test]
+fn a_twist_without_a_yaw_rate_has_a_speed() {
+    let never = Drive::new("", |bag| {
+        bag.turning_twist("/twist", |_| (10.0, f64::NAN));
+    });
+    near(never.speed(), 10.0);
+    assert!(!open(&never.bag).unwrap().yaw_known());
+    let now_and_then = Drive::new("", |bag| {
+        let gap = |t: f64| (t / 0.04).round() as i64 % 3 == 0;
+        bag.turning_twist("/twist", move |t| {
+            (10.0, if gap(t) { f64::NAN } else { 0.2 })
+        });
+    });
+    near(now_and_then.speed(), 10.0);
+    near(now_and_then.turn_rad(), 0.5 * 0.2);
+    assert!(open(&now_and_then.bag).unwrap().yaw_known());
+}
+
 #[test]
 fn a_steering_angle_without_a_wheelbase_does_not_replace_a_yaw_rate() {
     let fill = |bag: &mut TinyBag| {

@@ -1,6 +1,6 @@
 //! A conversion that does not come to its end, and the one after it.
 
-use crate::common::{DRIVE, TinyDrive};
+use crate::common::{DRIVE, TinyDrive, folder};
 use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_bag, convert_to_kitti};
 use deepfusion_fs::PartialFolder;
 use deepfusion_hint::Hint;
@@ -123,6 +123,103 @@ fn one_that_is_stopped_leaves_nothing_unless_it_is_done() {
     let options = OpenOptions::default();
     for path in [&kitti, &bag] {
         assert_eq!(Dataset::open(path, &options).unwrap()[0].frames().len(), 12);
+    }
+}
+
+fn kitti_of(dataset: &Dataset, out: &Path) -> Dataset {
+    let dataset = std::slice::from_ref(dataset);
+    convert_to_kitti(dataset, out, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    Dataset::open(out, &OpenOptions::default())
+        .unwrap()
+        .remove(0)
+}
+
+/// Packets hold zeros for what nobody measured: a copy of a drive without a yaw rate would go straight through every bend.
+#[test]
+fn what_was_not_measured_is_not_measured_in_the_copy() {
+    let root = tempfile::tempdir().unwrap();
+    let root = root.path();
+    let folder = root.join("folder");
+    folder::write_drive(&folder, 6, 5.0, 0.1);
+    let open = || {
+        Dataset::open(&folder, &OpenOptions::default())
+            .unwrap()
+            .remove(0)
+    };
+    let turns = kitti_of(&open(), &root.join("turns"));
+    assert!(turns.yaw_known() && turns.tilt_unknown());
+    let ahead: String = (0..6).fold("time_s,speed_mps\n".to_owned(), |table, n| {
+        table + &format!("{:.3},5\n", 0.349 + 0.103 * f64::from(n))
+    });
+    fs::write(folder.join("speed.csv"), ahead).unwrap();
+    let dataset = open();
+    assert!(!dataset.yaw_known());
+    let copy = kitti_of(&dataset, &root.join("ahead"));
+    assert!(!copy.yaw_known() && copy.tilt_unknown());
+    assert!(copy.frames()[2].speed_mps.is_some());
+    let warned: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
+    assert!(
+        warned.iter().any(|w| w.contains("yaw_known = false")),
+        "{warned:?}"
+    );
+    // KITTI's own drives measured all of it, and so did their copies.
+    let own = kitti_of(&drive(&root.join("drive")), &root.join("own"));
+    assert!(own.yaw_known() && !own.tilt_unknown());
+}
+
+/// An empty line is KITTI's way to say it.
+#[test]
+fn a_frame_without_a_time_has_none_in_the_copy() {
+    let root = tempfile::tempdir().unwrap();
+    let root = root.path();
+    let _ = drive(&root.join("drive"));
+    let times = root
+        .join("drive")
+        .join(DRIVE)
+        .join("image_02/timestamps.txt");
+    let text = fs::read_to_string(&times).unwrap();
+    let lines = text.lines().enumerate();
+    let lines: Vec<&str> = lines
+        .map(|(n, line)| if n == 4 { "" } else { line })
+        .collect();
+    fs::write(&times, lines.join("\n")).unwrap();
+    let folder = root.join("drive").join(DRIVE);
+    let dataset = Dataset::open(&folder, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    let timed =
+        |of: &Dataset| -> Vec<bool> { of.frames().iter().map(|f| f.time_s.is_some()).collect() };
+    assert_eq!(timed(&dataset).iter().filter(|timed| !**timed).count(), 1);
+    let copy = kitti_of(&dataset, &root.join("copy"));
+    assert_eq!(timed(&copy), timed(&dataset));
+}
+
+/// Names such as 20240101120000.png: a line for every number would be more than any disk holds.
+#[test]
+fn numbers_that_are_dates_are_counted_anew() {
+    let root = tempfile::tempdir().unwrap();
+    let root = root.path();
+    let names = ["20240101120000", "20240101120001", "20240101120007"];
+    for timed in [false, true] {
+        let folder = root.join(format!("folder-{timed}"));
+        folder::write_images(&folder, &names);
+        fs::write(folder.join("intrinsics.txt"), "36 36 30.5 8.6\n").unwrap();
+        if timed {
+            let table = format!(
+                "time_s,file\n0,{}.png\n1,{}.png\n7,{}.png\n",
+                names[0], names[1], names[2]
+            );
+            fs::write(folder.join("frames.csv"), table).unwrap();
+        }
+        let dataset = Dataset::open(&folder, &OpenOptions::default())
+            .unwrap()
+            .remove(0);
+        let copy = kitti_of(&dataset, &root.join(format!("copy-{timed}")));
+        let numbers: Vec<u64> = copy.frames().iter().map(|f| f.number).collect();
+        assert_eq!(numbers, [0, 1, 3]);
+        let times: Vec<Option<f64>> = copy.frames().iter().map(|f| f.time_s).collect();
+        let expected = [0.0, 1.0, 7.0].map(|s| timed.then_some(s));
+        assert_eq!(times, expected);
     }
 }
 

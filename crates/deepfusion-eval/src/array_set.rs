@@ -3,8 +3,11 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use deepfusion_geometry::{NpyHeader, NpyHeaderProblem};
 use ndarray::{ArrayD, Axis};
-use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt, ReadNpzError};
+use ndarray_npy::{ReadNpyError, ReadNpyExt};
+use zip::ZipArchive;
+use zip::result::ZipError;
 
 use crate::error::first_names;
 use crate::{ArrayName, ArrayProblem, Error, ExpectedShape, Grid, Result};
@@ -22,7 +25,7 @@ pub struct ArraySet {
 
 enum Source {
     Npz {
-        reader: Box<NpzReader<BufReader<File>>>,
+        reader: Box<ZipArchive<BufReader<File>>>,
         names: Vec<String>,
         /// Each name's place in the archive.
         places: Vec<usize>,
@@ -55,9 +58,13 @@ impl ArraySet {
         file.by_ref().take(6).read_to_end(&mut magic).map_err(io)?;
         file.seek(SeekFrom::Start(0)).map_err(io)?;
         let source = if magic.starts_with(b"PK") {
-            let mut reader = NpzReader::new(file).map_err(|e| unreadable_archive(path, e))?;
-            let names = reader.names().map_err(|e| unreadable_archive(path, e))?;
-            let depths = names.into_iter().enumerate();
+            let reader = ZipArchive::new(file).map_err(|e| unreadable_archive(path, e))?;
+            let names = (0..reader.len()).map(|i| {
+                let name = reader.name_for_index(i).unwrap_or_default();
+                name.strip_suffix(".npy").unwrap_or(name).to_owned()
+            });
+            let depths: Vec<_> = names.enumerate().collect();
+            let depths = depths.into_iter();
             let depths = depths.filter(|(_, name)| !name.starts_with(VELOCITY));
             let (places, names) = depths.unzip();
             Source::Npz {
@@ -66,17 +73,9 @@ impl ArraySet {
                 places,
             }
         } else if magic == b"\x93NUMPY" {
-            let array = match ArrayD::<f64>::read_npy(&mut file) {
-                Err(ReadNpyError::WrongDescriptor(_)) => {
-                    file.seek(SeekFrom::Start(0)).map_err(io)?;
-                    ArrayD::<f32>::read_npy(&mut file).map(|a| a.mapv(f64::from))
-                }
-                other => other,
-            };
-            Source::Stack(stack(
-                path,
-                array.map_err(|e| unreadable(path, ArrayName::Only, e))?,
-            )?)
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map_err(io)?;
+            Source::Stack(stack(path, array(path, ArrayName::Only, &bytes)?)?)
         } else {
             return Err(Error::ArrayFile {
                 path: path.to_owned(),
@@ -151,19 +150,15 @@ impl ArraySet {
             } => {
                 let (name, index) = (names[index].clone(), places[index]);
                 // By index, not by name: an archive may hold a name twice.
-                let array = match reader.by_index::<ndarray::OwnedRepr<f64>, _>(index) {
-                    Err(ReadNpzError::Npy(ReadNpyError::WrongDescriptor(_))) => reader
-                        .by_index::<ndarray::OwnedRepr<f32>, _>(index)
-                        .map(|a| a.mapv(f64::from)),
-                    other => other,
-                };
-                match array {
-                    Ok(array) => grid(&self.path, ArrayName::Named(name), array),
-                    Err(ReadNpzError::Npy(e)) => {
-                        Err(unreadable(&self.path, ArrayName::Named(name), e))
-                    }
-                    Err(e @ ReadNpzError::Zip(_)) => Err(unreadable_archive(&self.path, e)),
+                let entry = reader.by_index(index);
+                let mut entry = entry.map_err(|e| unreadable_archive(&self.path, e))?;
+                let mut bytes = Vec::new();
+                let name = ArrayName::Named(name);
+                if let Err(error) = entry.read_to_end(&mut bytes) {
+                    return Err(unreadable(&self.path, name, ReadNpyError::Io(error)));
                 }
+                let array = array(&self.path, name.clone(), &bytes)?;
+                grid(&self.path, name, array)
             }
         }
     }
@@ -217,6 +212,27 @@ fn require(wanted: &[String], from: &Path, present: &[String], path: &Path) -> R
         names: first_names(missing),
         instead: present.first().cloned(),
     })
+}
+
+/// The array in a file's bytes.
+fn array(path: &Path, name: ArrayName, bytes: &[u8]) -> Result<ArrayD<f64>> {
+    let wrong = |reason| Error::ArrayFile {
+        path: path.to_owned(),
+        reason,
+    };
+    // The reader allocates for as many numbers, and as long a header, as it is told that there are.
+    match NpyHeader::parse(bytes) {
+        Ok(header) if header.item_bytes().is_none() || header.fits(bytes.len() as u64) => {}
+        Err(NpyHeaderProblem::NotNpy) => return Err(wrong(ArrayProblem::NotArrays)),
+        _ => return Err(wrong(ArrayProblem::Cut { array: name })),
+    }
+    let doubles = match ArrayD::<f64>::read_npy(bytes) {
+        Err(ReadNpyError::WrongDescriptor(_)) => {
+            ArrayD::<f32>::read_npy(bytes).map(|array| array.mapv(f64::from))
+        }
+        other => other,
+    };
+    doubles.map_err(|error| unreadable(path, name, error))
 }
 
 /// N×H×W of an array that is that, or a single H×W.
@@ -276,7 +292,7 @@ fn unreadable(path: &Path, array: ArrayName, error: ReadNpyError) -> Error {
     }
 }
 
-fn unreadable_archive(path: &Path, error: ReadNpzError) -> Error {
+fn unreadable_archive(path: &Path, error: ZipError) -> Error {
     Error::ArrayFile {
         path: path.to_owned(),
         reason: ArrayProblem::Archive(Box::new(error)),

@@ -158,6 +158,35 @@ fn broken_files_say_what_is_wrong() {
     }
 }
 
+/// A reader that allocates for what a header says is ended by the system: 8 TiB here.
+#[test]
+fn an_array_that_claims_too_much_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = "{'descr': '<f8', 'fortran_order': False, 'shape': (1048576, 1048576), }\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((text.len() as u16).to_le_bytes());
+    bytes.extend(text.bytes());
+    std::fs::write(at("claims.npy"), &bytes).unwrap();
+    let said = ArraySet::open(&at("claims.npy")).unwrap_err().to_string();
+    assert!(
+        said.contains("fewer numbers than its header says"),
+        "{said}"
+    );
+    let mut archive = zip::ZipWriter::new(std::fs::File::create(at("claims.npz")).unwrap());
+    archive
+        .start_file("a.npy", zip::write::SimpleFileOptions::default())
+        .unwrap();
+    std::io::Write::write_all(&mut archive, &bytes).unwrap();
+    archive.finish().unwrap();
+    let said = ArraySet::open(&at("claims.npz"))
+        .unwrap()
+        .read(0)
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("`a` has fewer numbers"), "{said}");
+}
+
 #[test]
 fn axes_of_length_one_are_dropped() {
     let folder = tempfile::tempdir().unwrap();

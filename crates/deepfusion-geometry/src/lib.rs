@@ -11,6 +11,7 @@ mod depth_map;
 mod depth_range;
 mod distortion;
 mod intrinsics;
+mod npy;
 mod se3;
 mod trajectory;
 
@@ -18,5 +19,6 @@ pub use depth_map::DepthMap;
 pub use depth_range::DepthRange;
 pub use distortion::{Distortion, NoDistortion};
 pub use intrinsics::{HFOV_DEG, ImplausibleCamera, Intrinsics};
+pub use npy::{NpyHeader, NpyHeaderProblem};
 pub use se3::Se3;
 pub use trajectory::{StampedPose, Trajectory};

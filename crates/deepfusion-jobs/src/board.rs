@@ -219,7 +219,7 @@ impl BoardViews {
         let name = file.display().to_string();
         progress(SearchProgress::Video { file, frames });
         if frames > 0 {
-            // The first look decodes all of them.
+            // The first pass decodes all of them.
             video.frame(0)?;
         }
         let part = |i: usize| (i * frames / parts)..((i + 1) * frames / parts);

@@ -192,11 +192,17 @@ fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
             || l.starts_with("begin triggerblock")
     });
     let mut frames = Vec::new();
-    let mut decimal = false;
+    let mut header = AscHeader::default();
     for (index, line) in text.lines().enumerate() {
         let parsed = if is_asc {
-            decimal |= line.trim().to_ascii_lowercase().starts_with("base dec");
-            asc(line, decimal)
+            header.read(line);
+            asc(line, header.decimal).map(|parsed| {
+                let frame = parsed?;
+                Ok(Frame {
+                    ns: frame.ns.saturating_add(header.begin_ns),
+                    ..frame
+                })
+            })
         } else {
             candump(line)
         };
@@ -214,6 +220,40 @@ fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
     Ok((frames, if is_date { Clock::Date } else { Clock::Free }))
 }
 
+/// SocketCAN's bit of an identifier that marks a report of an error (`CAN_ERR_FLAG` of linux/can.h).
+const CAN_ERROR: u32 = 0x2000_0000;
+
+/// What the first lines of Vector's text say: `base hex  timestamps absolute`. With `relative`, each line counts from the line before it,
+/// whatever that line holds.
+#[derive(Default)]
+struct AscHeader {
+    decimal: bool,
+    relative: bool,
+    /// What a line's time counts from.
+    begin_ns: i64,
+    /// Time of the line before on that clock.
+    before_ns: i64,
+}
+
+impl AscHeader {
+    fn read(&mut self, line: &str) {
+        let words = line.to_ascii_lowercase();
+        let mut words = words.split_whitespace();
+        let Some(first) = words.next() else { return };
+        if first == "base" {
+            let rest: Vec<&str> = words.collect();
+            self.decimal = rest.first() == Some(&"dec");
+            self.relative = rest.ends_with(&["timestamps", "relative"]);
+        } else if self.relative
+            && first.starts_with(|c: char| c.is_ascii_digit())
+            && let Ok(ns) = seconds(first)
+        {
+            self.begin_ns = self.before_ns;
+            self.before_ns = self.begin_ns.saturating_add(ns);
+        }
+    }
+}
+
 /// `None` for a line without a frame, such as an empty one, or a frame without data.
 fn candump(line: &str) -> Option<Parsed<Frame>> {
     let rest = line.trim().strip_prefix('(')?;
@@ -227,11 +267,15 @@ fn candump(line: &str) -> Option<Parsed<Frame>> {
         None if data.starts_with(['R', 'r']) => return None,
         None => data,
     };
+    let number = u32::from_str_radix(id, 16);
+    // The controller's report of an error: no frame that was on the bus.
+    if number.as_ref().is_ok_and(|number| number & CAN_ERROR != 0) {
+        return None;
+    }
     let parsed = || {
         let ns = seconds(time)?;
-        let number =
-            u32::from_str_radix(id, 16).map_err(|_| CanFrameProblem::Identifier(id.to_owned()))?;
-        // The tool writes 3 digits of a standard identifier, 8 of an extended one; the top bit marks errors.
+        let number = number.map_err(|_| CanFrameProblem::Identifier(id.to_owned()))?;
+        // The tool writes 3 digits of a standard identifier, 8 of an extended one.
         let id = can_id(number, id.len() > 3)?;
         Ok(Frame {
             ns,
@@ -368,6 +412,26 @@ mod tests {
         );
         assert!(asc("   0.5 1  123 Rx d 8 01 02", false).unwrap().is_err());
         assert!(asc("// a comment", false).is_none());
+    }
+
+    #[test]
+    fn a_report_of_an_error_is_no_frame() {
+        assert!(candump("(1.0) can0 20000004#0000000000000000").is_none());
+        assert!(candump("(1.0) can0 00000004#0000000000000000").is_some());
+    }
+
+    /// Each line counts from the one before it, one without a frame as well.
+    #[test]
+    fn relative_times_are_added_up() {
+        let lines =
+            "   0.010 1  1A0 Rx d 1 00\n   0.020 CAN 1 Status: active\n   0.030 1  1A0 Rx d 1 00\n";
+        for (times, expected) in [("absolute", [10, 30]), ("relative", [10, 60])] {
+            let text =
+                format!("date Mon Nov 2 10:00:00 2026\nbase hex  timestamps {times}\n{lines}");
+            let (frames, _) = super::frames(Path::new("a.asc"), &text).unwrap();
+            let ms: Vec<i64> = frames.iter().map(|f| f.ns / 1_000_000).collect();
+            assert_eq!(ms, expected, "{times}");
+        }
     }
 
     #[test]

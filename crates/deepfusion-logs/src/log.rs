@@ -25,10 +25,11 @@ impl DriveLog {
     #[must_use]
     pub fn in_zone(mut self, ahead_s: i64) -> Self {
         if self.clock == Clock::LocalDate {
-            let ahead_ns = ahead_s * 1_000_000_000;
-            self.speeds.iter_mut().for_each(|s| s.ns -= ahead_ns);
+            let ahead_ns = ahead_s.saturating_mul(1_000_000_000);
+            let moved = |ns: &mut i64| *ns = ns.saturating_sub(ahead_ns);
+            self.speeds.iter_mut().for_each(|s| moved(&mut s.ns));
             let turns = self.yaw_rates.iter_mut().chain(&mut self.course_rates);
-            turns.for_each(|turn| turn.ns -= ahead_ns);
+            turns.for_each(|turn| moved(&mut turn.ns));
             self.clock = Clock::Date;
         }
         self

@@ -214,8 +214,9 @@ impl BoxContent<'_> {
             }
         };
         let chunks = offsets.u32(4)? as usize;
-        let mut begins = durations.starts(count, scale)?;
-        let (mut samples, mut run) = (Vec::with_capacity(count), 0);
+        let mut begins = durations.starts(scale)?;
+        // What is there is read before memory is asked for the rest.
+        let (mut samples, mut run) = (Vec::new(), 0);
         let runs_count = runs.u32(4)? as usize;
         for chunk in 0..chunks {
             // A run says from which chunk on (counted from 1) a chunk has so many samples.
@@ -228,7 +229,7 @@ impl BoxContent<'_> {
                 if index == count {
                     break;
                 }
-                let end = at + u64::from(size(index)?);
+                let end = at.saturating_add(u64::from(size(index)?));
                 let bytes = usize::try_from(at).ok().zip(usize::try_from(end).ok());
                 let Some((from, to)) = bytes.filter(|(_, to)| *to <= self.file.len()) else {
                     return Err(self.broken("stco", Mp4Problem::Beyond));
@@ -247,20 +248,20 @@ impl BoxContent<'_> {
     }
 
     /// When each sample begins and ends.
-    fn starts(&self, count: usize, scale: u32) -> Result<std::vec::IntoIter<Range<i64>>, Broken> {
-        let (mut all, mut ticks) = (Vec::with_capacity(count), 0_u64);
-        let ns = |ticks: u64| (ticks as f64 / f64::from(scale) * 1e9).round() as i64;
+    fn starts(&self, scale: u32) -> Result<impl Iterator<Item = Range<i64>>, Broken> {
+        let mut entries = Vec::new();
         for entry in 0..self.u32(4)? as usize {
-            let (repeats, ticks_each) = (self.u32(8 + 8 * entry)?, self.u32(12 + 8 * entry)?);
-            for _ in 0..repeats {
-                if all.len() == count {
-                    break;
-                }
-                let next = ticks + u64::from(ticks_each);
-                all.push(ns(ticks)..ns(next));
-                ticks = next;
-            }
+            entries.push((self.u32(8 + 8 * entry)?, self.u32(12 + 8 * entry)?));
         }
-        Ok(all.into_iter())
+        let ns = move |ticks: u64| (ticks as f64 / f64::from(scale) * 1e9).round() as i64;
+        let mut ticks = 0_u64;
+        let each = entries
+            .into_iter()
+            .flat_map(|(repeats, ticks_each)| (0..repeats).map(move |_| ticks_each));
+        Ok(each.map(move |ticks_each| {
+            let begin = ticks;
+            ticks = begin.saturating_add(u64::from(ticks_each));
+            ns(begin)..ns(ticks)
+        }))
     }
 }

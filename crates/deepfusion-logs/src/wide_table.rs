@@ -73,7 +73,7 @@ impl<'a> Times<'a> {
             Some(after) if ns < after => {
                 let problem = TableProblem::Backwards {
                     text: short(&word),
-                    back_s: (after - ns) as f64 * 1e-9,
+                    back_s: after.saturating_sub(ns) as f64 * 1e-9,
                 };
                 Err(table.bad(row, self.column, problem))
             }

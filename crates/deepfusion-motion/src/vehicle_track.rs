@@ -3,9 +3,6 @@
 use crate::vehicle_motion::tilt_between;
 use crate::{Signal, VehicleMotion};
 
-/// Longest gap that is interpolated, in seconds: five packets of KITTI's oxts.
-const MAX_GAP_S: f64 = 0.5;
-
 /// A vehicle's forward speed and yaw rate over time, and its roll and pitch if known.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleTrack {
@@ -18,6 +15,9 @@ pub struct VehicleTrack {
 }
 
 impl VehicleTrack {
+    /// Longest gap that is interpolated, in seconds: five packets of KITTI's oxts.
+    pub const MAX_GAP_S: f64 = 0.5;
+
     /// A track of samples (time in s, forward speed in m/s, yaw rate in rad/s). A sample that is not
     /// finite, or not later than the one before it, is dropped: recorders repeat packets.
     #[must_use]
@@ -29,8 +29,8 @@ impl VehicleTrack {
                 .filter(|(t, v, w)| t.is_finite() && v.is_finite() && w.is_finite())
         };
         Self {
-            speed_mps: Signal::with_max_gap(good().map(|s| (s.0, s.1)), MAX_GAP_S),
-            yaw_rate_radps: Signal::with_max_gap(good().map(|s| (s.0, s.2)), MAX_GAP_S),
+            speed_mps: Signal::with_max_gap(good().map(|s| (s.0, s.1)), Self::MAX_GAP_S),
+            yaw_rate_radps: Signal::with_max_gap(good().map(|s| (s.0, s.2)), Self::MAX_GAP_S),
             tilt_rad: None,
             tilt_rates_radps: None,
         }
@@ -44,10 +44,20 @@ impl VehicleTrack {
                 .iter()
                 .filter(|(t, roll, pitch)| t.is_finite() && roll.is_finite() && pitch.is_finite())
         };
-        let roll = Signal::with_max_gap(good().map(|s| (s.0, s.1)), MAX_GAP_S);
-        let pitch = Signal::with_max_gap(good().map(|s| (s.0, s.2)), MAX_GAP_S);
+        let roll = Signal::with_max_gap(good().map(|s| (s.0, s.1)), Self::MAX_GAP_S);
+        let pitch = Signal::with_max_gap(good().map(|s| (s.0, s.2)), Self::MAX_GAP_S);
         Self {
             tilt_rad: Some([roll, pitch]),
+            ..self
+        }
+    }
+
+    /// The same without roll and pitch, where nothing measured those it was given.
+    #[must_use]
+    pub fn without_tilt(self) -> Self {
+        Self {
+            tilt_rad: None,
+            tilt_rates_radps: None,
             ..self
         }
     }

@@ -142,7 +142,7 @@ pub struct SimConfig {
     pub width: u32,
     /// Height of the pictures, in pixels.
     pub height: u32,
-    /// Number of moving cars; in a varied drive those of them alone that nothing on the street stops.
+    /// Number of moving cars; in a varied drive cars whose way is blocked are left out.
     pub moving_cars: usize,
     /// Number of people who ride bicycles in traffic, walk along pavements and cross the road; fewer where a street has no room for
     /// them.

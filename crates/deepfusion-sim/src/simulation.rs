@@ -157,7 +157,7 @@ impl Simulation {
         self.look.as_ref().map(DriveLook::drawn)
     }
 
-    /// How many cars move: [`SimConfig::moving_cars`], but in a varied drive those of them alone that nothing on the street stops.
+    /// How many cars move: [`SimConfig::moving_cars`], but in a varied drive cars whose way is blocked are left out.
     #[must_use]
     pub fn moving_cars(&self) -> usize {
         self.traffic.count()

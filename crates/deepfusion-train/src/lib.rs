@@ -58,7 +58,10 @@ pub use deepfusion_model::{
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};
 pub use depth_set::{DepthFrame, DepthSet, DepthView, SimulatedViews};
-pub use error::{Error, LoaderProblem, SampleProblem, Skipped, ThreadsProblem, WorkersProblem};
+pub use error::{
+    Error, LoaderProblem, NoStereo, SampleProblem, SharedFrames, Skipped, ThreadsProblem,
+    WorkersProblem,
+};
 pub use event::{Control, TrainEvent};
 pub use factors::BatchFactors;
 pub use inspector::Inspector;
@@ -71,9 +74,9 @@ pub use pose::{Motion, rotation_from_axis_angle};
 pub use pose_predictor::PosePredictor;
 pub use runner::{BurnRunner, depth_net, peak_device_bytes};
 pub use sampler::Sampler;
-pub use shared_frames::{SharedFrames, shared_frames};
+pub use shared_frames::shared_frames;
 pub use source::{Sample, SampleSet};
-pub use stereo::{NoStereo, StereoSource, recordings_with_stereo};
+pub use stereo::{StereoSource, recordings_with_stereo};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};
 pub use warning::TrainWarning;

@@ -1,20 +1,9 @@
 //! Frames used for both training and validation.
 
-use crate::SampleSet;
+use crate::{SampleSet, SharedFrames};
 use deepfusion_data::FrameImage;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
-
-/// The validation frames of a drive that training also uses.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SharedFrames {
-    /// The drive.
-    pub drive: String,
-    /// Number of its validation targets that are also targets of training samples.
-    pub targets: usize,
-    /// Number of further ones that are sources of training samples.
-    pub sources: usize,
-}
 
 /// The validation targets that are frames of training samples, drive by drive in order of names; drives without any are
 /// left out. Frames are identified by their file, with links resolved, and their position in it.

@@ -1,6 +1,6 @@
 use crate::error::MOST_SIGMA_SHARE;
-use crate::stereo::{NoStereo, OtherCameras, StereoSource};
-use crate::{DepthSet, Error, Learn, SampleProblem, Skipped, TrainConfig, shared_frames};
+use crate::stereo::{OtherCameras, StereoSource};
+use crate::{DepthSet, Error, Learn, NoStereo, SampleProblem, Skipped, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
 use std::sync::Arc;

@@ -290,11 +290,7 @@ impl Trainer {
                 ..
             } = learned?;
             if failed {
-                return Err(Error::Workers {
-                    rank: self.workers.rank(),
-                    count: self.workers.count(),
-                    reason: WorkersProblem::AnotherFailed,
-                });
+                return Err(self.another_failed());
             }
             self.workers.average(&mut gradients, &mut losses)?;
             for (all, of_step) in [
@@ -355,15 +351,25 @@ impl Trainer {
             if due || stopped || save {
                 self.share_statistics()?;
             }
-            if due || stopped {
-                let shares = [low_view.value(), moving.value()];
-                self.report(listen, panel, shares, due)?;
-                if stopped || self.state.step == steps {
-                    self.report_camera(listen)?;
+            if due || stopped || save {
+                let reported = if due || stopped {
+                    let shares = [low_view.value(), moving.value()];
+                    self.report(listen, panel, shares, due).and_then(|()| {
+                        if stopped || self.state.step == steps {
+                            self.report_camera(listen)
+                        } else {
+                            Ok(())
+                        }
+                    })
+                } else {
+                    self.save_last(listen)
+                };
+                // The first worker alone validates and writes: the others must not wait for its next gradients.
+                let [failed] = self.workers.any([reported.is_err()])?;
+                reported?;
+                if failed {
+                    return Err(self.another_failed());
                 }
-                saved = Instant::now();
-            } else if save {
-                self.save_last(listen)?;
                 saved = Instant::now();
             }
         }
@@ -375,6 +381,14 @@ impl Trainer {
             seconds: start.elapsed().as_secs_f64(),
             stopped,
         })
+    }
+
+    fn another_failed(&self) -> Error {
+        Error::Workers {
+            rank: self.workers.rank(),
+            count: self.workers.count(),
+            reason: WorkersProblem::AnotherFailed,
+        }
     }
 }
 

@@ -212,8 +212,11 @@ fn a_worker_that_fails_ends_the_others() {
         &out,
         |rank, _, (train, _)| {
             if rank == 1 {
-                // Recordings that are not there, but for the first.
-                train.samples[1..].iter_mut().for_each(|s| s.dataset = 99);
+                // Sources that are not there, but for the first sample's.
+                let sources = train.samples[1..]
+                    .iter_mut()
+                    .flat_map(|s| &mut s.snippet.sources);
+                sources.for_each(|source| source.frame = 999_999);
             }
         },
         &start,
@@ -231,15 +234,22 @@ fn workers_that_do_not_hold_the_same_do_not_begin() {
     let folder = tempfile::tempdir().unwrap();
     let start = prepared(folder.path());
     type Change = fn(usize, &mut TrainConfig, &mut Sets);
-    let cases: [(&str, &str, Change); 3] = [
+    let cases: [(&str, &str, Change); 5] = [
         ("weights", "other weights", |rank, config, _| {
             config.seed += rank as u64;
         }),
         ("samples", "other samples", |rank, _, (train, _)| {
             train.samples.truncate(train.samples.len() - rank);
         }),
+        ("drives", "other samples", |rank, _, (train, _)| {
+            let last = train.samples.len() - 1;
+            train.samples.swap(0, rank * last);
+        }),
         ("settings", "other settings", |rank, config, _| {
             config.learning_rate *= 1.0 + rank as f64;
+        }),
+        ("loss", "other settings", |rank, config, _| {
+            config.loss.smoothness *= 1.0 + rank as f64;
         }),
     ];
     for (name, reason, change) in cases {

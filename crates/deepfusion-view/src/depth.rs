@@ -4,6 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use deepfusion_data::{image_size, read_depth_png};
+use deepfusion_geometry::NpyHeader;
 
 use crate::{ArrayProblem, ContentProblem, Error, Result};
 
@@ -88,26 +89,29 @@ fn read_npy(path: &Path) -> Result<DepthFile> {
         .take(4096)
         .read_to_end(&mut begin)
         .map_err(failed)?;
-    let header = NpyHeader::parse(&begin).map_err(|problem| Error::content(path, problem))?;
-    let (width, height) = (header.width, header.height);
+    let wrong = |problem: ArrayProblem| Error::content(path, problem);
+    let header = NpyHeader::parse(&begin).map_err(|problem| wrong(problem.into()))?;
+    let [height, width, item_bytes] = layout(&header).map_err(wrong)?;
     if width.checked_mul(height).is_none_or(|n| n > MOST_PIXELS) || width == 0 || height == 0 {
         return Err(too_large(path, width, height));
     }
-    let expected = header.begin as u64 + width * height * header.item_bytes;
+    let expected = header.begin as u64 + width * height * item_bytes;
     if length < expected {
         let problem = ArrayProblem::Cut {
             bytes: length,
             expected,
             size: (width, height),
         };
-        return Err(Error::content(path, problem));
+        return Err(wrong(problem));
     }
+    let read = begin.len() as u64;
     let mut values = begin.split_off(header.begin.min(begin.len()));
-    file.take(expected - begin.len() as u64 - values.len() as u64)
+    // Of a small array the numbers, and what may stand behind them, are read already.
+    file.take(expected.saturating_sub(read))
         .read_to_end(&mut values)
         .map_err(failed)?;
-    values.truncate((width * height * header.item_bytes) as usize);
-    if header.item_bytes == 8 {
+    values.truncate((width * height * item_bytes) as usize);
+    if item_bytes == 8 {
         values = values
             .chunks_exact(8)
             .flat_map(|b| {
@@ -123,72 +127,20 @@ fn read_npy(path: &Path) -> Result<DepthFile> {
     })
 }
 
-struct NpyHeader {
-    width: u64,
-    height: u64,
-    item_bytes: u64,
-    /// Where the numbers begin.
-    begin: usize,
-}
-
-impl NpyHeader {
-    fn parse(bytes: &[u8]) -> Result<Self, ArrayProblem> {
-        let early = || ArrayProblem::HeaderCut;
-        if !bytes.starts_with(b"\x93NUMPY") {
-            return Err(if bytes.len() < 6 {
-                early()
-            } else {
-                ArrayProblem::NoArray
-            });
-        }
-        let (text_at, text_bytes) = match bytes.get(6).ok_or_else(early)? {
-            1 => (10, usize::from(number16(bytes, 8).ok_or_else(early)?)),
-            _ => {
-                let low = number16(bytes, 8).ok_or_else(early)?;
-                let high = number16(bytes, 10).ok_or_else(early)?;
-                (12, usize::from(low) | usize::from(high) << 16)
-            }
-        };
-        let text = bytes.get(text_at..text_at + text_bytes).ok_or_else(early)?;
-        let text = String::from_utf8_lossy(text);
-        let item_bytes = match field(&text, "descr").map(|d| d.trim_matches(['\'', '"'])) {
-            Some("<f4") => 4,
-            Some("<f8") => 8,
-            other => return Err(ArrayProblem::Type(other.map(str::to_owned))),
-        };
-        if field(&text, "fortran_order").is_none_or(|f| f != "False") {
-            return Err(ArrayProblem::ColumnByColumn);
-        }
-        let after = text.split_once("'shape':").map(|(_, rest)| rest);
-        let inside = after.and_then(|rest| rest.split_once('(')?.1.split_once(')'));
-        let sides: Vec<u64> = inside
-            .map(|(sides, _)| {
-                sides
-                    .split(',')
-                    .filter_map(|s| s.trim().parse().ok())
-                    .collect()
-            })
-            .unwrap_or_default();
-        let &[height, width] = sides.as_slice() else {
-            return Err(ArrayProblem::Dimensions(sides.len()));
-        };
-        Ok(Self {
-            width,
-            height,
-            item_bytes,
-            begin: text_at + text_bytes,
-        })
+/// Height, width and bytes of a number of the arrays that are depth.
+fn layout(header: &NpyHeader) -> Result<[u64; 3], ArrayProblem> {
+    let item_bytes = match header.descr.as_deref() {
+        Some("<f4") => 4,
+        Some("<f8") => 8,
+        other => return Err(ArrayProblem::Type(other.map(str::to_owned))),
+    };
+    if header.fortran_order != Some(false) {
+        return Err(ArrayProblem::ColumnByColumn);
     }
-}
-
-fn number16(bytes: &[u8], at: usize) -> Option<u16> {
-    Some(u16::from_le_bytes([*bytes.get(at)?, *bytes.get(at + 1)?]))
-}
-
-/// The value of a key in the header's Python dictionary, up to the next comma.
-fn field<'a>(text: &'a str, key: &str) -> Option<&'a str> {
-    let (_, after) = text.split_once(&format!("'{key}':"))?;
-    Some(after.split([',', '}']).next()?.trim())
+    match header.shape.as_slice() {
+        &[height, width] => Ok([height, width, item_bytes]),
+        other => Err(ArrayProblem::Dimensions(other.len())),
+    }
 }
 
 #[cfg(test)]
@@ -239,6 +191,21 @@ mod tests {
             content.extend(bytes);
             std::fs::write(&path, content).unwrap();
             prop_assert!(DepthFile::read(&path).is_err());
+        }
+    }
+
+    /// What stands behind the numbers is not read, of an array so small that it came with the header, too.
+    #[test]
+    fn bytes_behind_an_array_are_left() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a_depth.npy");
+        for (side, more) in [(1, 1), (1, 9000), (100, 7)] {
+            ndarray_npy::write_npy(&path, &ndarray::Array2::<f32>::ones((side, side))).unwrap();
+            let whole = DepthFile::read(&path).unwrap();
+            let mut bytes = std::fs::read(&path).unwrap();
+            bytes.resize(bytes.len() + more, 7);
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(DepthFile::read(&path).unwrap(), whole);
         }
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,6 +11,7 @@ from os import PathLike
 from typing import Any
 
 import ray
+from ray.exceptions import RayError
 
 import deepfusion
 
@@ -27,8 +29,9 @@ def doctor(
     """What `deepfusion doctor` finds in each recording: `recording`, `drives`, `frames`, `errors`, `warnings`, `findings` (each one's
     message), `report` (the whole JSON) and `failed` (why it could not be looked at, else None), in the order given.
 
-    Recordings are of any known layout; those of other file systems are fetched by the machine that looks at them. At most `workers`
-    are looked at together (default: one a core of the cluster).
+    Recordings are of any known layout. Those of other file systems are fetched by the machine that looks at them, with the small files beside
+    them that belong to them: a KITTI date's `calib_*.txt` and `dataset.toml`, `drive.toml` of `drive.mp4`, `calibration.yaml`. What
+    `dataset.toml` names elsewhere is not: give the folder then. At most `workers` are looked at together (default: one a core of the cluster).
     """
     return _each(_doctor, recordings, workers, storage_options)
 
@@ -104,11 +107,17 @@ _EMPTY: dict[Callable[[str], Row], Row] = {
 
 
 def _look(look: Callable[[str], Row], url: str, options: dict[str, Any]) -> Row:
+    # One core, as the task asks for. Read by the pool of threads when it is first used, that is below.
+    os.environ["RAYON_NUM_THREADS"] = "1"
     try:
-        with Sources(options).local_tree(url) as path:
+        with Sources(options).local_recording(url) as path:
             return {"recording": url, **look(path), "failed": None}
-    except (deepfusion.DeepFusionError, OSError) as error:
-        return {"recording": url, **_EMPTY[look], "failed": str(error)}
+    except Exception as error:  # Each file system has errors of its own; the other recordings are not to suffer by them.
+        return _failed(look, url, error)
+
+
+def _failed(look: Callable[[str], Row], url: str, error: Exception) -> Row:
+    return {"recording": url, **_EMPTY[look], "failed": str(error) or type(error).__name__}
 
 
 def _each(
@@ -129,7 +138,11 @@ def _each(
     def ended() -> Iterator[None]:
         done, _ = ray.wait(list(running))
         for one in done:
-            rows[running.pop(one)] = ray.get(one)
+            i = running.pop(one)
+            try:
+                rows[i] = ray.get(one)
+            except RayError as error:  # Its process died each time.
+                rows[i] = _failed(look, given[i], error)
             yield
 
     most = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))

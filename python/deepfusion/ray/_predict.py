@@ -23,7 +23,7 @@ from ray.util import metrics
 import deepfusion
 
 from ._devices import of_workers
-from ._storage import Folder, Sources, images, urls, weights_mark
+from ._storage import Folder, Sources, images, network, urls, weights_mark
 
 if TYPE_CHECKING:
     from deepfusion._native import _PostProcess as PostProcess
@@ -108,11 +108,17 @@ class _Worker:
         self.made_with = job.made_with()
         self.sources = Sources(job.options)
         self.folder = Folder(job.output, job.options)
+        self.refused: deepfusion.DeepFusionError | None = None
         with ExitStack() as stack:
             model = job.model
             if "://" in model:
                 model = stack.enter_context(self.sources.local_tree(model))
-            self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set, device=job.device)
+            try:
+                self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set, device=job.device)
+            except deepfusion.DeepFusionError as error:
+                # Raised here it would end the job as the death of a worker: the caller is to get the error itself.
+                self.refused = error
+                return
         # What "auto" came to on this machine. A GPU's last digits are its own.
         opened = self.model.device.partition(":")[0]
         if job.gpus and opened == "cpu":
@@ -124,6 +130,9 @@ class _Worker:
 
     def __call__(self, batch: dict[str, np.ndarray]) -> dict[str, Any]:
         rows = list(zip(map(str, batch["image"]), map(str, batch["name"])))
+        if self.refused is not None:
+            why = json.dumps({"message": str(self.refused), "hint": self.refused.hint})
+            return {"image": [url for url, _ in rows], "outcome": ["refused"] * len(rows), "why": [why] * len(rows)}
         outcomes: dict[int, tuple[str, str]] = {}
         todo: list[tuple[int, dict[str, Any]]] = []
         for i, (url, name) in enumerate(rows):
@@ -201,6 +210,9 @@ class _Worker:
         """Writes the outputs, then the sidecar, which is the mark of the image's being done."""
         depth = prediction.depth
         outputs = {f"{name}{_ENDINGS[kind]}": _encoded(kind, prediction) for kind in self.job.save}
+        if self.job.overwrite:
+            # A sidecar of before would vouch for the new depth, where the job ends before its own is written.
+            self.folder.remove(f"{name}.json")
         for file, data in outputs.items():
             self.folder.write(file, data)
         known = depth[depth > 0]
@@ -250,6 +262,25 @@ def _depth_png(depth: np.ndarray) -> bytes:
     return file.getvalue()
 
 
+def _check(model: str, precision: str, data_set: str | None, save: Sequence[str], post_process: PostProcess | None) -> None:
+    """Raises what every worker would: a wrong name, a run without weights. This machine may lack their GPU, and their processors' precision."""
+    opened = deepfusion.load(model, data_set=data_set)
+    if precision == "int8":
+        # Whether it was calibrated is seen where the processor can.
+        try:
+            deepfusion.load(model, precision=precision, data_set=data_set)
+        except deepfusion.DeepFusionError as error:
+            if "needs a processor" not in str(error):
+                raise
+    grey = np.full((64, 64, 3), 128, np.uint8)
+    unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
+    if post_process is not None:
+        # A way of looking that the network cannot take.
+        opened.predict(grey, post_process=post_process)
+    if unsaid and opened.predict(grey).sigma is None:
+        raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
+
+
 def predict(
     paths: str | PathLike[str] | Sequence[str | PathLike[str]],
     model: str | PathLike[str] = "street",
@@ -276,7 +307,8 @@ def predict(
     of one camera: `intrinsics` are fx, fy, cx, cy in its pixels; without them each file's EXIF is asked, then the lens of the
     training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
     (`NAME_depth.npy`, f32 metres), "sigma" and "confidence" (`NAME_sigma.npy`, `NAME_confidence.npy`, of a network that says how sure it
-    is). `post_process` is that of `Model.predict`.
+    is). `post_process` is that of `Model.predict`, `precision` that of `deepfusion.load`: the workers' processors must have it, this
+    machine's may lack it.
 
     Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads, and with
     `gpus_per_worker` a GPU, or a share of one (0.5: two processes on each). It then computes there: `device` is "auto" by default, or the
@@ -300,20 +332,12 @@ def predict(
         raise ValueError(f"device: each worker is given a GPU of its own and sees that one alone, found {device}")
     if precision != "f32" and (gpus_per_worker or device not in ("cpu", "auto")):
         raise ValueError(f"precision: a GPU computes in f32, found {precision}")
+    if precision not in ("f32", "bf16", "int8"):
+        raise ValueError(f'precision: expected "f32", "bf16" or "int8", found {precision!r}')
     options = dict(storage_options or {})
-    model = os.fspath(model)
-    if "://" not in model and os.path.exists(model):
-        model = os.path.abspath(model)
+    model = network(model)
     if "://" not in model:
-        # Here rather than in each worker: a wrong name or a run without weights is one error, at once. This machine may have no GPU.
-        network = deepfusion.load(model, precision=precision, data_set=data_set)
-        grey = np.full((64, 64, 3), 128, np.uint8)
-        unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
-        if post_process is not None:
-            # Raised here, once: a way of looking that the network cannot take.
-            network.predict(grey, post_process=post_process)
-        if unsaid and network.predict(grey).sigma is None:
-            raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
+        _check(model, precision, data_set, save, post_process)
     camera = None
     if intrinsics is not None:
         fx, fy, cx, cy = map(float, intrinsics)
@@ -358,10 +382,18 @@ def predict(
     )
     counts = {"done": 0, "kept": 0, "failed": 0}
     failed = []
+    refused = None
     for row in outcomes.iter_rows():
+        if row["outcome"] == "refused":
+            refused = json.loads(row["why"])
+            break
         counts[row["outcome"]] += 1
         if row["outcome"] == "failed":
             failed.append((row["image"], row["why"]))
             _LOG.warning("%s: %s", row["image"], row["why"])
+    if refused is not None:
+        error = deepfusion.DeepFusionError(refused["message"])
+        error.hint = refused["hint"]
+        raise error
     seconds = time.monotonic() - begun
     return PredictSummary(len(named), counts["done"], counts["kept"], sorted(failed), seconds)

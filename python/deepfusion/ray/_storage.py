@@ -7,16 +7,26 @@ import tempfile
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from fnmatch import fnmatch
 from os import PathLike
-from pathlib import Path, PurePosixPath
+from pathlib import PurePath, PurePosixPath
 from typing import Any
 
 import fsspec
+
+import deepfusion
 
 # What is put there is there whole or not at all; a rename would be a copy.
 _OBJECT_STORES = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "memory"}
 
 _IMAGES = {".png", ".jpg", ".jpeg"}
+
+# What a recording's reader looks for in the folder above it, or beside a video or a bag.
+_BESIDE = ["calib_*.txt", "dataset.toml", "bag.toml", "speed.csv", "imu.csv", "course.csv", "frames.csv", "timestamps.txt", "times.txt",
+           "calibration.*", "camera.y*ml", "camchain.y*ml", "intrinsics.txt", "camera-intrinsics.txt"]  # fmt: skip
+
+# Logs and settings are smaller, other recordings mostly larger.
+_MOST_BESIDE = 64 << 20
 
 
 def is_local(fs: Any) -> bool:
@@ -52,6 +62,13 @@ class Folder:
             return self.fs.info(self.path(name))["size"]
         except FileNotFoundError:
             return None
+
+    def remove(self, name: str) -> None:
+        """Removes the file, if it is there."""
+        try:
+            self.fs.rm_file(self.path(name))
+        except FileNotFoundError:
+            pass
 
     def write(self, name: str, data: bytes) -> None:
         """Writes it so that a reader, or the next run after a power cut, finds the whole file or none."""
@@ -102,15 +119,15 @@ class Sources:
         with tempfile.TemporaryDirectory(prefix="deepfusion-") as folder:
             paths: list[str | Exception] = []
             for i, url in enumerate(urls):
-                fs, path = fsspec.core.url_to_fs(url, **self.options)
-                if is_local(fs):
-                    paths.append(path)
-                    continue
-                here = os.path.join(folder, f"{i}{PurePosixPath(path).suffix}")
                 try:
+                    fs, path = fsspec.core.url_to_fs(url, **self.options)
+                    if is_local(fs):
+                        paths.append(path)
+                        continue
+                    here = os.path.join(folder, f"{i}{PurePosixPath(path).suffix}")
                     fs.get_file(path, here)
                     paths.append(here)
-                except OSError as error:
+                except Exception as error:  # Each file system has errors of its own; the other images are not to suffer by them.
                     paths.append(error)
             yield paths
 
@@ -126,6 +143,42 @@ class Sources:
             fs.get(path, here, recursive=True)
             yield here
 
+    @contextmanager
+    def local_recording(self, url: str) -> Iterator[str]:
+        """As `local_tree`, with what belongs to a recording and lies beside it: files of its name without the ending (`drive.toml` of
+        `drive.mp4`, or of the folder `drive`), and those of the names that are looked for there (a KITTI date's `calib_*.txt`, `dataset.toml`,
+        `calibration.yaml` …), each below 64 MB. Other files that `dataset.toml` names are not fetched: give the folder then."""
+        fs, path = fsspec.core.url_to_fs(url, **self.options)
+        if is_local(fs):
+            yield path
+            return
+        path = path.rstrip("/")
+        above, _, name = path.rpartition("/")
+        with tempfile.TemporaryDirectory(prefix="deepfusion-") as folder:
+            # Below a folder of the same name: a KITTI drive's is the date.
+            parent = os.path.join(folder, PurePosixPath(above).name)
+            os.makedirs(parent, exist_ok=True)
+            fs.get(path, os.path.join(parent, name), recursive=True)
+            # A list of buckets is no folder.
+            for one in _files(fs, above) if above.strip("/") else []:
+                beside = PurePosixPath(one["name"])
+                belongs = beside.stem in (name, PurePosixPath(name).stem) or any(fnmatch(beside.name, shape) for shape in _BESIDE)
+                if belongs and beside.name != name and (one["size"] or 0) < _MOST_BESIDE:
+                    fs.get_file(one["name"], os.path.join(parent, beside.name))
+            yield os.path.join(parent, name)
+
+
+def _files(fs: Any, folder: str) -> list[dict[str, Any]]:
+    """The files of a folder; none where it may not be listed, as it need not be for one that is known by name."""
+    if not _protocols(fs).isdisjoint({"http", "https"}):
+        return []
+    # A listing may be of an earlier look, before somebody mended the recording.
+    fs.invalidate_cache()
+    try:
+        return [one for one in fs.ls(folder, detail=True) if one["type"] == "file"]
+    except (FileNotFoundError, NotImplementedError, PermissionError):
+        return []
+
 
 def urls(given: str | PathLike[str] | Sequence[str | PathLike[str]]) -> list[str]:
     """Paths become absolute: a worker stands elsewhere."""
@@ -136,6 +189,29 @@ def urls(given: str | PathLike[str] | Sequence[str | PathLike[str]]) -> list[str
         one = os.fspath(one)
         found.append(one if "://" in one else os.path.abspath(one))
     return found
+
+
+def network(given: str | PathLike[str]) -> str:
+    """A network as every worker finds it: the name of an embedded one, a URL, else an absolute path. A folder with an embedded one's name is
+    meant where it holds a run, or what is left of one, as `deepfusion.load` has it."""
+    given = os.fspath(given)
+    if given.rstrip("/") in deepfusion.networks() and not _holds_a_run(given):
+        return given.rstrip("/")
+    return urls(given)[0]
+
+
+def start(init: str | PathLike[str] | None) -> str | None:
+    """What training starts from, as every worker finds it."""
+    if init is None or os.fspath(init) == "none":
+        return None if init is None else "none"
+    return network(init)
+
+
+def _holds_a_run(folder: str) -> bool:
+    try:
+        return any(name == "config.toml" or PurePath(name).suffix == ".safetensors" for name in os.listdir(folder))
+    except OSError:
+        return False
 
 
 def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -174,10 +250,11 @@ def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, 
 
 
 def weights_mark(model: str, options: Mapping[str, Any]) -> str | None:
-    """SHA-256 over a run's configuration and weights; None of an embedded network, which the program's version tells."""
+    """SHA-256 over the configuration and weights of a run (`network` says which); None of an embedded network, which the program's
+    version tells."""
     import hashlib
 
-    if "://" not in model and not Path(model).exists():
+    if model in deepfusion.networks():
         return None
     fs, path = fsspec.core.url_to_fs(model, **options)
     files = [one for one in sorted(fs.find(path)) if one.endswith((".toml", ".safetensors"))] if fs.isdir(path) else [path]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
+import shutil
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -13,10 +15,21 @@ from typing import Any
 import deepfusion
 
 from ._devices import numbered, of_workers
-from ._storage import urls
+from ._storage import start, urls
 
+_LAST, _BEST = "last.safetensors", "best.safetensors"
+"""A run's checkpoints."""
 _FIGURES = "ray-train.json"
 """What the run came to, in its folder."""
+
+_ASIDE = r"\.\d+-[0-9a-f]{16}\.partial"
+"""How the name of a file ends that was being written; it begins with a dot."""
+_BEGUN = re.compile(
+    rf"config\.toml|log\.csv|events\.out\.tfevents\..*\.deepfusion\..*|\.(config\.toml|log\.csv|(last|best)\.safetensors){_ASIDE}"
+)
+"""The files of a run before its first checkpoint."""
+_PANEL = re.compile(rf"\d+\.png|\.\d+\.png{_ASIDE}")
+"""Those of its folder `panels`."""
 
 
 def train(
@@ -37,8 +50,9 @@ def train(
     """Learns one network with several workers, each with `config`'s own `batch` and `accumulate`, as `deepfusion.distributed` has it.
 
     Needs torch, whose process group adds the gradients: `backend` is "gloo", or "nccl" between GPUs, with a torch that has CUDA. `out` is
-    a folder that all machines see; a run that is there goes on with its own configuration. Where a worker dies Ray starts all of them
-    again, at most `restarts` times, and they go on from the last checkpoint (`checkpoint_minutes`, `validate_every`).
+    a folder that all machines see, new or empty; a run that is there goes on with its own configuration, or begins again where it has no
+    checkpoint yet. Where a worker dies Ray starts all of them again, at most `restarts` times, and they go on from the last checkpoint
+    (`checkpoint_minutes`, `validate_every`).
 
     With `use_gpu` each worker is given a GPU and learns on it: `device` is "auto" by default, or the backend ("cuda", "vulkan"), without a
     number: Ray says which of a machine's GPUs is whose. CUDA sees those alone that Ray gives; the others count all of a machine's, so that two
@@ -57,12 +71,15 @@ def train(
     from ray.train.torch import TorchConfig, TorchTrainer
 
     folder = Path(out).absolute()
+    # Here rather than in the workers: it is one error, at once.
+    if not (folder / _LAST).exists():
+        _check_begun(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     arguments = {
         "config": config if isinstance(config, str) else dict(config),
         "data": urls(data),
         "out": str(folder),
-        "init": init if init is None or str(init) in {*deepfusion.networks(), "none"} else urls(init)[0],
+        "init": start(init),
         "validation": None if validation is None else urls(validation),
         "camera": camera,
         "threads": cpus_per_worker,
@@ -104,20 +121,50 @@ def _learn(arguments: dict[str, Any]) -> None:
     del arguments["backend"]
     out = Path(arguments.pop("out"))
     leads = ray_train.get_context().get_world_rank() == 0
-    if (out / "last.safetensors").exists():
+    if (out / _LAST).exists():
         run = deepfusion.train({}, out=out, resume=True, workers=Torch(), device=device)
     else:
         config, data = arguments.pop("config"), arguments.pop("data")
-        # Of a run that died before its first checkpoint nothing is lost.
-        if leads and (out / "config.toml").exists():
-            (out / "config.toml").unlink()
-            (out / "log.csv").unlink(missing_ok=True)
+        if leads:
+            # Of a run that died before its first checkpoint nothing is lost. The best is written before the last: where it is there, it
+            # is of this job, which began without.
+            _check_begun(out, _BEST)
+            for file in list(out.iterdir()) if out.exists() else []:
+                if file.is_dir():
+                    shutil.rmtree(file)
+                else:
+                    file.unlink()
         run = deepfusion.train(config, data, out=out, workers=Torch(), device=device, **arguments)
     if leads:
         # Ray keeps metrics only beside checkpoints of its own.
         part = out / f"{_FIGURES}.part"
         part.write_text(json.dumps(dataclasses.asdict(run) | {"path": str(run.path)}))
         part.replace(out / _FIGURES)
+
+
+def _check_begun(out: Path, *more: str) -> None:
+    """That a folder without a last checkpoint holds nothing, or what a run leaves that died before its first one, and `more`."""
+    if not out.exists():
+        return
+    for file in out.iterdir():
+        if file.name == "panels" and file.is_dir():
+            strange = next((one for one in file.iterdir() if not _PANEL.fullmatch(one.name)), None)
+        else:
+            strange = None if file.name in more or _is_begun(file) else file
+        if strange is not None:
+            error = deepfusion.DeepFusionError(f"{out}: is not empty, and {strange.relative_to(out)} is not of a run that has just begun")
+            error.hint = "choose another folder, or empty this one first"
+            raise error
+
+
+def _is_begun(file: Path) -> bool:
+    """Whether a file is one that a run writes before its first checkpoint, and not somebody's own of the name."""
+    if not _BEGUN.fullmatch(file.name):
+        return False
+    if file.name == "config.toml":
+        # Nobody sets what a run finds out.
+        return "[findings" in file.read_text(errors="replace")
+    return file.name != "log.csv" or file.read_text(errors="replace").startswith("step,split,")
 
 
 def _own_gpu() -> int:

@@ -12,8 +12,9 @@ from typing import Any
 from ray import tune as ray_tune
 
 import deepfusion
+from deepfusion._train import _flat
 
-from ._storage import urls
+from ._storage import start, urls
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Trial:
     """A configuration that was tried."""
 
     settings: dict[str, Any]
-    """What was set, keys as in the configuration."""
+    """What was set over `config`, keys as in the configuration with dots between tables."""
     path: Path | None
     """The run's folder, on the machine that trained it."""
     step: int | None
@@ -32,6 +33,8 @@ class Trial:
     """What was reported last: `step`, `selection`, `scale_ratio` where something says it, and the held-out losses by their names in log.csv."""
     error: str | None
     """Why it failed; None where it did not."""
+    row: str | None = None
+    """The row that it is of; None but for `ablate`. Its seed is among the settings."""
 
 
 def tune(
@@ -61,7 +64,7 @@ def tune(
     folder = Path(out).absolute()
 
     def settings(drawn: Mapping[str, Any]) -> dict[str, Any]:
-        return dict(drawn)
+        return merged(drawn)
 
     return _run(settings, space, fixed, data, folder, trials, init, cpus_per_trial, metric, mode, scheduler, search)
 
@@ -81,16 +84,40 @@ def ablate(
     `{"all": {}, "no smoothness": {"loss.smoothness": 0.0}}`; otherwise as `tune`.
     """
     fixed = {"preset": config} if isinstance(config, str) else dict(config)
-    named = {name: dict(row) for name, row in rows.items()}
+    named = {name: merged(row) for name, row in rows.items()}
 
     def settings(drawn: Mapping[str, Any]) -> dict[str, Any]:
-        return {**named[drawn["row"]], "seed": drawn["seed"]}
+        return merged(named[drawn["row"]], {"seed": drawn["seed"]})
 
     space = {"row": ray_tune.grid_search(list(named)), "seed": ray_tune.grid_search(list(seeds))}
     folder = Path(out).absolute()
     tried = _run(settings, space, fixed, urls(data), folder, 1, init, cpus_per_trial, "selection", "min", None, None)
     by_seed = sorted(tried, key=lambda trial: list(seeds).index(trial.settings["seed"]))
-    return {name: [trial for trial in by_seed if trial.settings["row"] == name] for name in named}
+    return {name: [trial for trial in by_seed if trial.row == name] for name in named}
+
+
+def merged(*tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings over settings, each by its key with dots between tables: a table replaces those of its keys alone that it has."""
+    return {key: value for table in tables for key, value in _flat(table)}
+
+
+def lower(best: float | None, value: float) -> float | None:
+    """The lower of two; what is not finite is none, as NaN would stay for good."""
+    if not math.isfinite(value):
+        return best
+    return value if best is None else min(best, value)
+
+
+def best_first(trials: Sequence[Trial], metric: str, mode: str) -> list[Trial]:
+    """By what they reported last; those last that reported nothing, or nothing finite."""
+
+    def key(trial: Trial) -> tuple[bool, float]:
+        value = trial.metrics.get(metric, math.nan)
+        if not math.isfinite(value):
+            return True, 0.0
+        return False, value if mode == "min" else -value
+
+    return sorted(trials, key=key)
 
 
 def _run(
@@ -117,17 +144,17 @@ def _run(
         def report(event: deepfusion.TrainEvent) -> None:
             nonlocal best
             if event["event"] == "validated":
-                value = event["selection"]
-                best = value if best is None else min(best, value)
-                figures = {"step": event["step"], "selection": best, "path": str(out)}
+                best = lower(best, event["selection"])
+                # A scheduler wants a number from the first report on.
+                worst = math.inf if mode == "min" else -math.inf
+                figures = {"step": event["step"], "selection": worst if best is None else best, "path": str(out)}
                 if math.isfinite(event["scale_ratio"]):
                     figures["scale_ratio"] = event["scale_ratio"]
                 ray_tune.report(figures | dict(event["losses"] or {}))
 
-        deepfusion.train({**fixed, **settings(drawn)}, data, report, out=out, init=init)
+        deepfusion.train(merged(fixed, settings(drawn)), data, report, out=out, init=init)
 
-    if init is not None and str(init) not in {*deepfusion.networks(), "none"}:
-        init = urls(init)[0]
+    init = start(init)
     folder.mkdir(parents=True, exist_ok=True)
     tuner = ray_tune.Tuner(
         ray_tune.with_resources(trial, {"cpu": cpus}),
@@ -141,19 +168,20 @@ def _run(
     for result in tuner.fit():
         metrics = result.metrics or {}
         ours = {key: value for key, value in metrics.items() if isinstance(value, (int, float)) and key not in _RAYS_OWN}
+        drawn = result.config or {}
+        selection = metrics.get("selection")
         tried.append(
             Trial(
-                settings=dict(result.config or {}),
+                settings=settings(drawn),
                 path=Path(metrics["path"]) if "path" in metrics else None,
                 step=metrics.get("step"),
-                selection=metrics.get("selection"),
+                selection=None if selection is None else lower(None, selection),
                 metrics=ours,
                 error=None if result.error is None else str(result.error),
+                row=drawn.get("row"),
             )
         )
-    worst = float("inf")
-    sign = 1 if mode == "min" else -1
-    return sorted(tried, key=lambda one: sign * one.metrics[metric] if metric in one.metrics else worst)
+    return best_first(tried, metric, mode)
 
 
 # What Ray Tune adds to each report.

@@ -75,7 +75,7 @@ pub(crate) struct AblateArgs {
     /// Parts that no row has.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = SHARED_TERMS, conflicts_with = "resume")]
     pub without: Vec<String>,
-    /// Whose motion the views are synthesised with [default: posenet; with --config the file's].
+    /// The pose used for warping [default: posenet; with --config the file's].
     #[arg(long, value_parser = names::view_motion(), value_name = "MOTION", conflicts_with = "resume")]
     pub view_motion: Option<ViewMotion>,
     /// Any key of the configuration, as `loss.smoothness=0.01` (`deepfusion config show` prints them all); may be repeated.

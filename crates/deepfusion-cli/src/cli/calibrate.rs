@@ -13,7 +13,7 @@ use super::values::positive;
     degrees to each side, and in every corner of the image; 15 to 30 pictures, or a video of half a minute. Of a video the \
     sharpest frames with different poses are taken. The file is ROS's camera_info YAML: give it with --calib, or put it \
     beside a drive's images as calibration.yaml.\n\n\
-    Examples:\n  deepfusion calibrate board.mp4 --board 9x6 --square 0.025 --out camera.yaml\n  \
+    Examples:\n  deepfusion calibrate board.mp4 --board 9x6\n  \
     deepfusion calibrate pictures --board 9x6 --square 0.025 --fisheye --out camera.yaml --report camera.html"
 )]
 pub(crate) struct CalibrateArgs {
@@ -23,8 +23,8 @@ pub(crate) struct CalibrateArgs {
     /// Inner corners of the board, where four squares meet: a board of 10x7 squares has 9x6.
     #[arg(long, value_name = "WxH")]
     pub board: Size,
-    /// Side of a square in metres. Distances of the boards depend on it, the camera does not.
-    #[arg(long, value_name = "M", value_parser = positive)]
+    /// Side of a square in metres. Distances of the boards depend on it, the camera does not; without it they are counted in squares.
+    #[arg(long, value_name = "M", value_parser = positive, default_value = "1", hide_default_value = true)]
     pub square: f64,
     /// A fisheye lens after Kannala and Brandt (k1 to k4), instead of Brown and Conrady's (k1, k2, p1, p2, k3).
     #[arg(long)]
@@ -33,7 +33,7 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u16).range(5..=200))]
     pub frames: u16,
     /// The calibration file to write.
-    #[arg(long, value_name = "FILE.yaml", value_parser = yaml)]
+    #[arg(long, value_name = "FILE.yaml", value_parser = yaml, default_value = "camera.yaml")]
     pub out: PathBuf,
     /// Replace the file if it is there.
     #[arg(long)]

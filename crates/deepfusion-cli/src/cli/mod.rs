@@ -39,7 +39,7 @@ pub(crate) use adapt::{AdaptArgs, SimulatedView};
 pub(crate) use calibrate::CalibrateArgs;
 pub(crate) use compare::{CompareArgs, TableFormat};
 pub(crate) use completions::{CompletionsArgs, CompletionsKind};
-pub(crate) use config::{ConfigCommand, ShowArgs};
+pub(crate) use config::{ConfigCommand, ConfigSource, ShowArgs};
 pub(crate) use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
 pub(crate) use doctor::DoctorArgs;
 pub(crate) use engine::EngineArgs;
@@ -92,7 +92,7 @@ pub(crate) enum Command {
     /// Train on drives, without depth labels.
     #[cfg(feature = "train")]
     Train(Box<TrainArgs>),
-    /// Learn on new drives from a network that is there; kept only if nothing that can be checked gets worse.
+    /// Fine-tune an existing network on new drives; the result is kept only if no check gets worse.
     #[cfg(feature = "train")]
     Adapt(Box<AdaptArgs>),
     /// What can be configured.
@@ -184,7 +184,7 @@ pub(crate) struct SimulateArgs {
     /// Kind of place.
     #[arg(long, value_parser = names::scene(), default_value = "urban")]
     pub scene: Scene,
-    /// Number of cars that move; with --varied those of them alone that nothing on the street stops.
+    /// Number of moving cars; with --varied, cars whose way is blocked are left out.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub moving_cars: usize,
     /// Number of people who ride bicycles, walk along pavements and cross the road.

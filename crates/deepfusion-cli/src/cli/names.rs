@@ -91,7 +91,7 @@ pub(super) fn learn() -> impl TypedValueParser<Value = Learn> {
     )
 }
 
-/// Whose motion the views are synthesised with.
+/// The pose used for warping.
 pub(super) fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
     one_of(
         ViewMotion::name,
@@ -292,7 +292,7 @@ pub(super) fn depth_output() -> impl TypedValueParser<Value = DepthOutput> {
             ),
             (
                 DepthOutput::Image,
-                "The image itself as JPEG: `view` shows it where it is no file of its own",
+                "The image as JPEG, so that `view` can show frames of videos and bags",
             ),
             (
                 DepthOutput::SideBySide,

@@ -36,7 +36,7 @@ pub(crate) struct PredictArgs {
     /// say how sure they are.
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     pub max_sigma: Option<f64>,
-    /// Do one part of the work: the I-th of N (counted from 1) of the images in the order of their paths. Started
+    /// Do one shard of the work: the I-th of N (counted from 1) of the images in the order of their paths. Started
     /// with the same inputs and options, N such runs, at once and on any machines, do every image once.
     #[arg(
         long,

@@ -75,9 +75,9 @@ pub(crate) struct TrainArgs {
     /// Validate on the frames of this split file only, of --val-data, or of --data where there is none.
     #[arg(long, value_name = "FILE")]
     pub val_split: Option<PathBuf>,
-    /// Learn the camera of recordings that do not say theirs, the last resort: one focal length for all of them, from a field of view
-    /// of 60 degrees on (another one: --set assumed_camera.hfov_deg=90), the principal point in the middle. It takes drives with
-    /// bends, and their yaw rate.
+    /// Last resort for recordings without intrinsics: learn one focal length for all of them, beginning at a field of view of 60
+    /// degrees (another one: --set assumed_camera.hfov_deg=90), with the principal point in the middle. Needs drives with bends
+    /// and a yaw rate.
     #[arg(long, value_name = "learn", value_parser = learn_camera)]
     pub intrinsics: Option<LearnCamera>,
     /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
@@ -97,7 +97,7 @@ pub(crate) struct TrainArgs {
     /// [default: the embedded network of the preset's layers, if any; with --config what the file says].
     #[arg(long, value_name = "WEIGHTS")]
     pub init: Option<PathBuf>,
-    /// Whose motion the views are synthesised with [default: the preset's].
+    /// The pose used for warping [default: the preset's].
     #[arg(long, value_parser = names::view_motion(), value_name = "MOTION")]
     pub view_motion: Option<ViewMotion>,
     /// Parts of the network and terms of the loss to switch on.

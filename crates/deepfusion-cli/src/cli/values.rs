@@ -5,6 +5,7 @@ use std::str::FromStr;
 use deepfusion_eval::Scaling;
 use deepfusion_geometry::HFOV_DEG;
 pub(crate) use deepfusion_jobs::bulk::Shard;
+use deepfusion_model::InputSize;
 
 /// Width and height in pixels, written `640x192`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,6 +14,16 @@ pub(crate) struct Size {
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
+}
+
+/// As a network's input.
+impl From<Size> for InputSize {
+    fn from(size: Size) -> Self {
+        Self {
+            width: size.width as usize,
+            height: size.height as usize,
+        }
+    }
 }
 
 impl FromStr for Size {

@@ -78,7 +78,7 @@ fn request(args: &AblateArgs) -> Result<PlanRequest> {
         with: args.with.clone(),
         without: args.without.clone(),
         view_motion: args.view_motion,
-        size: args.size.map(train::input_size),
+        size: args.size.map(Into::into),
         batch: args.batch,
         assignments: args.set.clone(),
         data: args.data.clone(),

@@ -1,12 +1,15 @@
 //! `deepfusion config`: what can be configured.
 
-use crate::cli::ShowArgs;
+use crate::cli::{ConfigSource, ShowArgs};
 use crate::failure::Result;
 use crate::output;
 
 /// `deepfusion config show`.
 pub(super) fn show(args: &ShowArgs) -> Result<()> {
-    let mut config = args.preset.config_on(args.device.compute());
+    let mut config = match &args.of {
+        ConfigSource::Preset(preset) => preset.config_on(args.device.compute()),
+        ConfigSource::Run(run) => run.read_settings()?,
+    };
     for assignment in &args.set {
         config.set(assignment)?;
     }

@@ -1,5 +1,4 @@
 use deepfusion_jobs::export::{Check, export};
-use deepfusion_model::InputSize;
 use deepfusion_onnx::OPSET;
 use deepfusion_onnx::check::PICTURES;
 use serde::Serialize;
@@ -42,10 +41,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<()> {
         .into());
     }
     let network = model::chosen(args.model.as_deref())?.load(args.set.as_deref())?;
-    let size = args.size.map(|size| InputSize {
-        width: size.width as usize,
-        height: size.height as usize,
-    });
+    let size = args.size.map(Into::into);
     let exported = export(&network, size, args.check_with.as_deref(), out)?;
     if let Some(missing) = &exported.no_runtime {
         say(&format!("not checked with ONNX Runtime: {missing}"));

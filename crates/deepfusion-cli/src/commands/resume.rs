@@ -6,7 +6,6 @@ use deepfusion_jobs::training::resume::{self, MovedRecordings, ResumeRequest, Se
 use deepfusion_model::TrainConfig;
 
 use super::clocks;
-use super::train::input_size;
 use crate::cli::TrainArgs;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
@@ -64,7 +63,7 @@ fn request(args: &TrainArgs) -> Result<ResumeRequest> {
         steps: *steps,
         epochs: *epochs,
         preset: *preset,
-        size: size.map(input_size),
+        size: size.map(Into::into),
         batch: *batch,
         seed: *seed,
         learn: *learn,

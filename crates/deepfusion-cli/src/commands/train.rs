@@ -5,14 +5,14 @@ use deepfusion_jobs::training::{
     AskedRecordings, Pace, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
     leaves_turns_unused,
 };
-use deepfusion_model::{InputSize, RunFolder, TrainConfig};
+use deepfusion_model::{RunFolder, TrainConfig};
 use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 
 use super::recorder::Recorder;
 use super::recordings::open_samples;
 use super::{clocks, resume};
 use crate::allocator;
-use crate::cli::{Size, TrainArgs};
+use crate::cli::TrainArgs;
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{duration_text, say};
@@ -36,8 +36,11 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     })?;
     let mut trainer = match resumed {
         Some(folder) => {
-            folder.write_config(&config, &folder.read_findings()?)?;
-            Trainer::resume(config, folder, sets, &device)?
+            let settings = config.clone();
+            let trainer = Trainer::resume(config, folder.clone(), sets, &device)?;
+            // Only settings with which the run goes on.
+            folder.write_config(&settings, &folder.read_findings()?)?;
+            trainer
         }
         None => {
             // A file says what its run starts from, if anything.
@@ -168,7 +171,7 @@ fn request(args: &TrainArgs) -> Result<StartRequest> {
         compute: args.device.compute(),
         steps: args.steps,
         epochs: args.epochs,
-        size: args.size.map(input_size),
+        size: args.size.map(Into::into),
         batch: args.batch,
         seed: args.seed,
         learned_camera: args.intrinsics.is_some(),
@@ -178,14 +181,6 @@ fn request(args: &TrainArgs) -> Result<StartRequest> {
         assignments: args.set.clone(),
         recordings: asked_recordings(args),
     })
-}
-
-/// A network's size as it is asked for.
-pub(super) fn input_size(size: Size) -> InputSize {
-    InputSize {
-        width: size.width as usize,
-        height: size.height as usize,
-    }
 }
 
 /// The recordings that options ask for.

@@ -46,7 +46,8 @@ const THE_SYSTEMS: &str =
     "the system gave this reason: look at the disk or the network that the file is on";
 
 /// What to do about any other error that knows no remedy.
-const OURS_TO_MEND: &str = "where the message names no input of yours to mend, it is a fault of the program: please report it with the command";
+const OURS_TO_MEND: &str =
+    "if none of your inputs is at fault, this is a bug: please report it, with the command you ran";
 
 /// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
 pub(crate) const STOPPED: u8 = 130;

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
 /// frame's time), not the scanner's own. `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
-/// know: its `navstat` says that there was no fix. What is [simulated](Dataset::is_simulated) says so in the drive's `dataset.toml`, which goes
-/// with the drive wherever it is moved.
+/// know. The drive's `dataset.toml`, which goes with it wherever it is moved, says so where yaw or roll and pitch are not known, and where it
+/// is [simulated](Dataset::is_simulated). A frame without a time has an empty line, as in KITTI's own files.
 ///
 /// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
 /// is written to a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a conversion
@@ -85,19 +85,33 @@ fn write_date(
             done += frames;
             go_on(progress(done, total), done, total)
         })?;
-        if dataset.is_simulated() {
-            mark_simulated(&drive)?;
-        }
+        write_notes(dataset, &drive)?;
         names.push(name);
     }
     Ok(names)
 }
 
-/// Says of a drive that nobody drove it.
-fn mark_simulated(folder: &Path) -> Result<()> {
-    let text = format!("# Written by `data convert`, of a simulated recording.\n{SIMULATED}");
+/// Says of a drive what KITTI's own files cannot: that nobody drove it, and what of its oxts nobody measured.
+fn write_notes(dataset: &Dataset, folder: &Path) -> Result<()> {
+    let moves = dataset.track().is_some();
+    let notes = [
+        (dataset.is_simulated(), SIMULATED),
+        (moves && !dataset.yaw_known(), YAW_UNKNOWN),
+        (moves && dataset.tilt_unknown(), TILT_UNKNOWN),
+    ];
+    let notes = notes.iter().filter(|(holds, _)| *holds);
+    let notes: String = notes.map(|(_, note)| *note).collect();
+    if notes.is_empty() {
+        return Ok(());
+    }
+    let text =
+        format!("# Written by `data convert`: what KITTI's own files have no place for.\n{notes}");
     super::parts::write_text(&folder.join(FolderConfig::NAME), &text)
 }
+
+/// Zeros stand in the packets.
+const YAW_UNKNOWN: &str = "yaw_known = false\n";
+const TILT_UNKNOWN: &str = "tilt_known = false\n";
 
 /// Frames read and written together.
 const BATCH: usize = 8;
@@ -117,11 +131,12 @@ fn write_drive(
     let scans = part("velodyne_points")?;
     let has_motion = dataset.track().is_some();
     let oxts = has_motion.then(|| part("oxts")).transpose()?;
+    let numbers = Numbers::of(dataset);
     let frames: Vec<usize> = (0..dataset.frames().len()).collect();
     for batch in frames.chunks(BATCH) {
         batch.par_iter().try_for_each(|&index| {
             let frame = &dataset.frames()[index];
-            let name = format!("{:010}", frame.number);
+            let name = format!("{:010}", numbers.of_frames[index]);
             let image = dataset.load_image(index)?;
             save_png(&image, &images.join(format!("{name}.png")))?;
             if let Some(xyz) = points(dataset, index)? {
@@ -147,15 +162,8 @@ fn write_drive(
         })?;
         progress(batch.len())?;
     }
-    // A line for every number, as KITTI has it: numbers without a frame get the time between their neighbours'.
-    let last = dataset.frames().last().map_or(0, |f| f.number);
-    let mut text = String::new();
-    for number in 0..=last {
-        let time_s = dataset.time_of(number).or_else(|| between(dataset, number));
-        let ns = at_ns(dataset, time_s.unwrap_or_default(), moved_s);
-        let _ = writeln!(text, "{}", stamp(ns));
-    }
     if dataset.frames().iter().any(|f| f.time_s.is_some()) {
+        let text = numbers.times(dataset, moved_s);
         for name in ["image_02", "velodyne_points", "oxts"] {
             if name != "oxts" || has_motion {
                 super::parts::write_text(&folder.join(name).join("timestamps.txt"), &text)?;
@@ -165,14 +173,73 @@ fn write_drive(
     Ok(())
 }
 
-/// The time of a number that has no frame: straight between its neighbours'.
-fn between(dataset: &Dataset, number: u64) -> Option<f64> {
-    let frames = dataset.frames();
-    let after = frames.partition_point(|f| f.number < number);
-    let next = frames.get(after)?;
-    let before = frames.get(after.checked_sub(1)?)?;
-    let share = (number - before.number) as f64 / (next.number - before.number) as f64;
-    Some(before.time_s? + share * (next.time_s? - before.time_s?))
+/// The numbers by which a drive's files are named.
+struct Numbers {
+    of_frames: Vec<u64>,
+    /// Whether they are the recording's.
+    own: bool,
+}
+
+impl Numbers {
+    /// The recording's own. KITTI has a line of times for every number, so where these are dates, or leave out millions, the frames are
+    /// counted from 0 instead, one number left out between frames that were no neighbours.
+    fn of(dataset: &Dataset) -> Self {
+        let own: Vec<u64> = dataset.frames().iter().map(|f| f.number).collect();
+        let most = 1_000_000 + 100 * own.len() as u64;
+        if own.last().is_none_or(|last| *last <= most) {
+            return Self {
+                of_frames: own,
+                own: true,
+            };
+        }
+        let mut next = 0;
+        let gaps = own.windows(2).map(|pair| pair[1] - pair[0]);
+        let counted = gaps.map(|gap| {
+            next += gap.min(2);
+            next
+        });
+        Self {
+            of_frames: std::iter::once(0).chain(counted).collect(),
+            own: false,
+        }
+    }
+
+    /// A line for every number, as KITTI has it: numbers without a frame get the time between their neighbours', a frame without a time
+    /// an empty line.
+    fn times(&self, dataset: &Dataset, moved_s: i64) -> String {
+        let last = self.of_frames.last().copied().unwrap_or_default();
+        let mut text = String::new();
+        for number in 0..=last {
+            let time_s = match self.of_frames.binary_search(&number) {
+                Ok(frame) => dataset.frames()[frame].time_s,
+                Err(after) => {
+                    let own = if self.own {
+                        dataset.time_of(number)
+                    } else {
+                        None
+                    };
+                    own.or_else(|| self.between(dataset, number, after))
+                }
+            };
+            let line = time_s.map(|time_s| stamp(at_ns(dataset, time_s, moved_s)));
+            let _ = writeln!(text, "{}", line.unwrap_or_default());
+        }
+        text
+    }
+
+    /// The time of a number that has no frame, `after` the first with one behind it: straight between its neighbours'.
+    fn between(&self, dataset: &Dataset, number: u64, after: usize) -> Option<f64> {
+        let before = after.checked_sub(1)?;
+        let [from, to] = [before, after].map(|frame| {
+            Some((
+                *self.of_frames.get(frame)?,
+                dataset.frames().get(frame)?.time_s?,
+            ))
+        });
+        let ((from, from_s), (to, to_s)) = (from?, to?);
+        let share = (number - from) as f64 / (to - from) as f64;
+        Some(from_s + share * (to_s - from_s))
+    }
 }
 
 /// An OXTS packet that knows speed, turn, roll and pitch alone; at rest an accelerometer reads 9.81 upwards.

@@ -187,7 +187,9 @@ impl Dataset {
         self.warnings.retain(|warning| {
             !matches!(
                 warning,
-                DataWarning::Motion(MotionWarning::NoYawRate { .. })
+                DataWarning::Motion(
+                    MotionWarning::NoYawRate { .. } | MotionWarning::YawNotMeasured
+                )
             )
         });
         let images = self.frames().len();

@@ -34,7 +34,7 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
     for pose in world_from_vehicle {
         if rising
             .last()
-            .is_none_or(|last| pose.0 - last.0 >= LEAST_STEP_NS)
+            .is_none_or(|last| pose.0.saturating_sub(last.0) >= LEAST_STEP_NS)
         {
             rising.push(*pose);
         }

@@ -52,7 +52,11 @@ pub(crate) fn timed_images(
             .map(Some)
             .collect()
     } else if let Some(fps) = config.fps {
-        let numbers = numbers(&images, None);
+        // Names that are dates count no frames.
+        let numbers = match dates {
+            Some(_) => (0..images.len() as u64).collect(),
+            None => numbers(&images, None),
+        };
         let ns = |n: &u64| Some((*n as f64 / fps * 1e9).round() as i64);
         numbers.iter().map(ns).collect()
     } else if let Some((dates, unit)) = &dates {
@@ -129,6 +133,9 @@ fn numbers(images: &[PathBuf], times_ns: Option<&[i64]>) -> Vec<u64> {
     rising.unwrap_or_else(|| (0..images.len() as u64).collect())
 }
 
+/// Most numbers that a pause takes.
+const MOST_MISSING: f64 = 1e5;
+
 /// Numbers that leave out as many as frames are missing in a pause.
 pub(crate) fn numbers_by_time(times_ns: &[i64]) -> Vec<u64> {
     let steps: Vec<f64> = times_ns.windows(2).map(|w| seconds(w[1], w[0])).collect();
@@ -144,8 +151,8 @@ pub(crate) fn numbers_by_time(times_ns: &[i64]) -> Vec<u64> {
         } else {
             1.0
         };
-        // A break of years is a break.
-        next += frames.clamp(1.0, 1e9) as u64;
+        // A break of hours is a break: what goes through all numbers need not go through those of years.
+        next += frames.clamp(1.0, MOST_MISSING) as u64;
         numbers.push(next);
     }
     numbers

@@ -57,6 +57,21 @@ fn numbers_are_kept_and_need_a_rate() {
     assert_eq!(found.unwrap(), [(5, Some(3000 * MS)), (7, Some(3080 * MS))]);
 }
 
+/// `fps` beside EuRoC's names counts the frames: as numbers these names are years.
+#[test]
+fn a_rate_counts_frames_whose_names_are_dates() {
+    let names = ["1403636579763555584", "1403636579813555456"];
+    let found = timed(&names, &[("dataset.toml", "fps = 20")]).unwrap();
+    let times: Vec<_> = found.iter().map(|(_, ns)| ns.unwrap()).collect();
+    assert_eq!(times, [0, 50 * MS]);
+}
+
+#[test]
+fn a_break_of_years_takes_a_bounded_number_of_numbers() {
+    let numbers = numbers_by_time(&[0, 100 * MS, 200 * MS, 1 << 60, (1 << 60) + 100 * MS]);
+    assert_eq!(numbers, [0, 1, 2, 100_002, 100_003]);
+}
+
 #[test]
 fn lists_and_tables_are_read() {
     let found = timed(&["a", "b"], &[("timestamps.txt", "0.5\n0.6\n")]).unwrap();

@@ -135,6 +135,10 @@ impl SavedEvaluation {
             Some(how) => format!("{decides} {how:?}"),
             None => decides,
         };
+        let decides = match &self.report.fixed_scaled {
+            Some(fixed) => format!("{decides} scale {}", fixed.factor),
+            None => decides,
+        };
         let digest = hex(&Sha256::digest(decides));
         let checkpoint = self.model.checkpoint.trim_end_matches(".safetensors");
         names.push(slug(checkpoint));

@@ -1,7 +1,8 @@
 //! Why a file does not hold the arrays that it should.
 
 use deepfusion_hint::count_of;
-use ndarray_npy::{ReadNpyError, ReadNpzError};
+use ndarray_npy::ReadNpyError;
+use zip::result::ZipError;
 
 /// Why a file does not hold the arrays that it should.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +40,12 @@ pub enum ArrayProblem {
         /// NumPy's name for what it holds.
         found: String,
     },
+    /// An array of which something is missing.
+    #[error("{array} has fewer numbers than its header says")]
+    Cut {
+        /// Which one.
+        array: ArrayName,
+    },
     /// An array that cannot be read.
     #[error("{array} cannot be read: {source}")]
     Unreadable {
@@ -49,7 +56,7 @@ pub enum ArrayProblem {
     },
     /// An archive that cannot be read.
     #[error("cannot be read: {0}")]
-    Archive(#[source] Box<ReadNpzError>),
+    Archive(#[source] Box<ZipError>),
 }
 
 impl ArrayProblem {
@@ -64,7 +71,7 @@ impl ArrayProblem {
             Self::Numbers { .. } => Some(
                 "convert with .astype(numpy.float32); pickled object arrays: numpy.savez(file, **{name: array, …})",
             ),
-            Self::Unreadable { .. } | Self::Archive(_) => {
+            Self::Cut { .. } | Self::Unreadable { .. } | Self::Archive(_) => {
                 Some("the file may be cut off: write it again")
             }
         }

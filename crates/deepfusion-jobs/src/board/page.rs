@@ -45,7 +45,12 @@ impl CalibrationReport<'_> {
                 ]
             })
             .collect();
-        let header = ["View", "used", "error, px", "distance, m", "tilt, degrees"];
+        let distance = if self.board.square_m == 1.0 {
+            "distance, squares"
+        } else {
+            "distance, m"
+        };
+        let header = ["View", "used", "error, px", distance, "tilt, degrees"];
         page = page.section("Views").table(&header, &rows);
         Ok(page.section("Again").command(command))
     }

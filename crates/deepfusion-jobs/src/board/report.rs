@@ -71,6 +71,15 @@ impl BoardViews {
     }
 }
 
+/// How large they are; nothing where they are the unit.
+fn squares(board: &Board) -> String {
+    if board.square_m == 1.0 {
+        String::new()
+    } else {
+        format!(", squares of {} m", board.square_m)
+    }
+}
+
 impl CalibrationReport<'_> {
     /// The camera as ROS's camera_info YAML, which says of itself what it was made from.
     #[must_use]
@@ -79,11 +88,11 @@ impl CalibrationReport<'_> {
         let errors = &found.standard_errors;
         let comments = [
             format!(
-                "deepfusion calibrate: {} of a board of {}x{} inner corners, squares of {} m; error {:.3} px (root mean square)",
+                "deepfusion calibrate: {} of a board of {}x{} inner corners{}; error {:.3} px (root mean square)",
                 count_of(found.used(), "view"),
                 board.columns,
                 board.rows,
-                board.square_m,
+                squares(board),
                 found.rms_px
             ),
             format!(

@@ -222,24 +222,33 @@ pub struct LensFile {
 
 impl LensFile {
     fn lens_for(&self, size: (u32, u32)) -> Result<&Lens> {
+        let other_size = |made_for| {
+            Error::Camera(UnfitCamera::OtherSize {
+                file: Some(self.path.clone()),
+                made_for,
+                image: size,
+            })
+        };
         let (made_for, lens) = match self.lens.get() {
             Some(made) => made,
             None => {
                 let calibration = CameraCalibration::read(&self.path, size)?;
                 let k = &calibration.intrinsics;
-                let made = ((k.width, k.height), calibration.lens()?);
+                let said = (k.width, k.height);
+                // A lens takes memory for each pixel: not for a size that no image has.
+                if said != size {
+                    return Err(other_size(said));
+                }
+                let made = (said, calibration.lens()?);
                 // Another thread may have been first: it made the same.
                 self.lens.get_or_init(|| made)
             }
         };
         if *made_for == size {
-            return Ok(lens);
+            Ok(lens)
+        } else {
+            Err(other_size(*made_for))
         }
-        Err(Error::Camera(UnfitCamera::OtherSize {
-            file: Some(self.path.clone()),
-            made_for: *made_for,
-            image: size,
-        }))
     }
 }
 

@@ -21,7 +21,12 @@ impl Threads {
     /// shares the cores with the network's own threads.
     #[must_use]
     pub fn for_this_machine() -> Self {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Self::for_cores(std::thread::available_parallelism().map_or(1, usize::from))
+    }
+
+    /// For so many cores.
+    #[must_use]
+    pub fn for_cores(cores: usize) -> Self {
         Self {
             before: (cores / 4).clamp(1, 8),
             after: (cores / 2).clamp(1, 16),

@@ -36,7 +36,7 @@ impl fmt::Display for Shard {
 #[non_exhaustive]
 pub enum NoShard {
     /// It is not written as one.
-    #[error("expected I/N, the I-th of N parts, such as 2/8")]
+    #[error("expected I/N, the I-th of N shards, such as 2/8")]
     Shape,
     /// It is counted from 0.
     #[error("shards are counted from 1: the first of {count} is 1/{count}")]
@@ -99,8 +99,8 @@ mod tests {
     #[test]
     fn a_text_that_names_none_says_why() {
         for (text, why) in [
-            ("1", "expected I/N, the I-th of N parts, such as 2/8"),
-            ("0/0", "expected I/N, the I-th of N parts, such as 2/8"),
+            ("1", "expected I/N, the I-th of N shards, such as 2/8"),
+            ("0/0", "expected I/N, the I-th of N shards, such as 2/8"),
             ("0/8", "shards are counted from 1: the first of 8 is 1/8"),
             ("9/8", "there is no part 9 of 8"),
             ("1/0", "there is no part 1 of 0"),

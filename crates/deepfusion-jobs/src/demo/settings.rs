@@ -1,4 +1,4 @@
-//! What a demo can be told, and where it puts things.
+//! Settings of a demo, and where it puts things.
 
 use std::path::{Path, PathBuf};
 

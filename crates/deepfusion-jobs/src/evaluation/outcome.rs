@@ -26,9 +26,10 @@ struct OutcomeRecord<'a> {
     checkpoint: Option<&'a UsedCheckpoint>,
     #[serde(flatten)]
     report: Option<&'a Report>,
-    /// The certificate where there is nothing else to go by; it is always in `scale_certificate`.
+    /// The certificate where there is nothing else to go by, `null` where no part of the drives served for one; it is always in
+    /// `scale_certificate`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    certificate: Option<&'a ScaleCertificate>,
+    certificate: Option<Option<&'a ScaleCertificate>>,
     #[serde(flatten)]
     verdict: Option<&'a Verdict>,
 }
@@ -40,7 +41,7 @@ impl Serialize for EvaluationOutcome {
         OutcomeRecord {
             checkpoint: self.checkpoint.as_ref(),
             report: self.report.as_ref(),
-            certificate: certificate.filter(|_| self.report.is_none()),
+            certificate: self.report.is_none().then_some(certificate),
             verdict,
         }
         .serialize(serializer)

@@ -25,7 +25,7 @@ pub enum DepthOutput {
     Confidence,
     /// Depth in colours with a legend in metres.
     Color,
-    /// The image itself as JPEG: the viewer shows it where it is no file of its own.
+    /// The image as JPEG, so that the viewer can show frames of videos and bags.
     Image,
     /// The image and its depth in colours.
     SideBySide,

@@ -27,7 +27,7 @@ pub struct LossConfig {
     pub smoothness: f64,
     /// λ_v of the speed loss.
     pub speed: f64,
-    /// β_R: weight of the rotation inside the speed loss. Not read where the views are synthesised with
+    /// β_R: weight of the rotation inside the speed loss. Not read where the pose used for warping is
     /// the vehicle's motion: PoseNet then learns the whole of it, at a weight of its own.
     pub rotation: f64,
     /// Steps over which λ_v rises from 0; at most a tenth of the run.

@@ -30,7 +30,7 @@ pub enum ReversedPose {
     Inverted,
 }
 
-/// Whose motion the views are synthesised with. The first error that depth has to wait for is PoseNet's:
+/// The pose used for warping. The first error that depth has to wait for is PoseNet's:
 /// what the vehicle knows already need not be learned first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -217,12 +217,12 @@ pub struct TrainConfig {
     /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
     /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
     pub start_moving: bool,
-    /// Whose motion the views are synthesised with.
+    /// The pose used for warping.
     #[serde(default)]
     pub view_motion: ViewMotion,
     /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network
-    /// says depth × f_c/f_y, so that what looks the same in pixels is the same to it whatever the lens. Absent: it says
-    /// the depth of the camera it is trained with.
+    /// predicts depth × f_c/f_y, so that equal pixels mean equal output for every lens. Absent: it predicts depth for the
+    /// training camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
     /// Weights that do not learn, by the beginning of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's

@@ -1,6 +1,7 @@
 //! Reads NumPy array files of one or two dimensions.
 
 use crate::error::{ArrayProblem, Error, Result};
+use deepfusion_geometry::NpyHeader;
 use ndarray::ArrayD;
 use ndarray_npy::ReadNpyExt;
 use std::path::Path;
@@ -23,7 +24,9 @@ impl Table {
     }
 
     fn parse(bytes: &[u8], columns: usize) -> std::result::Result<Self, ArrayProblem> {
-        check_header(bytes)?;
+        if !NpyHeader::parse(bytes)?.fits(bytes.len() as u64) {
+            return Err(ArrayProblem::Cut);
+        }
         let array = ArrayD::<f64>::read_npy(bytes)
             .or_else(|_| ArrayD::<f32>::read_npy(bytes).map(|a| a.mapv(f64::from)))
             .map_err(ArrayProblem::NoFloats)?;
@@ -44,31 +47,10 @@ impl Table {
     }
 }
 
-/// Checks the header's length against the file's before anything is allocated for it.
-fn check_header(bytes: &[u8]) -> std::result::Result<(), ArrayProblem> {
-    let two = |at: usize| {
-        bytes
-            .get(at..at + 2)
-            .map(|b| usize::from(b[0]) | usize::from(b[1]) << 8)
-    };
-    let (Some(b"\x93NUMPY"), Some(version)) = (bytes.get(..6), bytes.get(6)) else {
-        return Err(ArrayProblem::NoArray);
-    };
-    let header = match version {
-        1 => two(8).map(|length| 10 + length),
-        _ => two(8)
-            .zip(two(10))
-            .map(|(low, high)| 12 + (low | high << 16)),
-    };
-    match header {
-        Some(length) if length <= bytes.len() => Ok(()),
-        _ => Err(ArrayProblem::HeaderCut),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_geometry::NpyHeaderProblem;
     use ndarray::{Array1, Array2, ShapeBuilder};
     use ndarray_npy::WriteNpyExt;
     use proptest::prelude::*;
@@ -105,15 +87,19 @@ mod tests {
         let mut file = b"\x93NUMPY\x02\x00".to_vec();
         file.extend([0xff, 0xff, 0xff, 0x7f]);
         let error = Table::parse(&file, 1).unwrap_err();
-        assert!(matches!(error, ArrayProblem::HeaderCut), "{error}");
+        assert!(
+            matches!(error, ArrayProblem::Header(NpyHeaderProblem::Cut)),
+            "{error}"
+        );
         assert_eq!(error.to_string(), "ends within its header");
         // A shape of 2^40 rows with 16 bytes behind it.
-        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, ), }";
+        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, ), }\n";
         let mut file = b"\x93NUMPY\x01\x00".to_vec();
         file.extend((header.len() as u16).to_le_bytes());
         file.extend(header.as_bytes());
         file.extend([0; 16]);
-        assert!(Table::parse(&file, 1).is_err());
+        let error = Table::parse(&file, 1).unwrap_err();
+        assert!(matches!(error, ArrayProblem::Cut), "{error}");
     }
 
     proptest! {

@@ -1,5 +1,6 @@
 //! Why an array file of a recording is of no use.
 
+use deepfusion_geometry::NpyHeaderProblem;
 use deepfusion_hint::count_of;
 use ndarray_npy::ReadNpyError;
 use std::fmt;
@@ -9,11 +10,11 @@ use std::fmt;
 #[non_exhaustive]
 pub enum ArrayProblem {
     /// It does not begin as an array file.
-    #[error("is no NumPy array")]
-    NoArray,
-    /// It is cut off.
-    #[error("ends within its header")]
-    HeaderCut,
+    #[error(transparent)]
+    Header(#[from] NpyHeaderProblem),
+    /// It is shorter than its header says, or its items are no numbers.
+    #[error("has fewer numbers than its header says, or no numbers")]
+    Cut,
     /// It cannot be read as an array of numbers with a fraction.
     #[error("no array of float64 or float32: {0}")]
     NoFloats(#[source] ReadNpyError),

@@ -114,7 +114,7 @@ pub enum LayoutProblem {
         step: usize,
     },
     /// There are fewer bytes than the pixels take.
-    #[error("{needed} bytes needed, there are {left}")]
+    #[error("{} needed, there are {left}", count_of(*needed, "byte"))]
     Pixels {
         /// How many bytes they take.
         needed: usize,

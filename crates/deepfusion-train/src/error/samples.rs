@@ -47,3 +47,14 @@ pub enum Skipped {
     #[error(transparent)]
     Drive(Arc<deepfusion_data::Error>),
 }
+
+/// The validation frames of a drive that training also uses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SharedFrames {
+    /// The drive.
+    pub drive: String,
+    /// Number of its validation targets that are also targets of training samples.
+    pub targets: usize,
+    /// Number of further ones that are sources of training samples.
+    pub sources: usize,
+}

@@ -3,6 +3,7 @@
 use super::Trainer;
 use crate::Error;
 use crate::learned_focal::LearnedFocal;
+use deepfusion_model::TrainConfig;
 use deepfusion_nn::weights::{apply, collect};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -32,17 +33,16 @@ impl Trainer {
         }
         let mut samples = DefaultHasher::new();
         (self.train.samples.len(), self.train.depth.len()).hash(&mut samples);
+        for sample in &self.train.samples {
+            let dataset = self.train.datasets.get(sample.dataset);
+            let frame = dataset.and_then(|dataset| dataset.frames().get(sample.snippet.target));
+            frame
+                .map(|frame| (&frame.drive, frame.number))
+                .hash(&mut samples);
+        }
         let mut settings = DefaultHasher::new();
-        let config = &self.config;
-        let rate = config.learning_rate.to_bits();
-        (config.batch, config.accumulate, config.seed, rate).hash(&mut settings);
+        common(&self.config).hash(&mut settings);
         (self.state.step, self.steps()).hash(&mut settings);
-        // Of another assumed camera the same ln(f/f₀) is another f.
-        let camera = config.assumed_camera.map(|camera| {
-            let numbers = [camera.hfov_deg, camera.aspect, camera.learning_rate];
-            (numbers.map(f64::to_bits), camera.learn)
-        });
-        camera.hash(&mut settings);
         self.workers
             .hold_the_same([weights.finish(), samples.finish(), settings.finish()])
     }
@@ -62,4 +62,21 @@ impl Trainer {
         self.model = Some(model);
         Ok(())
     }
+}
+
+/// What of a configuration must be every worker's: all of it but the places of files, and what is a machine's own.
+fn common(config: &TrainConfig) -> String {
+    let mut common = config.clone();
+    common.data.paths.clear();
+    common.data.validation.clear();
+    (common.data.split, common.data.validation_split) = (None, None);
+    (common.data.loader_threads, common.data.cache_mib) = (None, None);
+    for set in &mut common.data.sets {
+        set.paths.clear();
+        set.validation.clear();
+        (set.split, set.validation_split) = (None, None);
+    }
+    (common.init, common.init_sha256) = (None, None);
+    common.precision = Default::default();
+    format!("{common:?}")
 }

@@ -7,7 +7,7 @@ import * as geometry from './geometry.js';
 import { help, onKey } from './help.js';
 import { icons } from './icons.js';
 import { Orbit } from './orbit.js';
-import { metresTold } from './metres.js';
+import { metresFact } from './metres.js';
 import { PicturePane, escape } from './picture_pane.js';
 import { Player } from './player.js';
 import { Run } from './run.js';
@@ -349,10 +349,10 @@ class App {
     if (Number.isFinite(scale?.correction) && scale.correction !== 1) add('Corrected by', scale.correction.toFixed(3), 'warn');
     if (frame?.perceived) add('Targets', String(frame.targets.length), '', 'less');
     if (Number.isFinite(perceived.latency_ms)) add('Latency', number(perceived.latency_ms, 0, 'ms'), '', 'less');
-    const metres = metresTold(frame?.meta);
+    const metres = metresFact(frame?.meta);
     if (metres) add('Metres', ...metres);
     const html = facts.join('');
-    if (html !== this.factsTold) $('facts').innerHTML = this.factsTold = html;
+    if (html !== this.shownFacts) $('facts').innerHTML = this.shownFacts = html;
   }
 
   time() {

@@ -1,7 +1,7 @@
 // Describes how far a frame's metres can be trusted.
 
 /** Value, state and rank of the fact "Metres"; null if the sidecar has no such field. `meta` is a frame as sent by the server. */
-export function metresTold(meta) {
+export function metresFact(meta) {
   const scale = meta?.scale;
   if (meta?.camera_known === false) return ['camera not known', 'warn'];
   if (scale?.verdict === 'wrong') return [`wrong${factor(scale)}`, 'bad'];

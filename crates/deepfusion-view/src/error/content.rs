@@ -1,5 +1,7 @@
 //! What folders of results hold, and why a file is not what its name says.
 
+use deepfusion_geometry::NpyHeaderProblem;
+
 /// What a folder of results holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -57,11 +59,8 @@ fn no_json(error: &serde_json::Error) -> &'static str {
 #[non_exhaustive]
 pub enum ArrayProblem {
     /// It does not begin as one.
-    #[error("no NPY array")]
-    NoArray,
-    /// It is cut off within its header.
-    #[error("ends early: the NPY header is cut off")]
-    HeaderCut,
+    #[error(transparent)]
+    Header(#[from] NpyHeaderProblem),
     /// It is cut off within its numbers.
     #[error("ends early: {bytes} bytes of {expected} (a {}x{} array)", size.0, size.1)]
     Cut {

@@ -42,7 +42,7 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     let frame = parts.shown_frame();
     let before = Instant::now();
     let factors = shipped.interval_factors()?;
-    let first = demo.look((&mut estimator, &factors), &parts.all, frame)?;
+    let first = demo.predict_frame((&mut estimator, &factors), &parts.all, frame)?;
     let first_ms = 1e3 * before.elapsed().as_secs_f64();
     let (picture, cloud) = (first.write("")?, demo.folder.cloud());
     first.write_cloud(&cloud)?;
@@ -81,7 +81,7 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     let mut estimator = demo.estimator(&adapted)?;
     let learned = measure(&mut estimator, &parts.learned, &parts.measured)?;
     let factors = adapted.interval_factors()?;
-    let second = demo.look((&mut estimator, &factors), &parts.all, frame)?;
+    let second = demo.predict_frame((&mut estimator, &factors), &parts.all, frame)?;
     second.write("_learned")?;
     let overlay = first.overlay_in(&targets)?;
     let page = NewStreetPage {

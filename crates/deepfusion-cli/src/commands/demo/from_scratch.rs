@@ -36,9 +36,9 @@ pub(super) fn run(demo: &Demo) -> Result<()> {
     let factors = model.interval_factors()?;
     let mut shown = Vec::new();
     for frame in shown_frames(test_sets[0].frames().len()) {
-        let look = demo.look((&mut estimator, &factors), &test_sets[0], frame)?;
-        look.write("")?;
-        shown.push(look);
+        let predicted = demo.predict_frame((&mut estimator, &factors), &test_sets[0], frame)?;
+        predicted.write("")?;
+        shown.push(predicted);
     }
     if let Some(first) = shown.first() {
         first.write_cloud(&demo.folder.cloud())?;

@@ -114,7 +114,7 @@ impl Demo<'_> {
     }
 
     /// A frame of a drive, and the depth that a network sees in it.
-    fn look(
+    fn predict_frame(
         &self,
         network: (&mut DepthEstimator, &IntervalFactors),
         drive: &Dataset,

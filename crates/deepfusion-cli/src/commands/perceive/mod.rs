@@ -64,12 +64,12 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     interrupt::catch("stopping after the frames at work");
     match source {
         Some(address) => live::run(args, &job, finder, &address),
-        None => look_at(args, &job, finder, &all),
+        None => perceive_images(args, &job, finder, &all),
     }
 }
 
 /// Finds the targets of images that are there.
-fn look_at(
+fn perceive_images(
     args: &PerceiveArgs,
     job: &DepthJob<'_>,
     finder: TargetFinder<'_>,

@@ -29,7 +29,7 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
         ),
     }
     if made.lost_uncertainty {
-        tracing::warn!("not all of them say how sure they are, so the mean does not");
+        tracing::warn!("some of these networks predict no uncertainty, so the mean predicts none");
     }
     if let Some(StatisticsSpread {
         layers,

@@ -25,6 +25,9 @@ pub enum MotionWarning {
         /// The log's name.
         log: String,
     },
+    /// A recording in KITTI's layout whose `dataset.toml` says that its yaw rates are none.
+    #[error("oxts: yaw_known = false in dataset.toml: how the car turned is not recorded")]
+    YawNotMeasured,
     /// How another program's log was understood ([`deepfusion_logs::DriveLog::notes`]).
     #[error("{log}: {note}")]
     Understood {

@@ -35,11 +35,9 @@ pub(super) fn find(
         source: file.into(),
         field,
     };
-    let pinhole = |intrinsics: Intrinsics| {
-        Lens::new(intrinsics, &Distortion::default()).map_err(CameraInfoProblem::from)
-    };
+    let pinhole = |intrinsics: Intrinsics| Ok((intrinsics, Distortion::default()));
     let mut assumed = false;
-    let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
+    let (camera, place) = if let Some(numbers) = options.given_camera((width, height)) {
         let given = Intrinsics::from_numbers(numbers, (width, height));
         let place = CalibrationPlace {
             source: CalibrationSource::Given,
@@ -49,10 +47,12 @@ pub(super) fn find(
     } else if let Some(camera) = config.camera {
         (pinhole(camera.intrinsics()), place(&config.path, "camera"))
     } else if let Some(file) = &config.calibration {
-        let (lens, place) = calibrated(config, file, (width, height), rectified)?;
-        (Ok(lens), place)
+        let camera = calibrated(config, file, (width, height), rectified)?;
+        let place = camera.place();
+        (Ok((camera.intrinsics, camera.distortion)), place)
     } else if let Some(info) = index.camera_info.as_ref().filter(|info| info.k[0] > 0.0) {
-        (of_camera_info(info, rectified), place(bag, "CameraInfo"))
+        let camera = of_camera_info(info, (width, height), rectified);
+        (camera, place(bag, "CameraInfo"))
     } else if let Some(camera) = config.profile_camera {
         (pinhole(camera.intrinsics()), place(&config.path, "profile"))
     } else if let Some(numbers) = options.assumed_numbers((width, height)) {
@@ -65,22 +65,24 @@ pub(super) fn find(
             config: config.path.clone(),
         });
     };
-    let lens = lens.map_err(|problem| Error::CameraFile {
+    let wrong = |problem: CameraInfoProblem| Error::CameraFile {
         by: place.source.clone(),
         problem: problem.into(),
-    })?;
-    let found = lens.intrinsics();
-    if (found.width, found.height) != (width, height) {
+    };
+    let (camera, distortion) = camera.map_err(wrong)?;
+    // Before the lens, which takes memory for each pixel.
+    if (camera.width, camera.height) != (width, height) {
         return Err(Error::FrameSize {
             image: format!("{}, image 0", bag.display()),
             drive: source::name(bag),
             frame: 0,
             found: (width, height),
-            expected: (found.width, found.height),
+            expected: (camera.width, camera.height),
             field: place.field,
             calibration: place.source,
         });
     }
+    let lens = Lens::new(camera, &distortion).map_err(|problem| wrong(problem.into()))?;
     Ok((lens, place, assumed))
 }
 
@@ -90,7 +92,7 @@ fn calibrated(
     file: &Path,
     size: (u32, u32),
     rectified: bool,
-) -> Result<(Lens, CalibrationPlace)> {
+) -> Result<CameraCalibration> {
     let path = config.folder().join(file);
     if !path.is_file() {
         return Err(config.wrong(ConfigProblem::NoFile {
@@ -108,20 +110,23 @@ fn calibrated(
             },
         });
     }
-    Ok((calibration.lens()?, calibration.place()))
+    Ok(calibration)
 }
 
-/// Of rectified images P without distortion, of raw ones K with it.
+/// Of rectified images P without distortion, of raw ones K with it. A message that says no size is one of the images'.
 fn of_camera_info(
     info: &CameraInfo,
+    image_size: (u32, u32),
     rectified: bool,
-) -> std::result::Result<Lens, CameraInfoProblem> {
-    let size = (info.width, info.height);
+) -> std::result::Result<(Intrinsics, Distortion), CameraInfoProblem> {
+    let size = match (info.width, info.height) {
+        (0, 0) => image_size,
+        said => said,
+    };
     let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
     if rectified && info.p[0] > 0.0 {
         let p = &info.p;
-        let camera = of(p[0], p[5], p[2], p[6]);
-        return Ok(Lens::new(camera, &Distortion::default())?);
+        return Ok((of(p[0], p[5], p[2], p[6]), Distortion::default()));
     }
     let known = ["plumb_bob", "rational_polynomial", ""];
     let model = info.distortion_model.as_str();
@@ -136,7 +141,7 @@ fn of_camera_info(
         d => Distortion::from_opencv(d)?,
     };
     let k = &info.k;
-    Ok(Lens::new(of(k[0], k[4], k[2], k[5]), &distortion)?)
+    Ok((of(k[0], k[4], k[2], k[5]), distortion))
 }
 
 #[cfg(test)]
@@ -167,12 +172,22 @@ mod tests {
         let fisheye = by(Distortion::from_fisheye(&d).unwrap());
         let brown = by(Distortion::from_opencv(&d).unwrap());
         assert_ne!(fisheye, brown);
-        let read = |model, d: &[f64]| of_camera_info(&info(model, d), false);
-        assert_eq!(read("equidistant", &d).unwrap().intrinsics(), fisheye);
-        assert_eq!(read("plumb_bob", &d).unwrap().intrinsics(), brown);
+        let read = |model, d: &[f64]| of_camera_info(&info(model, d), (64, 48), false);
+        let lens = |model, d: &[f64]| {
+            let (camera, distortion) = read(model, d).unwrap();
+            Lens::new(camera, &distortion).unwrap()
+        };
+        assert_eq!(lens("equidistant", &d).intrinsics(), fisheye);
+        assert_eq!(lens("plumb_bob", &d).intrinsics(), brown);
         // An equidistant lens without coefficients is still one; without distortion a camera is a pinhole.
-        assert!(read("equidistant", &[0.0; 4]).unwrap().distorts());
-        assert!(!read("plumb_bob", &[]).unwrap().distorts());
+        assert!(lens("equidistant", &[0.0; 4]).distorts());
+        assert!(!lens("plumb_bob", &[]).distorts());
+        let sizeless = CameraInfo {
+            width: 0,
+            height: 0,
+            ..info("plumb_bob", &d)
+        };
+        assert_eq!(of_camera_info(&sizeless, (64, 48), false).unwrap().0, k);
         for (model, d, why) in [
             ("equidistant", &d[..0], "k1, k2, k3, k4"),
             ("equidistant", &[f64::NAN; 4], "NaN"),

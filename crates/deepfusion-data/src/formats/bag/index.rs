@@ -81,6 +81,12 @@ pub(super) struct Index {
 }
 
 impl Index {
+    /// Whether the messages that hold the speed ever say a turn: publishers that know none write zeros, or NaN.
+    pub(super) fn says_turns(&self) -> bool {
+        let turns = |rate: f64| rate.is_finite() && rate != 0.0;
+        self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
+    }
+
     /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. What cannot be read is
     /// counted and left out: a bag with a broken chunk has whole ones too.
     ///

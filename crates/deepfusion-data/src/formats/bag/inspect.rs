@@ -104,7 +104,7 @@ fn turn(
 /// Yaw rates in rad/s by whoever measures them: the speed's messages if they ever say a turn (not every publisher
 /// fills it), else the inertial unit, whose z is up unless the file beside the bag, or its frames, turn it.
 fn yaw_rates(index: &Index, vehicle_from_imu: Option<&Se3>) -> Vec<(i64, f64)> {
-    if index.yaw_rate.iter().any(|(_, rate)| *rate != 0.0) {
+    if index.says_turns() {
         return index.yaw_rate.clone();
     }
     let rates = index.imu.iter().map(|(ns, sample)| {

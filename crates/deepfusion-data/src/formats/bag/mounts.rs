@@ -126,12 +126,12 @@ impl Search<'_> {
         let of_profile = self.config.profile.clone().unwrap_or_default();
         let (transform, source) = match (own, found) {
             (Some(own), found) => {
-                if let MountByFrames::Known(by_frames, chain) = found {
+                if let MountByFrames::Found(by_frames, chain) = found {
                     self.compare(name, (&own, &in_file), (&by_frames, &chain));
                 }
                 (own, in_file)
             }
-            (None, MountByFrames::Known(by_frames, chain)) => {
+            (None, MountByFrames::Found(by_frames, chain)) => {
                 if let Some(profile) = profile {
                     let who = format!("the profile {of_profile}");
                     self.compare(name, (&by_frames, &chain), (&profile, &who));
@@ -179,7 +179,7 @@ impl Search<'_> {
 /// What the frames say of a mount.
 enum MountByFrames {
     /// It, and by which chain of frames.
-    Known(Se3, String),
+    Found(Se3, String),
     /// Why nothing, where something could be expected.
     Unknown(NotByFrames),
     /// Nothing, and nothing was to be expected.
@@ -357,7 +357,7 @@ impl<'a> ByFrames<'a> {
         Ok(match self.index.frames.lookup(target, source) {
             Lookup::Fixed(chain) => {
                 let source = format!("{BY_FRAMES}{chain}");
-                MountByFrames::Known(chain.target_from_source, source)
+                MountByFrames::Found(chain.target_from_source, source)
             }
             Lookup::Several(both) => {
                 let [a, b] = *both;
@@ -402,8 +402,8 @@ impl<'a> ByFrames<'a> {
     /// A transform into the images' frame as one into the camera's axes.
     fn upright(&self, mount: MountByFrames) -> MountByFrames {
         match mount {
-            MountByFrames::Known(body_from, source) if self.body_axes => {
-                MountByFrames::Known(looking_ahead() * body_from, source)
+            MountByFrames::Found(body_from, source) if self.body_axes => {
+                MountByFrames::Found(looking_ahead() * body_from, source)
             }
             other => other,
         }

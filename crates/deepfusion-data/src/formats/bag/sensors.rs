@@ -31,7 +31,7 @@ pub(super) fn motion(
     if index.speed_mps.is_empty() {
         return Ok(None);
     }
-    let turns = index.yaw_rate.iter().any(|(_, yaw_rate)| *yaw_rate != 0.0);
+    let turns = index.says_turns();
     // A steering angle without a wheelbase tells no turn: it does not stand in for a yaw rate that was measured.
     let steered = !index.steering_rad.is_empty() && config.vehicle.wheelbase_m.is_some();
     if turns && index.imu.is_empty() && !steered {
@@ -94,6 +94,18 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
         .collect();
     samples.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut track = VehicleTrack::new(&samples);
+    if samples.iter().any(|(_, _, yaw_rate)| !yaw_rate.is_finite()) {
+        // A speed is known without a yaw rate beside it.
+        let speeds: Vec<_> = samples
+            .iter()
+            .map(|(t, speed, _)| (*t, *speed, 0.0))
+            .collect();
+        let turns = samples
+            .iter()
+            .filter(|(_, _, yaw_rate)| yaw_rate.is_finite());
+        let turns: Vec<_> = turns.map(|(t, _, yaw_rate)| (*t, *yaw_rate)).collect();
+        track = VehicleTrack::new(&speeds).with_yaw_rate(&turns, VehicleTrack::MAX_GAP_S);
+    }
     if index.tilt_rates.iter().any(|(_, rates)| *rates != [0.0; 2]) {
         track = track.with_tilt(&roll_and_pitch(index, origin_ns));
     }

@@ -1,4 +1,4 @@
-//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, and whether it is simulated.
+//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, what was not measured, and whether it is simulated.
 
 use crate::dataset_toml::{Clock, FolderConfig, check_clock_and_scale, read_or_default};
 use crate::{Error, OpenOptions, Result};
@@ -12,6 +12,8 @@ struct Keys {
     clock: Ahead,
     vehicle: Speed,
     simulated: Option<bool>,
+    yaw_known: Option<bool>,
+    tilt_known: Option<bool>,
 }
 
 /// The cameras' clock.
@@ -30,13 +32,17 @@ struct Speed {
     speed_scale: Option<f64>,
 }
 
-/// A drive's clock and scale of speed.
+/// A drive's clock and scale of speed, and what of its oxts was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct DriveConfig {
     /// How far the cameras' clock is ahead of the oxts', in seconds.
     pub(super) camera_ahead_s: f64,
     /// True speed over the oxts'.
     pub(super) speed_scale: f64,
+    /// Whether the oxts' yaw rates were measured: another layout's drive may have had none.
+    pub(super) yaw_known: bool,
+    /// Whether its roll and pitch were.
+    pub(super) tilt_known: bool,
 }
 
 /// Whether the drive in a folder is simulated, as `dataset.toml` of that folder or else of its date's says. Files that cannot be read say nothing.
@@ -61,6 +67,8 @@ impl Keys {
                 speed_scale: own.vehicle.speed_scale.or(date.vehicle.speed_scale),
             },
             simulated: own.simulated.or(date.simulated),
+            yaw_known: own.yaw_known.or(date.yaw_known),
+            tilt_known: own.tilt_known.or(date.tilt_known),
         })
     }
 
@@ -88,6 +96,8 @@ impl DriveConfig {
         Ok(Self {
             camera_ahead_s: ahead.unwrap_or_default(),
             speed_scale: keys.vehicle.speed_scale.unwrap_or(1.0),
+            yaw_known: keys.yaw_known.unwrap_or(true),
+            tilt_known: keys.tilt_known.unwrap_or(true),
         })
     }
 }

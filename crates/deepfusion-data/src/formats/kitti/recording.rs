@@ -11,9 +11,9 @@ use super::velodyne::depth_map;
 use crate::dataset::selection::Selection;
 use crate::logs::clock::on_the_vehicles_clock;
 use crate::{
-    CalibrationPlace, Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
-    FrameImage, GtKind, MissingPart, MovingLabels, OpenOptions, Recording, Result, Stream,
-    load_rgb, read_depth_png,
+    CalibrationPlace, Camera, CameraPath, DataWarning, Dataset, DatasetKind, DatasetParts, Error,
+    Frame, FrameImage, GtKind, MissingPart, MotionWarning, MovingLabels, OpenOptions, Recording,
+    Result, Stream, load_rgb, read_depth_png,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -34,6 +34,7 @@ struct KittiRecording {
     speed_scale: f64,
     /// Seconds by frame number, also of frames without an image.
     times_s: Vec<Option<f64>>,
+    warnings: Vec<DataWarning>,
 }
 
 /// Opens the cameras of the drives found at `path`.
@@ -86,7 +87,14 @@ fn open_drive(
         Some(origin) => optional(read_oxts(&drive.folder.join("oxts"), origin))?,
         None => None,
     };
-    let track = track.map(|track| track.with_speed_scale(config.speed_scale));
+    let track = track.map(|track| {
+        let track = track.with_speed_scale(config.speed_scale);
+        if config.tilt_known {
+            track
+        } else {
+            track.without_tilt()
+        }
+    });
     let mut frames = Vec::with_capacity(files.len());
     for (number, image) in files {
         let time_s = match (&times, camera_origin_ns) {
@@ -113,7 +121,7 @@ fn open_drive(
         intrinsics: calibration.intrinsics,
         cam_from_vehicle: calibration.cam_from_imu,
         track: track.map(Into::into),
-        yaw_known: true,
+        yaw_known: config.yaw_known,
         origin_ns,
         camera_ahead_s: config.camera_ahead_s,
         scenario: None,
@@ -124,6 +132,11 @@ fn open_drive(
         camera,
         speed_scale: config.speed_scale,
         times_s,
+        warnings: if config.yaw_known {
+            Vec::new()
+        } else {
+            vec![MotionWarning::YawNotMeasured.into()]
+        },
     };
     let dataset = Dataset::new(parts, Arc::new(recording)).with_simulated(drive.is_simulated());
     dataset.check_sizes()?;
@@ -169,6 +182,10 @@ impl Recording for KittiRecording {
 
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
         load_rgb(frame.image.path())
+    }
+
+    fn warnings(&self) -> &[DataWarning] {
+        &self.warnings
     }
 
     fn calibration(&self) -> CalibrationPlace {

@@ -175,7 +175,7 @@ impl OpenTracklet {
             "l" => self.length = Some(length(text)?),
             "w" => self.width = Some(length(text)?),
             "h" => self.height = Some(length(text)?),
-            "first_frame" => self.first_frame = Some(number(text)?),
+            "first_frame" => self.first_frame = Some(number::<u32>(text)?.into()),
             _ => {}
         }
         Ok(())

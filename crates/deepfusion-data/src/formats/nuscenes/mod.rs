@@ -191,7 +191,7 @@ impl TableFolder {
         let mut times_s = Vec::new();
         for (number, image) in images {
             let scan = scans.get(scans.partition_point(|scan| scan.ns < image.ns));
-            let scan = scan.filter(|scan| scan.ns - image.ns <= SCAN_WITHIN_NS);
+            let scan = scan.filter(|scan| scan.ns.saturating_sub(image.ns) <= SCAN_WITHIN_NS);
             let Some((scan, file)) = scan.map(|scan| (scan, self.root.join(&scan.file))) else {
                 continue;
             };

@@ -85,9 +85,7 @@ impl fmt::Display for Refusal<'_> {
                 let checks: Vec<String> = checks.iter().map(ToString::to_string).collect();
                 f.write_str(&checks.join(", "))
             }
-            Self::NotJudged => {
-                f.write_str("the frames that are held out say nothing about it any more")
-            }
+            Self::NotJudged => f.write_str("the held-out frames can no longer judge it"),
         }
     }
 }
@@ -142,7 +140,7 @@ mod tests {
         assert_eq!(refusal, Some(Refusal::NotJudged));
         assert_eq!(
             refusal.map(|refusal| refusal.to_string()).as_deref(),
-            Some("the frames that are held out say nothing about it any more")
+            Some("the held-out frames can no longer judge it")
         );
     }
 }
