@@ -105,7 +105,7 @@ def _paths(given: str | PathLike[str] | Sequence[str | PathLike[str]] | None) ->
 
 
 def train(
-    config: str | PathLike[str] | Mapping[str, Any] = "tiny",
+    config: str | PathLike[str] | Mapping[str, Any] | None = None,
     data: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     callback: Callable[[TrainEvent], bool | None] | None = None,
     *,
@@ -119,7 +119,7 @@ def train(
 ) -> Run:
     """Learns metric depth from recordings, without depth labels.
 
-    `config` is a preset ("tiny", "light", "resnet50", "paper", "monodepth2", "monodepth2-50", "lite-mono", "lite-mono-small", "lite-mono-tiny",
+    `config` is a preset ("tiny", the default, "light", "resnet50", "paper", "monodepth2", "monodepth2-50", "lite-mono", "lite-mono-small", "lite-mono-tiny",
     "lite-mono-8m", "r-msfm3", "r-msfm6", "sfmlearner"), the path of a TOML file, or a dict over a preset:
     `{"preset": "light", "steps": 500, "loss": {"smoothness": 0.01}}` (tables in tables or dots in keys; None takes an optional key
     away; the keys are those of docs/reference/configuration.md). `data` are recordings of any known layout, and `validation` some to
@@ -143,7 +143,7 @@ def train(
     settings: list[str] = []
     if isinstance(config, Mapping):
         table = dict(config)
-        config = table.pop("preset", "tiny")
+        config = table.pop("preset", None)
         settings = list(_settings(table))
     if out is None:
         if workers is not None:

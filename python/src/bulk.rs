@@ -62,7 +62,8 @@ impl Predictions {
     /// The threads end when this goes.
     pub(crate) fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
         // For as many cores as rayon takes: of a large machine a worker may be given one alone.
-        let readers = Threads::for_cores(rayon::current_num_threads()).before;
+        let readers =
+            Threads::for_cores(deepfusion_cli::in_pool(rayon::current_num_threads)).before;
         let (to_read, images) = channel::<(Source, Answer)>();
         let (to_network, read) = sync_channel::<LoadedImage>(readers);
         let (to_finish, seen) = sync_channel(2);

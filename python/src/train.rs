@@ -23,8 +23,8 @@ use crate::interrupt::{Stop, interruptible};
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct TrainRequest {
-    /// A preset's name, or a TOML file.
-    config: PathBuf,
+    /// A preset's name, or a TOML file; the default, or the run's that goes on, where none is given.
+    config: Option<PathBuf>,
     /// `key=value` over it.
     settings: Vec<String>,
     data: Vec<PathBuf>,
@@ -254,13 +254,11 @@ impl TrainRequest {
             init: self.init.clone(),
             ..ResumeRequest::default()
         };
-        match preset_named(&self.config) {
-            // What is asked where nothing is.
-            Some(Preset::Tiny) => {}
-            Some(preset) => request.preset = Some(preset),
-            None => {
-                let file = TrainConfig::read_over_preset(&self.config, compute)?;
-                request.file = Some((self.config.clone(), Box::new(file)));
+        if let Some(config) = &self.config {
+            request.preset = preset_named(config);
+            if request.preset.is_none() {
+                let file = TrainConfig::read_over_preset(config, compute)?;
+                request.file = Some((config.clone(), Box::new(file)));
             }
         }
         if let Some(camera) = &self.camera {
@@ -287,20 +285,22 @@ fn preset_named(name: &Path) -> Option<Preset> {
 /// The configuration that is asked for, and whether it is a preset's: no file then says what the run starts from. A preset's sizes follow
 /// what it is trained on.
 fn configuration(asked: &TrainRequest, compute: Compute) -> Result<(TrainConfig, bool), Failure> {
-    let preset = preset_named(&asked.config);
+    let given = asked.config.as_deref();
+    let given = given.unwrap_or(Path::new(Preset::Tiny.name()));
+    let preset = preset_named(given);
     let mut config = match preset {
         Some(preset) => preset.config_on(compute),
-        None if asked.config.extension().is_none() && !asked.config.exists() => {
+        None if given.extension().is_none() && !given.exists() => {
             let names: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
             return Err(Failure {
-                message: format!("config: no preset `{}`", asked.config.display()),
+                message: format!("config: no preset `{}`", given.display()),
                 hint: Some(format!(
                     "a preset ({}), the path of a TOML file, or a dict",
                     names.join(", ")
                 )),
             });
         }
-        None => TrainConfig::read_over_preset(&asked.config, compute)?,
+        None => TrainConfig::read_over_preset(given, compute)?,
     };
     for assignment in &asked.settings {
         config.set(assignment)?;

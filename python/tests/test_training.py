@@ -110,6 +110,7 @@ def test_a_run_goes_on_with_its_own_settings(run, street, tmp_path):
         ({"batch": 8}, {}),
         ({"loss": {"smoothness": 0.0}}, {}),
         ("light", {}),
+        ({"preset": "light"}, {}),
         ({}, {"init": "street"}),
     ]:
         with pytest.raises(deepfusion.DeepFusionError) as caught:

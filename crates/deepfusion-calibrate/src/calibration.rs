@@ -78,7 +78,7 @@ pub struct ViewFit {
     pub used: bool,
     /// Root mean square distance of its corners, in pixels; none where the board's pose is unknown.
     pub rms_px: Option<f64>,
-    /// The board's distance from the camera, in metres.
+    /// The board's distance from the camera, in metres; none where its pose, or the side of its squares, is unknown.
     pub distance_m: Option<f64>,
     /// The angle between the board's normal and the camera's axis, in degrees: 0 is parallel to the image.
     pub tilt_deg: Option<f64>,

@@ -8,8 +8,8 @@ use deepfusion_hint::{Hint, count_of};
 pub enum Error {
     /// A board that cannot be used.
     #[error(
-        "a board of {}x{} inner corners with squares of {} m: expected {} to {} corners along each side, and squares above 0 m",
-        board.columns, board.rows, board.square_m, Board::LEAST, Board::MOST
+        "a board of {}x{} inner corners{}: expected {} to {} corners along each side, and squares above 0 m",
+        board.columns, board.rows, board.of_squares(), Board::LEAST, Board::MOST
     )]
     Board {
         /// What was asked for.

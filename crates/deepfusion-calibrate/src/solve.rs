@@ -62,7 +62,15 @@ pub fn calibrate(
         used = kept.map(|(_, view)| *view).collect();
         fitted = fit(&chosen(views, &used), &points, image_size, model)?;
     }
-    calibration(&fitted, views, &used, &points, image_size)
+    let mut found = calibration(&fitted, views, &used, &points, image_size)?;
+    if board.square_m.is_none() {
+        // In squares, whose side nobody measured.
+        found
+            .views
+            .iter_mut()
+            .for_each(|view| view.distance_m = None);
+    }
+    Ok(found)
 }
 
 fn chosen<'a>(views: &'a [View], used: &[usize]) -> Vec<&'a [Vector2<f64>]> {

@@ -142,6 +142,8 @@ fn a_board_is_enough() {
         let expected = sized["intrinsics"][key].as_f64().unwrap();
         close(&plain["intrinsics"][key], expected, 1e-3);
     }
+    assert!(sized["views"][0]["distance_m"].is_f64() && plain["views"][0]["distance_m"].is_null());
+    assert!(plain["board"]["square_m"].is_null());
     let read = |name: &str| fs::read_to_string(at.join(name)).unwrap();
     assert!(read("sized.yaml").contains("squares of 0.025 m"));
     assert!(!read("camera.yaml").contains("squares"));

@@ -23,9 +23,9 @@ pub(crate) struct CalibrateArgs {
     /// Inner corners of the board, where four squares meet: a board of 10x7 squares has 9x6.
     #[arg(long, value_name = "WxH")]
     pub board: Size,
-    /// Side of a square in metres. Distances of the boards depend on it, the camera does not; without it they are counted in squares.
-    #[arg(long, value_name = "M", value_parser = positive, default_value = "1", hide_default_value = true)]
-    pub square: f64,
+    /// Side of a square in metres. The boards' distances depend on it, the camera does not; without it none are given.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    pub square: Option<f64>,
     /// A fisheye lens after Kannala and Brandt (k1 to k4), instead of Brown and Conrady's (k1, k2, p1, p2, k3).
     #[arg(long)]
     pub fisheye: bool,

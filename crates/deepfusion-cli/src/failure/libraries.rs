@@ -42,28 +42,17 @@ impl Reportable for deepfusion_sim::Error {
                 Some(option) => format!("{option} is {value}, expected {expected}"),
                 None => self.to_string(),
             },
-            Self::Varied { value, why } => match simulator_option(why.setting()) {
-                Some(option) => format!("{option} is {value}: {why}"),
-                None => self.to_string(),
-            },
             _ => self.to_string(),
         }
     }
 
     fn remedy(&self) -> Option<String> {
-        use deepfusion_sim::VariedConflict as Conflict;
         match self {
             Self::Config {
                 field, expected, ..
             } => match simulator_option(field) {
                 Some(option) => Some(format!("{option} takes {expected}")),
                 None => self.hint(),
-            },
-            Self::Varied { why, .. } => match why {
-                Conflict::CameraHeight => Some("leave out --camera-height, or --varied".into()),
-                Conflict::SecondCamera => Some("leave out --stereo, or --varied".into()),
-                Conflict::OnlyVaried => Some("add --varied, or choose another --scene".into()),
-                _ => self.hint(),
             },
             _ => self.hint(),
         }
@@ -86,10 +75,8 @@ fn simulator_option(field: &str) -> Option<&'static str> {
         "moving_cars" => "--moving-cars",
         "riders" => "--riders",
         "fps" => "--fps",
-        "scan_every" => "--scan-every",
         "stereo_baseline_m" => "--stereo",
         "camera_height_m" => "--camera-height",
-        "scene" => "--scene",
         _ => return None,
     })
 }

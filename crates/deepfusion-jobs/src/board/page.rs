@@ -45,12 +45,7 @@ impl CalibrationReport<'_> {
                 ]
             })
             .collect();
-        let distance = if self.board.square_m == 1.0 {
-            "distance, squares"
-        } else {
-            "distance, m"
-        };
-        let header = ["View", "used", "error, px", distance, "tilt, degrees"];
+        let header = ["View", "used", "error, px", "distance, m", "tilt, degrees"];
         page = page.section("Views").table(&header, &rows);
         Ok(page.section("Again").command(command))
     }

@@ -71,15 +71,6 @@ impl BoardViews {
     }
 }
 
-/// How large they are; nothing where they are the unit.
-fn squares(board: &Board) -> String {
-    if board.square_m == 1.0 {
-        String::new()
-    } else {
-        format!(", squares of {} m", board.square_m)
-    }
-}
-
 impl CalibrationReport<'_> {
     /// The camera as ROS's camera_info YAML, which says of itself what it was made from.
     #[must_use]
@@ -92,7 +83,7 @@ impl CalibrationReport<'_> {
                 count_of(found.used(), "view"),
                 board.columns,
                 board.rows,
-                squares(board),
+                board.of_squares(),
                 found.rms_px
             ),
             format!(
