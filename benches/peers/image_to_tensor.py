@@ -1,4 +1,4 @@
-"""The peers of `cargo bench -p deepfusion-data --bench image`, on the files that it made: run it first.
+"""The peers of `cargo bench -p deepfusion-images --bench image`, on the files that it made: run it first.
 
 pip install numpy opencv-python-headless pillow-simd    (or pillow; CC="cc -mavx2" for pillow-simd with AVX2)
 python benches/peers/image_to_tensor.py [FOLDER]

@@ -4,7 +4,7 @@
 //! RUSTC_BOOTSTRAP=1 cargo fuzz run depth_png
 #![no_main]
 
-use deepfusion_data::{load_rgb, read_depth_png};
+use deepfusion_images::{load_rgb, read_depth_png};
 use libfuzzer_sys::fuzz_target;
 use std::path::PathBuf;
 use std::sync::LazyLock;

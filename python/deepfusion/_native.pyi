@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "Dataset",
@@ -72,14 +72,15 @@ class Model:
     def predict(
         self,
         image: NDArray[np.uint8] | str | PathLike[str] | Any,
-        intrinsics: _Intrinsics | None = None,
+        intrinsics: ArrayLike | None = None,
         *,
         focal_correction: bool = True,
         stretch: bool = False,
         post_process: _PostProcess | None = None,
     ) -> Prediction:
         """Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
-        `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
+        `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix) EXIF is asked, of a file or of what PIL opened from one, then the lens of the training
+        camera is assumed, and the metres are as right as that.
 
         `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
         image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two predictions of the image or of four
@@ -88,7 +89,7 @@ class Model:
     def predict_many(
         self,
         images: Iterable[NDArray[np.uint8] | str | PathLike[str] | Any],
-        intrinsics: _Intrinsics | None = None,
+        intrinsics: ArrayLike | None = None,
         *,
         focal_correction: bool = True,
         stretch: bool = False,
@@ -191,7 +192,7 @@ class Perception:
     def detect(
         self,
         depth: NDArray[np.float32],
-        intrinsics: _Intrinsics,
+        intrinsics: ArrayLike,
         sigma: NDArray[np.float32] | None,
         time_s: float | None,
         world_from_cam: NDArray[np.float64] | None,

@@ -39,7 +39,7 @@ class Target:
     pixels: int
     """How many pixels see it, of a depth image at most 640 wide; 0 where the track goes on without being seen."""
     bounds: tuple[int, int, int, int] | None
-    """Left, top, right, bottom of those pixels."""
+    """Left, top, right, bottom of those pixels, in pixels of the image."""
     corners_m: NDArray[np.float64] = field(compare=False, repr=False)
     """8 x 3, the lower four corners first."""
 
@@ -118,7 +118,7 @@ class Perception:
     def detect(
         self,
         depth: ArrayLike,
-        intrinsics: tuple[float, float, float, float],
+        intrinsics: ArrayLike,
         *,
         sigma: ArrayLike | None = None,
         time_s: float | None = None,
@@ -126,7 +126,8 @@ class Perception:
         speed_mps: float | None = None,
         yaw_rate_radps: float = 0.0,
     ) -> Surroundings:
-        """The targets in a depth image: H x W metres, 0 where there is none; `intrinsics` of that size, `sigma` its standard deviation.
+        """The targets in a depth image: H x W metres, 0 where there is none; `intrinsics` (fx, fy, cx, cy, or the 3 x 3
+        matrix) of that size, `sigma` its standard deviation.
 
         With `time_s` (seconds, on any clock) and `world_from_cam` (4 x 4, the camera to a frame that stays where it is) targets are
         followed: they keep their id, are reported once they were seen twice, and get a velocity. `speed_mps` and `yaw_rate_radps` (positive
@@ -146,7 +147,7 @@ class Perception:
 
 def perceive(
     depth: ArrayLike,
-    intrinsics: tuple[float, float, float, float],
+    intrinsics: ArrayLike,
     *,
     sigma: ArrayLike | None = None,
     exact: bool = False,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _native
+from ._devices import own_gpu
 from ._native import Model
 from .distributed import Workers
 
@@ -134,7 +135,8 @@ def train(
     the same arguments, `batch` and `accumulate` are each one's own, and worker 0 validates and writes the run. K workers learn what one
     learns with `accumulate` K times as large.
 
-    `device` is where it learns, as in `load`: "cpu", "auto", "cuda:1". On a GPU a preset has larger sizes, and `"precision": "bf16"` is for
+    `device` is where it learns, as in `load`: "cpu", "auto", "cuda:1". With `workers` that torchrun, MPI or Slurm started, "cuda" is each one's
+    own GPU. On a GPU a preset has larger sizes, and `"precision": "bf16"` is for
     those with tensor cores.
 
     `callback` gets each `TrainEvent`; where it returns False, training stops after the step and the run is saved. What it raises
@@ -162,7 +164,7 @@ def train(
         "init": init,
         "resume": resume,
         "workers": workers,
-        "device": device,
+        "device": own_gpu(device, workers),
     }
     figures = _native.train(asked, callback)
     return Run(**figures)

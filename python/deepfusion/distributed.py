@@ -55,7 +55,7 @@ class Torch:
     """A process group of `torch.distributed` (gloo, NCCL), as Ray Train, torchrun or Slurm set it up.
 
     `group` is by default the one that `torch.distributed.init_process_group` made. With NCCL gradients are added on torch's current GPU:
-    `torch.cuda.set_device` says which, before this is made. What they are learned on is `train`'s `device`.
+    `torch.cuda.set_device` says which, before this is made. What they are learned on is `train`'s `device`: "cuda" is the GPU of `LOCAL_RANK`.
     """
 
     def __init__(self, group: Any = None) -> None:

@@ -1,12 +1,13 @@
 //! Trained networks and what they say of an image.
 
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use deepfusion::data::{RgbImage, load_photo};
 use deepfusion::eval::{IntervalFactors, PostProcess};
 use deepfusion::geometry::cloud::PointCloud;
 use deepfusion::geometry::{DepthMap, Intrinsics};
+use deepfusion::images::{RgbImage, exif_block_camera, load_photo};
 use deepfusion::jobs::ModelFacts;
 use deepfusion::jobs::devices::ComputeDevice;
 use deepfusion::jobs::engine::EngineSettings;
@@ -15,7 +16,7 @@ use deepfusion::jobs::intervals::sigma;
 use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
@@ -61,10 +62,16 @@ pub(crate) fn load(
         };
         let estimator = engine.load(network).map_err(device::failure)?;
         let factors = Arc::new(source.interval_factors()?);
-        Ok(Model::new(estimator, place, factors))
+        let stale = source.stale_calibrations()?;
+        Ok((Model::new(estimator, place, factors), stale))
     };
     // Large weights are read, and packed or moved to a GPU: that can take a while.
-    Ok(abandonable(py, open)??)
+    let (model, stale) = abandonable(py, open)??;
+    for stale in stale {
+        let text = CString::new(stale.to_string().replace('\0', " ")).unwrap_or_default();
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    Ok(model)
 }
 
 /// A trained network.
@@ -103,7 +110,8 @@ impl Model {
 #[pymethods]
 impl Model {
     /// Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
-    /// `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
+    /// `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix) EXIF is asked, of a file or of what PIL opened from one, then the lens of the training
+    /// camera is assumed, and the metres are as right as that.
     ///
     /// `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
     /// image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two predictions of the image or of four
@@ -114,11 +122,12 @@ impl Model {
         &self,
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
-        intrinsics: Option<[f64; 4]>,
+        intrinsics: Option<GivenCamera>,
         focal_correction: bool,
         stretch: bool,
         post_process: Option<&str>,
     ) -> PyResult<Prediction> {
+        let intrinsics = numbers_of(intrinsics)?;
         let augmentation = augmentation_named(post_process)?;
         let source = Source::of(image)?;
         let work = || -> Result<_, Failure> {
@@ -149,11 +158,12 @@ impl Model {
         &self,
         py: Python<'_>,
         images: &Bound<'_, PyAny>,
-        intrinsics: Option<[f64; 4]>,
+        intrinsics: Option<GivenCamera>,
         focal_correction: bool,
         stretch: bool,
         post_process: Option<&str>,
     ) -> PyResult<Predictions> {
+        let intrinsics = numbers_of(intrinsics)?;
         let request = BulkRequest {
             images: images.try_iter()?.unbind(),
             intrinsics,
@@ -216,6 +226,39 @@ fn augmentation_named(name: Option<&str>) -> PyResult<Augmentation> {
     }
 }
 
+/// A camera as Python gives it.
+#[derive(FromPyObject)]
+pub(crate) enum GivenCamera {
+    /// fx, fy, cx, cy.
+    #[pyo3(annotation = "fx, fy, cx, cy")]
+    Numbers([f64; 4]),
+    /// K, row by row.
+    #[pyo3(annotation = "3 x 3 matrix")]
+    Matrix([[f64; 3]; 3]),
+}
+
+impl GivenCamera {
+    /// fx, fy, cx, cy.
+    pub(crate) fn numbers(self) -> Result<[f64; 4], Failure> {
+        match self {
+            Self::Numbers(numbers) => Ok(numbers),
+            Self::Matrix([[fx, skew, cx], [zero, fy, cy], last])
+                if skew == 0.0 && zero == 0.0 && last == [0.0, 0.0, 1.0] =>
+            {
+                Ok([fx, fy, cx, cy])
+            }
+            Self::Matrix(rows) => Err(Failure {
+                message: format!("intrinsics: {rows:?} is not the matrix of a pinhole camera"),
+                hint: Some("fx 0 cx, 0 fy cy, 0 0 1".into()),
+            }),
+        }
+    }
+}
+
+fn numbers_of(camera: Option<GivenCamera>) -> Result<Option<[f64; 4]>, Failure> {
+    camera.map(GivenCamera::numbers).transpose()
+}
+
 /// A camera that can be one, of an image of this size.
 pub(crate) fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsics, Failure> {
     let finite = [fx, fy, cx, cy].iter().all(|v| v.is_finite());
@@ -230,8 +273,8 @@ pub(crate) fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<In
 
 /// Where an image is.
 pub(crate) enum Source {
-    /// Here.
-    Pixels(RgbImage),
+    /// Here, and the camera that the file says which they were read from.
+    Pixels(RgbImage, Option<Intrinsics>),
     /// In a file.
     File(PathBuf),
 }
@@ -240,16 +283,18 @@ impl Source {
     /// From an array (NumPy's, or another's by DLPack), a PIL image, or a path.
     pub(crate) fn of(image: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(array) = image.extract::<PyReadonlyArray3<'_, u8>>() {
-            return of_array(&array).map(Self::Pixels);
+            return Ok(Self::Pixels(of_array(&array)?, None));
         }
         if let Ok(path) = image.extract::<PathBuf>() {
             return Ok(Self::File(path));
         }
         let numpy = image.py().import("numpy")?;
+        let mut exif = None;
         let array = if image.hasattr("__dlpack__")? {
             numpy.call_method1("from_dlpack", (image,))?
         } else if image.hasattr("convert")? {
             // PIL's way, which others have as well.
+            exif = exif_of_file(image)?;
             let image = upright(image)?;
             let rgb = image.call_method1("convert", ("RGB",))?;
             numpy.call_method1("asarray", (rgb,))?
@@ -257,20 +302,24 @@ impl Source {
             numpy.call_method1("asarray", (image,))?
         };
         match array.extract::<PyReadonlyArray3<'_, u8>>() {
-            Ok(array) => of_array(&array).map(Self::Pixels),
+            Ok(array) => {
+                let pixels = of_array(&array)?;
+                let camera = exif.and_then(|exif| exif_block_camera(&exif, pixels.dimensions()));
+                Ok(Self::Pixels(pixels, camera.map(|camera| camera.intrinsics)))
+            }
             Err(_) => Err(PyTypeError::new_err(
                 "image: expected an H x W x 3 array of uint8, a PIL image, or a path",
             )),
         }
     }
 
-    /// The pixels, and the camera: the one given, else what a file's EXIF says of the lens.
+    /// The pixels, and the camera: the one given, else what EXIF says of the lens.
     pub(crate) fn read(
         self,
         intrinsics: Option<[f64; 4]>,
     ) -> Result<(RgbImage, Option<Intrinsics>), Failure> {
         let (image, from_file) = match self {
-            Self::Pixels(image) => (image, None),
+            Self::Pixels(image, camera) => (image, camera),
             Self::File(path) => {
                 let photo = load_photo(&path)?;
                 (photo.image, photo.intrinsics)
@@ -280,6 +329,20 @@ impl Source {
         let given = intrinsics.map(|numbers| checked(numbers, size));
         Ok((image, given.transpose()?.or(from_file)))
     }
+}
+
+/// The EXIF block of an image that PIL opened and nobody changed: of one that was cut, the focal length is no longer true.
+fn exif_of_file(image: &Bound<'_, PyAny>) -> PyResult<Option<Vec<u8>>> {
+    let Ok(pil) = image.py().import("PIL.ImageFile") else {
+        return Ok(None);
+    };
+    if !image.is_instance(&pil.getattr("ImageFile")?)? {
+        return Ok(None);
+    }
+    // A PNG may have it behind its pixels.
+    image.call_method0("load")?;
+    let block = image.getattr("info")?.call_method1("get", ("exif",))?;
+    Ok(block.extract().ok())
 }
 
 /// A PIL image of a file whose EXIF says how the camera was held, turned as a file's own pixels are.

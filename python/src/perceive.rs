@@ -1,9 +1,9 @@
 //! From depth to 3D targets.
 
-use deepfusion::geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion::geometry::{DepthMap, Se3};
 use deepfusion::perception::{
     Collision, Perception as Perceiver, PerceptionConfig, Stamp, Surroundings, Target,
-    VehicleShape, time_to_collision,
+    VehicleShape, scale_bounds, time_to_collision, working_depth,
 };
 use nalgebra::{Matrix3, Vector3};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -13,10 +13,7 @@ use serde::Serialize;
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::{raise, with_hint};
-use crate::model::checked;
-
-/// Widest depth image that is looked at, as the command does: more pixels cost time and say no more than a network knew.
-const WIDTH: usize = 640;
+use crate::model::{GivenCamera, checked};
 
 /// Follows targets from image to image.
 #[pyclass(frozen, module = "deepfusion._native")]
@@ -55,12 +52,7 @@ impl Perception {
         } else {
             PerceptionConfig::predicted()
         };
-        // As the command does.
-        let base = PerceptionConfig {
-            parking_rows: true,
-            ..base
-        };
-        let config = over(&base, settings)?;
+        let config = over(&base.with_parking_rows(), settings)?;
         config.validate().map_err(raise)?;
         Ok(Self {
             inner: Mutex::new(Perceiver::new(config)),
@@ -80,7 +72,7 @@ impl Perception {
         &self,
         py: Python<'_>,
         depth: PyReadonlyArray2<'_, f32>,
-        intrinsics: [f64; 4],
+        intrinsics: GivenCamera,
         sigma: Option<PyReadonlyArray2<'_, f32>>,
         time_s: Option<f64>,
         world_from_cam: Option<PyReadonlyArray2<'_, f64>>,
@@ -90,7 +82,10 @@ impl Perception {
         let depth = depth_map(&depth);
         let sigma = sigma.map(|sigma| depth_map(&sigma));
         let size = |n: usize| u32::try_from(n).map_err(|e| PyValueError::new_err(e.to_string()));
-        let camera = checked(intrinsics, (size(depth.width)?, size(depth.height)?))?;
+        let camera = checked(
+            intrinsics.numbers()?,
+            (size(depth.width)?, size(depth.height)?),
+        )?;
         let pose = world_from_cam.map(|pose| transform(&pose)).transpose()?;
         let stamp = match (time_s, pose) {
             (Some(time_s), Some(world_from_cam)) => Some(Stamp {
@@ -105,10 +100,13 @@ impl Perception {
             }
         };
         let found = py.detach(|| {
-            let (small, k) = working(&depth, &camera);
-            let sigma = sigma.map(|sigma| working(&sigma, &camera).0);
+            let (small, k) = working_depth(&depth, &camera);
+            let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
             let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-            perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])
+            let mut found = perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])?;
+            let whole = [camera.width, camera.height];
+            scale_bounds(&mut found.targets, [small.width, small.height], whole);
+            Ok::<_, deepfusion::perception::Error>(found)
         });
         to_json(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
     }
@@ -159,16 +157,6 @@ pub(crate) fn depth_map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
         height: array.shape()[0],
         data: array.as_array().iter().copied().collect(),
     }
-}
-
-/// The nearest pixel of each: a mean would put points between near and far.
-fn working(depth: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics) {
-    if depth.width <= WIDTH {
-        return (depth.clone(), *k);
-    }
-    let height = (depth.height * WIDTH).div_ceil(depth.width).max(1);
-    let k = k.resized(WIDTH as u32, height as u32);
-    (depth.nearest(WIDTH, height), k)
 }
 
 /// A rigid transform of a 4×4 matrix.

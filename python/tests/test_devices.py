@@ -3,6 +3,7 @@
 import deepfusion
 import numpy as np
 import pytest
+from deepfusion._devices import own_gpu
 
 QUICK = {"preset": "tiny", "steps": 2, "batch": 1, "size": {"width": 64, "height": 64}, "seed": 4, "validation_share": 0.2}
 LACKING = [name for name in ("metal", "cuda", "wgpu", "vulkan") if name not in deepfusion.devices()]
@@ -60,3 +61,23 @@ def test_a_gpu_computes_in_f32():
     with pytest.raises(deepfusion.DeepFusionError, match="bf16") as caught:
         deepfusion.load("tiny", precision="bf16", device="cuda")
     assert "f32" in caught.value.hint
+
+
+def test_each_worker_has_a_gpu_of_its_own(monkeypatch):
+    """By the number that torchrun and its like give each process of a machine."""
+
+    class Workers:
+        rank, count = 3, 4
+
+        def sum(self, values):
+            pass
+
+    for name in ("LOCAL_RANK", "OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "SLURM_LOCALID", "CUDA_VISIBLE_DEVICES"):
+        monkeypatch.delenv(name, raising=False)
+    assert own_gpu("cuda", Workers()) == "cuda"
+    monkeypatch.setenv("SLURM_LOCALID", "1")
+    assert [own_gpu(device, Workers()) for device in ("cuda", "vulkan", "cuda:0", "cpu", "auto")] == ["cuda:1", "vulkan", "cuda:0", "cpu", "auto"]
+    assert own_gpu("cuda", None) == "cuda"
+    # Each sees its own alone.
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5")
+    assert own_gpu("cuda", Workers()) == "cuda:0"

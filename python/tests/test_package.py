@@ -126,6 +126,37 @@ def test_a_phones_picture_is_upright(drive, model, tmp_path):
     assert np.median(np.abs(np.log(from_file.depth / from_pil.depth))) < 0.02
 
 
+def test_a_camera_is_four_numbers_or_a_matrix(drive, model):
+    frame = deepfusion.Dataset(drive)[0]
+    fx, fy, cx, cy = frame.intrinsics
+    k = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    expected = model.predict(frame.image, frame.intrinsics)
+    for given in (k, k.tolist(), np.array(frame.intrinsics)):
+        seen = model.predict(frame.image, given)
+        assert seen.intrinsics == expected.intrinsics and np.array_equal(seen.depth, expected.depth)
+    assert np.array_equal(next(iter(model.predict_many([frame.image], k))).depth, expected.depth)
+    found, again = (deepfusion.perceive(expected.depth, given).ground for given in (frame.intrinsics, k))
+    assert found == again
+    k[0, 1] = 2.0
+    with pytest.raises(deepfusion.DeepFusionError, match="not the matrix of a pinhole camera") as refused:
+        model.predict(frame.image, k)
+    assert "0 0 1" in refused.value.hint
+
+
+def test_a_picture_that_pil_opened_says_its_lens(drive, model, tmp_path):
+    picture = Image.fromarray(deepfusion.Dataset(drive)[0].image)
+    exif = Image.Exif()
+    exif[0xA405] = 26
+    for name in ("lens.jpg", "lens.png"):
+        file = tmp_path / name
+        picture.save(file, exif=exif)
+        with Image.open(file) as opened:
+            assert model.predict(opened).intrinsics == model.predict(file).intrinsics
+            assert model.predict(opened).intrinsics is not None
+            # Of one that was cut the focal length is not true.
+            assert model.predict(opened.crop((0, 0, 96, 64))).intrinsics is None
+
+
 def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
     frame = deepfusion.Dataset(drive)[1]
     expected = model.predict(frame.image, frame.intrinsics).depth

@@ -147,6 +147,7 @@ impl Reportable for Error {
 fn wrapped(error: &Error) -> Option<&dyn Reportable> {
     match error {
         Error::Video(error) => Some(error),
+        Error::Images(error) => Some(error),
         Error::Data(error) => Some(error),
         Error::Cloud(error) => Some(error),
         Error::PoseFile(error) => Some(error),
@@ -184,7 +185,8 @@ fn options_of(what: Difference) -> &'static str {
         Difference::Camera => "another camera (--intrinsics, --calib)",
         Difference::FocalCorrection => "another --no-focal-correction",
         Difference::Stretch => "another --stretch",
-        Difference::CorrectScale => "another --correct-scale",
+        Difference::CorrectScale => "another --correct-scale or --camera-height",
+        Difference::Topics => "another --topic",
         Difference::PostProcess => "another --post-process",
         _ => "other options",
     }
@@ -279,15 +281,13 @@ mod tests {
 
     #[test]
     fn an_engine_that_refuses_another_size_has_the_hint_of_its_own_problem() {
-        use deepfusion_runtime::{EngineProblem, Error as RuntimeError};
-        let hint = |problem: Error| {
-            let problem = EngineProblem::Runner(Box::new(problem));
-            Failure::from(RuntimeError::engine("other size", problem)).hint()
-        };
+        use deepfusion_runtime::Error as RuntimeError;
+        let hint =
+            |problem: Error| Failure::from(RuntimeError::engine("other size", problem)).hint();
         let fused = RuntimeError::engine("fused", deepfusion_infer::Error::NoBf16);
         let fused = hint(fused.into()).unwrap();
         assert!(fused.contains("`--engine burn` runs every"), "{fused}");
-        assert!(hint(Error::OnlyOrt).is_some_and(|hint| hint.contains("--ort-lib")));
+        assert!(hint(Error::OnlyOrt).is_some_and(|hint| hint.contains("ONNX Runtime")));
     }
 
     #[test]

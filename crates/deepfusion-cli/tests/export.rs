@@ -41,7 +41,8 @@ fn a_run_becomes_a_file_that_is_its_network() {
         model.trained_with.map(|k| k.fy),
         report["training_fy_px"].as_f64()
     );
-    assert!(model.trained_with.is_some());
+    assert!(model.trained_with.is_some() && !model.canonical);
+    assert_eq!(report["canonical_fy_px"], serde_json::Value::Null);
 
     // Another size: the same weights, the same training camera.
     let done = run(

@@ -135,6 +135,13 @@ fn a_packed_network_stands_for_its_run() {
     let onnx = json(at, &format!("export {model} --out hut.onnx --json"));
     assert_eq!(onnx["size"], serde_json::json!([96, 64]));
     assert!(onnx["training_fy_px"].is_f64());
+    // The embedded ones learned many cameras: every picture's depth is to be multiplied by its own focal length.
+    let onnx = json(
+        at,
+        "export --model tiny --size 96x64 --out tiny.onnx --json",
+    );
+    assert!(onnx["canonical_fy_px"].is_f64());
+    assert_eq!(onnx["canonical_fy_px"], onnx["training_fy_px"]);
     let bench = json(at, &format!("bench {model} --repeats 1 --json"));
     assert_eq!(bench["network"], "packed/hut.safetensors");
     assert_eq!(bench["parameters"], parameters);

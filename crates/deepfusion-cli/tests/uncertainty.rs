@@ -205,6 +205,14 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
 
     let kept = at.join("sure/uncertainty.toml");
     let good = fs::read_to_string(&kept).unwrap();
+    // Of another step of the network: not used, and said.
+    fs::write(&kept, good.replacen("step = ", "step = 9", 1)).unwrap();
+    let stale = ok(at, "predict --model sure sim --save sigma --out stale");
+    assert!(
+        stale.stderr.contains("found for the network of step 9"),
+        "{}",
+        stale.stderr
+    );
     let impossible = good.replacen("factors = [", "factors = [-1.0, 1.0, 1.0] # ", 1);
     assert_ne!(impossible, good);
     for wrong in ["levels = [0.5]", &impossible] {

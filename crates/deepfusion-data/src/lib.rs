@@ -7,7 +7,7 @@
 //! [`Recording`]. Nothing here knows of tensors.
 //!
 //! Inside, `formats` reads each layout with the help of `camera` (calibrations, lenses), `logs` (tables of times and speeds),
-//! `pictures` and `truth` (measured depth), and makes a `dataset` of it; `convert` writes data sets in other layouts.
+//! and `truth` (measured depth), and makes a `dataset` of it; `convert` writes data sets in other layouts.
 
 mod camera;
 mod convert;
@@ -16,7 +16,6 @@ mod dataset_toml;
 mod error;
 mod formats;
 mod logs;
-mod pictures;
 mod truth;
 
 pub use camera::{CalibrationSource, CameraCalibration, Lens, calibration_near, camera_info_yaml};
@@ -33,6 +32,10 @@ pub use dataset::{
     SplitEntry, Stream, TimesWarning, TopicRole, Unreadable, grey_image, hold_out,
     road_camera_height, speed_unit_warning,
 };
+pub use deepfusion_images::{
+    Photo, RgbImage, decode_rgb, image_size, load_photo, load_rgb, read_depth_png, resize_rgb,
+    save_png, to_chw, to_network_input, write_depth_png,
+};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use error::{
     ArrayProblem, CalibrationFileProblem, CalibrationProblem, CameraInfoProblem, CameraProblem,
@@ -46,12 +49,7 @@ pub use formats::kitti;
 pub use formats::{
     DopplerEgo, ego_velocity, ground_radial, inspect, inspect_with, write_bag_config,
 };
-pub use image::RgbImage;
-pub use pictures::{
-    Photo, decode_rgb, image_size, load_photo, load_rgb, overlay, read_depth_png, resize_rgb,
-    save_png, to_chw, to_network_input, write_depth_png,
-};
 pub use truth::{
     DynamicAgreement, GtKind, LidarMotion, MovingLabels, MovingPixels, MovingSource, NoSuchDepth,
-    ScanTruth,
+    ScanTruth, overlay,
 };

@@ -21,7 +21,6 @@ mod lens;
 mod motion;
 mod moving;
 mod nuscenes;
-mod pictures;
 mod recording;
 mod rgbd;
 mod ros2;

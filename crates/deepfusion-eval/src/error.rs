@@ -158,7 +158,7 @@ impl Hint for Error {
             Self::Intervals { .. } => {
                 Some("calibrate the network's uncertainty anew".into())
             }
-            Self::Io { source, .. } => system_hint(source.kind()).map(Into::into),
+            Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
             Self::ArrayFile { reason, .. } => reason.remedy().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(

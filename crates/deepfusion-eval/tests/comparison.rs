@@ -6,7 +6,9 @@ use deepfusion_eval::compare::{
     Error, Evaluation, FrameScore, MeasuredOn, MetricScale, ModelFile, SAVED_VERSION,
     SavedEvaluation, Verdict, published_tables, run_tables, sha256_of_file,
 };
-use deepfusion_eval::{Crop, Evaluator, Grid, PostProcess, Prediction, Protocol, Report};
+use deepfusion_eval::{
+    Crop, Evaluator, Grid, GroundTruth, PostProcess, Prediction, Protocol, Report,
+};
 use deepfusion_hint::Hint;
 
 /// An evaluation of four pixels of two images; `factor` is how wrong the method is, `shift` makes another ground truth.
@@ -296,7 +298,8 @@ fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
     let found = verdict("good", &[good]);
     assert_eq!(found.verdict, Verdict::Trusted);
     assert_eq!((found.bias, found.ci95), (Some(0.01), Some([-0.03, 0.05])));
-    let nothing: [Change; 8] = [
+    let nothing: [Change; 9] = [
+        |s| s.report.protocol.gt = GroundTruth::Velodyne,
         |s| s.measured.held_out = None,
         |s| s.measured.held_out = Some(false),
         |s| s.model.sha256 = "another".into(),

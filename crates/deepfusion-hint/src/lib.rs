@@ -15,7 +15,7 @@
 //! }
 //! ```
 //!
-//! [`system_hint`] is the hint of an error that holds a reason of the system's that says what to do: a missing file, a full disk. [`count_of`]
+//! [`system_hint`] is the hint of an error that holds a reason of the system's: a missing file, a full disk. [`count_of`]
 //! writes the counts of a message: `1 frame`, `2 frames`.
 
 mod system;

@@ -140,10 +140,7 @@ impl StreetBench {
 
     /// Ground, boxes and tracks of a picture that is seen again and again.
     fn targets(&self, repeats: usize) -> Result<f64> {
-        let mut perception = Perception::new(PerceptionConfig {
-            parking_rows: true,
-            ..PerceptionConfig::default()
-        });
+        let mut perception = Perception::new(PerceptionConfig::default().with_parking_rows());
         let mut time_s = 0.0;
         median(repeats, || {
             time_s += 0.1;

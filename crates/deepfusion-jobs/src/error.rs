@@ -74,6 +74,18 @@ pub enum Error {
         /// The recording.
         path: PathBuf,
     },
+    /// Ground truth without names, and not an array for each frame.
+    #[error(
+        "{} of ground truth without names for {}",
+        count_of(*found, "array"),
+        count_of(*expected, "frame")
+    )]
+    StackLength {
+        /// How many arrays there are.
+        found: usize,
+        /// How many frames are evaluated.
+        expected: usize,
+    },
     /// Something that would be overwritten.
     #[error("{}: already exists", path.display())]
     Exists {
@@ -375,7 +387,10 @@ pub enum Error {
     /// A video.
     #[error(transparent)]
     Video(#[from] deepfusion_video::Error),
-    /// A recording, a picture, or another file.
+    /// A picture.
+    #[error(transparent)]
+    Images(#[from] deepfusion_images::Error),
+    /// A recording, or another file.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
     /// A scan.
@@ -446,6 +461,8 @@ pub enum StaleReason {
     MadeWith(Difference),
     /// The image is another one now.
     ImageChanged(PathBuf),
+    /// Its recording has another calibration now.
+    Calibration,
 }
 
 impl std::fmt::Display for StaleReason {
@@ -454,6 +471,7 @@ impl std::fmt::Display for StaleReason {
             Self::NoSidecar => write!(f, "and does not say how it was made"),
             Self::OtherImage(image) => write!(f, "made from {}", image.display()),
             Self::MadeWith(what) => write!(f, "made with {what}"),
+            Self::Calibration => write!(f, "made with another calibration of its recording"),
             Self::ImageChanged(image) => write!(f, "and {} has changed since", image.display()),
         }
     }
@@ -526,6 +544,16 @@ impl std::fmt::Display for NoMean {
     }
 }
 
+/// For networks of other input sizes: what the runtime says stays its own.
+impl From<Error> for deepfusion_runtime::EngineProblem {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Runtime(error) => error.into(),
+            error => Self::Runner(Box::new(error)),
+        }
+    }
+}
+
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
@@ -544,6 +572,9 @@ impl Hint for Error {
             }
             Self::NothingToMeasure { .. } => Some(
                 "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
+            ),
+            Self::StackLength { .. } => Some(
+                "give an .npz whose arrays have the frames' names, or an array for each frame, in their order".into(),
             ),
             Self::Exists { .. } | Self::Stale { .. } => {
                 Some("allow overwriting, or choose another folder".into())
@@ -634,7 +665,7 @@ impl Hint for Error {
             #[cfg(feature = "train")]
             Self::ReadBack { source, .. }
             | Self::CheckNotStarted { source }
-            | Self::CheckNotEnded { source } => system_hint(source.kind()).map(Into::into),
+            | Self::CheckNotEnded { source } => Some(system_hint(source.kind()).into()),
             #[cfg(feature = "train")]
             Self::Deviates { .. } => {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())
@@ -658,9 +689,9 @@ impl Hint for Error {
             ),
             Self::Picture(image::ImageError::IoError(source))
             | Self::Npy(ndarray_npy::WriteNpyError::Io(source)) => {
-                system_hint(source.kind()).map(Into::into)
+                Some(system_hint(source.kind()).into())
             }
-            Self::Json(error) => error.io_error_kind().and_then(system_hint).map(Into::into),
+            Self::Json(error) => error.io_error_kind().map(|kind| system_hint(kind).into()),
             Self::Pattern(_)
             | Self::Picture(_)
             | Self::Shape(_)
@@ -670,6 +701,7 @@ impl Hint for Error {
             | Self::Toml(_) => None,
             Self::KeptFactors { source, .. } => source.hint(),
             Self::Video(error) => error.hint(),
+            Self::Images(error) => error.hint(),
             Self::Data(error) => error.hint(),
             Self::Cloud(error) => error.hint(),
             Self::PoseFile(error) => error.hint(),

@@ -94,6 +94,7 @@ fn model_of(
             }),
             None => camera.map(|k| FocalLength { fx: k.fx, fy: k.fy }),
         },
+        canonical: config.canonical_focal_px.is_some(),
     })
 }
 

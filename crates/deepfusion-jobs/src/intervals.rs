@@ -9,25 +9,51 @@ use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
 
 use crate::evaluation::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files;
-use crate::{Error, ModelFacts, Result};
+use crate::{Error, ModelFacts, Result, StaleCalibration};
 
 /// The file in a run's folder.
 const FILE: &str = "uncertainty.toml";
+/// Its key of the network's step.
+const STEP: &str = "step";
 
-/// A run's factors, where they were found.
+/// What the file of a run holds: the factors, and the step of the network that they were found for.
+fn kept(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
+    let path = run.join(FILE);
+    let text = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(deepfusion_data::Error::file(&path, e).into()),
+    };
+    let parsed = text.parse::<toml::Table>().and_then(|mut table| {
+        let step = table.remove(STEP).map(toml::Value::try_into).transpose()?;
+        Ok((table.try_into()?, step))
+    });
+    match parsed {
+        Ok((factors, step)) => Ok(Some((validated(factors, &path)?, step))),
+        Err(source) => Err(Error::Kept { path, source }),
+    }
+}
+
+/// The factors that were found for a run's network at this step. Those of another step are not its own: [`stale`].
 ///
 /// # Errors
 /// A file that holds none.
-pub fn read(run: &Path) -> Result<Option<IntervalFactors>> {
-    let path = run.join(FILE);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => match toml::from_str(&text) {
-            Ok(factors) => Ok(Some(validated(factors, &path)?)),
-            Err(source) => Err(Error::Kept { path, source }),
-        },
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),
-    }
+pub fn read(run: &Path, step: usize) -> Result<Option<IntervalFactors>> {
+    let kept = kept(run)?.filter(|(_, found)| *found == Some(step));
+    Ok(kept.map(|(factors, _)| factors))
+}
+
+/// The factors beside a run that are not its network's at this step, where it has such.
+///
+/// # Errors
+/// As [`read`].
+pub fn stale(run: &Path, step: usize) -> Result<Option<StaleCalibration>> {
+    let kept = kept(run)?.filter(|(_, found)| *found != Some(step));
+    Ok(kept.map(|(_, found)| StaleCalibration {
+        path: run.join(FILE),
+        found,
+        step,
+    }))
 }
 
 /// Factors that can be used; `path` names where they come from.
@@ -41,11 +67,11 @@ pub(crate) fn validated(factors: IntervalFactors, path: &Path) -> Result<Interva
     }
 }
 
-fn write(factors: &IntervalFactors, run: &Path) -> Result<PathBuf> {
+fn write(factors: &IntervalFactors, step: usize, run: &Path) -> Result<PathBuf> {
     let path = run.join(FILE);
     let text = format!(
         "# The interval of a depth is depth * exp(-q * b) to depth * exp(q * b); b is what the network says, and q stands here for\n\
-         # each level and range of predicted depth. Found by an evaluation.\n{}",
+         # each level and range of predicted depth. Found by an evaluation, for the network of this step.\n{STEP} = {step}\n{}",
         toml::to_string(factors)?
     );
     files::write(&path, text)?;
@@ -121,7 +147,7 @@ pub fn measure(
         && let Some(found) = IntervalFactors::calibrate(&samples)
         && let Some(run) = model.folder()
     {
-        kept = Some((found.clone(), write(&found, run)?));
+        kept = Some((found.clone(), write(&found, estimator.step, run)?));
         factors = found;
     }
     evaluated.report.intervals = factors.measure(&samples);

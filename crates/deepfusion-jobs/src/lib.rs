@@ -85,6 +85,7 @@ mod run_history;
 #[cfg(feature = "train")]
 pub mod samples;
 pub mod scene;
+mod stale_calibration;
 mod target_finder;
 #[cfg(feature = "train")]
 pub mod training;
@@ -95,4 +96,5 @@ pub use inputs::{Input, find_inputs};
 pub use model_facts::{ModelFacts, name_of};
 pub use perception_settings::perception_settings;
 pub use run_history::RunHistory;
+pub use stale_calibration::StaleCalibration;
 pub use target_finder::{PerceivedFrame, StartedFrame, TargetFinder, TargetSettings};

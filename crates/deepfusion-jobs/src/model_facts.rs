@@ -7,7 +7,8 @@ use deepfusion_eval::{IntervalFactors, PostProcess};
 use deepfusion_runtime::{ModelSource, Precision};
 use sha2::{Digest, Sha256};
 
-use crate::{Error, Result, intervals};
+use crate::evaluation::confidence::Confidence;
+use crate::{Error, Result, StaleCalibration, intervals};
 
 /// The last part of a path, for people: a folder given as `.` by its own name.
 #[must_use]
@@ -40,6 +41,12 @@ pub trait ModelFacts {
     /// # Errors
     /// For a file or a card that holds none.
     fn interval_factors(&self) -> Result<IntervalFactors>;
+
+    /// What is kept beside a run and was found for another step of its network: it is not used.
+    ///
+    /// # Errors
+    /// For a file that cannot be read.
+    fn stale_calibrations(&self) -> Result<Vec<StaleCalibration>>;
 
     /// What evaluations that the run's folder keeps say of this checkpoint's metres, with the metres of a data set, for a network that
     /// has learned for `steps`. A packed network keeps none.
@@ -100,7 +107,9 @@ impl ModelFacts for ModelSource {
 
     fn interval_factors(&self) -> Result<IntervalFactors> {
         let found = match self {
-            Self::Run { folder, .. } => intervals::read(folder.path())?,
+            Self::Run { folder, kind, .. } => {
+                intervals::read(folder.path(), folder.read_state(*kind)?.step)?
+            }
             Self::Packed { network, .. } => {
                 let named = || PathBuf::from(&network.card.name);
                 let table = network.card.uncertainty.clone();
@@ -115,6 +124,15 @@ impl ModelFacts for ModelSource {
             }
         };
         Ok(found.unwrap_or_else(IntervalFactors::uncalibrated))
+    }
+
+    fn stale_calibrations(&self) -> Result<Vec<StaleCalibration>> {
+        let Self::Run { folder, kind, .. } = self else {
+            return Ok(Vec::new());
+        };
+        let (run, step) = (folder.path(), folder.read_state(*kind)?.step);
+        let both = [intervals::stale(run, step)?, Confidence::stale(run, step)?];
+        Ok(both.into_iter().flatten().collect())
     }
 
     fn scale(

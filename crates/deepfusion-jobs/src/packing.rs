@@ -120,7 +120,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
         depth_difference: rounded(difference(&network, &bytes)?),
         note: options.note,
         figures: figures(folder.path(), &sha256_of_file(&file)?),
-        uncertainty: intervals::read(folder.path())?
+        uncertainty: intervals::read(folder.path(), state.step)?
             .map(toml::Table::try_from)
             .transpose()
             .map_err(no_form("the factors of its intervals have no TOML form"))?,

@@ -13,10 +13,7 @@ pub fn perception_settings(
     path: Option<&Path>,
     base: PerceptionConfig,
 ) -> Result<PerceptionConfig> {
-    let base = PerceptionConfig {
-        parking_rows: true,
-        ..base
-    };
+    let base = base.with_parking_rows();
     let Some(path) = path else { return Ok(base) };
     let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
     let wrong = |error: toml::de::Error| Error::PerceptionFile {

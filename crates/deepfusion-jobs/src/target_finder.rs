@@ -8,8 +8,8 @@ use deepfusion_geometry::DepthMap;
 use deepfusion_instances::InstanceModel;
 use deepfusion_motion::ScaleMonitorConfig;
 use deepfusion_perception::{
-    ConfidenceModel, Instance, Perception, PerceptionConfig, Run, VehicleShape, time_to_collision,
-    working_depth,
+    ConfidenceModel, Instance, Perception, PerceptionConfig, Run, VehicleShape, scale_bounds,
+    time_to_collision, working_depth,
 };
 use deepfusion_records::FrameRecord;
 use deepfusion_runtime::{DepthEstimator, ModelSource, PreparedImage};
@@ -89,7 +89,7 @@ impl<'a> TargetFinder<'a> {
         settings: TargetSettings,
     ) -> Result<Self> {
         let confidence = match model.folder() {
-            Some(run) => Confidence::read(run)?,
+            Some(run) => Confidence::read(run, estimator.step)?,
             None => None,
         };
         Ok(Self {
@@ -142,7 +142,7 @@ impl<'a> TargetFinder<'a> {
         let (image, ground) = (&loaded.image, surroundings.ground.as_ref());
         let scale = self.watch.add(image, &camera, &motion, ground);
         let drift = self.watch.first_drift();
-        let record = FrameRecord {
+        let mut record = FrameRecord {
             scale_monitor: scale,
             ..FrameRecord::new(
                 &input.name,
@@ -152,6 +152,8 @@ impl<'a> TargetFinder<'a> {
                 latency_ms,
             )
         };
+        let size = [image.width(), image.height()];
+        scale_bounds(&mut record.targets, [depth.width, depth.height], size);
         let scene = TargetScene {
             image: (image, &camera),
             depth: (&depth, &k),

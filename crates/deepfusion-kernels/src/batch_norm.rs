@@ -87,7 +87,11 @@ pub fn batch_norm(
 
 fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [MaybeUninit<f32>]) {
     let floor = if relu { 0.0 } else { f32::NEG_INFINITY };
-    let normalised = |x: &f32| ((x - mean) * scale + beta).max(floor);
+    // `f32::max` would make a number of NaN, and a loss that is none would look like one.
+    let normalised = |x: &f32| {
+        let y = (x - mean) * scale + beta;
+        if y < floor { floor } else { y }
+    };
     filled(out, x.iter().map(normalised));
 }
 
@@ -234,6 +238,23 @@ mod tests {
                 (numeric - ours).abs() < 2e-5 * (1.0 + numeric.abs()),
                 "{name}[{i}]: {ours} instead of {numeric}"
             );
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_stays_none() {
+        for relu in [false, true] {
+            let mut y = [0.0; 4];
+            batch_norm(
+                &[f32::NAN, 1.0, 2.0, 3.0],
+                &[1.0],
+                &[0.0],
+                4,
+                1e-5,
+                relu,
+                &mut y,
+            );
+            assert!(y.iter().all(|y| y.is_nan()), "{relu}: {y:?}");
         }
     }
 

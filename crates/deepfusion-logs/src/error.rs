@@ -134,7 +134,7 @@ pub enum ColumnProblem {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::File { source, .. } => return system_hint(source.kind()).map(Into::into),
+            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
             Self::Motion(error) => return error.hint(),
             Self::Line { .. } => "correct the line or delete it, or export the log anew",
             Self::Bytes { .. } => "copy the file again from where it was recorded",

@@ -1,7 +1,7 @@
 //! A phone's export folder: a table for each sensor, as Sensor Logger and phyphox write them.
 
 use crate::error::{Error, Result};
-use crate::log::{DriveLog, Format, ReadOptions};
+use crate::log::{Clock, DriveLog, Format, ReadOptions};
 use crate::note::{LogNote, TurnsNote};
 use crate::problem::SpeedProblem;
 use crate::rows::text_of;
@@ -58,8 +58,8 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
         log.notes.push(TurnsNote::NoGyroscope.into());
         return Ok(log);
     };
-    let rates = axes(&gyroscope, options)?;
-    let accelerations = axes(&gravity, options)?;
+    let rates = axes(&gyroscope, options, log.clock)?;
+    let accelerations = axes(&gravity, options, log.clock)?;
     let heading = headings(&location, options)?;
     let (turns, note) = yaw_rates(&rates, &accelerations, &heading);
     log.yaw_rates = turns;
@@ -67,15 +67,21 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
     Ok(log)
 }
 
-/// The three axes of a sensor over time, in the units of the file: rad/s, m/s².
-fn axes(table: &Table, options: &ReadOptions) -> Result<Vec<Sensor>> {
+/// The three axes of a sensor over time, in the units of the file: rad/s, m/s². Their times are in the column that was asked for where there is
+/// such, and on the positions' clock.
+fn axes(table: &Table, options: &ReadOptions, clock: Clock) -> Result<Vec<Sensor>> {
+    let asked = options.time.clone();
     let times = Times::of(
         table,
         &ReadOptions {
-            time: None,
+            time: asked.filter(|name| table.asked_for(name).is_ok()),
             ..options.clone()
         },
     )?;
+    if times.clock != clock {
+        let path = table.path.clone();
+        return Err(Error::OtherClock { path });
+    }
     let axis = |letter: &'static str| {
         let fits = |name: &str| name == letter || name.ends_with(&format!(" {letter}"));
         table

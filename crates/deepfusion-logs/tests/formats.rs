@@ -155,10 +155,20 @@ fn sensor_logger_has_turns_too() {
     }
     let turned = TurnsNote::AboutGravity(TurnSign::TurnedRound);
     assert!(
-        log.notes.contains(&turned.into()),
+        log.notes.contains(&turned.clone().into()),
         "gravity points down there: {:?}",
         log.notes
     );
+    // By another of its columns of time both are on that one's clock.
+    let elapsed = ReadOptions {
+        time: Some("seconds_elapsed".into()),
+        ..ReadOptions::default()
+    };
+    let log = read(&fixture("sensor_logger"), &elapsed).unwrap();
+    assert_eq!(log.clock, Clock::Free);
+    speeds_are_true(&log, 0, 13, 1e-3);
+    assert_eq!(log.yaw_rates.first().map(|turn| turn.ns), Some(0));
+    assert!(log.notes.contains(&turned.into()), "{:?}", log.notes);
 }
 
 #[test]

@@ -110,6 +110,12 @@ pub enum Error {
         /// What it lacks.
         reason: CheckpointLacks,
     },
+    /// A network that cannot be run: its encoder was imported, and the rest has learned nothing.
+    #[error("{path}: only its encoder has weights: the rest was never trained")]
+    EncodersOnly {
+        /// The file.
+        path: PathBuf,
+    },
     /// A folder that already holds a run.
     #[error("{path}: there is a run here already")]
     RunExists {
@@ -171,7 +177,7 @@ impl Hint for Error {
                 std::io::ErrorKind::PermissionDenied => {
                     Some(format!("no permission to {action} there"))
                 }
-                kind => system_hint(kind).map(Into::into),
+                kind => Some(system_hint(kind).into()),
             },
             Self::NotToml { .. } => None,
             Self::Checkpoint { .. } => Some("use the version of the program that wrote it".into()),
@@ -179,6 +185,7 @@ impl Hint for Error {
             Self::Foreign { .. } => {
                 Some("weights of other programs are imported: deepfusion-nn".into())
             }
+            Self::EncodersOnly { .. } => Some("train from it first".into()),
             Self::NotResumable { .. } => Some("start a new run from these weights".into()),
             Self::RunExists { .. } => Some("resume it, or choose another folder".into()),
             Self::Network(error) => error.hint(),

@@ -232,6 +232,18 @@ impl RunFolder {
 }
 
 impl Checkpoint {
+    /// That its networks can be run; `path` is its file.
+    ///
+    /// # Errors
+    /// [`Error::EncodersOnly`].
+    pub fn require_trained(&self, path: &Path) -> Result<(), Error> {
+        if self.encoders_only {
+            let path = path.to_owned();
+            return Err(Error::EncodersOnly { path });
+        }
+        Ok(())
+    }
+
     /// What its file's metadata say of it.
     #[must_use]
     pub fn metadata(&self) -> BTreeMap<String, String> {

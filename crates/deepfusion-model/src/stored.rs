@@ -36,7 +36,7 @@ impl StoredNetwork {
     /// That of a checkpoint; `set` as in [`Self::of_run`].
     ///
     /// # Errors
-    /// As [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
+    /// [`Error::EncodersOnly`]; as [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
     pub fn of_checkpoint(
         folder: &RunFolder,
         kind: CheckpointKind,
@@ -44,6 +44,7 @@ impl StoredNetwork {
     ) -> Result<Self, Error> {
         let config = folder.read_config()?.for_set(set)?;
         let (weights, state) = folder.load_depth_weights(kind)?;
+        state.require_trained(&folder.checkpoint_path(kind))?;
         Ok(Self {
             config,
             camera: folder.camera_of(&state, set)?,

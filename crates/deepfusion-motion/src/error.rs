@@ -165,7 +165,7 @@ impl Hint for Error {
             Self::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "a comma2k19 segment has processed_log/CAN, processed_log/IMU and global_pose"
             }
-            Self::File { source, .. } => return system_hint(source.kind()).map(Into::into),
+            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
             Self::Array { .. } => {
                 "fetch the recording again: the file is cut off, or of another data set"
             }

@@ -250,12 +250,12 @@ impl DepthNet {
     }
 
     /// As [`Self::forward_with_uncertainty`], for training the uncertainty head alone: the rest of the network keeps nothing for
-    /// a backward pass.
+    /// a backward pass and is as in inference, with its running statistics, which stay as they are.
     ///
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
     pub fn forward_for_uncertainty(&self, images: Tensor<4>) -> DepthOutput {
-        let fixed = self.clone().no_grad();
+        let fixed = freeze_statistics(self.clone().no_grad(), true);
         let (disparities, finest) = fixed.forward_with_feature(images);
         DepthOutput {
             disparities,

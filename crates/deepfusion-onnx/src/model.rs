@@ -12,6 +12,9 @@ pub struct FocalLength {
     pub fy: f64,
 }
 
+/// The key of a file's metadata for a canonical focal length.
+pub(crate) const CANONICAL: &str = "canonical_fy_px";
+
 /// A depth network for images of one size, from an RGB picture to metres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthModel {
@@ -26,6 +29,9 @@ pub struct DepthModel {
     /// The camera trained with. Depth of another camera's images is to be multiplied by
     /// f_y(that camera at this model's size) / f_y(trained with).
     pub trained_with: Option<FocalLength>,
+    /// Whether [`Self::trained_with`] is a canonical focal length, which no camera need have had: then depth of every camera's images is to be
+    /// multiplied so.
+    pub canonical: bool,
 }
 
 /// The output of a [`DepthModel`]: two maps of H×W values, row by row.

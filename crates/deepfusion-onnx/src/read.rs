@@ -8,6 +8,7 @@ use deepfusion_geometry::DepthRange;
 use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId};
 use prost::Message;
 
+use crate::model::CANONICAL;
 use crate::proto::{GraphProto, ModelProto, NodeProto, TensorProto};
 use crate::write::encode;
 use crate::{
@@ -37,6 +38,7 @@ pub fn read(bytes: &[u8]) -> Result<DepthModel, Error> {
         width,
         height: side(graph, 1)?,
         trained_with: focal_length(&proto)?,
+        canonical: proto.metadata_props.iter().any(|e| e.key == CANONICAL),
     };
     compare(&proto, graph, &encode(&model)?)?;
     Ok(model)
@@ -327,6 +329,8 @@ impl<'a> Reader<'a> {
         width: usize,
     ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
         let code = self.constant(node, 0)?;
+        // Its sides are as large as it has values.
+        floats(node, code)?;
         let side = |axis: usize| {
             let side = code.dims.get(axis).copied();
             side.and_then(|side| usize::try_from(side).ok())

@@ -6,6 +6,7 @@ use deepfusion_infer::{Activation, Border, Conv, Depthwise, Node, Op, ValueId};
 use deepfusion_kernels::position_code;
 use prost::Message;
 
+use crate::model::CANONICAL;
 use crate::proto::{
     AttributeProto, FLOAT, GraphProto, ModelProto, NodeProto, OperatorSetIdProto,
     StringStringEntryProto, TensorProto, UINT8, ValueInfoProto,
@@ -53,7 +54,8 @@ pub(crate) fn encode(model: &DepthModel) -> Result<ModelProto, Error> {
         Op::Conv(conv) => 4 * (conv.weight.len() + conv.bias.len()),
         Op::Depthwise(op) => 4 * (op.weight.len() + op.bias.len()),
         Op::Position { per_axis, halvings } => {
-            8 * per_axis * (model.width >> halvings) * (model.height >> halvings)
+            let sides = [*per_axis, model.width >> halvings, model.height >> halvings];
+            sides.into_iter().fold(8, usize::saturating_mul)
         }
         _ => 0,
     });
@@ -89,7 +91,16 @@ pub(crate) fn encode(model: &DepthModel) -> Result<ModelProto, Error> {
             "RGB picture, resized (Lanczos) to this size",
         )],
         output: vec![
-            ValueInfoProto::array("depth", FLOAT, [1, 1, h, w], "camera z in metres"),
+            ValueInfoProto::array(
+                "depth",
+                FLOAT,
+                [1, 1, h, w],
+                if model.canonical {
+                    "camera z in metres of a camera with the canonical focal length"
+                } else {
+                    "camera z in metres"
+                },
+            ),
             ValueInfoProto::array("disparity", FLOAT, [1, 1, h, w], "1 / depth, in 1/m"),
         ],
     };
@@ -101,9 +112,14 @@ pub(crate) fn encode(model: &DepthModel) -> Result<ModelProto, Error> {
         }],
         producer_name: "deepfusion".into(),
         producer_version: version.into(),
-        doc_string: "Metric depth from one RGB picture. For a camera other than the one trained with, multiply depth \
+        doc_string: if model.canonical {
+            "Metric depth from one RGB picture, shown whole. For every camera multiply depth by its f_y, in pixels of the \
+             resized picture, over the metadata's canonical_fy_px."
+        } else {
+            "Metric depth from one RGB picture. For a camera other than the one trained with, multiply depth \
             by f_y of that camera, in pixels of the resized picture, over the metadata's training_fy_px."
-            .into(),
+        }
+        .into(),
         graph: Some(graph),
         metadata_props: metadata(model, version),
     })
@@ -118,6 +134,9 @@ fn metadata(model: &DepthModel, version: &str) -> Vec<StringStringEntryProto> {
     if let Some(focal) = model.trained_with {
         entries.push(("training_fx_px", focal.fx.to_string()));
         entries.push(("training_fy_px", focal.fy.to_string()));
+        if model.canonical {
+            entries.push((CANONICAL, focal.fy.to_string()));
+        }
     }
     // What must be there stands last: a file that ends early is then never taken for a whole one.
     entries.push(("depth_min_m", model.range.min_m.to_string()));

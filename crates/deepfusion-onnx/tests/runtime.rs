@@ -101,6 +101,7 @@ fn the_far_end_of_the_range_is_exact() {
         width,
         height,
         trained_with: None,
+        canonical: false,
     };
     let mut engine = OrtEngine::load(None, &write(&model).unwrap(), 1).unwrap();
     let rgb: Vec<u8> = (0..=255).flat_map(|red| [red, 0, 0]).collect();

@@ -56,6 +56,15 @@ impl PerceptionConfig {
             ..Self::default()
         }
     }
+
+    /// These with [`Self::parking_rows`], as the commands and the Python package have them unless their settings say otherwise.
+    #[must_use]
+    pub fn with_parking_rows(self) -> Self {
+        Self {
+            parking_rows: true,
+            ..self
+        }
+    }
 }
 
 impl PerceptionConfig {

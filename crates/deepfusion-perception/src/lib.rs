@@ -50,4 +50,4 @@ pub use perception::{Perception, Stamp, Surroundings};
 pub use rays::Rays;
 pub use scoring::{Label, Matched, RangeScore, Scorer, ScoringRules, TargetScore};
 pub use target::Target;
-pub use working_depth::working_depth;
+pub use working_depth::{scale_bounds, working_depth};

@@ -29,7 +29,7 @@ pub struct Target {
     /// Its class by a segmentation model, if there is one: the class with the most votes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// Left, top, right, bottom of those pixels.
+    /// Left, top, right, bottom of those pixels, in pixels of the depth image; [`crate::scale_bounds`] brings them to an image's.
     pub bounds: Option<[u32; 4]>,
     /// Its index among the image's detections.
     #[serde(skip)]

@@ -2,6 +2,8 @@
 
 use deepfusion_geometry::{DepthMap, Intrinsics};
 
+use crate::Target;
+
 /// Widest depth image that is looked at: more pixels cost time and say no more than the network knew.
 const WIDTH: usize = 640;
 
@@ -17,9 +19,61 @@ pub fn working_depth(depth: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics)
     (depth.nearest(WIDTH, height), k)
 }
 
+/// Brings [`Target::bounds`] from pixels of a depth image at its working size to those of an image, both as width and height: the whole pixels that
+/// hold all of them.
+pub fn scale_bounds(targets: &mut [Target], working: [usize; 2], image: [u32; 2]) {
+    for bounds in targets
+        .iter_mut()
+        .filter_map(|target| target.bounds.as_mut())
+    {
+        for (i, side) in bounds.iter_mut().enumerate() {
+            let (from, to) = (working[i % 2].max(1) as u64, u64::from(image[i % 2]));
+            let begin = |pixel: u64| pixel * to / from;
+            let pixel = u64::from(*side);
+            let scaled = match i {
+                0 | 1 => begin(pixel),
+                _ => ((pixel + 1) * to).div_ceil(from).saturating_sub(1),
+            };
+            *side = scaled.min(to.saturating_sub(1)) as u32;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_are_those_of_the_image() {
+        let scaled = |bounds, working, image| {
+            let mut targets = [Target {
+                id: 1,
+                center_m: [0.0, 0.0, 9.0],
+                size_m: [4.0, 2.0, 1.5],
+                yaw_rad: 0.0,
+                distance_m: 9.0,
+                sigma_m: None,
+                velocity_mps: None,
+                moving: None,
+                confidence: 1.0,
+                pixels: 0,
+                class: None,
+                bounds: Some(bounds),
+                detection: None,
+            }];
+            scale_bounds(&mut targets, working, image);
+            targets[0].bounds.unwrap()
+        };
+        assert_eq!(
+            scaled([0, 0, 639, 193], [640, 194], [1242, 375]),
+            [0, 0, 1241, 374]
+        );
+        assert_eq!(
+            scaled([10, 20, 11, 20], [640, 194], [1280, 388]),
+            [20, 40, 23, 41]
+        );
+        assert_eq!(scaled([3, 4, 5, 6], [64, 32], [64, 32]), [3, 4, 5, 6]);
+    }
 
     #[test]
     fn the_working_size_keeps_pixels_where_the_camera_sees_them() {

@@ -17,6 +17,6 @@ pub use deepfusion_eval::compare::MetricScale;
 pub use deepfusion_motion::{ScaleReading, ScaleState};
 pub use deepfusion_perception::Target;
 pub use frame::{FrameRecord, GroundPlane};
-pub use made_with::{Difference, MadeWith};
+pub use made_with::{Difference, MadeWith, same_number};
 pub use marks::{FileMark, LiveMark, ScaleRecord};
 pub use prediction::{PredictionRecord, Sidecar};

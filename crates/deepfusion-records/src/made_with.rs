@@ -41,6 +41,12 @@ pub struct MadeWith {
     /// The data set, of those that the network learned from, whose metres are meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
+    /// The topics that were named for bags: `image=/left`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<String>,
+    /// The camera's height above the road that was given, metres, where depth is brought back by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_height_m: Option<f64>,
 }
 
 /// In what two [`MadeWith`] differ.
@@ -71,6 +77,8 @@ pub enum Difference {
     CorrectScale,
     /// In how many ways the network looked.
     PostProcess,
+    /// The topics that bags are read by.
+    Topics,
 }
 
 impl std::fmt::Display for Difference {
@@ -86,6 +94,7 @@ impl std::fmt::Display for Difference {
             Self::Camera => "another camera",
             Self::FocalCorrection => "another correction for the focal length",
             Self::Stretch => "another way of fitting images to the network",
+            Self::Topics => "other topics",
             Self::CorrectScale => "another correction of the scale",
             Self::PostProcess => "another post-processing",
         })
@@ -105,7 +114,7 @@ impl MadeWith {
             (self.save != other.save, Difference::Save),
             (self.set != other.set, Difference::Set),
             (
-                !equal(self.max_depth_m, other.max_depth_m),
+                !same_number(self.max_depth_m, other.max_depth_m),
                 Difference::MaxDepth,
             ),
             (self.max_sigma != other.max_sigma, Difference::MaxSigma),
@@ -116,13 +125,15 @@ impl MadeWith {
             ),
             (self.stretch != other.stretch, Difference::Stretch),
             (
-                self.correct_scale != other.correct_scale,
+                self.correct_scale != other.correct_scale
+                    || self.camera_height_m != other.camera_height_m,
                 Difference::CorrectScale,
             ),
             (
                 self.post_process != other.post_process,
                 Difference::PostProcess,
             ),
+            (self.topics != other.topics, Difference::Topics),
         ]
         .into_iter()
         .find_map(|(differs, what)| differs.then_some(what))
@@ -130,13 +141,13 @@ impl MadeWith {
 
     fn same_camera(&self, other: &Self) -> bool {
         match (self.intrinsics, other.intrinsics) {
-            (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| equal(*a, b)),
+            (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| same_number(*a, b)),
             (a, b) => {
                 let views = (self.hfov_deg, other.hfov_deg);
                 a.is_none()
                     && b.is_none()
                     && match views {
-                        (Some(a), Some(b)) => equal(a, b),
+                        (Some(a), Some(b)) => same_number(a, b),
                         (a, b) => a.is_none() && b.is_none(),
                     }
             }
@@ -145,6 +156,7 @@ impl MadeWith {
 }
 
 /// Whether two numbers are the same but for the last digits, which JSON may lose.
-fn equal(a: f64, b: f64) -> bool {
+#[must_use]
+pub fn same_number(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-12 * a.abs()
 }

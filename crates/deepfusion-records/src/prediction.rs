@@ -18,6 +18,9 @@ pub struct PredictionRecord {
     pub image_file: Option<FileMark>,
     /// The input's width and height.
     pub size: Option<[u32; 2]>,
+    /// Whether depth, camera and boxes are of the picture without the lens's distortion, which the input's file has.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub undistorted: bool,
     /// What the depths are.
     pub unit: String,
     /// The run or checkpoint given, or the embedded network's name.
@@ -82,6 +85,7 @@ mod tests {
                     modified_ns: Some(1_767_225_600_123_456_789),
                 }),
                 size: Some([1242, 375]),
+                undistorted: false,
                 unit: "metres".into(),
                 model: "street".into(),
                 model_sha256: Some("ab".into()),
@@ -123,6 +127,8 @@ mod tests {
                 correct_scale: false,
                 post_process: None,
                 set: None,
+                topics: Vec::new(),
+                camera_height_m: None,
             },
         }
     }

@@ -3,10 +3,10 @@
 
 use std::path::PathBuf;
 
-use deepfusion_data::to_chw;
 use deepfusion_eval::{Crop, Evaluator, Grid, MeanDepthBaseline, Prediction, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_images::to_chw;
 use deepfusion_render::{
     CloudView, DepthScale, HtmlReport, LineChart, PictureFormat, SamplePanel, depth_picture,
     error_picture, render_cloud, sample_panel, side_by_side, with_depth_legend,

@@ -27,7 +27,7 @@ pub enum Error {
     },
     /// A file cannot be read or written.
     #[error(transparent)]
-    Data(#[from] deepfusion_data::Error),
+    File(#[from] deepfusion_images::Error),
 }
 
 /// Why a file is not the log of a run.
@@ -51,10 +51,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::Data(inner) => inner.hint(),
+            Self::File(inner) => inner.hint(),
             Self::Log { .. } => Some("it should be the log.csv of a run's folder".into()),
             Self::Encode(image::ImageError::IoError(source)) => {
-                system_hint(source.kind()).map(Into::into)
+                Some(system_hint(source.kind()).into())
             }
             Self::Size { .. } | Self::Encode(_) => None,
         }

@@ -22,10 +22,10 @@ impl LearningLog {
     /// Reads a log.
     ///
     /// # Errors
-    /// [`Error::Data`] if the file cannot be read, [`Error::Log`] if it is not a log.
+    /// [`Error::File`] if the file cannot be read, [`Error::Log`] if it is not a log.
     pub fn read(path: &Path) -> Result<Self> {
         let text =
-            std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+            std::fs::read_to_string(path).map_err(|e| deepfusion_images::Error::file(path, e))?;
         Self::parse(&text).map_err(|problem| Error::Log {
             path: path.to_owned(),
             problem,

@@ -171,10 +171,10 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         use std::io::ErrorKind;
         let text = match self {
-            Self::NoSuchPath { .. } => return system_hint(ErrorKind::NotFound).map(Into::into),
+            Self::NoSuchPath { .. } => return Some(system_hint(ErrorKind::NotFound).into()),
             Self::File { source, .. } => match source.kind() {
                 ErrorKind::IsADirectory => "give the .bag file itself",
-                kind => return system_hint(kind).map(Into::into),
+                kind => return Some(system_hint(kind).into()),
             },
             Self::NotABag { .. } => {
                 "a ROS 2 recording (.mcap, .db3) keeps its own ending; other files are no recordings of ROS"

@@ -11,9 +11,18 @@ pub enum EngineProblem {
     /// ONNX Runtime refuses it.
     #[error("{0}")]
     Onnx(#[from] deepfusion_onnx::Error),
+    /// It cannot be made ready for another input size.
+    #[error("{0}")]
+    Network(Box<Error>),
     /// The caller's own runner refuses it.
     #[error("{0}")]
     Runner(Box<dyn Hint + Send + Sync>),
+}
+
+impl From<Error> for EngineProblem {
+    fn from(error: Error) -> Self {
+        Self::Network(Box::new(error))
+    }
 }
 
 impl Hint for EngineProblem {
@@ -21,6 +30,7 @@ impl Hint for EngineProblem {
         match self {
             Self::Fused(error) => error.hint(),
             Self::Onnx(error) => error.hint(),
+            Self::Network(error) => error.hint(),
             Self::Runner(error) => error.hint(),
         }
     }

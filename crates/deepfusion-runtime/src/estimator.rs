@@ -1,9 +1,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
-use deepfusion_hint::Hint;
+use deepfusion_images::RgbImage;
 use deepfusion_infer::Precision;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{InputSize, LOG_SCALE_BOUNDS, StoredNetwork, TrainConfig};
@@ -63,7 +62,7 @@ impl DepthEstimator {
     ///
     /// # Errors
     /// The runner's own.
-    pub fn of<E: Hint + Send + Sync + 'static>(
+    pub fn of<E: Into<EngineProblem>>(
         network: StoredNetwork,
         runner: impl Fn(&TrainConfig, Weights) -> Result<Box<dyn DepthRunner>, E>
         + Send
@@ -87,8 +86,7 @@ impl DepthEstimator {
                     size,
                     ..of.as_ref().clone()
                 };
-                runner(&config, weights.clone())
-                    .map_err(|e| Error::engine("other size", EngineProblem::Runner(Box::new(e))))
+                runner(&config, weights.clone()).map_err(|e| Error::engine("other size", e))
             })
         });
         Ok(Self {

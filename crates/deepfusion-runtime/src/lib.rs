@@ -5,7 +5,7 @@
 //! use deepfusion_runtime::DepthEstimator;
 //!
 //! let mut estimator = DepthEstimator::load("street")?;
-//! let photo = deepfusion_data::load_photo("street.jpg".as_ref())?;
+//! let photo = deepfusion_images::load_photo("street.jpg".as_ref())?;
 //! let depth = estimator.estimate(&photo.image, photo.intrinsics.as_ref())?.depth();
 //! println!("the middle is {:.1} m away", depth.data[depth.data.len() / 2]);
 //! # Ok(())

@@ -38,6 +38,7 @@ impl OrtRunner {
             width: config.size.width,
             height: config.size.height,
             trained_with: None,
+            canonical: false,
         })?;
         let pixels = config.size.width * config.size.height;
         Self::open(library, bytes.into(), pixels)

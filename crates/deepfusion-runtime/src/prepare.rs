@@ -1,5 +1,5 @@
-use deepfusion_data::{RgbImage, to_network_input};
 use deepfusion_geometry::Intrinsics;
+use deepfusion_images::{RgbImage, to_network_input};
 use deepfusion_model::InputSize;
 
 use crate::Augmentation;

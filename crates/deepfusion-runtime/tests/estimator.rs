@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier};
 
-use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_hint::Hint;
+use deepfusion_images::RgbImage;
 use deepfusion_runtime::{
     Augmentation, DepthEstimator, DepthRunner, Error as RuntimeError, FusedRunner, ModelSource,
     Precision, Prediction,

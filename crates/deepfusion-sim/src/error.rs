@@ -109,7 +109,7 @@ impl Hint for Error {
             Self::Encode {
                 source: image::ImageError::IoError(source),
                 ..
-            } => system_hint(source.kind()).map(Into::into),
+            } => Some(system_hint(source.kind()).into()),
             Self::Encode { .. } => None,
         }
     }

@@ -25,6 +25,18 @@ pub struct DepthFrame {
     pub frame: usize,
 }
 
+impl DepthFrame {
+    /// The recording and the frame in it.
+    pub(crate) fn place(&self) -> (usize, usize) {
+        (self.dataset, self.frame)
+    }
+
+    /// The frame itself.
+    pub(crate) fn of<'a>(&self, datasets: &'a [Dataset]) -> &'a deepfusion_data::Frame {
+        &datasets[self.dataset].frames()[self.frame]
+    }
+}
+
 /// Views of simulated worlds.
 #[derive(Clone)]
 pub struct SimulatedViews {

@@ -27,7 +27,7 @@ impl PosePredictor {
     /// one. `set` names one of the data sets the run learned from, where it learned several.
     ///
     /// # Errors
-    /// [`Error::NoPoseNet`] for a run that left it out; as [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
+    /// [`Error::NoPoseNet`] for a run that left it out; [`deepfusion_model::Error::EncodersOnly`]; as [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
     pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
         let config = folder.read_config()?;
@@ -35,6 +35,7 @@ impl PosePredictor {
         let config = config.for_set(set)?;
         let checkpoint = kind.unwrap_or_else(|| folder.preferred());
         let (model, _, state) = folder.load(checkpoint, &config, device)?;
+        state.require_trained(&folder.checkpoint_path(checkpoint))?;
         let pose_net = model.pose_net.ok_or_else(|| Error::NoPoseNet {
             run: path.to_owned(),
         })?;

@@ -12,14 +12,21 @@ use crate::{LossTerms, TrainConfig, ViewMotion};
 ///
 /// The explainability masks' price is included: without it the masks alone could make the error small.
 ///
-/// The loss on known depth is included at its own weight, and is the whole value for a run that learns from known depth alone.
+/// The loss on known depth is included at its own weight, and is the whole value for a run that learns from known depth alone. Where the
+/// uncertainty head learns alone (`loss.depth.weight` 0), that is its own loss, which may be negative.
 pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
     let views = match config.view_motion {
         ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
         ViewMotion::Distance | ViewMotion::Vehicle | ViewMotion::Auto => held_out.reprojection,
     };
     let masks = config.loss.explainability * held_out.explainability;
-    views + masks + config.loss.depth.weight * held_out.depth
+    let head_alone = config.depth_net.uncertainty && config.loss.depth.weight == 0.0;
+    let known = if head_alone {
+        held_out.uncertainty
+    } else {
+        config.loss.depth.weight * held_out.depth
+    };
+    views + masks + known
 }
 
 #[cfg(test)]
@@ -50,5 +57,20 @@ mod tests {
         assert!(selection(&config, &late) > selection(&config, &early));
         config.loss.speed = 0.0;
         assert_eq!(selection(&config, &late), 0.09);
+    }
+
+    /// Depth stays as it is then: only what the head learns can be better or worse.
+    #[test]
+    fn the_head_for_uncertainty_alone_is_chosen_by_its_own_loss() {
+        let mut config = Preset::Tiny.config();
+        (config.depth_net.uncertainty, config.loss.depth.weight) = (true, 0.0);
+        let terms = |uncertainty| LossTerms {
+            depth: 0.2,
+            uncertainty,
+            ..LossTerms::default()
+        };
+        assert!(selection(&config, &terms(-0.4)) < selection(&config, &terms(0.1)));
+        config.loss.depth.weight = 1.0;
+        assert_eq!(selection(&config, &terms(-0.4)), 0.2);
     }
 }

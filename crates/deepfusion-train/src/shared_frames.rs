@@ -2,10 +2,10 @@
 
 use crate::{SampleSet, SharedFrames};
 use deepfusion_data::FrameImage;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// The validation targets that are frames of training samples, drive by drive in order of names; drives without any are
+/// The validation targets, frames with known depth among them, that are frames of training samples, drive by drive in order of names; drives without any are
 /// left out. Frames are identified by their file, with links resolved, and their position in it.
 #[must_use]
 pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFrames> {
@@ -19,13 +19,28 @@ pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFra
             *seen.entry(place).or_insert(is_target) |= is_target;
         }
     }
-    let mut drives: BTreeMap<String, (usize, usize)> = BTreeMap::new();
-    for sample in &validation.samples {
+    for known in &train.depth.frames {
+        let place = files.place(&known.of(&train.depth.datasets).image);
+        seen.insert(place, true);
+    }
+    let own = validation.samples.iter().map(|sample| {
         let dataset = &validation.datasets[sample.dataset];
-        let place = files.place(&dataset.frames()[sample.snippet.target].image);
+        (dataset, &dataset.frames()[sample.snippet.target])
+    });
+    let with_depth = validation.depth.frames.iter().map(|known| {
+        let datasets = &validation.depth.datasets;
+        (&datasets[known.dataset], known.of(datasets))
+    });
+    let mut counted = HashSet::new();
+    let mut drives: BTreeMap<String, (usize, usize)> = BTreeMap::new();
+    for (dataset, frame) in own.chain(with_depth) {
+        let place = files.place(&frame.image);
         let Some(is_target) = seen.get(&place) else {
             continue;
         };
+        if !counted.insert(place) {
+            continue;
+        }
         let (targets, sources) = drives.entry(dataset.name().to_owned()).or_default();
         if *is_target {
             *targets += 1;
@@ -45,14 +60,14 @@ pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFra
 
 /// Files by number, with links resolved. Consecutive frames of one file need a single look-up.
 #[derive(Default)]
-struct Files {
+pub(crate) struct Files {
     numbers: HashMap<PathBuf, usize>,
     last: Option<(PathBuf, usize)>,
 }
 
 impl Files {
     /// An image's file, and its position in it.
-    fn place(&mut self, image: &FrameImage) -> (usize, u64) {
+    pub(crate) fn place(&mut self, image: &FrameImage) -> (usize, u64) {
         match image {
             FrameImage::File(path) => (self.number(path), 0),
             FrameImage::Within { file, index } => (self.number(file), *index),

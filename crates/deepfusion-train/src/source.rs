@@ -1,8 +1,10 @@
 use crate::error::MOST_SIGMA_SHARE;
+use crate::shared_frames::Files;
 use crate::stereo::{OtherCameras, StereoSource};
 use crate::{DepthSet, Error, Learn, NoStereo, SampleProblem, Skipped, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Whether every distance of a sample is sure enough, as far as that is known.
@@ -41,6 +43,49 @@ impl Sample {
         let own = self.snippet.sources.iter().map(|s| (self.dataset, s.frame));
         own.chain(self.stereo.iter().map(|s| (s.dataset, s.frame)))
     }
+}
+
+/// Leaves out of training what the other way of learning holds out: depth of frames whose views are held out, and views of frames whose depth is.
+/// A drive of which nothing would be left keeps what it has.
+fn keep_apart(
+    (samples, depth): (&mut Vec<Sample>, &mut DepthSet),
+    (held_out, held_depth): (&[Sample], &DepthSet),
+) {
+    if samples.is_empty() || depth.frames.is_empty() {
+        return;
+    }
+    let mut files = Files::default();
+    let datasets = Arc::clone(&depth.datasets);
+    // By their files: a drive may be in two data sets, or its depth in another than its views.
+    let mut place =
+        |(dataset, frame): (usize, usize)| files.place(&datasets[dataset].frames()[frame].image);
+    let mut shown = |sample: &Sample| -> Vec<_> {
+        let target = (sample.dataset, sample.snippet.target);
+        sample.sources().chain([target]).map(&mut place).collect()
+    };
+    let views: HashSet<_> = held_out.iter().flat_map(&mut shown).collect();
+    let shown: Vec<_> = samples.iter().map(&mut shown).collect();
+    let known: HashSet<_> = held_depth.frames.iter().map(|f| place(f.place())).collect();
+    let of_depth: Vec<_> = depth.frames.iter().map(|f| place(f.place())).collect();
+    let unseen = |i: usize| !views.contains(&of_depth[i]);
+    retain_where_some_stay(&mut depth.frames, |frame| frame.dataset, unseen);
+    let unseen = |i: usize| !shown[i].iter().any(|place| known.contains(place));
+    retain_where_some_stay(samples, |sample| sample.dataset, unseen);
+}
+
+/// Keeps what `keep` says, by place, and all of each data set of which it would leave nothing.
+fn retain_where_some_stay<T>(
+    all: &mut Vec<T>,
+    dataset: impl Fn(&T) -> usize,
+    keep: impl Fn(usize) -> bool,
+) {
+    let kept = all.iter().enumerate().filter(|(i, _)| keep(*i));
+    let stay: HashSet<usize> = kept.map(|(_, one)| dataset(one)).collect();
+    let mut places = 0..;
+    all.retain(|one| {
+        let kept = places.next().is_some_and(&keep);
+        kept || !stay.contains(&dataset(one))
+    });
 }
 
 /// The samples of all recordings.
@@ -91,7 +136,7 @@ impl SampleSet {
             (Arc::new(sets), Arc::new(datasets))
         };
         let (set_of, train) = shared(train);
-        let (samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
+        let (mut samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
         if let (true, Some(first)) = (config.stereo, samples.first())
             && samples.iter().all(|sample| sample.stereo.is_none())
         {
@@ -100,7 +145,7 @@ impl SampleSet {
                 why: NoStereo::OneCamera,
             });
         }
-        let (depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
+        let (mut depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
         let validation = match validation {
             Some(datasets) => {
                 let (set_of, datasets) = shared(datasets);
@@ -119,12 +164,15 @@ impl SampleSet {
                     depth: held_depth,
                 }
             }
-            None => Self {
-                datasets: Arc::clone(&train),
-                set_of: Arc::clone(&set_of),
-                samples: held_out,
-                depth: held_depth,
-            },
+            None => {
+                keep_apart((&mut samples, &mut depth), (&held_out, &held_depth));
+                Self {
+                    datasets: Arc::clone(&train),
+                    set_of: Arc::clone(&set_of),
+                    samples: held_out,
+                    depth: held_depth,
+                }
+            }
         };
         let train = Self {
             datasets: train,

@@ -3,12 +3,12 @@
 use crate::support::{drive, small};
 use burn::tensor::Device;
 use deepfusion_hint::Hint;
-use deepfusion_model::Error as ModelError;
+use deepfusion_model::{Error as ModelError, StoredNetwork};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{DepthNetConfig, PoseNetConfig, ResNetDepth};
 use deepfusion_train::{
-    Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, Preset, RunFolder, TrainConfig,
-    TrainFindings, Trainer,
+    Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, PosePredictor, Preset,
+    RunFolder, TrainConfig, TrainFindings, Trainer,
 };
 use std::path::Path;
 
@@ -138,6 +138,11 @@ fn imported_encoders_start_a_network_with_other_parts() {
     let kind = CheckpointKind::Last;
     run.save(kind, &theirs, None, &state).unwrap();
     assert_eq!(run.read_state(kind).unwrap(), state);
+    // What has learned nothing predicts nothing.
+    let error = StoredNetwork::of_run(folder.path(), None).unwrap_err();
+    assert!(matches!(error, ModelError::EncodersOnly { .. }), "{error}");
+    let error = PosePredictor::load(folder.path(), None, &device).unwrap_err();
+    assert!(error.to_string().contains("only its encoder"), "{error}");
 
     let paper = narrow(Preset::Paper.config());
     assert!(paper.depth_net.encoder.is_dilated() && paper.depth_net.hce.is_some());

@@ -180,7 +180,6 @@ fn the_head_for_uncertainty_learns_alone() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = streets(20);
     config.depth_net.uncertainty = true;
-    config.depth_net.encoder.frozen_statistics = true;
     config.loss.depth.weight = 0.0;
     (config.learning_rate, config.weight_decay) = (1e-2, 0.1);
     let mut trainer = trainer(&config, &folder.path().join("run"));
@@ -251,8 +250,27 @@ fn a_drive_is_learned_from_as_its_set_says() {
         if !depth {
             continue;
         }
-        // Exact depth of all eight frames, the last one held out.
-        assert_eq!((train.depth.len(), validation.depth.len()), (7, 1));
+        // Exact depth of all eight frames, the last one held out; where views are held out, too, so is the depth of what they show.
+        let held: Vec<usize> = validation
+            .samples
+            .iter()
+            .flat_map(|sample| {
+                sample
+                    .sources()
+                    .map(|(_, frame)| frame)
+                    .chain([sample.snippet.target])
+            })
+            .collect();
+        let known: Vec<usize> = train.depth.frames.iter().map(|known| known.frame).collect();
+        assert_eq!(held.is_empty(), !motion);
+        assert!(
+            known.iter().all(|frame| !held.contains(frame)),
+            "{known:?} {held:?}"
+        );
+        assert_eq!(
+            (known.len(), validation.depth.len()),
+            (if motion { 6 } else { 7 }, 1)
+        );
         for batch in batches(&config, &train) {
             let share = |mask: &Tensor<4>| mask.clone().mean().into_scalar::<f32>();
             let (known, far) = (share(&batch.truth.known), share(&batch.truth.far));
@@ -266,6 +284,18 @@ fn a_drive_is_learned_from_as_its_set_says() {
         let (steps, _) = run(&mut trainer(&config, &at), None);
         assert!(steps[0].depth > 0.0);
         assert_eq!(steps[0].reprojection > 0.0, motion);
+    }
+    // A drive to validate on must be another one, whatever is learned of it.
+    for learn in [Learn::Depth, Learn::Both] {
+        let mut config = streets(1);
+        config.data.sets.clear();
+        with_recording(&mut config, vec![scanned.clone()], learn);
+        let open = || Dataset::open(&scanned, &OpenOptions::default()).unwrap();
+        let error = SampleSet::split(&config, open(), Some(open())).unwrap_err();
+        assert!(
+            matches!(error, Error::SharedFrames { .. }),
+            "{learn:?}: {error}"
+        );
     }
     // A real drive's scans are all that it knows.
     std::fs::remove_dir_all(scanned.join("proj_depth")).unwrap();

@@ -85,7 +85,7 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::File { source, .. } => return system_hint(source.kind()).map(Into::into),
+            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
             Self::Picture { .. } => "PNG and JPEG are read",
             Self::Program { problem, .. } => return problem.hint(),
             Self::Packet { problem, .. } => return problem.hint(),

@@ -3,8 +3,8 @@
 use std::io::Read;
 use std::path::Path;
 
-use deepfusion_data::{image_size, read_depth_png};
 use deepfusion_geometry::NpyHeader;
+use deepfusion_images::{image_size, read_depth_png};
 
 use crate::{ArrayProblem, ContentProblem, Error, Result};
 
@@ -218,7 +218,7 @@ mod tests {
             data: (0..2048).map(|i| 1.0 + (i % 97) as f32).collect(),
         };
         let png = dir.path().join("a_depth.png");
-        deepfusion_data::write_depth_png(&map, &png).unwrap();
+        deepfusion_images::write_depth_png(&map, &png).unwrap();
         let npy = dir.path().join("a_depth.npy");
         ndarray_npy::write_npy(&npy, &ndarray::Array2::<f32>::ones((32, 64))).unwrap();
         for path in [png, npy] {

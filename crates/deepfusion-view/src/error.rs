@@ -88,7 +88,7 @@ pub enum Error {
     },
     /// A picture or a depth PNG cannot be read.
     #[error(transparent)]
-    Picture(#[from] deepfusion_data::Error),
+    Picture(#[from] deepfusion_images::Error),
     /// Another program listens there.
     #[error("{address}: the port is in use")]
     PortInUse {
@@ -167,7 +167,7 @@ impl Hint for Error {
                 Some("give two folders of predictions, or two of training runs".into())
             }
             Self::NoFrames { .. } => Some("give a folder of predictions or of targets".into()),
-            Self::File { source, .. } => system_hint(source.kind()).map(Into::into),
+            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
             Self::Content { .. } | Self::Stopped { .. } => None,
             #[cfg(feature = "rerun")]
             Self::Encoding { .. } => None,

@@ -242,8 +242,9 @@ fn two_runs_stand_side_by_side() {
     // The second lacks frame 0, and all it has is a metre farther.
     for i in 1..4 {
         write_frame(second.path(), i);
-        let map = deepfusion_data::read_depth_png(&second.path().join(format!("{i:06}_depth.png")))
-            .unwrap();
+        let map =
+            deepfusion_images::read_depth_png(&second.path().join(format!("{i:06}_depth.png")))
+                .unwrap();
         let farther = deepfusion_geometry::DepthMap {
             data: map
                 .data
@@ -252,7 +253,7 @@ fn two_runs_stand_side_by_side() {
                 .collect(),
             ..map
         };
-        deepfusion_data::write_depth_png(
+        deepfusion_images::write_depth_png(
             &farther,
             &second.path().join(format!("{i:06}_depth.png")),
         )

@@ -21,7 +21,7 @@ impl Recording for NamedByTime {
         &self.warnings
     }
     fn load_image(&self, frame: &Frame) -> data::Result<data::RgbImage> {
-        data::load_rgb(frame.image.path())
+        Ok(data::load_rgb(frame.image.path())?)
     }
 }
 

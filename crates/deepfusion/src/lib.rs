@@ -119,6 +119,7 @@ pub use deepfusion_data as data;
 pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;
 pub use deepfusion_geometry as geometry;
+pub use deepfusion_images as images;
 pub use deepfusion_infer as infer;
 pub use deepfusion_instances as instances;
 pub use deepfusion_jobs as jobs;

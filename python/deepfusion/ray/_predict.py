@@ -26,6 +26,8 @@ from ._devices import of_workers
 from ._storage import Folder, Sources, images, network, urls, weights_mark
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from deepfusion._native import _PostProcess as PostProcess
 
 _LOG = logging.getLogger(__name__)
@@ -286,7 +288,7 @@ def predict(
     model: str | PathLike[str] = "street",
     output: str | PathLike[str] = "depth",
     *,
-    intrinsics: tuple[float, float, float, float] | None = None,
+    intrinsics: ArrayLike | None = None,
     save: Sequence[str] = ("depth-png",),
     workers: int | None = None,
     cpus_per_worker: int = 1,
@@ -304,7 +306,7 @@ def predict(
 
     `paths` are images, folders (with all below them) and globs; `output` is a folder. Both, and `model`, where it is no embedded
     network, are paths that all machines see, or URLs; `storage_options` are those of their file system (fsspec's). The images are
-    of one camera: `intrinsics` are fx, fy, cx, cy in its pixels; without them each file's EXIF is asked, then the lens of the
+    of one camera: `intrinsics` are fx, fy, cx, cy in its pixels, or the 3 x 3 matrix; without them each file's EXIF is asked, then the lens of the
     training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
     (`NAME_depth.npy`, f32 metres), "sigma" and "confidence" (`NAME_sigma.npy`, `NAME_confidence.npy`, of a network that says how sure it
     is). `post_process` is that of `Model.predict`, `precision` that of `deepfusion.load`: the workers' processors must have it, this
@@ -340,7 +342,8 @@ def predict(
         _check(model, precision, data_set, save, post_process)
     camera = None
     if intrinsics is not None:
-        fx, fy, cx, cy = map(float, intrinsics)
+        k = np.asarray(intrinsics, dtype=float)
+        fx, fy, cx, cy = map(float, (k[0, 0], k[1, 1], k[0, 2], k[1, 2]) if k.shape == (3, 3) else k)
         camera = (fx, fy, cx, cy)
     job = _Job(
         id=uuid.uuid4().hex,

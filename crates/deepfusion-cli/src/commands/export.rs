@@ -19,6 +19,8 @@ struct Report {
     depth_min_m: f64,
     depth_max_m: f64,
     training_fy_px: Option<f64>,
+    /// For networks of many cameras: depth of every camera is to be multiplied by its f_y over this.
+    canonical_fy_px: Option<f64>,
     pictures: [&'static str; 4],
     checks: Vec<CheckReport>,
 }
@@ -56,11 +58,17 @@ pub(super) fn run(args: &ExportArgs) -> Result<()> {
         depth_min_m: model.range.min_m,
         depth_max_m: model.range.max_m,
         training_fy_px: model.trained_with.map(|k| k.fy),
+        canonical_fy_px: model.trained_with.filter(|_| model.canonical).map(|k| k.fy),
         pictures: PICTURES,
         checks: checks.map(CheckReport::from).collect(),
     };
     if args.json {
         return output::print_json(&report);
+    }
+    if let Some(focal) = report.canonical_fy_px {
+        say(&format!(
+            "learned many cameras: multiply its depth by f_y / {focal} for each, f_y in pixels of the resized picture"
+        ));
     }
     for check in &report.checks {
         say(&format!(

@@ -308,6 +308,9 @@ impl Reportable for deepfusion_model::Error {
 
     fn remedy(&self) -> Option<String> {
         match self {
+            Self::EncodersOnly { .. } => {
+                Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
+            }
             Self::DataSet { .. } => {
                 Some("give the name of the data set whose metres are meant: --data-set NAME".into())
             }
@@ -357,17 +360,22 @@ impl Reportable for deepfusion_onnx::Error {
     }
 }
 
-impl Reportable for deepfusion_render::Error {
-    fn message(&self) -> String {
-        match self {
-            Self::Data(error) => error.message(),
-            _ => self.to_string(),
-        }
+impl Reportable for deepfusion_images::Error {
+    fn remedy(&self) -> Option<String> {
+        self.hint()
     }
 
+    fn missing(&self) -> Option<&Path> {
+        match self {
+            Self::NoSuchPath { path } => Some(path),
+            _ => None,
+        }
+    }
+}
+
+impl Reportable for deepfusion_render::Error {
     fn remedy(&self) -> Option<String> {
         match self {
-            Self::Data(error) => error.remedy(),
             Self::Log { .. } => {
                 Some("it should be the log.csv that `train` wrote into the run's folder".into())
             }
@@ -417,11 +425,7 @@ fn of_engine(problem: &EngineProblem) -> Option<String> {
     match problem {
         EngineProblem::Fused(error) => error.remedy(),
         EngineProblem::Onnx(error) => error.remedy(),
-        EngineProblem::Runner(error) => {
-            let error: &(dyn std::error::Error + 'static) = &**error;
-            let ours = error.downcast_ref::<deepfusion_jobs::Error>();
-            ours.map_or_else(|| problem.hint(), Reportable::remedy)
-        }
+        EngineProblem::Network(error) => error.remedy(),
         other => other.hint(),
     }
 }
@@ -502,13 +506,6 @@ impl Reportable for deepfusion_train::Error {
 }
 
 impl Reportable for deepfusion_view::Error {
-    fn message(&self) -> String {
-        match self {
-            Self::Picture(error) => error.message(),
-            _ => self.to_string(),
-        }
-    }
-
     fn remedy(&self) -> Option<String> {
         match self {
             Self::NoSuchFolder { .. } => {
@@ -521,7 +518,6 @@ impl Reportable for deepfusion_view::Error {
                 "make something to look at first: deepfusion predict IMAGES --out {}",
                 path.display()
             )),
-            Self::Picture(error) => error.remedy(),
             Self::PortInUse { .. } => {
                 Some("give another --port, or --port 0 for any that is free".into())
             }
@@ -559,13 +555,12 @@ foreign!(clap::Error, toml::de::Error, toml::ser::Error);
 
 impl Reportable for std::io::Error {
     fn remedy(&self) -> Option<String> {
-        system_hint(self.kind()).map(Into::into)
+        Some(system_hint(self.kind()).into())
     }
 }
 
 impl Reportable for serde_json::Error {
     fn remedy(&self) -> Option<String> {
-        let reason = self.io_error_kind();
-        reason.and_then(system_hint).map(Into::into)
+        self.io_error_kind().map(|kind| system_hint(kind).into())
     }
 }

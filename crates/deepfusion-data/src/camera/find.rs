@@ -4,8 +4,8 @@ use super::calibration::CameraCalibration;
 use super::source::CalibrationSource;
 use crate::dataset::numbers_of_hfov;
 use crate::dataset_toml::FolderConfig;
-use crate::pictures::{ExifCamera, exif_camera};
 use crate::{CameraProblem, CameraWarning, DataWarning, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_images::{ExifCamera, exif_camera};
 use deepfusion_logs::GoproLens;
 use std::path::{Path, PathBuf};
 

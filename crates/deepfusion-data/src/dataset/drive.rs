@@ -385,6 +385,12 @@ impl Dataset {
         Ok(image)
     }
 
+    /// Whether [`Self::load_image`] undoes a distortion, so that its picture is not that of the frame's file.
+    #[must_use]
+    pub fn corrects_lens(&self) -> bool {
+        self.recording.corrects_lens()
+    }
+
     /// Reads the header of every image that is a file: that takes some microseconds each, and a wrong
     /// size found now is not found at night.
     ///

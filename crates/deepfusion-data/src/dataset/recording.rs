@@ -31,6 +31,11 @@ pub trait Recording: fmt::Debug + Send + Sync {
     /// Where it cannot be read.
     fn load_image(&self, frame: &Frame) -> Result<RgbImage>;
 
+    /// Whether [`Self::load_image`] undoes a distortion, so that the picture is not that of the frame's file.
+    fn corrects_lens(&self) -> bool {
+        false
+    }
+
     /// Where the camera's numbers are from, for the error on an image of another size.
     fn calibration(&self) -> CalibrationPlace {
         CalibrationPlace {

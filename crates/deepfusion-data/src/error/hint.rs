@@ -9,8 +9,8 @@ use std::io::ErrorKind;
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::NoSuchPath { .. } => return system_hint(ErrorKind::NotFound).map(Into::into),
-            Self::File { source, .. } => return system_hint(source.kind()).map(Into::into),
+            Self::NoSuchPath { .. } => return Some(system_hint(ErrorKind::NotFound).into()),
+            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
             Self::UnknownLayout { .. } if self.needs_ros2() => {
                 "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }
@@ -31,6 +31,7 @@ impl Hint for Error {
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
+            Self::ImageFile(error) => return error.hint(),
             Self::Video(error) => return error.hint(),
             Self::Log(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
@@ -86,11 +87,9 @@ impl Hint for Error {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
             }
             Self::Image {
-                problem: ImageProblem::Truncated,
+                problem: ImageProblem::File(problem),
                 ..
-            } => {
-                "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
-            }
+            } => problem.remedy(),
             Self::Image { .. } => "PNG and JPEG are read",
             Self::FrameSize { .. } => {
                 "use the images and the calibration of one recording; resized images need their own calibration"

@@ -7,27 +7,15 @@ use image::ImageError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageProblem {
-    /// It ends early.
-    #[error("the image is truncated: the file ends within it")]
-    Truncated,
-    /// It is of another kind.
-    #[error("neither a PNG nor a JPEG")]
-    OtherFormat,
-    /// A JPEG that does not say its size.
-    #[error("the JPEG has no frame header")]
-    NoFrameHeader,
-    /// Its content is damaged.
-    #[error("cannot be decoded: {0}")]
-    Undecodable(#[source] ImageError),
+    /// Its file.
+    #[error(transparent)]
+    File(#[from] deepfusion_images::ImageProblem),
     /// It cannot be written in another format.
     #[error("{0}")]
     Unencodable(#[source] ImageError),
     /// A picture where a recording's depth should be.
     #[error("not a 16-bit grey PNG, which depth images are")]
     NotDepth,
-    /// A picture where KITTI's annotated depth should be.
-    #[error("not a 16-bit grey PNG, which depth in steps of 1/256 m needs")]
-    NotAnnotatedDepth,
     /// A recording has no image of this number.
     #[error("there is no image {0}")]
     NoImage(u64),

@@ -1,7 +1,7 @@
 //! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
 
-use super::files::name_of;
-use super::plain::PlainParts;
+use super::shared::files::name_of;
+use super::shared::plain::PlainParts;
 use super::video::frames_of;
 use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;

@@ -1,7 +1,7 @@
 //! A folder of images with tables and a calibration beside them.
 
-use super::files::{images_in, name_of};
-use super::plain::PlainParts;
+use super::shared::files::{images_in, name_of};
+use super::shared::plain::PlainParts;
 use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::timed_images;

@@ -1,7 +1,7 @@
 //! What is in a recording.
 
-use super::files::name_of;
 use super::layout::Layout;
+use super::shared::files::name_of;
 use super::{bag, comma};
 use crate::{
     Cameras, ClockOffset, DataWarning, Dataset, DatasetKind, DriveInspection, Error, GtKind,

@@ -4,11 +4,11 @@
 //! A pose is where the inertial unit was (x forward, y right, z down, above the rear axle), in a world that does not move. Frames in which
 //! the car hardly moved have none. Cameras 0 and 1, whose images are rectified, are the left and the right one; 2 and 3 are fisheyes.
 
-use super::files::{both_names, folders, name_of};
 use super::kitti::{Fields, TimeStamps, numbered_files, optional};
-use super::plain::{PlainParts, open_each};
-use super::pose_track::speed_log;
-use super::poses::read_poses;
+use super::shared::files::{both_names, folders, name_of};
+use super::shared::plain::{PlainParts, open_each};
+use super::shared::pose_track::speed_log;
+use super::shared::poses::read_poses;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::measured::{MeasuredDepth, velodyne};
 use crate::{

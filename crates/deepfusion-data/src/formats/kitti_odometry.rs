@@ -4,11 +4,11 @@
 //! A pose is where rectified camera 0 was, in the axes of its first place. There are no speeds: they are the poses' slopes. Nor is it
 //! said where the cameras are on the car, which is KITTI raw's.
 
-use super::files::{both_names, folders, name_of};
 use super::kitti::{Fields, cam_from_cam0, numbered_files, optional};
-use super::plain::{PlainParts, open_each};
-use super::pose_track::{cam_from_vehicle, speed_log};
-use super::poses::read_poses;
+use super::shared::files::{both_names, folders, name_of};
+use super::shared::plain::{PlainParts, open_each};
+use super::shared::pose_track::{cam_from_vehicle, speed_log};
+use super::shared::poses::read_poses;
 use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::TimeUnit;
 use crate::logs::frame_times::TimedImage;

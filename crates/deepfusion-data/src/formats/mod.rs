@@ -1,24 +1,19 @@
-//! Recordings of each layout as [`Dataset`](crate::Dataset)s: one module a layout, told apart by `layout`.
+//! Recordings of each layout as [`Dataset`](crate::Dataset)s: one module a layout; `layout` tells them apart.
 //!
 //! Each layout makes [`DatasetParts`](crate::DatasetParts) and a [`Recording`](crate::Recording) of what it finds. All but
-//! bags and KITTI raw share one: `plain`; those with poses get their speeds from `pose_track`.
+//! bags and KITTI raw share one, `shared::plain`; those with poses get their speeds from `shared::pose_track`.
 
 mod bag;
 mod comma;
-mod files;
 mod folder;
-mod found_instead;
 mod inspect;
 pub mod kitti;
 mod kitti360;
 mod kitti_odometry;
 mod layout;
-mod neighbours;
 mod nuscenes;
-mod plain;
-mod pose_track;
-mod poses;
 mod rgbd;
+mod shared;
 mod video;
 
 pub(crate) use bag::Change;

@@ -1,8 +1,8 @@
 //! Folders of colour, depth and pose files, one of each a frame, as the 7-Scenes data set has them.
 
-use super::files::{folders, images_in, name_of};
-use super::plain::{PlainParts, open_each};
-use super::poses::motion_of_rows;
+use super::shared::files::{folders, images_in, name_of};
+use super::shared::plain::{PlainParts, open_each};
+use super::shared::poses::motion_of_rows;
 use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::TimedImage;

@@ -1,6 +1,6 @@
 //! A video file with tables and a calibration beside it.
 
-use super::plain::PlainParts;
+use super::shared::plain::PlainParts;
 use crate::camera::{CameraCalibration, Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::{TimeUnit, seconds};

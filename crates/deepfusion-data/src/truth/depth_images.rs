@@ -1,8 +1,8 @@
 //! Folders of depth images.
 
-use crate::pictures::decode;
 use crate::{Error, ImageProblem, Result};
 use deepfusion_geometry::DepthMap;
+use deepfusion_images::decode;
 use image::DynamicImage;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

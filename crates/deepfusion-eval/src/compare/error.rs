@@ -95,8 +95,8 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::NoSuchPath { .. } => system_hint(ErrorKind::NotFound).map(Into::into),
-            Self::File { source, .. } => system_hint(source.kind()).map(Into::into),
+            Self::NoSuchPath { .. } => Some(system_hint(ErrorKind::NotFound).into()),
+            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or an evaluation as JSON".into(),
             ),
@@ -104,7 +104,11 @@ impl Hint for Error {
                 Some("use the program's version that wrote it, or evaluate again".into())
             }
             Self::NotEvaluated { .. } => Some("measure it first".into()),
-            Self::Csv(_) | Self::Published(_) => None,
+            Self::Csv(error) => match error.kind() {
+                csv::ErrorKind::Io(source) => Some(system_hint(source.kind()).into()),
+                _ => None,
+            },
+            Self::Published(_) => None,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::saved::SavedEvaluation;
-use crate::PostProcess;
+use crate::{GroundTruth, PostProcess};
 
 /// How far a prediction may be off as a whole, and its metres still be trusted: exp(|bias|) ≤ 1 ± this.
 pub const TRUSTED_WITHIN: f64 = 0.1;
@@ -64,8 +64,8 @@ impl MetricScale {
     }
 
     /// From the evaluations that a run's folder keeps: those of this very checkpoint (by the SHA-256 of its file), and of the same
-    /// data set where it learned several. They must have the same correction for the focal length and the same post-processing, and be known
-    /// to be of frames that training did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
+    /// data set where it learned several. They must have the same correction for the focal length and the same post-processing, be of the camera's own depth (not
+    /// `velodyne`), and be known to be of frames that training did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
     /// place and not in another are not trusted.
     ///
     /// A file that cannot be read, or is of an older version that does not say what training saw, says nothing.
@@ -87,6 +87,8 @@ impl MetricScale {
                 && saved.measured.focal_correction == focal_correction
                 && saved.measured.post_process == post_process
                 && saved.measured.held_out == Some(true)
+                // Those depths are the scanner's, a quarter of a metre from the camera's.
+                && saved.report.protocol.gt != GroundTruth::Velodyne
                 && saved.report.n >= LEAST_IMAGES
         };
         let (mut images, mut sum) = (0, 0.0);

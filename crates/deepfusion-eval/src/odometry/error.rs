@@ -103,7 +103,7 @@ pub enum PoseFileError {
 impl Hint for PoseFileError {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::Io { source, .. } => system_hint(source.kind()).map(Into::into),
+            Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
             Self::Line { .. } | Self::Empty { .. } => Some(
                 "a line is a pose of the camera in the world: KITTI's 12 numbers (the rows of [R t]), or TUM's \
                  8 (time tx ty tz qx qy qz qw); # starts a comment"

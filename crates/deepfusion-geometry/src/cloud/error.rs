@@ -59,7 +59,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::File { source, .. } | Self::Stream(source) => {
-                system_hint(source.kind()).map(Into::into)
+                Some(system_hint(source.kind()).into())
             }
             Self::Truncated { .. } => {
                 Some("the scan was cut off while copying or unpacking: fetch it again".into())

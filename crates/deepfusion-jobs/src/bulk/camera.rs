@@ -107,6 +107,7 @@ impl CameraSource {
                 image: lens.correct(image)?,
                 camera: Some(lens.intrinsics()),
                 from: self.from(),
+                undistorted: lens.distorts(),
             });
         }
         let (camera, from) = match (self, exif) {
@@ -119,6 +120,7 @@ impl CameraSource {
             image,
             camera,
             from,
+            undistorted: false,
         })
     }
 
@@ -157,6 +159,8 @@ pub struct PinholeImage {
     pub camera: Option<Intrinsics>,
     /// Where that comes from.
     pub from: CameraFrom,
+    /// Whether a distortion was undone: then the pixels are not those of the file.
+    pub undistorted: bool,
 }
 
 /// Where an image's camera comes from.
@@ -252,14 +256,20 @@ impl LensFile {
     }
 }
 
-/// A camera of the same field of view from left to right, square pixels, the same height of the horizon. Of an upright
+/// A camera of the same field of view from left to right, pixels of the same shape, the same height of the horizon. Of an upright
 /// image the field of view is that from top to bottom: the camera was turned, not its lens changed.
 fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
-    let f = k.fx * f64::from(width.max(height)) / f64::from(k.width);
+    let along = k.fx * f64::from(width.max(height)) / f64::from(k.width);
+    let across = along * k.fy / k.fx;
+    let (fx, fy) = if width < height {
+        (across, along)
+    } else {
+        (along, across)
+    };
     let centre = |c: f64, from: u32, to: u32| (c + 0.5) * f64::from(to) / f64::from(from) - 0.5;
     Intrinsics {
-        fx: f,
-        fy: f,
+        fx,
+        fy,
         cx: centre(k.cx, k.width, width),
         cy: centre(k.cy, k.height, height),
         width,
@@ -270,6 +280,32 @@ fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An image of the training camera has that camera, whatever the shape of its pixels, and upright it is turned.
+    #[test]
+    fn the_training_cameras_own_images_have_its_numbers() {
+        let k = Intrinsics {
+            fx: 703.64,
+            fy: 724.82,
+            cx: 640.1,
+            cy: 511.2,
+            width: 1280,
+            height: 1024,
+        };
+        let same = with_the_view_of(&k, 1280, 1024);
+        for (a, b) in [
+            (same.fx, k.fx),
+            (same.fy, k.fy),
+            (same.cx, k.cx),
+            (same.cy, k.cy),
+        ] {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+        let half = with_the_view_of(&k, 640, 512);
+        assert!((half.fx - 0.5 * k.fx).abs() < 1e-9 && (half.fy - 0.5 * k.fy).abs() < 1e-9);
+        let upright = with_the_view_of(&k, 1024, 1280);
+        assert!((upright.fy - k.fx).abs() < 1e-9 && (upright.fx - k.fy).abs() < 1e-9);
+    }
 
     #[test]
     fn what_was_given_comes_before_what_the_network_knows() {

@@ -1,5 +1,6 @@
 //! How images become depth, and what of it their outputs depend on.
 
+use deepfusion_data::NamedTopic;
 use deepfusion_eval::PostProcess;
 use deepfusion_motion::ScaleMonitorConfig;
 use deepfusion_records::MadeWith;
@@ -27,6 +28,8 @@ pub struct DepthSettings {
     pub correct_scale: bool,
     /// The data set, of those that the network learned from, whose metres are meant.
     pub set: Option<String>,
+    /// The topics that bags are read by, where they were named.
+    pub topics: Vec<NamedTopic>,
     /// In which numbers the network computes.
     pub precision: Precision,
     /// The name of what it computes on.
@@ -90,6 +93,8 @@ impl DepthSettings {
             correct_scale: self.correct_scale,
             post_process: self.post_process,
             set: self.set.clone(),
+            topics: self.topics.iter().map(ToString::to_string).collect(),
+            camera_height_m: self.scale.height_m.filter(|_| self.correct_scale),
         })
     }
 }

@@ -34,6 +34,8 @@ pub struct LoadedImage {
     pub camera: Option<Intrinsics>,
     /// Where that comes from.
     pub camera_from: CameraFrom,
+    /// Whether a distortion was undone: then the pixels are not those of the file.
+    pub undistorted: bool,
     /// Of a live source's frame.
     pub live: Option<LiveMark>,
 }
@@ -49,6 +51,7 @@ impl ImageLoader {
         let taken = match &input.frame {
             Some((dataset, index)) => PinholeImage {
                 image: dataset.load_image(*index)?,
+                undistorted: dataset.corrects_lens(),
                 camera: Some(dataset.intrinsics(*index)),
                 from: match (dataset.camera_assumed(), self.camera_learned) {
                     (false, _) => CameraFrom::Recording,
@@ -83,6 +86,7 @@ impl ImageLoader {
             image,
             camera,
             from,
+            undistorted,
         } = taken;
         let (correct, crop) = (self.focal_correction, self.crop);
         let prepared = self
@@ -93,6 +97,7 @@ impl ImageLoader {
             image,
             camera,
             camera_from: from,
+            undistorted,
             live: None,
         };
         (loaded, prepared)

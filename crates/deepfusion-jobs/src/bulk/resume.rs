@@ -2,15 +2,16 @@
 
 use std::collections::HashSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use deepfusion_fs::Partial;
-use deepfusion_records::{FileMark, MadeWith, Sidecar};
+use deepfusion_records::{FileMark, MadeWith, Sidecar, same_number};
 use rayon::prelude::*;
 use serde::de::IgnoredAny;
 
 use super::manifest::{Manifest, State};
 use super::sidecars::{is_complete, sidecar_path};
-use super::{Shard, video};
+use super::{CameraFrom, Shard, video};
 use crate::{Error, Input, Result, StaleReason};
 
 /// What is made of images, and where.
@@ -66,8 +67,12 @@ impl BulkJob<'_> {
                 self.finished(input, known)
             })
             .collect();
+        let mut found = found.into_iter().collect::<Result<Vec<_>>>()?;
+        if self.made_with.correct_scale {
+            begin_recordings_anew(mine, &mut found);
+        }
         for (i, found) in found.into_iter().enumerate() {
-            match found? {
+            match found {
                 None => todo.push(i),
                 Some(sidecar) => {
                     manifest.images[i].state = State::Done;
@@ -126,6 +131,7 @@ impl BulkJob<'_> {
             }
             Ok(sidecar) => match self.made_with.difference(&sidecar.made_with) {
                 Some(what) => StaleReason::MadeWith(what),
+                None if recalibrated(input, &sidecar) => StaleReason::Calibration,
                 None if changed(input, &sidecar) => StaleReason::ImageChanged(input.path.clone()),
                 None if is_complete(&sidecar, self.folder) => return Ok(Some(sidecar)),
                 // Ours, but a file of it is gone or is not what was written.
@@ -170,6 +176,42 @@ impl BulkJob<'_> {
         }
         Ok(())
     }
+}
+
+/// Takes what is done of a recording for not done where some of it is not: a scale that is watched is followed from the recording's first frame on.
+fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Sidecar>]) {
+    let recording = |input: &Input| {
+        input
+            .frame
+            .as_ref()
+            .map(|(dataset, _)| Arc::as_ptr(dataset))
+    };
+    let each = mine.iter().zip(found.iter());
+    let unfinished: HashSet<_> = each
+        .filter(|(_, found)| found.is_none())
+        .filter_map(|(input, _)| recording(input))
+        .collect();
+    for (input, found) in mine.iter().zip(found) {
+        if recording(input).is_some_and(|dataset| unfinished.contains(&dataset)) {
+            *found = None;
+        }
+    }
+}
+
+/// Whether the recording of an image has another calibration than the one that its depth was made by.
+fn recalibrated(input: &Input, sidecar: &Sidecar) -> bool {
+    let Some((dataset, frame)) = &input.frame else {
+        return false;
+    };
+    let then = &sidecar.prediction;
+    let by_its_own = then.intrinsics_from == CameraFrom::Recording.word();
+    if by_its_own == dataset.camera_assumed() || then.undistorted != dataset.corrects_lens() {
+        return true;
+    }
+    let k = dataset.intrinsics(*frame);
+    let now = [k.fx, k.fy, k.cx, k.cy];
+    let differs = |then: [f64; 4]| then.iter().zip(now).any(|(a, b)| !same_number(*a, b));
+    by_its_own && then.intrinsics.is_some_and(differs)
 }
 
 /// Whether an image is another one than its outputs were made of.

@@ -1,9 +1,9 @@
 //! Runs over a few small pictures, through the embedded `tiny`.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
-use deepfusion_data::{RgbImage, save_png};
+use deepfusion_data::{Dataset, OpenOptions, RgbImage, save_png};
 use deepfusion_motion::ScaleMonitorConfig;
 use deepfusion_perception::PerceptionConfig;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
@@ -30,6 +30,7 @@ fn settings(camera: Option<GivenCamera>) -> DepthSettings {
         scale: ScaleMonitorConfig::default(),
         correct_scale: false,
         set: None,
+        topics: Vec::new(),
         precision: Precision::F32,
         device: "cpu".into(),
     }
@@ -112,6 +113,66 @@ fn depth_is_made_once_and_warned_of_once() {
     assert_eq!((again.done, again.sidecars.len()), (2, 2));
     assert!(warned.is_empty(), "{warned:?}");
     assert_eq!(made_at(), before);
+}
+
+/// Frames of a folder of images whose camera has this focal length.
+fn frames(folder: &Path, focal_px: f64) -> Vec<Input> {
+    inputs(folder, &["a", "b"]);
+    let toml = format!("fps = 10\nintrinsics = [{focal_px}, {focal_px}, 47.5, 31.5]\n");
+    std::fs::write(folder.join("dataset.toml"), toml).unwrap();
+    let opened = Dataset::open(folder, &OpenOptions::default()).unwrap();
+    let dataset = Arc::new(opened.into_iter().next().unwrap());
+    let frame = |index: usize| Input {
+        path: dataset.frames()[index].image.path().to_owned(),
+        name: index.to_string(),
+        frame: Some((Arc::clone(&dataset), index)),
+    };
+    (0..dataset.frames().len()).map(frame).collect()
+}
+
+/// A recording that was calibrated anew has other metres, and a scale that is followed is followed from the first frame on.
+#[test]
+fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let drive = at.join("drive");
+    std::fs::create_dir_all(&drive).unwrap();
+    let out = folder_for_outputs(at);
+    let (model, mut estimator) = network();
+    for correct_scale in [false, true] {
+        let settings = DepthSettings {
+            correct_scale,
+            ..settings(None)
+        };
+        let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, None, &|_| ());
+        let job = job.unwrap();
+        let begun = |all: &[Input], overwrite| {
+            let mine: Vec<&Input> = all.iter().collect();
+            let bulk = job.bulk(Shard::WHOLE, overwrite, false);
+            bulk.begin(all, &mine, true)
+        };
+        let all = frames(&drive, 60.0);
+        let mine: Vec<&Input> = all.iter().collect();
+        let StartedJob {
+            manifest,
+            sidecars,
+            todo,
+        } = begun(&all, true).unwrap();
+        assert_eq!(todo, [0, 1]);
+        let why = |error: &Error| error.to_string();
+        let progress = BulkProgress::new(&out, manifest, sidecars, why, |_, _| ());
+        predict(&job, &mut estimator, &mine, &todo, &progress, &|| false);
+        assert_eq!(progress.finish().done, 2);
+        assert!(begun(&all, false).unwrap().todo.is_empty());
+        let depth = format!("{}_depth.npy", all[1].name);
+        std::fs::remove_file(out.join(depth)).unwrap();
+        let again: &[usize] = if correct_scale { &[0, 1] } else { &[1] };
+        assert_eq!(begun(&all, false).unwrap().todo, again);
+        let Err(error) = begun(&frames(&drive, 61.0), false) else {
+            panic!("another calibration is no reason to begin anew");
+        };
+        assert!(error.to_string().contains("another calibration"), "{error}");
+    }
 }
 
 /// Neither a job nor a frame keeps a picture of layers that nothing shows.

@@ -137,6 +137,7 @@ mod tests {
                 image: RgbImage::new(96, 64),
                 camera: Some(Intrinsics::from_numbers(camera, (96, 64))),
                 camera_from,
+                undistorted: false,
                 live: None,
             };
             warnings.of_camera(&input, &loaded);

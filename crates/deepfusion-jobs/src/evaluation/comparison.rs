@@ -42,7 +42,9 @@ impl Comparison {
     /// A prediction that is none, or of another shape than the truth.
     pub fn add(&mut self, image: &Sample<'_>) -> Result<bool> {
         let counted = self.method.add_sample(image)?.is_some();
-        if let Some((evaluator, baseline)) = &mut self.mean_depth_baseline {
+        if let Some((evaluator, baseline)) = &mut self.mean_depth_baseline
+            && counted
+        {
             // A baseline of this one scan alone has nothing else to say than "80 m": that is its score.
             let depth = baseline.depth_for(Some(image.ground_truth))?;
             evaluator.add(image.name, &Prediction::Depth(depth), image.ground_truth)?;
@@ -82,7 +84,9 @@ impl Comparison {
     fn report(&self) -> Result<Report> {
         let mut report = self.method.report()?;
         if self.scenarios.len() > 1 {
-            for (name, evaluator) in &self.scenarios {
+            // A kind of drive may have no depth within the range.
+            let measured = self.scenarios.iter();
+            for (name, evaluator) in measured.filter(|(_, e)| !e.images().is_empty()) {
                 let row = ScenarioRow::new(name, &evaluator.report()?);
                 report.scenarios.push(row);
             }

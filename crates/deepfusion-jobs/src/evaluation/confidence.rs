@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::division::divide;
 use super::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files::write;
-use crate::{Error, Result};
+use crate::{Error, Result, StaleCalibration};
 
 /// The file in a run's folder.
 const FILE: &str = "confidence.toml";
@@ -29,6 +29,9 @@ pub struct Confidence {
     pub single: ConfidenceModel,
     /// From the image and its mirror image.
     pub mirrored: ConfidenceModel,
+    /// Steps of the network that it was learned for.
+    #[serde(default)]
+    pub step: Option<usize>,
     /// Frames it was learned from.
     pub frames: usize,
     /// Frames it was judged by: of other drives, or of another part of the one drive, none of them learned from.
@@ -39,11 +42,28 @@ pub struct Confidence {
 }
 
 impl Confidence {
-    /// A run's, where it was calibrated.
+    /// That of a run's network at this step. That of another step is not its own: [`Self::stale`].
     ///
     /// # Errors
     /// A file that is none.
-    pub fn read(run: &Path) -> Result<Option<Self>> {
+    pub fn read(run: &Path, step: usize) -> Result<Option<Self>> {
+        Ok(Self::kept(run)?.filter(|kept| kept.step == Some(step)))
+    }
+
+    /// What is kept beside a run and is not its network's at this step, where there is such.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn stale(run: &Path, step: usize) -> Result<Option<StaleCalibration>> {
+        let kept = Self::kept(run)?.filter(|kept| kept.step != Some(step));
+        Ok(kept.map(|kept| StaleCalibration {
+            path: run.join(FILE),
+            found: kept.step,
+            step,
+        }))
+    }
+
+    fn kept(run: &Path) -> Result<Option<Self>> {
         let path = run.join(FILE);
         match std::fs::read_to_string(&path) {
             Ok(text) => match toml::from_str(&text) {
@@ -162,6 +182,7 @@ pub fn calibrate(
     let confidence = Confidence {
         single,
         mirrored,
+        step: Some(estimator.step),
         frames: division.learned.len(),
         held_out: division.held_out.len(),
         pixels: learned.len(),

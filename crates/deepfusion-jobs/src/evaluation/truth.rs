@@ -10,8 +10,8 @@ use deepfusion_geometry::DepthMap;
 use deepfusion_model::TrainConfig;
 use deepfusion_runtime::Prediction;
 
-use crate::Result;
 use crate::recordings::training_recordings;
+use crate::{Error, Result};
 
 /// Pixels taken of each frame by [`known_pixels`], at most.
 const PIXELS: usize = 4_000;
@@ -102,17 +102,18 @@ pub fn depth_map(truth: &Grid) -> DepthMap {
 }
 
 /// Frame names to places in the file: by name, or, for a stack without names, in the frames' order.
-#[must_use]
-pub fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> HashMap<String, usize> {
-    match arrays.names() {
-        Some(names) => names.iter().cloned().zip(0..).collect(),
-        None => frames
-            .iter()
-            .flatten()
-            .cloned()
-            .zip(0..arrays.len())
-            .collect(),
+///
+/// # Errors
+/// [`Error::StackLength`] for a stack of more or fewer arrays than frames: which is whose would be a guess.
+pub fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> Result<HashMap<String, usize>> {
+    if let Some(names) = arrays.names() {
+        return Ok(names.iter().cloned().zip(0..).collect());
     }
+    let (found, expected) = (arrays.len(), frames.iter().map(Vec::len).sum());
+    if found != expected {
+        return Err(Error::StackLength { found, expected });
+    }
+    Ok(frames.iter().flatten().cloned().zip(0..).collect())
 }
 
 /// The network's pixels, by their place in [`Prediction::disparity`], with the true depth in metres: evenly among those of the

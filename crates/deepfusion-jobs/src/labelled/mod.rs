@@ -141,7 +141,7 @@ impl TargetEvaluation {
                 name: name.into_owned(),
                 targets: &targets,
                 camera: frame.camera,
-                image: &|| deepfusion_data::load_rgb(&frame.image),
+                image: &|| Ok(deepfusion_data::load_rgb(&frame.image)?),
                 progress: (done, total),
             })?;
         }

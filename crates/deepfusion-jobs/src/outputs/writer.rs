@@ -42,7 +42,10 @@ impl DepthWriter<'_> {
     /// Everything that is written of an image of a file or a recording.
     #[must_use]
     pub fn paths(&self, input: &Input) -> Vec<PathBuf> {
-        let saves = self.outputs.of_image(has_file(input)).into_iter();
+        let saves = self
+            .outputs
+            .of_image(has_file(input) && !self.may_undistort(input))
+            .into_iter();
         let files = saves.map(|save| self.folder.join(file_of(input, save)));
         files
             .chain([sidecar_path(self.folder, &input.name)])
@@ -83,7 +86,7 @@ impl DepthWriter<'_> {
             layers: &seen.layers,
             sigma: sigma.as_ref(),
         };
-        let is_file = loaded.live.is_none() && has_file(input);
+        let is_file = loaded.live.is_none() && has_file(input) && !loaded.undistorted;
         let mut files = Vec::new();
         for save in self.outputs.of_image(is_file) {
             let file = file_of(input, save);
@@ -105,6 +108,14 @@ impl DepthWriter<'_> {
         Ok(sidecar)
     }
 
+    /// Whether a distortion may be undone, before the image is read: only a lens knows whether it distorts.
+    fn may_undistort(&self, input: &Input) -> bool {
+        match &input.frame {
+            Some((dataset, _)) => dataset.corrects_lens(),
+            None => self.made_with.calibration_sha256.is_some(),
+        }
+    }
+
     /// What the sidecar says of the prediction; `depth_m`: its metres.
     fn record(
         &self,
@@ -119,6 +130,7 @@ impl DepthWriter<'_> {
             image: Some(input.path.clone()),
             image_file: Some(loaded.mark),
             size: Some([loaded.image.width(), loaded.image.height()]),
+            undistorted: loaded.undistorted,
             unit: "metres along the camera's axis (z)".into(),
             model: self.model.given().to_owned(),
             model_sha256: self.model.packed_sha256().map(str::to_owned),

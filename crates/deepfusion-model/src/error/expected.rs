@@ -95,6 +95,11 @@ pub enum AskedBy {
         "false where nothing is learned from known depth: the head has nothing else to learn from"
     )]
     NoKnownDepth,
+    /// A data set has nothing else to learn from.
+    #[error(
+        "above 0 where recordings are learned from by their depth alone, or depth_net.uncertainty = true"
+    )]
+    DepthAlone,
     /// The depth network is another one.
     #[error(
         "0 where the depth network is no ResNet with its decoder: the flow decoder reads a ResNet's features"

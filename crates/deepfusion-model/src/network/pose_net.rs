@@ -69,33 +69,43 @@ impl PoseNetConfig {
     /// # Errors
     /// [`NetworkError::Config`] for a network that cannot be built, or a factor that is not positive.
     pub fn validate(&self) -> Result<(), NetworkError> {
-        self.encoder.validate()?;
-        if self.encoder.frames < 2 {
+        self.validate_layers()?;
+        if !(self.metres_per_unit > 0.0 && self.metres_per_unit.is_finite()) {
             return Err(NetworkError::config(
-                "pose.encoder.frames",
+                "pose_net.metres_per_unit",
+                Expected::Metres,
+                self.metres_per_unit,
+            ));
+        }
+        Ok(())
+    }
+
+    /// As [`Self::validate`], but without looking at `metres_per_unit`, which may still be measured.
+    ///
+    /// # Errors
+    /// [`NetworkError::Config`].
+    pub fn validate_layers(&self) -> Result<(), NetworkError> {
+        self.encoder.validate()?;
+        // What it sees is a pair, in training and in use.
+        if self.encoder.frames != 2 {
+            return Err(NetworkError::config(
+                "pose_net.encoder.frames",
                 Expected::Pair,
                 self.encoder.frames,
             ));
         }
         if self.explainability && self.encoder.is_dilated() {
             return Err(NetworkError::config(
-                "pose.encoder.output_stride",
+                "pose_net.encoder.output_stride",
                 Expected::StrideOfMasks,
                 self.encoder.output_stride,
             ));
         }
         if !(1..=16).contains(&self.poses) {
             return Err(NetworkError::config(
-                "pose.poses",
+                "pose_net.poses",
                 Expected::UpTo(16),
                 self.poses,
-            ));
-        }
-        if !(self.metres_per_unit > 0.0 && self.metres_per_unit.is_finite()) {
-            return Err(NetworkError::config(
-                "pose.metres_per_unit",
-                Expected::Metres,
-                self.metres_per_unit,
             ));
         }
         Ok(())

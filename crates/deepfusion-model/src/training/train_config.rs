@@ -569,6 +569,27 @@ mod tests {
     }
 
     #[test]
+    fn what_could_not_learn_or_not_see_is_refused_before_it_begins() {
+        let mut config = Preset::Tiny.config();
+        config.pose_net.encoder.frames = 3;
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains("pose_net.encoder.frames"), "{error}");
+        let mut config = Preset::Tiny.config();
+        config.data.sets = vec![DataSetConfig {
+            name: "rooms".into(),
+            paths: vec!["rooms".into()],
+            learn: Learn::Depth,
+            ..DataSetConfig::default()
+        }];
+        config.validate().unwrap();
+        config.loss.depth.weight = 0.0;
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains("loss.depth.weight"), "{error}");
+        config.depth_net.uncertainty = true;
+        config.validate().unwrap();
+    }
+
+    #[test]
     fn parts_of_the_network_go_on_and_off_by_name() {
         let start = Preset::Light.config();
         let mut config = start.clone();

@@ -2,7 +2,9 @@
 
 use deepfusion_hint::count_of;
 
-use crate::{AskedBy, Error, ExpectedSetting, FoundSetting, Reprojection, TrainConfig, ViewMotion};
+use crate::{
+    AskedBy, Error, ExpectedSetting, FoundSetting, Learn, Reprojection, TrainConfig, ViewMotion,
+};
 
 impl TrainConfig {
     /// That video at several sizes has a canonical focal length: without it one sigmoid disparity would have to mean the same metres at
@@ -27,7 +29,7 @@ impl TrainConfig {
     pub fn validate(&self) -> Result<(), Error> {
         self.size.validate()?;
         self.depth_net.validate()?;
-        self.pose_net.encoder.validate()?;
+        self.pose_net.validate_layers()?;
         self.flow_decoder.validate()?;
         self.loss.validate()?;
         self.validate_sets()?;
@@ -35,6 +37,10 @@ impl TrainConfig {
         if self.depth_net.uncertainty && !sets.into_iter().any(|set| self.learn(set).from_depth()) {
             let found = "true".to_owned();
             return fail("depth_net.uncertainty", AskedBy::NoKnownDepth, found);
+        }
+        let alone = (0..self.data.sets.len().max(1)).any(|set| self.learn(set) == Learn::Depth);
+        if self.loss.depth.weight == 0.0 && alone && !self.depth_net.uncertainty {
+            return fail("loss.depth.weight", AskedBy::DepthAlone, "0".to_owned());
         }
         if !self.depth_net.is_resnet() && self.loss.flow.weight > 0.0 {
             let found = self.loss.flow.weight.to_string();

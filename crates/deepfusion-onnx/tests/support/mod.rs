@@ -282,14 +282,16 @@ pub(crate) fn model(seed: u64) -> DepthModel {
     graph.add_output(output);
     let (width, height) = (16 + 4 * r.below(4), 12 + 4 * r.below(3));
     let max_m = 50.0 + r.below(1000) as f64 / 7.0;
+    let trained_with = (r.below(2) == 0).then(|| FocalLength {
+        fx: 100.0 / 3.0,
+        fy: r.below(1000) as f64 / 7.0,
+    });
     DepthModel {
         graph,
         range: DepthRange { min_m: 0.1, max_m },
         width,
         height,
-        trained_with: (r.below(2) == 0).then(|| FocalLength {
-            fx: 100.0 / 3.0,
-            fy: r.below(1000) as f64 / 7.0,
-        }),
+        canonical: trained_with.is_some() && r.below(2) == 0,
+        trained_with,
     }
 }

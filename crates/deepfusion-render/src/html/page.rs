@@ -280,10 +280,10 @@ impl HtmlReport {
     /// Writes the page atomically.
     ///
     /// # Errors
-    /// [`crate::Error::Data`] naming the file.
+    /// [`crate::Error::File`] naming the file.
     pub fn write(&self, path: &Path) -> Result<()> {
         let written = deepfusion_fs::write(path, self.to_html());
-        Ok(written.map_err(|e| deepfusion_data::Error::file(path, e))?)
+        Ok(written.map_err(|e| deepfusion_images::Error::file(path, e))?)
     }
 }
 

@@ -55,10 +55,9 @@ pub fn depth(
     let valid = truth.known.clone() + truth.far.clone();
     let finest = log_depth_error(metric_disparities[0].clone(), truth);
     let error = mean_over(finest.clone().abs(), valid.clone());
-    let bias = mean_over(
-        finest.clone().detach() * truth.known.clone(),
-        truth.known.clone(),
-    );
+    // NaN where no depth is known: then nothing says the scale.
+    let known = truth.known.clone();
+    let bias = (finest.clone().detach() * known.clone()).sum() / known.sum();
     let gradient = STEPS
         .into_iter()
         .flat_map(|step| [(2, step), (3, step)])

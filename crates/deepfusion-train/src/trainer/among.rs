@@ -40,6 +40,10 @@ impl Trainer {
                 .map(|frame| (&frame.drive, frame.number))
                 .hash(&mut samples);
         }
+        for known in &self.train.depth.frames {
+            let frame = known.of(&self.train.depth.datasets);
+            (&frame.drive, frame.number).hash(&mut samples);
+        }
         let mut settings = DefaultHasher::new();
         common(&self.config).hash(&mut settings);
         (self.state.step, self.steps()).hash(&mut settings);

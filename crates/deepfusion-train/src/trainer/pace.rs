@@ -14,7 +14,11 @@ impl Smoothed {
         Self(None)
     }
 
+    /// NaN, of a batch that does not say it, is left out.
     pub(super) fn add(&mut self, value: f64) {
+        if value.is_nan() {
+            return;
+        }
         let old = self.0.unwrap_or(value);
         self.0 = Some(old + (value - old) / SMOOTHING as f64);
     }
@@ -55,5 +59,20 @@ impl Pace {
 
     pub(super) fn images_per_second(&self) -> f64 {
         self.images / self.seconds_per_step()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_leaves_a_mean_as_it_is() {
+        let mut mean = Smoothed::new();
+        mean.add(f64::NAN);
+        assert!(mean.value().is_nan());
+        mean.add(2.0);
+        mean.add(f64::NAN);
+        assert_eq!(mean.value(), 2.0);
     }
 }

@@ -43,7 +43,7 @@ pub fn validation_loss(
             let numbers = unread.read();
             mean.add(batch.len(), &numbers.terms, numbers.scale_ratio);
         }
-        scale_ratio = model.pose_net.is_some().then_some(mean.ratio / mean.count);
+        scale_ratio = model.pose_net.is_some().then_some(mean.ratio());
         terms.add(&mean.terms, 1.0 / mean.count);
     }
     if !samples.depth.is_empty() {
@@ -54,7 +54,7 @@ pub fn validation_loss(
             let pass = model.learn_depth(&batch);
             mean.add(batch.len(), &pass.terms, pass.scale_ratio.ln());
         }
-        scale_ratio.get_or_insert((mean.ratio / mean.count).exp());
+        scale_ratio.get_or_insert(mean.ratio().exp());
         terms.add(&mean.terms, 1.0 / mean.count);
     }
     Ok((terms, scale_ratio.unwrap_or(f64::NAN)))
@@ -65,6 +65,8 @@ pub fn validation_loss(
 struct Mean {
     terms: LossTerms,
     ratio: f64,
+    /// Images of the batches that say it.
+    with_ratio: f64,
     count: f64,
 }
 
@@ -72,8 +74,16 @@ impl Mean {
     fn add(&mut self, images: usize, terms: &LossTerms, ratio: f64) {
         let n = images as f64;
         self.count += n;
-        self.ratio += n * ratio;
+        if !ratio.is_nan() {
+            self.ratio += n * ratio;
+            self.with_ratio += n;
+        }
         self.terms.add(terms, n);
+    }
+
+    /// NaN where no batch says it.
+    fn ratio(&self) -> f64 {
+        self.ratio / self.with_ratio
     }
 }
 

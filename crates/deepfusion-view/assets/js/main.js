@@ -435,7 +435,7 @@ class App {
       $(id).innerHTML = icons[id];
       $(id).onclick = act;
     }
-    $('rate').onclick = () => { this.player.rate = this.player.rate >= 4 ? 0.25 : this.player.rate * 2; this.touch('time'); };
+    $('rate').onclick = () => this.player.nextRate();
     $('loop').onclick = () => this.repeat();
     addEventListener('keydown', e => {
       const typing = e.target.closest?.('input, select') || (document.getElementById('help').open && e.key !== '?');

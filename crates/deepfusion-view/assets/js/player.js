@@ -43,6 +43,12 @@ export class Player {
     this.app.touch('time');
   }
 
+  /** The next faster one, and after the fastest of use the slowest. */
+  nextRate() {
+    this.rate = this.rate >= 4 ? 0.25 : RATES.find(rate => rate > this.rate);
+    this.app.touch('time');
+  }
+
   tick(now) {
     if (!this.playing) return;
     requestAnimationFrame(later => this.tick(later));

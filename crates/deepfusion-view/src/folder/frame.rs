@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::image_size;
 use deepfusion_geometry::Intrinsics;
+use deepfusion_images::image_size;
 use deepfusion_records::PredictionRecord;
 use serde_json::{Value, json};
 
@@ -144,8 +144,11 @@ fn picture(
 ) -> Result<Picture, FrameProblem> {
     let named = sidecar.and_then(|s| s.image.clone());
     // As it was given to `predict`, whose folder this may still be; or beside the results, which were moved together.
+    let undistorted = sidecar.is_some_and(|s| s.undistorted);
     let mut places: Vec<PathBuf> = named
         .iter()
+        // That one is bent as the lens saw it, and depth is not.
+        .filter(|_| !undistorted)
         .flat_map(|p| [p.clone(), folder.join(p)])
         .collect();
     let beside = entry.image.as_ref().map(|i| folder.join(&i.file));
@@ -176,6 +179,7 @@ fn picture(
         }
     }
     Err(match (problem, named) {
+        (None, Some(named)) if undistorted => FrameProblem::Distorted(named),
         (Some(problem), _) => FrameProblem::Unreadable(problem.to_string()),
         (None, Some(named)) if places.iter().any(|path| path.is_file()) => {
             FrameProblem::PictureAmongOthers(named)

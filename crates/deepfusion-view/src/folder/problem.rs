@@ -59,6 +59,9 @@ pub enum FrameProblem {
     /// A video or a bag, which holds the picture, is named.
     #[error("{}: one picture among others, and none is kept beside the results", .0.display())]
     PictureAmongOthers(PathBuf),
+    /// The picture has the lens's distortion, which depth, cloud and boxes have not.
+    #[error("{}: not shown, as depth is of the picture without the lens's distortion, and that was not saved", .0.display())]
+    Distorted(PathBuf),
     /// The picture has another size than the sidecar says.
     #[error("the picture is {}, the sidecar says {}", by(*found), by(*expected))]
     PictureSize {

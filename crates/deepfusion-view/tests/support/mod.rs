@@ -53,7 +53,7 @@ pub(crate) fn write_frame(folder: &Path, i: usize) {
             .flat_map(|y| (0..width).map(move |x| f32::from(steps(i, x, y)) / 256.0))
             .collect(),
     };
-    deepfusion_data::write_depth_png(&depth, &folder.join(format!("{name}_depth.png"))).unwrap();
+    deepfusion_images::write_depth_png(&depth, &folder.join(format!("{name}_depth.png"))).unwrap();
     let targets = json!({
         "frame": name, "time_s": 0.1 * i as f64, "targets": [target(i)],
         "ground": {"normal": [0.0, -1.0, 0.0], "offset_m": 1.5},

@@ -241,6 +241,7 @@ fn settings(args: &PredictionArgs) -> DepthSettings {
         scale: args.scale_config(),
         correct_scale: args.correct_scale,
         set: args.engine.set.clone(),
+        topics: args.topics.clone(),
         precision: args.engine.precision,
         device: args.engine.device.to_string(),
     }

@@ -42,7 +42,7 @@ pub(super) fn message<'bag>(
 pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<RgbImage> {
     if message.is::<CompressedImage<'_>>() {
         let image: CompressedImage<'_> = message.decode()?;
-        return decode_rgb(&image.data, bag.path());
+        return Ok(decode_rgb(&image.data, bag.path())?);
     }
     let image: Image<'_> = message.decode()?;
     // As a message of the bag's, whose hint says what is read: an image file's would say PNG and JPEG.

@@ -47,6 +47,10 @@ impl Recording for BagRecording {
         &self.folder
     }
 
+    fn corrects_lens(&self) -> bool {
+        self.lens.distorts()
+    }
+
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
         let missing = || Error::Image {
             path: self.bag.path().to_owned(),

@@ -47,7 +47,7 @@ impl BagVideo {
     pub(super) fn first(&self, bag: &dyn MessageSource) -> Result<RgbImage> {
         let mut packets = self.packets(bag)?;
         let first = packets.next().unwrap_or_else(|| Ok(Vec::new()))?;
-        decode_rgb(&self.frames.first_picture(&first)?, bag.path())
+        Ok(decode_rgb(&self.frames.first_picture(&first)?, bag.path())?)
     }
 
     /// An image by its number in order of time; `None` where there is no such image.
@@ -60,7 +60,7 @@ impl BagVideo {
             return Ok(None);
         };
         let file = self.frames.frame(*packet, || self.packets(bag))?;
-        load_rgb(&file).map(Some)
+        Ok(Some(load_rgb(&file)?))
     }
 
     /// The packets from the first key frame on.

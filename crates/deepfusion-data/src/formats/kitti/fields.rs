@@ -1,6 +1,6 @@
 //! The `name: values` lines of KITTI's calibration files.
 
-use crate::formats::poses::{is_rotation, motion_of_rows};
+use crate::formats::shared::poses::{is_rotation, motion_of_rows};
 use crate::{CalibrationProblem, Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};

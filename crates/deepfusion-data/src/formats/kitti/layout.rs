@@ -3,7 +3,7 @@
 use super::calibration::Calibration;
 use super::config::says_simulated;
 use super::moving::MASKS;
-use crate::formats::files::folders;
+use crate::formats::shared::files::folders;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -181,7 +181,7 @@ impl Recording for KittiRecording {
     }
 
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
-        load_rgb(frame.image.path())
+        Ok(load_rgb(frame.image.path())?)
     }
 
     fn warnings(&self) -> &[DataWarning] {

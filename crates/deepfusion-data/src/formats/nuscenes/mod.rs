@@ -9,9 +9,9 @@ mod tables;
 use self::tables::{
     CALIBRATED_SENSOR, CAMERA, LIDAR, SAMPLE_DATA, Scene, SensorFrame, read_scenes,
 };
-use super::files::{folders, name_of};
-use super::plain::{PlainParts, open_each};
-use super::pose_track::speed_log;
+use super::shared::files::{folders, name_of};
+use super::shared::plain::{PlainParts, open_each};
+use super::shared::pose_track::speed_log;
 use crate::logs::frame_times::{TimedImage, numbers_by_time};
 use crate::truth::measured::{MeasuredDepth, PlacedScan, Scans};
 use crate::{

@@ -1,4 +1,4 @@
-//! From an image file's bytes to the network's numbers: `cargo bench -p deepfusion-data --bench image`.
+//! From an image file's bytes to the network's numbers: `cargo bench -p deepfusion-images --bench image`.
 //!
 //! The picture is made here, of a KITTI frame's size (1242×375): JPEG of quality 92 with half the colour resolution
 //! (what KITTI's copies in JPEG usually are) and with all of it, and PNG. It is left in the folder that
@@ -12,7 +12,7 @@
 )]
 
 use criterion::{Criterion, criterion_main};
-use deepfusion_data::{RgbImage, decode_rgb, to_network_input};
+use deepfusion_images::{RgbImage, decode_rgb, to_network_input};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 

@@ -120,6 +120,15 @@ mod tests {
     }
 
     #[test]
+    fn a_block_alone_says_the_same_camera() {
+        let bytes = jpeg(&[(Tag::FocalLengthIn35mmFilm, 26)]);
+        // After the marker and the length of APP1; what follows the block is skipped.
+        let said = crate::exif_block_camera(&bytes[6..], (64, 48)).unwrap();
+        assert_eq!(Some(said.intrinsics), load(&bytes).intrinsics);
+        assert_eq!(crate::exif_block_camera(b"no block", (64, 48)), None);
+    }
+
+    #[test]
     fn what_is_not_said_or_cannot_be_is_not_known() {
         for fields in [
             &[][..],

@@ -1,7 +1,7 @@
 //! What lies in the folder of a recording, looks like another one, and is not read with it.
 
-use super::{comma, video};
 use crate::dataset_toml::FolderConfig;
+use crate::formats::{comma, video};
 use std::path::{Path, PathBuf};
 
 /// Endings of bags.

@@ -1,6 +1,6 @@
 //! Finds out what lies at a path where no recording of a known layout is.
 
-use super::files::folders;
+use crate::formats::shared::files::folders;
 use crate::{Error, FileKind, FoundInstead, Result};
 use std::collections::BTreeMap;
 use std::path::Path;

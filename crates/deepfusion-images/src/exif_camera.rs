@@ -12,15 +12,15 @@ const FOCAL_LENGTHS_MM: RangeInclusive<u32> = 5..=2000;
 
 /// A pinhole camera that a picture's EXIF block says, and by what.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ExifCamera {
+pub struct ExifCamera {
     /// Square pixels, the principal point in the middle, in pixels of the picture as it is stored or turned by quarters.
-    pub(crate) intrinsics: Intrinsics,
+    pub intrinsics: Intrinsics,
     /// What it was taken from, for people.
-    pub(crate) by: String,
+    pub by: String,
     /// Whether an action camera took it, whose wide lenses are no pinhole.
-    pub(crate) action_camera: bool,
+    pub action_camera: bool,
     /// Whether the picture is to be turned or mirrored to be upright.
-    pub(crate) turned: bool,
+    pub turned: bool,
 }
 
 /// The block of a PNG or JPEG; of one that is damaged what can be read, as of those that some libraries write without the end of a
@@ -33,10 +33,24 @@ pub(super) fn block(mut bytes: impl BufRead + Seek) -> Option<Exif> {
         .ok()
 }
 
-/// What the block of a file says of the camera of its picture, which is `size` pixels wide and high.
-pub(crate) fn exif_camera(path: &Path, size: (u32, u32)) -> Option<ExifCamera> {
+/// What the EXIF block of a file says of the camera of its picture, which is `size` pixels wide and high; `None` where it says nothing, or
+/// the file cannot be read.
+#[must_use]
+pub fn exif_camera(path: &Path, size: (u32, u32)) -> Option<ExifCamera> {
     let file = std::fs::File::open(path).ok()?;
     camera_of(&block(std::io::BufReader::new(file))?, size)
+}
+
+/// What an EXIF block says of the camera of its picture, which is `size` pixels wide and high, as [`exif_camera`]. `block` is a TIFF structure, with or
+/// without JPEG's `Exif\0\0` before it; `None` where it says nothing, or is damaged.
+#[must_use]
+pub fn exif_block_camera(block: &[u8], size: (u32, u32)) -> Option<ExifCamera> {
+    let tiff = block.strip_prefix(b"Exif\0\0").unwrap_or(block);
+    let mut reader = exif::Reader::new();
+    reader.continue_on_error(true);
+    let read = reader.read_raw(tiff.to_vec());
+    let exif = read.or_else(|error| error.distill_partial_result(|_| ()));
+    camera_of(&exif.ok()?, size)
 }
 
 /// By the focal length in 35 mm film, else by the make, the model and the lens.

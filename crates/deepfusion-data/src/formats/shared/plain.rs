@@ -261,6 +261,10 @@ impl Recording for PlainRecording {
         &self.folder
     }
 
+    fn corrects_lens(&self) -> bool {
+        self.lens.distorts()
+    }
+
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
         let image = match (&self.video, &frame.image) {
             (Some(video), FrameImage::Within { index, .. }) => load_rgb(&video.frame(*index)?)?,

@@ -1,9 +1,15 @@
 //! Images: resized as PIL does, truncated ones refused.
 
-use deepfusion_data::{
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+use deepfusion_hint::Hint;
+use deepfusion_images::{
     Error, ImageProblem, image_size, load_rgb, resize_rgb, to_chw, to_network_input,
 };
-use deepfusion_hint::Hint;
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};

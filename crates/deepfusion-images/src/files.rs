@@ -24,8 +24,11 @@ pub fn decode_rgb(bytes: &[u8], path: &Path) -> Result<RgbImage> {
     Ok(decode_bytes(bytes, path)?.into_rgb8())
 }
 
-/// A PNG or JPEG in the pixel type it has.
-pub(crate) fn decode(path: &Path) -> Result<DynamicImage> {
+/// Reads a PNG or JPEG in the pixel type it has.
+///
+/// # Errors
+/// As [`load_rgb`].
+pub fn decode(path: &Path) -> Result<DynamicImage> {
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
     decode_bytes(&bytes, path)
 }

@@ -1,15 +1,18 @@
 //! Telling layouts apart.
 
-use super::files::folders;
+mod found_instead;
+mod neighbours;
+
 use super::kitti::{self, Drive, drive_around, find_drives};
-use super::neighbours::{NeighbourSearch, unread};
-use super::{bag, comma, folder, found_instead, kitti_odometry, kitti360, nuscenes, rgbd, video};
+use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
+use crate::formats::shared::files::folders;
 use crate::{
     ConfigProblem, Dataset, DatasetKind, Error, FoundInstead, IncompleteWarning, OpenOptions,
     Result,
 };
 use deepfusion_rosbag::MessageSource;
+use neighbours::{NeighbourSearch, unread};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -1,0 +1,105 @@
+use deepfusion_hint::{Hint, system_hint};
+use image::ImageError;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// What can go wrong with an image's file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is nothing at the path.
+    #[error("{}: no such file or folder", path.display())]
+    NoSuchPath {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// A file could not be opened, read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// An image that cannot be read.
+    #[error("{}: {problem}", path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        problem: ImageProblem,
+    },
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why an image cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageProblem {
+    /// It ends early.
+    #[error("the image is truncated: the file ends within it")]
+    Truncated,
+    /// It is of another kind.
+    #[error("neither a PNG nor a JPEG")]
+    OtherFormat,
+    /// A JPEG that does not say its size.
+    #[error("the JPEG has no frame header")]
+    NoFrameHeader,
+    /// Its content is damaged.
+    #[error("cannot be decoded: {0}")]
+    Undecodable(#[source] ImageError),
+    /// A picture where KITTI's annotated depth should be.
+    #[error("not a 16-bit grey PNG, which depth in steps of 1/256 m needs")]
+    NotAnnotatedDepth,
+}
+
+impl ImageProblem {
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Truncated => {
+                "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
+            }
+            _ => "PNG and JPEG are read",
+        }
+    }
+}
+
+impl Error {
+    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    #[must_use]
+    pub fn file(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            ErrorKind::NotFound => Self::NoSuchPath { path },
+            _ => Self::File { path, source },
+        }
+    }
+}
+
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::NoSuchPath { .. } => Some(system_hint(ErrorKind::NotFound).into()),
+            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::Image { problem, .. } => Some(problem.remedy().into()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let path = Path::new("no/such/folder/a.png");
+        let error = crate::save_png(&image::RgbImage::new(1, 1), path).unwrap_err();
+        let message = error.to_string();
+        assert!(message.contains("no/such/folder/a.png"), "{message}");
+        assert!(error.hint().is_some());
+    }
+}

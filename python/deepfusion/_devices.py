@@ -1,0 +1,25 @@
+"""Which GPU is whose."""
+
+from __future__ import annotations
+
+import os
+
+from .distributed import Workers
+
+_LOCAL_RANKS = ("LOCAL_RANK", "OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "SLURM_LOCALID")
+"""Where torchrun, Open MPI, Intel's MPI and Slurm say which of its machine's processes this is."""
+
+
+def own_gpu(device: str, workers: Workers | None) -> str:
+    """The device of one of several workers: "cuda" is then the GPU of its own number on its machine, of those that it sees."""
+    if workers is None or device != "cuda":
+        return device
+    said = next((os.environ[name] for name in _LOCAL_RANKS if os.environ.get(name, "").isdecimal()), None)
+    if said is None:
+        return device
+    seen = os.environ.get("CUDA_VISIBLE_DEVICES")
+    index = int(said)
+    # A scheduler that shows each process its own GPU alone.
+    if seen:
+        index %= len(seen.split(","))
+    return f"{device}:{index}"
