@@ -36,14 +36,18 @@ class Snippets:
         self.offsets = tuple(offsets)
         self.depth_kind = depth_kind
         self._opened: Dataset | None = None
-        recording, count = self.recording, len(self.recording)
+        recording = self.recording
+        # By the frames' numbers: between two that are there others may be missing.
+        places = {frame.number: place for place, frame in enumerate(recording)}
 
-        def has_all(i: int) -> bool:
-            sources = [i + offset for offset in self.offsets]
-            inside = all(0 <= source < count for source in sources)
-            return inside and all(recording.motion(i, source) is not None for source in sources)
+        def sources_of(number: int, place: int) -> list[int] | None:
+            sources = [places.get(number + offset) for offset in self.offsets]
+            there = [source for source in sources if source is not None and recording.motion(place, source) is not None]
+            return there if len(there) == len(sources) else None
 
-        self.frames = [i for i in range(count) if has_all(i)]
+        found = {place: sources_of(number, place) for number, place in places.items()}
+        self._sources = {place: sources for place, sources in found.items() if sources is not None}
+        self.frames = list(self._sources)
 
     @property
     def recording(self) -> Dataset:
@@ -65,7 +69,7 @@ class Snippets:
         place = self.frames[index]
         frame = self.recording[place]
         image = frame.image
-        sources = [place + offset for offset in self.offsets]
+        sources = self._sources[place]
         depth = frame.ground_truth(self.depth_kind)
         fx, fy, cx, cy = frame.intrinsics
         return {

@@ -24,7 +24,8 @@ impl Dataset {
     #[new]
     #[pyo3(signature = (path, *, camera="2", drive=0))]
     fn new(py: Python<'_>, path: PathBuf, camera: &str, drive: usize) -> PyResult<Self> {
-        let camera: Cameras = camera.parse().map_err(|_| {
+        let one = |camera: &Cameras| *camera != Cameras::Both;
+        let camera = camera.parse().ok().filter(one).ok_or_else(|| {
             PyValueError::new_err(format!("camera: expected \"2\" or \"3\", found {camera:?}"))
         })?;
         let options = OpenOptions {

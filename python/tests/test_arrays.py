@@ -160,6 +160,15 @@ def test_perception_says_what_is_wrong():
         deepfusion.Perception().detect(depth, camera, time_s=0.0, world_from_cam=np.ones((4, 4)))
 
 
+def test_snippets_are_of_neighbouring_frames(tmp_path):
+    street = deepfusion.simulate(tmp_path, frames=6, seed=5, size=(96, 32), scan_every=0)
+    (street / "image_02/data/0000000002.png").unlink()
+    snippets = deepfusion.Snippets(street, offsets=(1,))
+    assert [sample["number"] for sample in snippets] == [0, 3, 4]
+    with pytest.raises(ValueError, match="camera"):
+        deepfusion.Dataset(street, camera="both")
+
+
 def test_snippets(drive):
     snippets = deepfusion.Snippets(drive, offsets=(-1, 1))
     assert len(snippets) == 4

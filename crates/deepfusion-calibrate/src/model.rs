@@ -209,18 +209,19 @@ impl Camera {
         Some((point.xy() * scale, by_coefficients, by_point))
     }
 
-    /// The angle from the axis of what is seen at this distance from the principal point, in units of the focal length; `None` where
+    /// The angle from the axis of what is seen this far to the right of the principal point, in units of the focal length; `None` where
     /// nothing is.
-    fn angle(&self, seen: f64) -> Option<f64> {
+    fn angle(&self, right: f64) -> Option<f64> {
         match self.model {
             LensModel::BrownConrady => {
-                let ideal = self.distortion()?.undistort(&Vector2::new(seen, 0.0))?;
+                let ideal = self.distortion()?.undistort(&Vector2::new(right, 0.0))?;
                 Some(ideal.norm().atan())
             }
             LensModel::Fisheye => {
                 let [k1, k2, k3, k4, ..] = self.numbers[4..] else {
                     return None;
                 };
+                let seen = right.abs();
                 let shown = |t: f64| {
                     let t2 = t * t;
                     t * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
@@ -249,7 +250,7 @@ impl Camera {
     /// The field of view from the left edge of an image of this width to its right, at the principal point's height, in degrees.
     pub(crate) fn hfov_deg(&self, width: u32) -> Option<f64> {
         let [fx, _, cx, ..] = self.numbers;
-        let left = self.angle((cx + 0.5) / fx)?;
+        let left = self.angle(-(cx + 0.5) / fx)?;
         let right = self.angle((f64::from(width) - 0.5 - cx) / fx)?;
         Some((left + right).to_degrees())
     }

@@ -7,11 +7,14 @@ use super::skip::MotionSkip;
 use deepfusion_data::{
     CameraPath, Dataset, DatasetKind, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
 };
+use deepfusion_geometry::Se3;
 
 /// Way by the poses over way by the speeds.
 const RATIO: Limit = Limit::Within(0.95, 1.05);
 /// Shorter ways prove nothing, metres.
 const LEAST_WAY_M: f64 = 5.0;
+/// From one pose that is compared to the next, metres.
+const STRETCH_M: f64 = 5.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let mut outcome = Outcome::new("speed");
@@ -57,12 +60,24 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
         ..
     } in &paths
     {
-        for (times, poses) in times_s.windows(2).zip(world_from_cam.windows(2)) {
-            if let Some(motion) = track.motion(times[0], times[1])
-                && let Some(mount) = dataset.cam_from_vehicle()
-            {
-                by_speeds += motion.camera0_from_camera1(&mount).translation().norm();
-                by_poses += (poses[1].translation() - poses[0].translation()).norm();
+        let Some(mount) = dataset.cam_from_vehicle() else {
+            continue;
+        };
+        // From a pose to one some metres on: poses that jitter from frame to frame go a longer way than the vehicle.
+        let (mut begin, mut moved, mut way) = (0, Se3::identity(), 0.0);
+        for (i, times) in times_s.windows(2).enumerate() {
+            let Some(motion) = track.motion(times[0], times[1]) else {
+                (begin, moved, way) = (i + 1, Se3::identity(), 0.0);
+                continue;
+            };
+            let step = motion.camera0_from_camera1(&mount);
+            way += step.translation().norm();
+            moved = moved * step;
+            if way >= STRETCH_M {
+                let [from, to] = [begin, i + 1].map(|i| world_from_cam[i].translation());
+                by_speeds += moved.translation().norm();
+                by_poses += (to - from).norm();
+                (begin, moved, way) = (i + 1, Se3::identity(), 0.0);
             }
         }
     }

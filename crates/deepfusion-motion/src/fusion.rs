@@ -268,8 +268,12 @@ impl FusedTrack {
         let freed = self.freed_yaw_rates.as_ref();
         let freed = freed.map(|both| both.each_ref().map(|rate| rate.integral(from_s, to_s)));
         let [imu_yaw_rad, steering_yaw_rad] = match freed {
-            Some([Some(imu), Some(steering)]) => [Some(imu), Some(steering)],
-            _ => [parts.imu_yaw_rad, parts.steering_yaw_rad],
+            // Each without what it was found to be off by, where the other has a gap, too.
+            Some([imu, steering]) => [
+                imu.or(parts.imu_yaw_rad),
+                steering.or(parts.steering_yaw_rad),
+            ],
+            None => [parts.imu_yaw_rad, parts.steering_yaw_rad],
         };
         let yaw_rad = match (imu_yaw_rad, steering_yaw_rad) {
             (Some(imu), Some(steering)) => alpha_yaw * imu + (1.0 - alpha_yaw) * steering,

@@ -6,7 +6,7 @@
 //! alarm. The height of the camera over the network's own road is reported beside it: the ratio of the two is the scale of
 //! depth.
 
-use crate::road_height::{CONCLUSIVE, GroundPair, least};
+use crate::road_height::{CONCLUSIVE, GroundPair, SWEEP_M, least};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -57,7 +57,7 @@ pub enum ScaleState {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReading {
     /// Height now over the reference: 1.1 if images are zoomed by 10 %, or the reported speed is 10 % too high. `None`
-    /// while learning.
+    /// while learning, and while a height far from the last one is measured.
     pub ratio: Option<f64>,
     /// Its 95 % interval.
     pub ci95: Option<[f64; 2]>,
@@ -77,8 +77,10 @@ const STEP: f64 = 0.02;
 const TILT_KEPT: f64 = 0.9;
 /// Number of pairs per estimate: single pairs are too noisy.
 const BLOCK: usize = 10;
-/// Heights tried first, metres: those of anything that drives, in steps of 6 %.
-const FIRST_M: (f64, f64) = (0.3, 4.5);
+/// Heights tried first, metres, in steps of 6 %: those of anything that drives, and those that a speed in another unit makes of them.
+const FIRST_M: (f64, f64) = SWEEP_M;
+/// Blocks one after the other that none of the heights tried explains, before all heights are tried again.
+const BLOCKS_LOST: usize = 3;
 /// Number of standard errors of a significant change.
 const SIGMAS: f64 = 3.0;
 /// Least standard error assumed: blocks on one street agree better than different streets do.
@@ -99,6 +101,10 @@ pub struct ScaleMonitor {
     /// ln of the height of the network's road, the latest last.
     depth_heights: VecDeque<f64>,
     drifting: bool,
+    /// How many of the latest blocks no height tried explains.
+    lost: usize,
+    /// The centre before all heights were tried again.
+    lost_m: Option<f64>,
     /// The camera's pitch relative to its mount, radians, nose up.
     tilt: f64,
     /// Speed over each of the latest pairs, m/s, and their seconds.
@@ -118,6 +124,8 @@ impl ScaleMonitor {
             learned: Vec::new(),
             depth_heights: VecDeque::new(),
             drifting: false,
+            lost: 0,
+            lost_m: None,
             tilt: 0.0,
             speeds: VecDeque::new(),
         }
@@ -194,6 +202,14 @@ impl ScaleMonitor {
             // Where the images say nothing it is tried again.
             self.guess_m = best(&self.first).map(|place| FIRST_M.0 * (0.06 * place).exp());
             self.first.clear();
+            let moved = |before: f64, now: f64| (now / before).ln().abs() > REACH;
+            if let (Some(now), Some(before)) = (self.guess_m, self.lost_m)
+                && moved(before, now)
+            {
+                // What was measured before is of another time.
+                self.heights.clear();
+                self.lost_m = None;
+            }
         }
     }
 
@@ -209,7 +225,15 @@ impl ScaleMonitor {
         }
         let place = best(&self.block);
         self.block.clear();
-        let Some(place) = place else { return };
+        let Some(place) = place else {
+            // The height may have left those that are tried, by a speed in another unit or another size of the images.
+            self.lost += 1;
+            if self.lost == BLOCKS_LOST {
+                (self.lost, self.lost_m) = (0, self.guess_m.take());
+            }
+            return;
+        };
+        (self.lost, self.lost_m) = (0, None);
         let height = guess.ln() + STEP * place - REACH;
         if self.learned.len() * BLOCK < self.config.learn_pairs && self.config.height_m.is_none() {
             self.learned.push(height);
@@ -221,12 +245,17 @@ impl ScaleMonitor {
         }
     }
 
-    fn reading(&mut self) -> ScaleReading {
-        let reference = match self.config.height_m {
+    /// ln of the height that is compared with, and its standard error.
+    fn reference(&self) -> Option<(f64, f64)> {
+        match self.config.height_m {
             Some(height) => Some((height.ln(), 0.0)),
             None if self.learned.len() * BLOCK < self.config.learn_pairs => None,
             None => mean_and_error(&self.learned),
-        };
+        }
+    }
+
+    fn reading(&mut self) -> ScaleReading {
+        let reference = self.reference();
         let recent: Vec<f64> = self.heights.iter().copied().collect();
         let now = mean_and_error(&recent)
             .filter(|_| 2 * recent.len() * BLOCK >= self.config.window_pairs);
@@ -241,7 +270,12 @@ impl ScaleMonitor {
                 depths.sort_by(f64::total_cmp);
                 depths.get(depths.len() / 2).map(|d| (d - height).exp())
             }),
-            state: ScaleState::Learning,
+            // A change goes on being one while it is measured anew.
+            state: if self.drifting {
+                ScaleState::Drift
+            } else {
+                ScaleState::Learning
+            },
         };
         if let (Some((reference, reference_error)), Some((now, error))) = (reference, now) {
             let change = now - reference;

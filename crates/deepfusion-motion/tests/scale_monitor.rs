@@ -142,6 +142,29 @@ fn clean_drives_are_silent_and_a_zoom_is_noticed() {
     }
 }
 
+/// Speeds in another unit, and another resolution, are beyond the heights that are tried about the usual one.
+#[test]
+fn a_change_by_more_than_is_tried_is_one_all_the_same() {
+    let drive = drive(81);
+    for (zoom, speed, expected) in [(1.0, 3.6, 3.6), (1.6, 1.0, 1.6)] {
+        let all = readings(&drive, zoom, speed, ScaleMonitorConfig::default());
+        assert_eq!(alarms(&all[..FRAMES[0]]), 0);
+        let last = all.last().unwrap();
+        assert_eq!(last.state, ScaleState::Drift, "{expected}: {last:?}");
+        if let Some(ratio) = last.ratio {
+            assert!((ratio / expected).ln().abs() < 0.2, "{expected}: {last:?}");
+        }
+    }
+    // From the first frame on, where the height was measured.
+    let known = ScaleMonitorConfig {
+        height_m: Some(HEIGHT_M),
+        ..ScaleMonitorConfig::default()
+    };
+    let all = readings(&drive, 1.0, 3.6, known);
+    let last = all.last().unwrap();
+    assert_eq!(last.state, ScaleState::Drift, "{last:?}");
+}
+
 #[test]
 fn a_height_that_was_measured_needs_no_learning() {
     let drive = drive(83);

@@ -78,6 +78,9 @@ impl CameraProblem {
             Self::File(problem) => problem.remedy(),
             Self::Implausible(_) => "give the calibration of these images, in their own pixels",
             Self::Lens(problem) => return problem.hint().unwrap_or_default(),
+            Self::CameraInfo(CameraInfoProblem::NoProjection) => {
+                "name the raw images' topic (topics.image), or give the rectified camera as [camera], in the file beside the bag"
+            }
             Self::CameraInfo(_) => "calibrate the camera at the size of these images",
             Self::Zoomed { .. } => {
                 "a recording has one camera: keep apart what was taken with another lens or zoom, or give a calibration"
@@ -113,6 +116,9 @@ pub enum CameraInfoProblem {
         /// Its name.
         name: String,
     },
+    /// Its images are rectified, and it says the camera of the others alone.
+    #[error("its images are rectified and its P is 0; K and D are of the images before that")]
+    NoProjection,
     /// The coefficients are no lens's.
     #[error(transparent)]
     Coefficients(#[from] NoDistortion),

@@ -79,7 +79,7 @@ fn draw_label(picture: &mut RgbImage, k: &Intrinsics, target: &Target) {
     let size = TextSize::for_width(picture.width() / 2);
     let (width, height) = (text_width(&text, size) as i32, size.height() as i32);
     let left = (place.x as i32 - width / 2).clamp(0, (picture.width() as i32 - width).max(0));
-    let up = (place.y as i32 - height - 2).clamp(0, picture.height() as i32 - height);
+    let up = (place.y as i32 - height - 2).clamp(0, (picture.height() as i32 - height).max(0));
     for (px, py) in
         (left - 1..left + width + 1).flat_map(|x| (up..up + height).map(move |y| (x, y)))
     {

@@ -30,7 +30,7 @@ pub(super) fn find(
 ) -> Result<(Lens, CalibrationPlace, bool)> {
     let bag = messages.path();
     let topic = topics.of(Role::Image).unwrap_or_default();
-    let rectified = topic.contains("rect");
+    let rectified = is_rectified(topic);
     let place = |file: &Path, field| CalibrationPlace {
         source: file.into(),
         field,
@@ -114,6 +114,12 @@ fn calibrated(
 }
 
 /// Of rectified images P without distortion, of raw ones K with it. A message that says no size is one of the images'.
+/// Whether a topic's name says that its images are rectified: `/camera/image_rect_color`, `/rectified/image`, not `/direct/image`.
+fn is_rectified(topic: &str) -> bool {
+    let mut words = topic.split(['/', '_', '-', '.']);
+    words.any(|word| word == "rect" || word.starts_with("rectif"))
+}
+
 fn of_camera_info(
     info: &CameraInfo,
     image_size: (u32, u32),
@@ -127,6 +133,10 @@ fn of_camera_info(
     if rectified && info.p[0] > 0.0 {
         let p = &info.p;
         return Ok((of(p[0], p[5], p[2], p[6]), Distortion::default()));
+    }
+    if rectified && info.d.iter().any(|d| *d != 0.0) {
+        // K and D are of the images as they were: their distortion would be taken out twice.
+        return Err(CameraInfoProblem::NoProjection);
     }
     let known = ["plumb_bob", "rational_polynomial", ""];
     let model = info.distortion_model.as_str();
@@ -147,6 +157,26 @@ fn of_camera_info(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rectified_is_a_word_of_the_topics_name() {
+        for topic in [
+            "/camera/image_rect",
+            "/camera/image_rect_color/compressed",
+            "/left/rectified",
+            "/a/rect-image",
+        ] {
+            assert!(is_rectified(topic), "{topic}");
+        }
+        for topic in [
+            "/cam_direct/image_raw",
+            "/camera/image_unrectified",
+            "/camera/image_raw",
+            "",
+        ] {
+            assert!(!is_rectified(topic), "{topic}");
+        }
+    }
 
     fn info(model: &str, d: &[f64]) -> CameraInfo {
         CameraInfo {

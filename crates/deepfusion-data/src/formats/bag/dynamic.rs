@@ -1,6 +1,7 @@
 //! The topic of dynamic points beside a LiDAR: those points of a scan that its driver calls moving.
 
 use super::index::{MessageRef, nearest};
+use super::scan::usable;
 use super::{image, scan};
 use crate::Result;
 use deepfusion_rosbag::MessageSource;
@@ -83,12 +84,6 @@ impl MatchedPoints {
     pub(super) fn is_of_scan(&self) -> bool {
         self.found as f64 >= LEAST_FOUND * self.points as f64
     }
-}
-
-/// Drivers fill rays without an echo with zeros or NaN.
-fn usable(point: &[f32; 3]) -> bool {
-    let length = Vector3::from(*point).norm();
-    length.is_finite() && length > 0.1
 }
 
 #[cfg(test)]

@@ -133,7 +133,8 @@ impl Scan {
         let (width, height) = (k.width as usize, k.height as usize);
         let mut depth = DepthMap::empty(width, height);
         let mut nearest = vec![SeenScan::NONE; width * height];
-        for (i, point) in (0_u32..).zip(&self.xyz) {
+        let points = (0_u32..).zip(&self.xyz);
+        for (i, point) in points.filter(|(_, point)| usable(point)) {
             let seen = cam_from_lidar.transform(&Vector3::from(point.map(f64::from)));
             let Some(pixel) = k.project(&seen) else {
                 continue;
@@ -153,5 +154,35 @@ impl Scan {
             depth,
             point: nearest,
         }
+    }
+}
+
+/// Whether a point is one: drivers fill rays without an echo with zeros or NaN.
+pub(super) fn usable(point: &[f32; 3]) -> bool {
+    let length = Vector3::from(*point).norm();
+    length.is_finite() && length > 0.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ray without an echo would else be the scanner itself, wherever it stands in the image.
+    #[test]
+    fn a_ray_without_an_echo_is_no_depth() {
+        let scan = Scan {
+            xyz: vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 8.0]],
+            radial: None,
+        };
+        let ahead = Se3::from_axis_angle(Vector3::zeros(), Vector3::new(0.0, 0.5, 1.0));
+        let seen = scan.seen(&ahead, &Intrinsics::centred(100.0, (200, 100)));
+        let known: Vec<f32> = seen
+            .depth
+            .data
+            .iter()
+            .copied()
+            .filter(|d| *d > 0.0)
+            .collect();
+        assert_eq!(known, [9.0]);
     }
 }
