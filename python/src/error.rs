@@ -1,7 +1,9 @@
 //! Errors of the library as Python's.
 
+use std::ffi::CString;
+
 use deepfusion::Hint;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(
@@ -40,6 +42,12 @@ impl From<Failure> for PyErr {
 /// A library's error as an exception: its message, and its remedy as `hint` and as a note.
 pub(crate) fn raise(error: impl Hint) -> PyErr {
     with_hint(error.to_string(), error.hint())
+}
+
+/// As one of Python's own warnings; where those are errors, it is raised.
+pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
 /// An exception with this message and remedy.

@@ -1,6 +1,5 @@
 //! Trained networks and what they say of an image.
 
-use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,14 +15,14 @@ use deepfusion::jobs::intervals::sigma;
 use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
 use crate::bulk::{BulkRequest, Predictions};
 use crate::device;
-use crate::error::{Failure, raise, with_hint};
+use crate::error::{Failure, raise, warn, with_hint};
 use crate::interrupt::abandonable;
 use crate::perceive::depth_map;
 
@@ -62,14 +61,14 @@ pub(crate) fn load(
         };
         let estimator = engine.load(network).map_err(device::failure)?;
         let factors = Arc::new(source.interval_factors()?);
-        let stale = source.stale_calibrations()?;
+        // What cannot be read is an error of whoever needs it.
+        let stale = source.stale_calibrations().unwrap_or_default();
         Ok((Model::new(estimator, place, factors), stale))
     };
     // Large weights are read, and packed or moved to a GPU: that can take a while.
     let (model, stale) = abandonable(py, open)??;
     for stale in stale {
-        let text = CString::new(stale.to_string().replace('\0', " ")).unwrap_or_default();
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+        warn(py, &stale.to_string())?;
     }
     Ok(model)
 }

@@ -1,7 +1,6 @@
 //! Training, with a listener in Python.
 
 use std::collections::BTreeMap;
-use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
@@ -11,12 +10,12 @@ use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
 use deepfusion::train::{Control, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
-use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::device;
-use crate::error::{Failure, raise};
+use crate::error::{Failure, raise, warn};
 use crate::interrupt::{Stop, interruptible};
 
 /// What was asked for, as `deepfusion/__init__.py` arranges it.
@@ -376,9 +375,7 @@ impl Listener {
     /// As Python's own warnings; where those are errors, the first stops the run.
     pub(crate) fn warn(&mut self, warnings: &Warnings) {
         for text in &warnings.others {
-            let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-            let warned =
-                Python::attach(|py| PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1));
+            let warned = Python::attach(|py| warn(py, text));
             if let Err(error) = warned {
                 self.raised.get_or_insert(error);
             }

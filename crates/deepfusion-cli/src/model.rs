@@ -29,15 +29,11 @@ pub(crate) fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
 pub(crate) fn named(model: &Path) -> Result<ModelSource> {
     warn_of_hidden(model);
     let source = ModelSource::named(model)?;
-    warn_of_stale(&source);
-    Ok(source)
-}
-
-/// Warns of what is kept beside a run and was found for another step of its network. What cannot be read is an error of whoever needs it.
-pub(crate) fn warn_of_stale(model: &ModelSource) {
-    for stale in model.stale_calibrations().unwrap_or_default() {
+    // What cannot be read is an error of whoever needs it.
+    for stale in source.stale_calibrations().unwrap_or_default() {
         tracing::warn!("{stale}");
     }
+    Ok(source)
 }
 
 /// Warns where a name could mean an embedded network as well as the run that is taken.

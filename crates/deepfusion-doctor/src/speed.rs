@@ -50,7 +50,10 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
     if dataset.kind() != DatasetKind::Bag {
         return;
     }
-    let (Ok(paths), Some(track)) = (dataset.camera_paths(), dataset.track()) else {
+    let (Some(track), Some(mount)) = (dataset.track(), dataset.cam_from_vehicle()) else {
+        return;
+    };
+    let Ok(paths) = dataset.camera_paths() else {
         return;
     };
     let (mut by_poses, mut by_speeds) = (0.0, 0.0);
@@ -60,9 +63,6 @@ fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
         ..
     } in &paths
     {
-        let Some(mount) = dataset.cam_from_vehicle() else {
-            continue;
-        };
         // From a pose to one some metres on: poses that jitter from frame to frame go a longer way than the vehicle.
         let (mut begin, mut moved, mut way) = (0, Se3::identity(), 0.0);
         for (i, times) in times_s.windows(2).enumerate() {

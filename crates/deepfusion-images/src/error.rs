@@ -27,6 +27,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// Why.
+        #[source]
         problem: ImageProblem,
     },
 }

@@ -23,13 +23,17 @@ pub struct ExifCamera {
     pub turned: bool,
 }
 
-/// The block of a PNG or JPEG; of one that is damaged what can be read, as of those that some libraries write without the end of a
-/// directory.
+/// The block of a PNG or JPEG.
 pub(super) fn block(mut bytes: impl BufRead + Seek) -> Option<Exif> {
+    readable(|reader| reader.read_from_container(&mut bytes))
+}
+
+/// Of a block that is damaged what can be read, as of those that some libraries write without the end of a directory.
+fn readable(read: impl FnOnce(&exif::Reader) -> Result<Exif, exif::Error>) -> Option<Exif> {
     let mut reader = exif::Reader::new();
     reader.continue_on_error(true);
-    let read = reader.read_from_container(&mut bytes);
-    read.or_else(|error| error.distill_partial_result(|_| ()))
+    read(&reader)
+        .or_else(|error| error.distill_partial_result(|_| ()))
         .ok()
 }
 
@@ -46,11 +50,7 @@ pub fn exif_camera(path: &Path, size: (u32, u32)) -> Option<ExifCamera> {
 #[must_use]
 pub fn exif_block_camera(block: &[u8], size: (u32, u32)) -> Option<ExifCamera> {
     let tiff = block.strip_prefix(b"Exif\0\0").unwrap_or(block);
-    let mut reader = exif::Reader::new();
-    reader.continue_on_error(true);
-    let read = reader.read_raw(tiff.to_vec());
-    let exif = read.or_else(|error| error.distill_partial_result(|_| ()));
-    camera_of(&exif.ok()?, size)
+    camera_of(&readable(|reader| reader.read_raw(tiff.to_vec()))?, size)
 }
 
 /// By the focal length in 35 mm film, else by the make, the model and the lens.

@@ -16,7 +16,7 @@ use deepfusion_sim::{SimConfig, Simulation};
 use deepfusion_weights::{Card, FORMAT_VERSION, NUMBERS, Shipped, Tensor, pack};
 
 use crate::figures::{figures, names};
-use crate::{Error, Result, dates, intervals};
+use crate::{Error, Result, StaleCalibration, dates, intervals};
 
 /// What a card says that the run does not know.
 #[derive(Debug, Clone, Default)]
@@ -44,6 +44,8 @@ pub struct PackedRun {
     /// Where it is to count as one that saw no real image: the recordings and networks of its past of which nothing shows it. The card says it
     /// all the same.
     pub not_known_as_simulated: Vec<PathBuf>,
+    /// The factors of intervals beside the run, where they are another step's: the card has none.
+    pub stale: Option<StaleCalibration>,
 }
 
 /// Packs the depth network of a run (its folder, or a checkpoint in it): kernels rounded to bf16, vectors in f32.
@@ -140,6 +142,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
     Ok(PackedRun {
         shipped: Shipped::new(card, bytes)?,
         not_known_as_simulated,
+        stale: intervals::stale(folder.path(), state.step)?,
     })
 }
 

@@ -151,9 +151,8 @@ fn a_change_by_more_than_is_tried_is_one_all_the_same() {
         assert_eq!(alarms(&all[..FRAMES[0]]), 0);
         let last = all.last().unwrap();
         assert_eq!(last.state, ScaleState::Drift, "{expected}: {last:?}");
-        if let Some(ratio) = last.ratio {
-            assert!((ratio / expected).ln().abs() < 0.2, "{expected}: {last:?}");
-        }
+        let ratio = last.ratio.unwrap();
+        assert!((ratio / expected).ln().abs() < 0.2, "{expected}: {last:?}");
     }
     // From the first frame on, where the height was measured.
     let known = ScaleMonitorConfig {

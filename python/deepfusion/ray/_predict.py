@@ -343,6 +343,8 @@ def predict(
     camera = None
     if intrinsics is not None:
         k = np.asarray(intrinsics, dtype=float)
+        if k.shape == (3, 3) and (k[0, 1], k[1, 0], *k[2]) != (0, 0, 0, 0, 1):
+            raise ValueError("intrinsics: not the matrix of a pinhole camera (fx 0 cx, 0 fy cy, 0 0 1)")
         fx, fy, cx, cy = map(float, (k[0, 0], k[1, 1], k[0, 2], k[1, 2]) if k.shape == (3, 3) else k)
         camera = (fx, fy, cx, cy)
     job = _Job(

@@ -1,11 +1,8 @@
 use deepfusion_jobs::packing::{PackOptions, PackedRun, pack_run};
-use deepfusion_model::RunFolder;
-use deepfusion_runtime::ModelSource;
 use deepfusion_weights::MAX_BYTES;
 
 use crate::cli::PackArgs;
 use crate::failure::Result;
-use crate::model;
 use crate::output;
 use crate::progress::say;
 
@@ -22,15 +19,12 @@ pub(crate) fn run(args: &PackArgs) -> Result<()> {
     let PackedRun {
         shipped,
         not_known_as_simulated,
+        stale,
         ..
     } = pack_run(&args.model, options)?;
-    let (folder, given) = RunFolder::open(&args.model)?;
-    let kind = args.checkpoint.or(given);
-    model::warn_of_stale(&ModelSource::Run {
-        given: args.model.clone(),
-        kind: kind.unwrap_or_else(|| folder.preferred()),
-        folder,
-    });
+    if let Some(stale) = stale {
+        tracing::warn!("{stale}");
+    }
     for path in not_known_as_simulated {
         tracing::warn!(
             "{}: nothing shows whether its images were simulated; the card says so by your word (--simulated-only)",
