@@ -238,3 +238,95 @@ fn what_cannot_be_written_is_named_by_its_place() {
     assert!(said.contains("_drive_0001_sync"), "{said}");
     assert!(!said.contains("partial"), "{said}");
 }
+
+fn bag_of(dataset: &Dataset, out: &Path) -> Dataset {
+    let go = &mut |_, _| ControlFlow::Continue(());
+    convert_to_bag(dataset, out, Compression::None, go).unwrap();
+    let options = OpenOptions::default();
+    Dataset::open(out, &options).unwrap().remove(0)
+}
+
+/// What lies on either side of a pause are no neighbours, in a bag as little as in files with numbers.
+#[test]
+fn frames_that_a_bag_has_not_leave_out_their_numbers() {
+    let root = tempfile::tempdir().unwrap();
+    let numbers: Vec<u64> = (0..5).chain(9..12).collect();
+    let drive = TinyDrive {
+        frames: numbers.clone(),
+        lines: 12,
+        ..TinyDrive::default()
+    };
+    let folder = drive.write(&root.path().join("drive"));
+    let options = OpenOptions::default();
+    let dataset = Dataset::open(&folder, &options).unwrap().remove(0);
+    let bag = bag_of(&dataset, &root.path().join("drive.bag"));
+    let found: Vec<u64> = bag.frames().iter().map(|f| f.number).collect();
+    assert_eq!(found, numbers);
+    for frame in 0..numbers.len() {
+        let images = [&dataset, &bag].map(|of| of.load_image(frame).unwrap());
+        assert!(images[0] == images[1], "frame {frame}");
+    }
+}
+
+/// A copy that gives a guess as known is never [aimed](Dataset::aim).
+#[test]
+fn a_place_of_the_camera_that_was_assumed_is_assumed_in_the_copy() {
+    let root = tempfile::tempdir().unwrap();
+    let root = root.path();
+    let folder = root.join("folder");
+    folder::write_drive(&folder, 6, 5.0, 0.1);
+    for (mount, assumed) in [("", true), ("[mount]\nup_m = 1.5\n", false)] {
+        fs::write(folder.join("dataset.toml"), mount).unwrap();
+        let options = OpenOptions::default();
+        let dataset = Dataset::open(&folder, &options).unwrap().remove(0);
+        let copies = [
+            kitti_of(&dataset, &root.join(format!("kitti-{assumed}"))),
+            bag_of(&dataset, &root.join(format!("{assumed}.bag"))),
+        ];
+        assert_eq!(dataset.mount_assumed(), assumed);
+        for copy in copies {
+            assert_eq!(copy.mount_assumed(), assumed);
+            let (own, copied) = (dataset.cam_from_vehicle(), copy.cam_from_vehicle());
+            let apart = own.unwrap().inverse() * copied.unwrap();
+            assert!(apart.translation().norm() < 1e-9 && apart.angle() < 1e-9);
+            let said: Vec<String> = copy.warnings().iter().map(ToString::to_string).collect();
+            assert_eq!(
+                said.iter().any(|w| w.contains("it is taken to look")),
+                assumed,
+                "{said:?}"
+            );
+        }
+    }
+}
+
+/// Packets at the frames of a camera that takes one a second would be too far apart to tell how the vehicle moved.
+#[test]
+fn a_slow_camera_keeps_the_motion_between_its_frames() {
+    let root = tempfile::tempdir().unwrap();
+    let root = root.path();
+    let folder = root.join("folder");
+    folder::write_images(&folder, &["a", "b", "c", "d"]);
+    fs::write(folder.join("intrinsics.txt"), "36 36 30.5 8.6\n").unwrap();
+    let frames = "time_s,file\n10.0,a.png\n11.0,b.png\n12.0,c.png\n13.0,d.png\n";
+    fs::write(folder.join("frames.csv"), frames).unwrap();
+    let speeds: String = (0..35).fold(
+        "time_s,speed_mps,yaw_rate_radps\n".to_owned(),
+        |table, n| {
+            let time_s = 9.8 + 0.1 * f64::from(n);
+            table + &format!("{time_s:.1},{:.2},0.1\n", 5.0 + 0.1 * f64::from(n))
+        },
+    );
+    fs::write(folder.join("speed.csv"), speeds).unwrap();
+    let options = OpenOptions::default();
+    let dataset = Dataset::open(&folder, &options).unwrap().remove(0);
+    let copy = kitti_of(&dataset, &root.join("kitti"));
+    for frame in 0..3 {
+        let moved = [&dataset, &copy].map(|of| of.camera_motion(frame, frame + 1).unwrap());
+        let apart = moved[0].inverse() * moved[1];
+        assert!(moved[0].translation().norm() > 4.0);
+        assert!(
+            apart.translation().norm() < 0.01 && apart.angle() < 0.001,
+            "{apart:?}"
+        );
+    }
+}

@@ -63,9 +63,8 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         };
         return Outcome::skipped("ground", why);
     }
-    // Up by the road, turned into the mount's: about the camera's x and z.
-    let pitch = |(n, _): &(Vector3<f64>, f64)| up.cross(n).x.asin().to_degrees();
-    let roll = |(n, _): &(Vector3<f64>, f64)| up.cross(n).z.asin().to_degrees();
+    let pitch = |(n, _): &(Vector3<f64>, f64)| turns_deg(&up, n)[0];
+    let roll = |(n, _): &(Vector3<f64>, f64)| turns_deg(&up, n)[1];
     // Road, kerb and what stands on it do not lie alike from frame to frame; a mount that is off always is by as much.
     let pitches = Angle::of(planes.iter().map(pitch).collect());
     let rolls = Angle::of(planes.iter().map(roll).collect());
@@ -86,19 +85,21 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             pitches.median,
             RoadAngle::Pitch,
             MOST_PITCH_DEG,
+            1.0,
         ),
         (
             "roll of the road against the mount",
             rolls.median,
             RoadAngle::Roll,
             MOST_ROLL_DEG,
+            -1.0,
         ),
     ];
-    for (quantity, value, angle, most) in angles {
+    for (quantity, value, angle, most, sign) in angles {
         let figure = Figure::new(quantity, value, "degrees", Limit::Within(-most, most));
         outcome.judge(Severity::Warning, figure, || CameraReason::RoadTurned {
             frames: planes.len(),
-            by_deg: value.abs(),
+            camera_by_deg: sign * value,
             angle,
         });
     }
@@ -109,6 +110,13 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         CameraReason::Height { height_m }
     });
     outcome
+}
+
+/// Up by the mount, turned into up by the road: about the camera's x (the camera looks further down than its mount says) and z (it is
+/// turned anticlockwise as it looks), degrees.
+fn turns_deg(by_mount: &Vector3<f64>, by_road: &Vector3<f64>) -> [f64; 2] {
+    let turn = by_mount.cross(by_road);
+    [turn.x, turn.z].map(|sine| sine.asin().to_degrees())
 }
 
 /// An angle over the frames, degrees.
@@ -208,6 +216,20 @@ mod tests {
         let (n, height) = plane(&points, &-Vector3::y()).unwrap();
         assert!((n - normal).norm() < 0.004, "{n}");
         assert!((height - 1.65).abs() < 0.02, "{height}");
+    }
+
+    #[test]
+    fn a_camera_that_looks_down_or_leans_is_told_from_its_opposite() {
+        let (sin, cos) = 3.0_f64.to_radians().sin_cos();
+        let up = -Vector3::y();
+        // Up along the right, lower and front sides of a camera that looks 3 degrees down, and of one that is turned clockwise.
+        let (looks_down, clockwise) =
+            (Vector3::new(0.0, -cos, -sin), Vector3::new(-sin, -cos, 0.0));
+        let near = |found: [f64; 2], expected: [f64; 2]| {
+            assert!((found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-9);
+        };
+        near(turns_deg(&up, &looks_down), [3.0, 0.0]);
+        near(turns_deg(&up, &clockwise), [0.0, -3.0]);
     }
 
     #[test]

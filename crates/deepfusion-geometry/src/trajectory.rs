@@ -30,16 +30,21 @@ impl Trajectory {
         &self.poses
     }
 
-    /// The pose at `time_s`, interpolated between its neighbours; `None` outside the path.
+    /// The pose at `time_s`, interpolated between its neighbours; `None` outside the path, and between neighbours more than `max_gap_s` apart:
+    /// nobody knows how the body moved there.
     #[must_use]
-    pub fn at(&self, time_s: f64) -> Option<Se3> {
+    pub fn at(&self, time_s: f64, max_gap_s: f64) -> Option<Se3> {
         let after = self.poses.partition_point(|p| p.time_s < time_s);
         let next = self.poses.get(after)?;
         if next.time_s == time_s {
             return Some(next.world_from_body);
         }
         let previous = self.poses.get(after.checked_sub(1)?)?;
-        let fraction = (time_s - previous.time_s) / (next.time_s - previous.time_s);
+        let gap_s = next.time_s - previous.time_s;
+        if gap_s > max_gap_s {
+            return None;
+        }
+        let fraction = (time_s - previous.time_s) / gap_s;
         Some(
             previous
                 .world_from_body
@@ -77,17 +82,23 @@ mod tests {
 
     #[test]
     fn between_two_poses_is_interpolated() {
-        let pose = straight().at(1.25).unwrap();
+        let pose = straight().at(1.25, 1.0).unwrap();
         assert!((pose.translation().x - 2.5).abs() < 1e-12);
         assert!((pose.axis_angle().z - 0.125).abs() < 1e-12);
     }
 
     #[test]
     fn outside_the_path_there_is_no_pose() {
-        assert!(straight().at(-0.1).is_none());
-        assert!(straight().at(2.1).is_none());
-        assert!(straight().at(2.0).is_some());
-        assert!(Trajectory::default().at(0.0).is_none());
+        assert!(straight().at(-0.1, 1.0).is_none());
+        assert!(straight().at(2.1, 1.0).is_none());
+        assert!(straight().at(2.0, 1.0).is_some());
+        assert!(Trajectory::default().at(0.0, 1.0).is_none());
+    }
+
+    #[test]
+    fn nothing_is_known_of_a_gap() {
+        assert!(straight().at(1.25, 0.9).is_none());
+        assert!(straight().at(1.0, 0.9).is_some());
     }
 
     #[test]

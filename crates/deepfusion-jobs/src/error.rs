@@ -574,7 +574,7 @@ impl Hint for Error {
                 "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
             ),
             Self::StackLength { .. } => Some(
-                "give an .npz whose arrays have the frames' names, or an array for each frame, in their order".into(),
+                "give an .npz whose arrays have the frames' names, or an array for each frame, in the order of the split's lines".into(),
             ),
             Self::Exists { .. } | Self::Stale { .. } => {
                 Some("allow overwriting, or choose another folder".into())

@@ -204,7 +204,11 @@ fn describe(dataset: &Dataset) -> String {
         let _ = writeln!(text, "\n[{name}]\ntranslation = {t}\nrotation = {r}");
     };
     add("cam_from_lidar", &cam_from_scanner());
-    if let Some(pose) = dataset.cam_from_vehicle() {
+    // A guess is left out: the bag's reader makes the same one, and says so.
+    if let Some(pose) = dataset
+        .cam_from_vehicle()
+        .filter(|_| !dataset.mount_assumed())
+    {
         add("cam_from_vehicle", &pose);
     }
     text

@@ -4,7 +4,7 @@ use super::parts::{
     seconds_to_move,
 };
 use crate::dataset_toml::FolderConfig;
-use crate::{Dataset, Error, Result, save_png};
+use crate::{Dataset, Error, MotionModel, Result, VehicleTrack, save_png};
 use deepfusion_fs::PartialFolder;
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
 /// frame's time), not the scanner's own. `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
-/// know. The drive's `dataset.toml`, which goes with it wherever it is moved, says so where yaw or roll and pitch are not known, and where it
+/// know: a packet a frame, or where frames are more than half a second apart, packets at the times of the recording's speeds. The drive's `dataset.toml`, which goes with it wherever it is moved, says so where yaw, roll and pitch, or the camera's place are not known, and where it
 /// is [simulated](Dataset::is_simulated). A frame without a time has an empty line, as in KITTI's own files.
 ///
 /// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
@@ -91,13 +91,14 @@ fn write_date(
     Ok(names)
 }
 
-/// Says of a drive what KITTI's own files cannot: that nobody drove it, and what of its oxts nobody measured.
+/// Says of a drive what KITTI's own files cannot: that nobody drove it, what of its oxts nobody measured, and that the camera's place is a guess.
 fn write_notes(dataset: &Dataset, folder: &Path) -> Result<()> {
     let moves = dataset.track().is_some();
     let notes = [
         (dataset.is_simulated(), SIMULATED),
         (moves && !dataset.yaw_known(), YAW_UNKNOWN),
         (moves && dataset.tilt_unknown(), TILT_UNKNOWN),
+        (dataset.mount_assumed(), MOUNT_UNKNOWN),
     ];
     let notes = notes.iter().filter(|(holds, _)| *holds);
     let notes: String = notes.map(|(_, note)| *note).collect();
@@ -112,6 +113,8 @@ fn write_notes(dataset: &Dataset, folder: &Path) -> Result<()> {
 /// Zeros stand in the packets.
 const YAW_UNKNOWN: &str = "yaw_known = false\n";
 const TILT_UNKNOWN: &str = "tilt_known = false\n";
+/// The calibration has the place that was assumed.
+const MOUNT_UNKNOWN: &str = "mount_known = false\n";
 
 /// Frames read and written together.
 const BATCH: usize = 8;
@@ -131,6 +134,7 @@ fn write_drive(
     let scans = part("velodyne_points")?;
     let has_motion = dataset.track().is_some();
     let oxts = has_motion.then(|| part("oxts")).transpose()?;
+    let own_packets = has_motion && is_too_slow(dataset);
     let numbers = Numbers::of(dataset);
     let frames: Vec<usize> = (0..dataset.frames().len()).collect();
     for batch in frames.chunks(BATCH) {
@@ -154,7 +158,7 @@ fn write_drive(
                 )?;
             }
             let known = frame.time_s.and_then(|t| moving_at(dataset, t));
-            if let (Some(folder), Some(moving)) = (&oxts, known) {
+            if let (Some(folder), Some(moving), false) = (&oxts, known, own_packets) {
                 let path = folder.join(format!("{name}.txt"));
                 super::parts::write_text(&path, &packet(&moving))?;
             }
@@ -165,12 +169,40 @@ fn write_drive(
     if dataset.frames().iter().any(|f| f.time_s.is_some()) {
         let text = numbers.times(dataset, moved_s);
         for name in ["image_02", "velodyne_points", "oxts"] {
-            if name != "oxts" || has_motion {
+            if name != "oxts" || (has_motion && !own_packets) {
                 super::parts::write_text(&folder.join(name).join("timestamps.txt"), &text)?;
             }
         }
     }
+    if let (Some(oxts), true) = (&oxts, own_packets) {
+        write_own_packets(dataset, oxts, moved_s)?;
+    }
     Ok(())
+}
+
+/// Whether frames that follow one another are farther apart in time than a reader of packets bridges.
+fn is_too_slow(dataset: &Dataset) -> bool {
+    let frames = dataset.frames().windows(2);
+    let mut apart_s = frames.filter_map(|pair| {
+        (pair[0].number + 1 == pair[1].number).then_some(pair[1].time_s? - pair[0].time_s?)
+    });
+    apart_s.any(|apart_s| apart_s > VehicleTrack::MAX_GAP_S)
+}
+
+/// Packets at the times of the recording's own speeds, with numbers of their own: at a slow camera's frames alone nobody could tell how the
+/// vehicle moved from one to the next. KITTI's `sync` drives have a packet a frame, its raw ones have packets as these.
+fn write_own_packets(dataset: &Dataset, data: &Path, moved_s: i64) -> Result<()> {
+    let times = dataset.track().map(MotionModel::times_s);
+    let mut lines = String::new();
+    let known = times.unwrap_or_default().iter().copied();
+    let known = known.filter_map(|time_s| Some((time_s, moving_at(dataset, time_s)?)));
+    for (number, (time_s, moving)) in known.enumerate() {
+        let path = data.join(format!("{number:010}.txt"));
+        super::parts::write_text(&path, &packet(&moving))?;
+        let _ = writeln!(lines, "{}", stamp(at_ns(dataset, time_s, moved_s)));
+    }
+    let folder = data.parent().unwrap_or(data);
+    super::parts::write_text(&folder.join("timestamps.txt"), &lines)
 }
 
 /// The numbers by which a drive's files are named.

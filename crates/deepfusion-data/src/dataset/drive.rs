@@ -80,6 +80,8 @@ fn looks_ahead() -> Se3 {
 pub struct Dataset {
     parts: DatasetParts,
     selected: Vec<usize>,
+    /// Of each of these its place in the split.
+    split_places: Vec<Option<usize>>,
     recording: Arc<dyn Recording>,
     receiver: Receiver,
     camera_assumed: bool,
@@ -99,6 +101,7 @@ impl Dataset {
         parts.split_name = drive_name(&parts.split_name);
         Self {
             selected: (0..parts.frames.len()).collect(),
+            split_places: vec![None; parts.frames.len()],
             parts,
             warnings: recording.warnings().to_vec(),
             recording,
@@ -150,7 +153,8 @@ impl Dataset {
     }
 
     /// Turns the camera on its vehicle to where its images show that it looks: motions between frames then have that direction.
-    /// Nothing happens where the mount is not [assumed](Self::mount_assumed).
+    /// Nothing happens where the mount is not [assumed](Self::mount_assumed). A bag's scans are still brought to the frames' times by the
+    /// motion of the mount that was assumed: over milliseconds these differ by millimetres.
     pub fn aim(&mut self, heading: &Heading) {
         if !self.mount_assumed {
             return;
@@ -159,8 +163,12 @@ impl Dataset {
         if let Some(cam_from_vehicle) = mount {
             *cam_from_vehicle = heading.turn() * *cam_from_vehicle;
             self.mount_assumed = false;
-            self.warnings
-                .retain(|warning| !matches!(warning, DataWarning::Mount(MountWarning::NotGiven)));
+            self.warnings.retain(|warning| {
+                !matches!(
+                    warning,
+                    DataWarning::Mount(MountWarning::NotGiven | MountWarning::CameraUnknown)
+                )
+            });
             self.warnings.push(MountWarning::Aimed(*heading).into());
         }
     }
@@ -246,9 +254,9 @@ impl Dataset {
         &self.receiver
     }
 
-    /// With only these frames selected, by index.
-    pub(crate) fn with_selected(mut self, selected: Vec<usize>) -> Self {
-        self.selected = selected;
+    /// With only these frames selected, by index, each with its place in the split.
+    pub(crate) fn with_selected(mut self, selected: Vec<(usize, Option<usize>)>) -> Self {
+        (self.selected, self.split_places) = selected.into_iter().unzip();
         self
     }
 
@@ -318,6 +326,14 @@ impl Dataset {
     #[must_use]
     pub fn selected(&self) -> &[usize] {
         &self.selected
+    }
+
+    /// Of each [selected](Self::selected) frame its place among the lines of the split that name frames, from 0; `None` without a split,
+    /// and for what a scenario selects. Recordings are opened in an order of their own, with their frames by number: the lists of the field
+    /// often have another, and what comes without names is in theirs.
+    #[must_use]
+    pub fn split_places(&self) -> &[Option<usize>] {
+        &self.split_places
     }
 
     /// A point of the vehicle (x forward, y left, z up) in the camera, in metres; `None` where unknown.

@@ -4,43 +4,50 @@ use super::camera::Camera;
 use super::options::OpenOptions;
 use super::split::{Split, SplitEntry};
 use crate::Error;
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// The frames asked for.
 pub(crate) struct Selection<'a> {
-    split: Option<(&'a Split, HashSet<&'a SplitEntry>)>,
+    /// Its frames, each with its place in the list; of two lines the first's.
+    split: Option<(&'a Split, HashMap<&'a SplitEntry, usize>)>,
 }
 
 impl<'a> Selection<'a> {
     pub(crate) fn new(options: &'a OpenOptions) -> Self {
         let split = options.split.as_ref();
         Self {
-            split: split.map(|split| (split, split.entries.iter().collect())),
+            split: split.map(|split| (split, split.entries.iter().zip(0..).rev().collect())),
         }
     }
 
-    /// Indices into `numbers` of the frames asked for, of a drive of a kind.
+    /// Of a drive of a kind the frames asked for, as indices into `numbers`, each with its place among the split's frames where it has one there.
     pub(crate) fn of(
         &self,
         folder: &str,
         scenario: Option<&str>,
         camera: Camera,
         numbers: impl Iterator<Item = u64>,
-    ) -> Vec<usize> {
-        let wanted = |frame: u64| {
-            self.split.as_ref().is_none_or(|(split, wanted)| {
-                let of_kind = scenario.is_some_and(|s| split.scenarios.iter().any(|w| w == s));
-                of_kind
-                    || wanted.contains(&SplitEntry {
-                        folder: folder.to_owned(),
-                        frame,
-                        camera,
-                    })
-            })
+    ) -> Vec<(usize, Option<usize>)> {
+        let Some((split, places)) = &self.split else {
+            return numbers
+                .enumerate()
+                .map(|(index, _)| (index, None))
+                .collect();
         };
-        let numbers = numbers.enumerate();
-        numbers.filter(|(_, n)| wanted(*n)).map(|n| n.0).collect()
+        let of_kind = scenario.is_some_and(|s| split.scenarios.iter().any(|w| w == s));
+        let place = |frame: u64| {
+            let entry = SplitEntry {
+                folder: folder.to_owned(),
+                frame,
+                camera,
+            };
+            places.get(&entry).copied()
+        };
+        let placed = numbers.enumerate().map(|(index, n)| (index, place(n)));
+        placed
+            .filter(|(_, place)| of_kind || place.is_some())
+            .collect()
     }
 
     /// The error of a split that selects nothing of `path`; `None` without a split.

@@ -79,13 +79,15 @@ pub enum CameraReason {
     Depth(SharedError<Error>),
     /// The road in the measured depth is turned against the mounts.
     #[error(
-        "the road in the measured depth of {frames} frames is turned by {by_deg:.1} degrees ({angle}) against what the mounts say"
+        "the road in the measured depth of {frames} frames is turned by {:.1} degrees ({angle}) against what the mounts say",
+        camera_by_deg.abs()
     )]
     RoadTurned {
         /// Frames that show it.
         frames: usize,
-        /// By how much, degrees.
-        by_deg: f64,
+        /// By how much the camera is turned against its mount, if the LiDAR is where it is said to be: further down, or clockwise as it looks,
+        /// degrees.
+        camera_by_deg: f64,
         /// About which axis.
         angle: RoadAngle,
     },
@@ -138,9 +140,19 @@ impl CameraReason {
                     .hint()
                     .unwrap_or_else(|| "copy the recording again".to_owned());
             }
-            Self::RoadTurned { angle, .. } => {
+            Self::RoadTurned {
+                angle,
+                camera_by_deg,
+                ..
+            } => {
+                let to = match (angle, *camera_by_deg > 0.0) {
+                    (RoadAngle::Pitch, true) => "down",
+                    (RoadAngle::Pitch, false) => "up",
+                    (RoadAngle::Roll, true) => "clockwise",
+                    (RoadAngle::Roll, false) => "anticlockwise",
+                };
                 return format!(
-                    "correct the {angle} of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle"
+                    "turn the camera on the vehicle (cam_from_vehicle) {to} by that angle, or correct the {angle} of the LiDAR on the camera by it"
                 );
             }
             Self::Height { .. } => {
@@ -311,7 +323,7 @@ mod tests {
         };
         let turned = CameraReason::RoadTurned {
             frames: 8,
-            by_deg: 3.04,
+            camera_by_deg: -3.04,
             angle: RoadAngle::Roll,
         };
         for (reason, remedy) in [
@@ -329,7 +341,7 @@ mod tests {
             ),
             (
                 turned,
-                "correct the roll of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle",
+                "turn the camera on the vehicle (cam_from_vehicle) anticlockwise by that angle, or correct the roll of the LiDAR on the camera by it",
             ),
         ] {
             assert_eq!(reason.remedy(), remedy);
@@ -340,7 +352,7 @@ mod tests {
     fn what_measured_depth_says_of_the_mounts() {
         let turned = |angle| CameraReason::RoadTurned {
             frames: 8,
-            by_deg: 3.04,
+            camera_by_deg: 3.04,
             angle,
         };
         for (angle, name) in [(RoadAngle::Pitch, "pitch"), (RoadAngle::Roll, "roll")] {

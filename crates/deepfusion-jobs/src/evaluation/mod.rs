@@ -162,7 +162,7 @@ pub fn evaluate_datasets<E: From<Error>>(
     let total = names.iter().map(Vec::len).sum();
     let arrays = match truth {
         Truth::Scans(_) => HashMap::new(),
-        Truth::Arrays(arrays) => array_places(arrays, &names)?,
+        Truth::Arrays(arrays) => array_places(arrays, datasets)?,
     };
     let (mut done, mut places) = (0, Vec::new());
     for (number, (dataset, names)) in datasets.iter().zip(&names).enumerate() {

@@ -31,7 +31,7 @@ pub fn shown_of_datasets(
     let names = ground_truth_names(datasets);
     let arrays = match truth {
         Truth::Scans(_) => HashMap::new(),
-        Truth::Arrays(arrays) => array_places(arrays, &names)?,
+        Truth::Arrays(arrays) => array_places(arrays, datasets)?,
     };
     shown(evaluated, |ImageRef(number, frame)| {
         let dataset = &datasets[number];

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 
-use deepfusion_data::{Dataset, GtKind};
+use deepfusion_data::{Dataset, GtKind, ground_truth_names};
 use deepfusion_eval::{ArraySet, Grid, MeanDepthBaseline};
 use deepfusion_geometry::DepthMap;
 use deepfusion_model::TrainConfig;
@@ -101,19 +101,24 @@ pub fn depth_map(truth: &Grid) -> DepthMap {
     }
 }
 
-/// Frame names to places in the file: by name, or, for a stack without names, in the frames' order.
+/// Frame names to places in the file: by name, or, for a stack without names, in the order of the split's lines; without a split in that of
+/// the recordings and their frames.
 ///
 /// # Errors
 /// [`Error::StackLength`] for a stack of more or fewer arrays than frames: which is whose would be a guess.
-pub fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> Result<HashMap<String, usize>> {
+pub fn array_places(arrays: &ArraySet, datasets: &[Dataset]) -> Result<HashMap<String, usize>> {
     if let Some(names) = arrays.names() {
         return Ok(names.iter().cloned().zip(0..).collect());
     }
-    let (found, expected) = (arrays.len(), frames.iter().map(Vec::len).sum());
+    let names = ground_truth_names(datasets).into_iter().flatten();
+    let places = datasets.iter().flat_map(Dataset::split_places);
+    let mut frames: Vec<(&Option<usize>, String)> = places.zip(names).collect();
+    let (found, expected) = (arrays.len(), frames.len());
     if found != expected {
         return Err(Error::StackLength { found, expected });
     }
-    Ok(frames.iter().flatten().cloned().zip(0..).collect())
+    frames.sort_by_key(|(place, _)| (place.is_none(), **place));
+    Ok(frames.into_iter().map(|(_, name)| name).zip(0..).collect())
 }
 
 /// The network's pixels, by their place in [`Prediction::disparity`], with the true depth in metres: evenly among those of the
@@ -136,4 +141,59 @@ pub fn known_pixels(truth: &Grid, seen: &Prediction, range_m: &Range<f64>) -> Ve
         (v * seen.width + u, z)
     };
     known.into_iter().step_by(step).map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_data::{OpenOptions, Split};
+    use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+    use std::ops::ControlFlow;
+
+    /// The field's lists are not in the order of their frames, and arrays without names are in the lists'.
+    #[test]
+    fn a_stack_is_in_the_order_of_the_split() {
+        let at = tempfile::tempdir().unwrap();
+        let simulation = Simulation::new(&SimConfig {
+            frames: 5,
+            width: 64,
+            height: 48,
+            scan_every: 0,
+            ..SimConfig::default()
+        });
+        let kitti = at.path().join("kitti");
+        let go = &mut |_, _| ControlFlow::Continue(());
+        let root = write_kitti(&simulation.unwrap(), &kitti, go).unwrap();
+        let drive = Dataset::open(&root, &OpenOptions::default())
+            .unwrap()
+            .remove(0);
+        let lines = [3, 0, 4].map(|frame| format!("{} {frame} l\n", drive.split_name()));
+        let split = at.path().join("split.txt");
+        std::fs::write(&split, lines.concat()).unwrap();
+        let options = OpenOptions {
+            split: Some(Split::read(&split).unwrap()),
+            ..OpenOptions::default()
+        };
+        let datasets = Dataset::open(&root, &options).unwrap();
+        assert_eq!(datasets[0].split_places(), [Some(1), Some(0), Some(2)]);
+        let stack = |arrays: usize| {
+            let path = at.path().join("gt.npy");
+            ndarray_npy::write_npy(&path, &ndarray::Array3::<f32>::ones((arrays, 48, 64))).unwrap();
+            ArraySet::open(&path).unwrap()
+        };
+        let places = array_places(&stack(3), &datasets).unwrap();
+        let place = |frame: u64| places.get(&format!("{frame:010}")).copied();
+        assert_eq!([3, 0, 4].map(place), [Some(0), Some(1), Some(2)]);
+        let error = array_places(&stack(4), &datasets).unwrap_err();
+        assert!(matches!(
+            error,
+            Error::StackLength {
+                found: 4,
+                expected: 3
+            }
+        ));
+        // Without a split in that of the frames.
+        let all = array_places(&stack(5), &[drive]).unwrap();
+        assert!((0..5_usize).all(|frame| all.get(&format!("{frame:010}")) == Some(&frame)));
+    }
 }

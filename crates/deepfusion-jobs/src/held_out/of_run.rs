@@ -73,12 +73,12 @@ fn seen_by(
     let (train, _, _) = SampleSet::split_sets(&config, recordings, None).ok()?;
     let mut seen = HashSet::new();
     for sample in &train.samples {
-        let of = |(dataset, frame): (usize, usize)| key(&train.datasets[dataset].frames()[frame]);
-        seen.insert(of((sample.dataset, sample.snippet.target)));
-        seen.extend(sample.sources().map(of));
+        let of = |(dataset, frame): (usize, usize)| keys(&train.datasets[dataset].frames()[frame]);
+        seen.extend(of((sample.dataset, sample.snippet.target)));
+        seen.extend(sample.sources().flat_map(of));
     }
     for frame in &train.depth.frames {
-        seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));
+        seen.extend(keys(&train.datasets[frame.dataset].frames()[frame.frame]));
     }
     if let Some(init) = &config.init {
         let sha256 = config.init_sha256.as_deref();
@@ -126,6 +126,54 @@ fn seen_before(
 }
 
 fn key(frame: &Frame) -> FrameKey {
-    let size = std::fs::metadata(frame.image.path()).map_or(0, |meta| meta.len());
+    key_of(frame, frame.image.path())
+}
+
+fn key_of(frame: &Frame, image: &Path) -> FrameKey {
+    let size = std::fs::metadata(image).map_or(0, |meta| meta.len());
     (frame.drive.clone(), frame.number, size)
+}
+
+/// The keys of a frame that was seen: its own, and that of the stereo pair's other camera, which shows the same street at the same time.
+fn keys(frame: &Frame) -> impl Iterator<Item = FrameKey> {
+    let other = other_camera(frame.image.path()).filter(|image| image.is_file());
+    let other = other.map(|image| key_of(frame, &image));
+    std::iter::once(key(frame)).chain(other)
+}
+
+/// Where KITTI's layouts keep the other colour camera's image.
+fn other_camera(image: &Path) -> Option<PathBuf> {
+    const PAIRS: [[&str; 2]; 2] = [["image_02", "image_03"], ["image_2", "image_3"]];
+    let swapped = |name: &std::ffi::OsStr| {
+        let pairs = PAIRS.iter();
+        let mut sides = pairs.flat_map(|[left, right]| [(left, right), (right, left)]);
+        sides.find_map(|(side, other)| (name == *side).then_some(*other))
+    };
+    let mut found = false;
+    let parts = image.iter().rev().map(|part| match swapped(part) {
+        Some(other) if !std::mem::replace(&mut found, true) => std::ffi::OsStr::new(other),
+        _ => part,
+    });
+    // The innermost folder of that name is the camera's.
+    let parts: Vec<_> = parts.collect();
+    found.then(|| parts.into_iter().rev().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_other_camera_of_a_pair_lies_beside_it() {
+        let other = |path: &str| other_camera(Path::new(path));
+        let left = "/kitti/image_02/2011_09_26_drive_0005_sync/image_02/data/0000000004.png";
+        let right = "/kitti/image_02/2011_09_26_drive_0005_sync/image_03/data/0000000004.png";
+        assert_eq!(other(left), Some(right.into()));
+        assert_eq!(other(right), Some(left.into()));
+        assert_eq!(
+            other("04/image_3/000004.png"),
+            Some("04/image_2/000004.png".into())
+        );
+        assert_eq!(other("images/0000000004.png"), None);
+    }
 }

@@ -27,6 +27,8 @@ const BODY_AXES: f64 = 0.7;
 #[derive(Debug)]
 pub(super) struct Mounts {
     pub(super) cam_from_vehicle: Se3,
+    /// Whether nothing says the above.
+    pub(super) camera_assumed: bool,
     /// `None` where nothing says it.
     pub(super) cam_from_lidar: Option<Se3>,
     /// `None` where nothing says it.
@@ -90,6 +92,7 @@ impl Mounts {
             search.warn(MountWarning::CameraUnknown);
         }
         Ok(Self {
+            camera_assumed: cam_from_vehicle.is_none(),
             cam_from_vehicle: cam_from_vehicle.unwrap_or_else(looking_ahead),
             cam_from_lidar,
             vehicle_from_imu,

@@ -12,6 +12,7 @@ use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use super::{camera, image, sensors, source};
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
+use crate::logs::frame_times::numbers_by_time;
 use crate::{
     Camera, CameraWarning, DataWarning, Dataset, DatasetParts, Error, Frame, FrameImage,
     IncompleteWarning, MotionModel, MountWarning, NoFramesReason, OpenOptions, Result,
@@ -87,7 +88,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let implausible = lens.intrinsics().implausible();
     warnings.extend(implausible.map(|why| DataWarning::from(CameraWarning::from(why))));
     let mounts = Mounts::find(path, &config, &index, &mut warnings)?;
-    let cam_from_vehicle = mounts.cam_from_vehicle;
+    let (cam_from_vehicle, mount_assumed) = (mounts.cam_from_vehicle, mounts.camera_assumed);
     let imu = mounts.vehicle_from_imu.as_ref();
     let motion = sensors::motion(path, &index, &config, imu, clock.origin_ns)?;
     let yaw_known = motion.as_ref().is_some_and(|m| m.yaw_known);
@@ -153,6 +154,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let dataset = Dataset::new(parts, Arc::new(recording));
     Ok(dataset
         .with_camera_assumed(assumed)
+        .with_mount_assumed(mount_assumed)
         .with_simulated(simulated))
 }
 
@@ -208,23 +210,26 @@ impl Clock {
     }
 }
 
+/// Numbers leave out as many as frames are missing in a pause: what lies on either side of one are no neighbours.
 fn frames(
     path: &Path,
     drive: &str,
     images: &[(MessageRef, f64)],
     track: Option<&MotionModel>,
 ) -> Vec<Frame> {
-    let frame = |(number, (_, time_s)): (u64, &(MessageRef, f64))| Frame {
+    let stamps: Vec<i64> = images.iter().map(|(place, _)| place.stamp_ns).collect();
+    let numbered = numbers_by_time(&stamps).into_iter().zip(images);
+    let frame = |(index, (number, (_, time_s)))| Frame {
         drive: drive.to_owned(),
         number,
         time_s: Some(*time_s),
         image: FrameImage::Within {
             file: path.to_owned(),
-            index: number,
+            index,
         },
         speed_mps: track.and_then(|t| t.speed_at(*time_s)),
     };
-    (0..).zip(images).map(frame).collect()
+    (0..).zip(numbered).map(frame).collect()
 }
 
 /// Where the vehicle was, exactly: a simulated drive knows it, on the vehicle's clock.

@@ -7,7 +7,7 @@ use super::topics::{Role, Topics};
 use super::video::BagVideo;
 use crate::{
     CalibrationPlace, CameraPath, DataWarning, Dataset, DatasetKind, DynamicAgreement, Error,
-    Frame, GtKind, ImageProblem, Lens, LidarMotion, Mount, MovingLabels, MovingSource,
+    Frame, FrameImage, GtKind, ImageProblem, Lens, LidarMotion, Mount, MovingLabels, MovingSource,
     NoTrackReason, Recording, Result, ScanTruth, Stream,
 };
 use ::image::RgbImage;
@@ -15,6 +15,9 @@ use deepfusion_geometry::{DepthMap, Se3, Trajectory};
 use deepfusion_rosbag::MessageSource;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Longest gap between exact poses across which the vehicle is taken to have moved evenly, in seconds.
+const POSE_GAP_S: f64 = 0.5;
 
 /// A bag with a camera.
 #[derive(Debug)]
@@ -56,17 +59,17 @@ impl Recording for BagRecording {
             path: self.bag.path().to_owned(),
             problem: ImageProblem::NoImage(frame.number),
         };
+        let FrameImage::Within { index, .. } = frame.image else {
+            return Err(missing());
+        };
         if let Some(video) = &self.video {
-            let image = video.load(self.bag.as_ref(), frame.number)?;
+            let image = video.load(self.bag.as_ref(), index)?;
             return self.lens.correct(image.ok_or_else(missing)?);
         }
         let topic = self.topics.of(Role::Image).unwrap_or_default();
-        let place = usize::try_from(frame.number)
-            .ok()
-            .and_then(|n| self.images.get(n));
-        let Some(place) = place else {
-            return Err(missing());
-        };
+        let place = usize::try_from(index).ok();
+        let place = place.and_then(|index| self.images.get(index));
+        let place = place.ok_or_else(missing)?;
         let message = image::message(self.bag.as_ref(), topic, place)?;
         self.lens
             .correct(image::decode(self.bag.as_ref(), &message)?)
@@ -165,19 +168,19 @@ impl Recording for BagRecording {
     fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
         let vehicle_from_cam = self.cam_from_vehicle.inverse();
         let mut paths = Vec::new();
+        let pose = |frame: &usize| {
+            let time_s = dataset.frames()[*frame].time_s?;
+            let world_from_vehicle = self.truth.at(time_s, POSE_GAP_S)?;
+            Some((time_s, world_from_vehicle * vehicle_from_cam))
+        };
         for stretch in dataset.stretches() {
-            let known: Vec<(usize, f64, Se3)> = stretch
-                .into_iter()
-                .filter_map(|frame| {
-                    let time_s = dataset.frames()[frame].time_s?;
-                    Some((frame, time_s, self.truth.at(time_s)? * vehicle_from_cam))
-                })
-                .collect();
-            if known.len() > 1 {
+            let have_poses = |a: &usize, b: &usize| pose(a).is_some() && pose(b).is_some();
+            for piece in stretch.chunk_by(have_poses).filter(|p| p.len() > 1) {
+                let (times_s, world_from_cam) = piece.iter().filter_map(pose).unzip();
                 paths.push(CameraPath {
-                    frames: known.iter().map(|k| k.0).collect(),
-                    times_s: known.iter().map(|k| k.1).collect(),
-                    world_from_cam: known.iter().map(|k| k.2).collect(),
+                    frames: piece.to_vec(),
+                    times_s,
+                    world_from_cam,
                 });
             }
         }

@@ -1,4 +1,4 @@
-//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, what was not measured, and whether it is simulated.
+//! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say, what was not measured or is not known, and whether it is simulated.
 
 use crate::dataset_toml::{Clock, FolderConfig, check_clock_and_scale, read_or_default};
 use crate::{Error, OpenOptions, Result};
@@ -14,6 +14,7 @@ struct Keys {
     simulated: Option<bool>,
     yaw_known: Option<bool>,
     tilt_known: Option<bool>,
+    mount_known: Option<bool>,
 }
 
 /// The cameras' clock.
@@ -43,6 +44,8 @@ pub(super) struct DriveConfig {
     pub(super) yaw_known: bool,
     /// Whether its roll and pitch were.
     pub(super) tilt_known: bool,
+    /// Whether its calibration says where the camera is: another layout's drive may have said nothing of it.
+    pub(super) mount_known: bool,
 }
 
 /// Whether the drive in a folder is simulated, as `dataset.toml` of that folder or else of its date's says. Files that cannot be read say nothing.
@@ -69,6 +72,7 @@ impl Keys {
             simulated: own.simulated.or(date.simulated),
             yaw_known: own.yaw_known.or(date.yaw_known),
             tilt_known: own.tilt_known.or(date.tilt_known),
+            mount_known: own.mount_known.or(date.mount_known),
         })
     }
 
@@ -98,6 +102,7 @@ impl DriveConfig {
             speed_scale: keys.vehicle.speed_scale.unwrap_or(1.0),
             yaw_known: keys.yaw_known.unwrap_or(true),
             tilt_known: keys.tilt_known.unwrap_or(true),
+            mount_known: keys.mount_known.unwrap_or(true),
         })
     }
 }

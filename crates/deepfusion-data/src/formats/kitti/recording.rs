@@ -12,8 +12,8 @@ use crate::dataset::selection::Selection;
 use crate::logs::clock::on_the_vehicles_clock;
 use crate::{
     CalibrationPlace, Camera, CameraPath, DataWarning, Dataset, DatasetKind, DatasetParts, Error,
-    Frame, FrameImage, GtKind, MissingPart, MotionWarning, MovingLabels, OpenOptions, Recording,
-    Result, Stream, load_rgb, read_depth_png,
+    Frame, FrameImage, GtKind, MissingPart, MotionWarning, MountWarning, MovingLabels, OpenOptions,
+    Recording, Result, Stream, load_rgb, read_depth_png,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -126,19 +126,24 @@ fn open_drive(
         camera_ahead_s: config.camera_ahead_s,
         scenario: None,
     };
+    let mut warnings = Vec::new();
+    if !config.yaw_known {
+        warnings.push(MotionWarning::YawNotMeasured.into());
+    }
+    if !config.mount_known {
+        warnings.push(MountWarning::NotGiven.into());
+    }
     let recording = KittiRecording {
         drive: drive.clone(),
         calibration,
         camera,
         speed_scale: config.speed_scale,
         times_s,
-        warnings: if config.yaw_known {
-            Vec::new()
-        } else {
-            vec![MotionWarning::YawNotMeasured.into()]
-        },
+        warnings,
     };
-    let dataset = Dataset::new(parts, Arc::new(recording)).with_simulated(drive.is_simulated());
+    let dataset = Dataset::new(parts, Arc::new(recording))
+        .with_simulated(drive.is_simulated())
+        .with_mount_assumed(!config.mount_known);
     dataset.check_sizes()?;
     Ok(dataset)
 }

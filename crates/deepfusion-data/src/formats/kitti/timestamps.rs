@@ -11,12 +11,14 @@ pub struct TimeStamps {
     /// seconds since 1970 resolves only a quarter of a microsecond. `None` where the line is empty:
     /// KITTI writes that for frames the sensor missed (drive 0009's scans 177 to 180).
     pub ns: Vec<Option<i64>>,
+    /// Empty lines behind the last time: of frames without a time, if those frames are there at all.
+    empty_at_end: usize,
     path: PathBuf,
 }
 
 impl TimeStamps {
     /// Reads a file of lines like `2011-09-26 13:04:32.345808896`, or empty for a frame without a time.
-    /// Empty lines at its end are no frames.
+    /// Empty lines at its end count where a frame asks for them.
     ///
     /// # Errors
     /// [`Error::Missing`] if there is no such file, [`Error::TimeStamp`] with the number of a bad line.
@@ -30,7 +32,9 @@ impl TimeStamps {
         })?;
         let text = String::from_utf8_lossy(&bytes);
         let mut ns = Vec::new();
-        for (i, line) in text.trim_end().lines().enumerate() {
+        let with_times = text.trim_end();
+        let empty_at_end = text.lines().count() - with_times.lines().count();
+        for (i, line) in with_times.lines().enumerate() {
             if line.trim().is_empty() {
                 ns.push(None);
                 continue;
@@ -44,6 +48,7 @@ impl TimeStamps {
         }
         Ok(Self {
             ns,
+            empty_at_end,
             path: path.to_owned(),
         })
     }
@@ -68,12 +73,16 @@ impl TimeStamps {
     /// # Errors
     /// [`Error::NoTimeStamp`] if the file ends before that frame.
     pub fn nanoseconds(&self, frame: u64) -> Result<Option<i64>> {
-        let found = usize::try_from(frame).ok().and_then(|i| self.ns.get(i));
-        found.copied().ok_or_else(|| Error::NoTimeStamp {
-            path: self.path.clone(),
-            lines: self.ns.len(),
-            frame,
-        })
+        let index = usize::try_from(frame).unwrap_or(usize::MAX);
+        match self.ns.get(index) {
+            Some(ns) => Ok(*ns),
+            None if index - self.ns.len() < self.empty_at_end => Ok(None),
+            None => Err(Error::NoTimeStamp {
+                path: self.path.clone(),
+                lines: self.ns.len(),
+                frame,
+            }),
+        }
     }
 
     /// Seconds from `origin_ns` to the time of every frame.
@@ -140,6 +149,14 @@ mod tests {
         let origin = times.origin_ns().unwrap();
         let seconds: Vec<_> = (0..4).map(|n| times.seconds(n, origin).unwrap()).collect();
         assert_eq!(seconds, [None, Some(0.0), None, Some(1.0)]);
+    }
+
+    #[test]
+    fn the_last_frame_may_have_no_time() {
+        let times = read("2011-09-26 13:04:32.3\n\n").unwrap();
+        assert_eq!(times.ns.len(), 1);
+        assert_eq!(times.nanoseconds(1).unwrap(), None);
+        assert!(times.nanoseconds(2).is_err());
     }
 
     #[test]
