@@ -54,7 +54,8 @@ pub fn elu(x: &[f32], out: &mut [impl Slot]) {
         .for_each(|(out, x)| {
             let elu = |x: &f32| {
                 let negative = exp_negative(x.min(0.0)) - 1.0;
-                if *x > 0.0 { *x } else { negative }
+                // NaN stays NaN: a minimum would make 0 of it, and of a run that diverged a loss like any other.
+                if *x > 0.0 || x.is_nan() { *x } else { negative }
             };
             filled(out, x.iter().map(elu));
         });
@@ -71,7 +72,10 @@ pub fn elu_backward(y: &[f32], grad_out: &[f32], grad_x: &mut [impl Slot]) {
         .par_chunks_mut(CHUNK)
         .zip(y.par_chunks(CHUNK).zip(grad_out.par_chunks(CHUNK)))
         .for_each(|(gx, (y, g))| {
-            let gradient = |(y, g): (&f32, &f32)| g * (y.min(0.0) + 1.0);
+            let gradient = |(y, g): (&f32, &f32)| {
+                let slope = y.min(0.0) + 1.0;
+                g * if y.is_nan() { *y } else { slope }
+            };
             filled(gx, y.iter().zip(g).map(gradient));
         });
 }
@@ -79,6 +83,16 @@ pub fn elu_backward(y: &[f32], grad_out: &[f32], grad_x: &mut [impl Slot]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nan_stays_nan() {
+        let (x, mut y, mut gradient) = ([1.0, f32::NAN, -1.0], [0.0; 3], [0.0; 3]);
+        elu(&x, &mut y);
+        elu_backward(&y, &[1.0; 3], &mut gradient);
+        for values in [y, gradient] {
+            assert_eq!(values.map(f32::is_nan), [false, true, false], "{values:?}");
+        }
+    }
 
     #[test]
     fn elu_equals_its_definition() {

@@ -90,6 +90,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
             },
         });
     }
+    let beyond = signal.keep_measured(&mut speeds, |speed| speed.mps / unit.mps());
     enough(path, &speeds)?;
     let read = CanNote::Signal {
         signal: name.to_owned(),
@@ -98,7 +99,8 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         frames: all,
     };
     let left_out = (repeated > 0).then_some(CanNote::NotLater { frames: repeated });
-    let notes = [Some(read), several, left_out];
+    let beyond = (beyond > 0).then_some(CanNote::BeyondRange { frames: beyond });
+    let notes = [Some(read), several, left_out, beyond];
     Ok(DriveLog {
         format: Format::CanTrace,
         clock,

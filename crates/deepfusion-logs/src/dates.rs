@@ -62,6 +62,8 @@ pub(crate) fn style_of(words: &[&str], unit: Option<&str>) -> Option<TimeStyle> 
     }
     let mut steps: Vec<f64> = numbers.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     steps.sort_by(f64::total_cmp);
+    // Rows of one moment have one time.
+    steps.retain(|step| *step > 0.0);
     let median = *steps.get(steps.len() / 2)?;
     // Steps of 40 could be milliseconds, or frames.
     (median <= 1.0).then_some(TimeStyle::Number(1_000_000_000))
@@ -102,22 +104,39 @@ pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
 }
 
 /// A moment as a user writes it, in nanoseconds on a log's clock: seconds as a number, a date, or a time of day. A date without a zone is
-/// one of the log's own; a time of day on a clock of dates is one of the day on which the log begins.
+/// one of the log's own; a time of day is the one nearest to the log's first time, `first_ns`. Of a log of local dates the clock is the one after
+/// [`in_zone`](crate::DriveLog::in_zone), `zone_s` ahead of UTC; `first_ns` is the one before it.
 #[must_use]
-pub fn time_on_clock(word: &str, clock: Clock, first_ns: i64) -> Option<i64> {
+pub fn time_on_clock(word: &str, clock: Clock, first_ns: i64, zone_s: i64) -> Option<i64> {
     let word = word.trim();
     if word.parse::<f64>().is_ok() {
         return number_ns(word, 1_000_000_000);
     }
+    let of_local = |ns: i64| match clock {
+        Clock::LocalDate => ns.saturating_sub(zone_s.saturating_mul(1_000_000_000)),
+        _ => ns,
+    };
     match (date(word), clock) {
-        (Some((ns, _)), Clock::Date | Clock::LocalDate) => Some(ns),
-        (Some((ns, _)), Clock::TimeOfDay) => Some(ns.rem_euclid(DAY_NS)),
+        (Some((ns, true)), Clock::Date | Clock::LocalDate) => Some(ns),
+        (Some((ns, false)), Clock::Date | Clock::LocalDate) => Some(of_local(ns)),
+        (Some((ns, _)), Clock::TimeOfDay) => Some(nearest_day(ns, first_ns)),
         (Some(_), Clock::Free | Clock::Video) => None,
-        (None, Clock::Date | Clock::LocalDate) => {
-            Some(first_ns.div_euclid(DAY_NS) * DAY_NS + time_of_day(word)?)
+        (None, Clock::Date | Clock::LocalDate | Clock::TimeOfDay) => {
+            Some(of_local(nearest_day(time_of_day(word)?, first_ns)))
         }
-        (None, _) => time_of_day(word),
+        // Some apps count the seconds of a day on, past midnight.
+        (None, Clock::Free) if (DAY_NS / 2..DAY_NS).contains(&first_ns) => {
+            Some(nearest_day(time_of_day(word)?, first_ns))
+        }
+        (None, Clock::Free | Clock::Video) => time_of_day(word),
     }
+}
+
+/// The moment at this time of a day that is nearest to another moment: a log that begins before midnight has its video after it.
+fn nearest_day(ns: i64, to_ns: i64) -> i64 {
+    let ahead = (ns - to_ns).rem_euclid(DAY_NS);
+    let back = if ahead > DAY_NS / 2 { DAY_NS } else { 0 };
+    to_ns.saturating_add(ahead - back)
 }
 
 /// A written number of a unit, to the last digit: an f64 of seconds since 1970 has a quarter of a microsecond.
@@ -255,11 +274,56 @@ mod tests {
             ("later", Clock::Date, None),
         ] {
             assert_eq!(
-                time_on_clock(word, clock, midnight + 5 * SECOND),
+                time_on_clock(word, clock, midnight + 5 * SECOND, 0),
                 ns,
                 "{word}"
             );
         }
+    }
+
+    #[test]
+    fn a_moment_past_midnight_is_on_the_next_day() {
+        let day = DAY_NS / SECOND;
+        for (first_s, word, clock, expected_s) in [
+            (day - 10, "00:00:10", Clock::TimeOfDay, day + 10),
+            (day - 10, "00:00:10", Clock::Free, day + 10),
+            (700 * day - 10, "00:00:10", Clock::Date, 700 * day + 10),
+            (700 * day + 10, "23:59:50", Clock::Date, 700 * day - 10),
+            (
+                700 * day + 10,
+                "11:00:00",
+                Clock::Date,
+                700 * day + 11 * 3600,
+            ),
+            (0, "00:01:30", Clock::Free, 90),
+        ] {
+            let ns = time_on_clock(word, clock, first_s * SECOND, 0);
+            assert_eq!(ns, Some(expected_s * SECOND), "{word} of {clock:?}");
+        }
+    }
+
+    #[test]
+    fn a_moment_of_a_local_clock_is_in_its_zone() {
+        let (noon, zone_s) = (1_569_153_600 * SECOND, 7200);
+        // The log begins at 14:00 local time.
+        let first = noon + 7200 * SECOND;
+        for word in ["14:00:00", "2019-09-22 14:00:00", "2019-09-22T12:00:00Z"] {
+            assert_eq!(
+                time_on_clock(word, Clock::LocalDate, first, zone_s),
+                Some(noon),
+                "{word}"
+            );
+        }
+        let utc = time_on_clock("12:00:00", Clock::Date, noon, zone_s);
+        assert_eq!(utc, Some(noon), "a clock that says its zone stays as it is");
+    }
+
+    #[test]
+    fn several_rows_of_one_moment_are_no_step() {
+        let words = ["0", "0", "0", "500", "500", "500", "1000", "1000"];
+        assert_eq!(style_of(&words, None), None);
+        let seconds = ["0", "0", "0.5", "0.5", "1"];
+        assert_eq!(style_of(&seconds, None), Some(TimeStyle::Number(SECOND)));
     }
 
     proptest! {

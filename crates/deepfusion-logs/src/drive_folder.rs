@@ -3,9 +3,9 @@
 use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Speed};
 use crate::note::{ClockNote, LogNote};
-use deepfusion_fs::write_atomically;
+use deepfusion_fs::{PartialFolder, write_atomically};
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// What a drive's folder is made of.
@@ -74,9 +74,14 @@ impl DriveFolder<'_> {
     /// names; [`Error::File`].
     pub fn write(&self, out: &Path) -> Result<Vec<LogNote>> {
         self.check(out)?;
+        self.write_into(out, out)
+    }
+
+    /// Writes the files of the drive `of` into a folder.
+    fn write_into(&self, folder: &Path, of: &Path) -> Result<Vec<LogNote>> {
         let (start_ns, notes) = self.start()?;
-        let files = Self::FILES.map(|name| out.join(name));
-        std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
+        let files = Self::FILES.map(|name| folder.join(name));
+        std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
         let [speed, imu, course, config] = &files;
         save(speed, &speeds(&self.log.speeds))?;
         if !self.log.yaw_rates.is_empty() {
@@ -92,12 +97,13 @@ impl DriveFolder<'_> {
             }
             save(course, &text)?;
         }
-        save(config, &self.config(out, start_ns)?)?;
+        save(config, &self.config(of, start_ns)?)?;
         Ok(notes)
     }
 
-    /// Writes the folder, has `measure` find in it how far the camera's clock is ahead of the log's, in seconds, and writes it again with that.
-    /// Where that is not found, nothing is left that looks finished: `dataset.toml`, which makes the folder a recording, goes first.
+    /// Has `measure` find how far the camera's clock is ahead of the log's, in seconds, and writes the folder with that. What it measures on is a
+    /// folder beside it under another name: stopped, whenever it may be, nothing looks finished. Frames that were decoded meanwhile lie where the
+    /// folder will be, for it or the next try.
     ///
     /// # Errors
     /// As [`Self::write`], and those of `measure`.
@@ -107,22 +113,10 @@ impl DriveFolder<'_> {
         measure: impl FnOnce(&Path) -> std::result::Result<Option<f64>, E>,
     ) -> std::result::Result<Vec<LogNote>, E> {
         self.check(out)?;
-        let made = !out.exists();
-        self.write(out)?;
-        let measured = measure(out);
-        for file in Self::FILES.iter().rev().map(|name| out.join(name)) {
-            match std::fs::remove_file(&file) {
-                Err(e) if e.kind() != ErrorKind::NotFound => {
-                    return Err(Error::file(&file, e).into());
-                }
-                _ => {}
-            }
-        }
-        if measured.is_err() && made {
-            // Frames that were decoded stay for the next try.
-            let _ = std::fs::remove_dir(out);
-        }
-        self.camera_ahead_s = measured?;
+        let trial = PartialFolder::beside(out).map_err(|e| Error::file(out, e))?;
+        self.write_into(trial.path(), out)?;
+        self.camera_ahead_s = measure(trial.path())?;
+        drop(trial);
         Ok(self.write(out)?)
     }
 

@@ -119,3 +119,14 @@ pub struct ReadOptions {
     /// A DBC file, for CAN traces.
     pub dbc: Option<PathBuf>,
 }
+
+impl ReadOptions {
+    /// The same, with columns by their usual names.
+    pub(crate) fn without_columns(&self) -> Self {
+        Self {
+            time: None,
+            speed: None,
+            ..self.clone()
+        }
+    }
+}

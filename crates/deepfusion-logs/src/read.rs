@@ -1,7 +1,8 @@
 //! What a file is: by its name, by what stands in it, and by what a user says of it.
 
-use crate::error::Result;
-use crate::log::{DriveLog, ReadOptions};
+use crate::error::{ColumnProblem, Error, Result};
+use crate::log::{Clock, DriveLog, ReadOptions};
+use crate::note::ClockNote;
 use crate::rows::text_of;
 use crate::table::Table;
 use crate::{can_trace, export_folder, gnss_logger, gpmf, gpx, receiver, tall_table, wide_table};
@@ -19,20 +20,30 @@ pub fn may_hold_log(path: &Path) -> bool {
     ["mp4", "mov", "360", "lrv"].contains(&extension(path).as_str())
 }
 
-/// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. `zone_s`: how far the clocks of
-/// logs that name none are ahead of UTC, in seconds. `None` for no log at all.
+/// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. What the options name is looked for in
+/// the first, and in the others where they have it. `None` for no log at all.
 ///
 /// # Errors
 /// As [`read`]; [`crate::Error::OtherClock`] where the turns are on a clock of another kind than the speeds.
-pub fn read_all(paths: &[PathBuf], options: &ReadOptions, zone_s: i64) -> Result<Option<DriveLog>> {
+pub fn read_all(paths: &[PathBuf], options: &ReadOptions) -> Result<Option<DriveLog>> {
     let mut merged: Option<DriveLog> = None;
     for path in paths {
-        let log = read(path, options)?.in_zone(zone_s);
+        let log = match read(path, options) {
+            // Columns of the log that gives the speeds.
+            Err(Error::Column {
+                problem: ColumnProblem::Missing(_),
+                ..
+            }) if merged.is_some() => read(path, &options.without_columns())?,
+            read => read?,
+        };
         match &mut merged {
             None => merged = Some(log),
             Some(first) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
                 if first.clock != log.clock {
-                    return Err(crate::Error::OtherClock { path: path.clone() });
+                    return Err(Error::OtherClock { path: path.clone() });
+                }
+                if log.clock == Clock::Free {
+                    first.notes.push(ClockNote::SameStart.into());
                 }
                 first.yaw_rates = log.yaw_rates;
                 first.notes.extend(log.notes);

@@ -97,7 +97,12 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     let Some(column) = speed else {
         return positions(table, &times, notes);
     };
-    let phone_export = table.named(&["seconds elapsed"]).is_some();
+    // Sensor Logger's columns, which no other program writes together.
+    let phone_export = table.named(&["seconds elapsed"]).is_some()
+        && table.named(&ACCURACY).is_some()
+        && table
+            .named(&["horizontalaccuracy", "bearingaccuracy"])
+            .is_some();
     let unit = match column.speed_unit().or(options.unit) {
         Some(unit) => unit,
         // Sensor Logger's documentation: metres a second.
@@ -110,7 +115,8 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         unit,
     };
     notes.insert(0, of_columns.into());
-    let accuracy = table.named(&["speedaccuracy", "speed accuracy"]);
+    let accuracy = table.named(&ACCURACY);
+    let of_accuracy = accuracy.and_then(Column::speed_unit).unwrap_or(unit);
     let (mut speeds, mut last, mut absent, mut repeated) = (Vec::<Speed>::new(), None, 0, 0);
     for row in 0..table.len() {
         let value = table.number(row, column)?;
@@ -137,7 +143,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         speeds.push(Speed {
             ns,
             mps: value * unit.mps(),
-            sigma_mps: sigma.filter(|s| *s > 0.0),
+            sigma_mps: sigma.filter(|s| *s > 0.0).map(|s| s * of_accuracy.mps()),
         });
     }
     left_out(&mut notes, table.len(), absent, repeated);
@@ -151,6 +157,9 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         notes,
     })
 }
+
+/// Names of a speed's standard deviation.
+const ACCURACY: [&str; 2] = ["speedaccuracy", "speed accuracy"];
 
 /// Names of a vehicle's yaw rate. A gyroscope's own axes are none: nobody knows how it is mounted.
 const YAW_RATE: [&str; 3] = ["yaw rate", "yawrate", "yaw velocity"];

@@ -72,15 +72,20 @@ pub fn course_rates(speeds: &[FixSpeed]) -> Vec<(f64, f64)> {
     speeds.windows(2).filter_map(rate).collect()
 }
 
-/// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out; a fix more than ten seconds
-/// from both neighbours has none.
+/// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out, but one that leapt ahead is left out
+/// itself where the next is back in time; a fix more than ten seconds from both neighbours has none.
 #[must_use]
 pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
     let mut kept: Vec<Fix> = Vec::with_capacity(fixes.len());
     for fix in fixes {
         let numbers = [fix.time_s, fix.latitude_deg, fix.longitude_deg];
-        let later = kept.last().is_none_or(|last| fix.time_s > last.time_s);
-        if later && numbers.iter().all(|n| n.is_finite()) {
+        if !numbers.iter().all(|n| n.is_finite()) {
+            continue;
+        }
+        if leapt(&kept, fix) {
+            kept.pop();
+        }
+        if kept.last().is_none_or(|last| fix.time_s > last.time_s) {
             kept.push(*fix);
         }
     }
@@ -89,6 +94,17 @@ pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
         .filter(|part| part.len() > 1)
         .flat_map(speeds)
         .collect()
+}
+
+/// Whether the last of the fixes has a time far ahead of its neighbours': of the one before it, and of the next, which goes on where that was.
+fn leapt(fixes: &[Fix], next: &Fix) -> bool {
+    let Some((last, before)) = fixes.split_last() else {
+        return false;
+    };
+    let far = last.time_s - next.time_s > MAX_GAP_S;
+    far && before
+        .last()
+        .is_none_or(|before| next.time_s > before.time_s && last.time_s - before.time_s > MAX_GAP_S)
 }
 
 /// The speeds of a track without gaps.
@@ -302,6 +318,17 @@ mod tests {
                 .zip(&truth)
                 .filter(|(f, t)| (f.speed_mps - **t).abs() < f.sigma_mps);
             assert!(within.count() * 3 > 2 * truth.len(), "{jitter}");
+        }
+    }
+
+    #[test]
+    fn a_time_far_ahead_does_not_take_the_rest_away() {
+        let (mut fixes, _) = drive(0.3);
+        for glitch in [0, 7] {
+            let (own, all) = (fixes[glitch].time_s, fixes.len());
+            fixes[glitch].time_s = own + 86_400.0;
+            assert_eq!(speeds_of_fixes(&fixes).len(), all - 1, "fix {glitch}");
+            fixes[glitch].time_s = own;
         }
     }
 

@@ -67,8 +67,7 @@ impl DepthLoader {
         let picker = set.clone();
         let plans = numbers.map(move |number| {
             let draws = number * size..(number + 1) * size;
-            let picks = draws.map(|draw| picker.pick(seed, draw)).collect();
-            (number, picks)
+            (number, picker.pick(seed, draws))
         });
         Self::start(config, set, Some(workers), plans)
     }

@@ -1,13 +1,12 @@
 //! Images with known depth to learn from: frames of recordings, and simulated views.
 
 use crate::fit_depth::fit_depth;
-use crate::sampler::stream;
 use crate::{Error, Sampler, SimulatedCamera, TrainConfig};
 use deepfusion_data::{Dataset, GtKind, RgbImage};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::InputSize;
 use deepfusion_sim::{Endless, EndlessConfig, Ingredient, MountedCamera, Scene};
-use rand::Rng;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Offset of the seeds of validation worlds, so that training never sees them.
@@ -164,13 +163,18 @@ impl DepthSet {
         frames.chain(views).collect()
     }
 
-    /// The `draw`-th view of training: each set is drawn in proportion to its number of views. Simulated views come in
-    /// the order of their numbers, since neighbours share a world; frames in a new order each epoch.
-    pub(crate) fn pick(&self, seed: u64, draw: usize) -> ViewRef {
-        let mut place = stream(seed, 2, draw).random_range(0..self.len().max(1));
+    /// These views of training, counted from 0 over the whole run: in a pass every frame comes once and each simulated set as often as it has
+    /// views, in a new order each pass. Simulated views themselves come in the order of their numbers, since neighbours share a world.
+    pub(crate) fn pick(&self, seed: u64, draws: Range<usize>) -> Vec<ViewRef> {
+        let order = Sampler::new(self.len().max(1), 1, seed).samples_at(draws.clone());
+        let picks = order.into_iter().zip(draws);
+        picks.map(|(place, draw)| self.at(place, draw)).collect()
+    }
+
+    /// What stands at a place of a pass, for a draw.
+    fn at(&self, mut place: usize, draw: usize) -> ViewRef {
         if place < self.frames.len() {
-            let order = Sampler::new(self.frames.len(), 1, seed);
-            return ViewRef::Frame(order.batch(draw)[0]);
+            return ViewRef::Frame(place);
         }
         place -= self.frames.len();
         for (i, simulated) in self.simulated.iter().enumerate() {
@@ -345,4 +349,44 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
         }
     }
     Ok((train, held))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pass_has_every_frame_once() {
+        let endless = Endless::new(EndlessConfig::default()).unwrap();
+        let frames = (0..30).map(|frame| DepthFrame { dataset: 0, frame });
+        let set = DepthSet {
+            frames: frames.collect(),
+            simulated: vec![SimulatedViews {
+                name: "worlds".into(),
+                set: 1,
+                views: 70,
+                endless: Arc::new(endless),
+            }],
+            ..DepthSet::default()
+        };
+        let mut orders = Vec::new();
+        for pass in 0..3 {
+            let draws = 100 * pass..100 * (pass + 1);
+            let picks = set.pick(5, draws.clone());
+            let mut seen: Vec<usize> = Vec::new();
+            for (pick, draw) in picks.iter().zip(draws) {
+                match pick {
+                    ViewRef::Frame(index) => seen.push(*index),
+                    ViewRef::View(0, number) => assert_eq!(*number, draw as u64),
+                    other => panic!("{other:?}"),
+                }
+            }
+            orders.push(seen.clone());
+            seen.sort_unstable();
+            assert!(seen.iter().copied().eq(0..30), "pass {pass}: {seen:?}");
+            // Batches that cross the border of two passes are those of the passes.
+            assert_eq!(set.pick(5, 100 * pass + 40..100 * pass + 46), picks[40..46]);
+        }
+        assert_ne!(orders[0], orders[1]);
+    }
 }

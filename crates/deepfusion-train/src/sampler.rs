@@ -1,5 +1,6 @@
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
+use std::ops::Range;
 
 /// The order in which samples are seen: every epoch a new permutation.
 ///
@@ -32,9 +33,13 @@ impl Sampler {
     /// The samples of batch number `index`, counted from 0 over the whole run.
     #[must_use]
     pub fn batch(&self, index: usize) -> Vec<usize> {
-        let first = index * self.batch;
+        self.samples_at(index * self.batch..(index + 1) * self.batch)
+    }
+
+    /// The samples at these positions, counted from 0 over the whole run.
+    pub(crate) fn samples_at(&self, positions: Range<usize>) -> Vec<usize> {
         let mut order: Option<(usize, Vec<usize>)> = None;
-        (first..first + self.batch)
+        positions
             .map(|position| {
                 let epoch = position / self.samples;
                 let order = match &mut order {

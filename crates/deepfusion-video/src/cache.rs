@@ -88,6 +88,9 @@ pub(crate) fn keep<E: From<Error>>(
     if Origin::read(cache).as_ref() == Some(origin) {
         return Ok(());
     }
+    // Of a link, what it leads to: frames are kept where there is room for them.
+    let real = cache.canonicalize();
+    let cache = real.as_deref().unwrap_or(cache);
     // What cannot be replaced in the end is said before hours of decoding.
     let is_in_the_way = Origin::read(cache).is_none()
         && std::fs::read_dir(cache).is_ok_and(|mut files| files.next().is_some());
@@ -159,6 +162,23 @@ mod tests {
         let kept = std::fs::read_to_string(frame_path(&cache, 0)).unwrap();
         assert_eq!(kept, "second");
         assert_eq!(names(&cache), ["drive.mp4.frames"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_leads_to_where_there_is_room() {
+        let folder = tempfile::tempdir().unwrap();
+        let (cache, origin) = video(folder.path(), 3);
+        let disk = folder.path().join("disk/frames");
+        std::fs::create_dir_all(&disk).unwrap();
+        std::fs::create_dir_all(cache.parent().unwrap()).unwrap();
+        std::os::unix::fs::symlink(&disk, &cache).unwrap();
+        keep(&cache, &origin, frame("there")).unwrap();
+        assert!(cache.is_symlink() && frame_path(&disk, 0).is_file());
+        let (_, origin) = video(folder.path(), 4);
+        keep(&cache, &origin, frame("anew")).unwrap();
+        let kept = std::fs::read_to_string(frame_path(&disk, 0)).unwrap();
+        assert_eq!((kept.as_str(), cache.is_symlink()), ("anew", true));
     }
 
     #[test]

@@ -54,7 +54,7 @@ impl VideoFrames {
         self.probed.frames
     }
 
-    /// Width and height of the frames as shown, the recorder's rotation applied.
+    /// Width and height of the frames as shown, the recorder's rotation applied, and pixels that are not square made so.
     #[must_use]
     pub fn size(&self) -> (u32, u32) {
         self.probed.size
@@ -84,7 +84,7 @@ impl VideoFrames {
             let frames = self.probed.frames;
             let origin = Origin::of(&self.file, frames, None)?;
             keep(&self.cache, &origin, |part| {
-                decode(&self.file, part, frames)
+                decode(&self.file, part, &self.probed)
             })?;
             *decoded = true;
         }
@@ -92,9 +92,12 @@ impl VideoFrames {
     }
 }
 
-fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
+fn decode(video: &Path, part: &Path, probed: &Probed) -> Result<()> {
+    let frames = probed.frames;
+    let (width, height) = probed.size;
+    let scale = (!probed.square).then(|| format!("scale={width}:{height},setsar=1"));
     // One file a frame: none doubled or dropped to keep a rate.
-    in_either_words(|mode| ffmpeg(video, part, mode))?
+    in_either_words(|mode| ffmpeg(video, part, mode, scale.as_deref()))?
         .succeeded("ffmpeg", (video, ProgramTask::Read))?;
     let written = std::fs::read_dir(part)
         .map_err(|e| Error::file(part, e))?
@@ -112,8 +115,8 @@ fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
     Ok(())
 }
 
-fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Printed> {
-    let arguments: [&OsStr; 15] = [
+fn ffmpeg(video: &Path, part: &Path, mode: &str, filter: Option<&str>) -> Result<Printed> {
+    let mut arguments: Vec<&OsStr> = vec![
         "-v".as_ref(),
         "error".as_ref(),
         "-y".as_ref(),
@@ -128,8 +131,11 @@ fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Printed> {
         "-start_number".as_ref(),
         "0".as_ref(),
         "-an".as_ref(),
-        // Within the folder: a `%` in its own path would count as a number's place.
-        "%010d.jpg".as_ref(),
     ];
+    if let Some(filter) = filter {
+        arguments.extend([OsStr::new("-vf"), filter.as_ref()]);
+    }
+    // Within the folder: a `%` in its own path would count as a number's place.
+    arguments.push("%010d.jpg".as_ref());
     outcome("ffmpeg", &arguments, (video, ProgramTask::Read), part, None)
 }

@@ -13,8 +13,10 @@ const RECORDED_S: RangeInclusive<i64> = 946_684_800..=4_102_444_800;
 /// A video's frames before they are decoded.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Probed {
-    /// Width and height as shown, the recorder's rotation applied.
+    /// Width and height as shown, the recorder's rotation applied, pixels made square.
     pub(crate) size: (u32, u32),
+    /// Whether its pixels are square as they are stored.
+    pub(crate) square: bool,
     /// How many.
     pub(crate) frames: usize,
     /// Their times in order, in nanoseconds; `None` where the file has none.
@@ -56,6 +58,7 @@ struct Packet {
 struct StreamAnswer {
     width: Option<u32>,
     height: Option<u32>,
+    sample_aspect_ratio: Option<String>,
     #[serde(default)]
     side_data_list: Vec<SideData>,
 }
@@ -68,7 +71,7 @@ struct SideData {
 /// Looks at the first video stream. Its packets are listed rather than its frames: that needs no decoding,
 /// and each packet is a frame.
 pub(crate) fn probe(file: &Path) -> Result<Probed> {
-    let entries = "packet=pts_time,flags:stream=width,height:stream_side_data=rotation:format_tags=creation_time";
+    let entries = "packet=pts_time,flags:stream=width,height,sample_aspect_ratio:stream_side_data=rotation:format_tags=creation_time";
     let arguments = [
         "-v",
         "error",
@@ -102,6 +105,8 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, AnswerProblem> {
     let (Some(width), Some(height)) = (stream.width, stream.height) else {
         return Err(AnswerProblem::NoSize);
     };
+    let stretch = stretch(stream.sample_aspect_ratio.as_deref());
+    let wide = (f64::from(width) * stretch).round() as u32;
     let mut rotations = stream.side_data_list.iter().filter_map(|s| s.rotation);
     let upright = rotations
         .next_back()
@@ -124,14 +129,28 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, AnswerProblem> {
     let distinct = times_ns.filter(|t| t.windows(2).all(|w| w[0] < w[1]));
     Ok(Probed {
         size: if upright {
-            (width, height)
+            (wide, height)
         } else {
-            (height, width)
+            (height, wide)
         },
+        square: wide == width,
         frames: shown.len(),
         times_ns: distinct,
         created_ns: created(answer.format.tags.creation_time.as_deref()),
     })
+}
+
+/// By how much pixels are wider than high: film for television was stored narrower than it is shown. What differs by less than a percent is a
+/// rounding of the recorder's.
+fn stretch(aspect: Option<&str>) -> f64 {
+    let ratio = aspect.and_then(|text| {
+        let (x, y) = text.split_once(':')?;
+        Some(x.parse::<f64>().ok()? / y.parse::<f64>().ok()?)
+    });
+    let ratio = ratio.filter(|ratio| (0.1..=10.0).contains(ratio));
+    ratio
+        .filter(|ratio| (ratio - 1.0).abs() > 0.01)
+        .unwrap_or(1.0)
 }
 
 /// Decimal seconds, kept to the last digit.
@@ -172,6 +191,24 @@ mod tests {
             "streams": [{"width": 64, "height": 48, "side_data_list": [{"rotation": -90}]}]}"#;
         let probed = parse(json).unwrap();
         assert_eq!((probed.size, probed.times_ns), ((48, 64), None));
+    }
+
+    #[test]
+    fn pixels_that_are_not_square_are_made_so() {
+        for (aspect, size, square) in [
+            ("4:3", (1920, 1080), false),
+            ("1:1", (1440, 1080), true),
+            ("0:1", (1440, 1080), true),
+            ("N/A", (1440, 1080), true),
+            ("12160:12153", (1440, 1080), true),
+        ] {
+            let json = format!(
+                r#"{{"packets": [{{"flags": "K__"}}],
+                "streams": [{{"width": 1440, "height": 1080, "sample_aspect_ratio": "{aspect}"}}]}}"#
+            );
+            let probed = parse(json.as_bytes()).unwrap();
+            assert_eq!((probed.size, probed.square), (size, square), "{aspect}");
+        }
     }
 
     #[test]

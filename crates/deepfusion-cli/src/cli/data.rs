@@ -125,7 +125,7 @@ pub(crate) struct ConvertArgs {
     deepfusion data import trace.blf --dbc car.dbc --speed Wheels.Speed --start 1.5 --video drive.mp4 --out my-drive"
 )]
 pub(crate) struct ImportArgs {
-    /// The log: a file, or a phone app's export folder. Of several the first that has speeds gives them, the first that has turns the turns.
+    /// The log: a file, or a phone app's export folder. Of several the first gives the speeds, the first that has turns the turns.
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// The video [default: the log itself where it is a GoPro's].

@@ -27,15 +27,21 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         dbc: args.dbc.clone(),
     };
     // clap asks for one log at least.
-    let log = read_all(&args.logs, &options, args.zone.unwrap_or(0))?.ok_or(CliError::NoMedia)?;
+    let mut log = read_all(&args.logs, &options)?.ok_or(CliError::NoMedia)?;
     let start_ns = match &args.start {
         None => None,
         Some(word) => {
             let first = log.speeds.first().map_or(0, |s| s.ns);
-            let ns = time_on_clock(word, log.clock, first);
+            let ns = time_on_clock(word, log.clock, first, args.zone.unwrap_or(0));
             Some(ns.ok_or_else(|| CliError::NotOnClock { word: word.clone() })?)
         }
     };
+    if let Some(ahead_s) = args.zone {
+        log = log.in_zone(ahead_s);
+    }
+    if log.clock == Clock::Video && args.start.is_none() && args.clock_offset.is_none() {
+        of_its_own_video(args)?;
+    }
     let mut folder = DriveFolder {
         log: &log,
         media: media(args, log.clock)?,
@@ -102,6 +108,17 @@ fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<LogNot
         interrupt::check("comparing the clocks")?;
         Ok(ahead_s)
     })
+}
+
+/// A camera's own log counts from the first frame of its video: of another one, were it the same cut, nobody knows when it began.
+fn of_its_own_video(args: &ImportArgs) -> Result<()> {
+    let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
+    match (&args.video, args.logs.first()) {
+        (Some(video), Some(log)) if !same(video, log) => {
+            Err(deepfusion_logs::Error::NoStart { first_ns: 0 }.into())
+        }
+        _ => Ok(()),
+    }
 }
 
 fn media(args: &ImportArgs, clock: Clock) -> Result<Media> {

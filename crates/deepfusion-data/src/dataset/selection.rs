@@ -17,7 +17,7 @@ impl<'a> Selection<'a> {
     pub(crate) fn new(options: &'a OpenOptions) -> Self {
         let split = options.split.as_ref();
         Self {
-            split: split.map(|split| (split, split.entries.iter().zip(0..).rev().collect())),
+            split: split.map(|split| (split, placed(split))),
         }
     }
 
@@ -62,4 +62,12 @@ impl<'a> Selection<'a> {
             first: frame.or(scenario).unwrap_or_default(),
         })
     }
+}
+
+fn placed(split: &Split) -> HashMap<&SplitEntry, usize> {
+    let mut places = HashMap::new();
+    for (place, entry) in split.entries.iter().enumerate() {
+        places.entry(entry).or_insert(place);
+    }
+    places
 }

@@ -42,6 +42,15 @@ pub enum CanNote {
         /// How many.
         frames: usize,
     },
+    /// Values that the description says the signal never has.
+    #[error(
+        "left out, beyond the range of the signal: {}",
+        count_of(*frames, "frame")
+    )]
+    BeyondRange {
+        /// How many.
+        frames: usize,
+    },
 }
 
 fn counted(channels: &[(String, usize)]) -> String {
@@ -76,6 +85,10 @@ mod tests {
             (
                 CanNote::NotLater { frames: 2 },
                 "left out, not later than the one before: 2 frames",
+            ),
+            (
+                CanNote::BeyondRange { frames: 1 },
+                "left out, beyond the range of the signal: 1 frame",
             ),
         ] {
             assert_eq!(note.to_string(), said);

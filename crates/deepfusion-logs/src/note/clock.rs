@@ -10,6 +10,9 @@ pub enum ClockNote {
     /// The log counts from about its own beginning.
     #[error("the log counts from its own start, which is taken for the video's first frame")]
     OwnStart,
+    /// Speeds and turns are of two logs that count from starts of their own.
+    #[error("the turns are of another log: both are taken to count from the same moment")]
+    SameStart,
 }
 
 #[cfg(test)]
@@ -25,6 +28,10 @@ mod tests {
         assert_eq!(
             ClockNote::OwnStart.to_string(),
             "the log counts from its own start, which is taken for the video's first frame"
+        );
+        assert_eq!(
+            ClockNote::SameStart.to_string(),
+            "the turns are of another log: both are taken to count from the same moment"
         );
     }
 }

@@ -1,6 +1,6 @@
 use super::{BitLayout, ByteOrder, CanId, CanSignal, MultiplexCondition, Number};
 use crate::error::{Error, Result, SignalProblem};
-use can_dbc::{MessageId, MultiplexIndicator, SignalExtendedValueType};
+use can_dbc::{MessageId, MultiplexIndicator, NumericValue, SignalExtendedValueType};
 use std::path::Path;
 
 /// A DBC file: the description of the signals in CAN frames.
@@ -67,6 +67,7 @@ impl Dbc {
             id: id(message.id),
             layout,
             multiplexed,
+            range: range(signal),
         })
     }
 
@@ -174,4 +175,14 @@ fn id(id: MessageId) -> CanId {
         MessageId::Standard(id) => CanId::Standard(id),
         MessageId::Extended(id) => CanId::Extended { extended: id },
     }
+}
+/// The least and the greatest value; `[0|0]` is how a file says nothing of them.
+fn range(signal: &can_dbc::Signal) -> Option<[f64; 2]> {
+    let number = |value: &NumericValue| match *value {
+        NumericValue::Uint(value) => value as f64,
+        NumericValue::Int(value) => value as f64,
+        NumericValue::Double(value) => value,
+    };
+    let range = [number(&signal.min), number(&signal.max)];
+    (range[0] < range[1]).then_some(range)
 }

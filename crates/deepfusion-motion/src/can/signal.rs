@@ -50,6 +50,9 @@ pub struct CanSignal {
     /// Conditions that must all hold for the signal to be present.
     #[serde(default)]
     pub multiplexed: Vec<MultiplexCondition>,
+    /// The least and the greatest physical value that the signal has, where its description says them.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
 }
 
 impl CanSignal {
@@ -74,7 +77,31 @@ impl CanSignal {
     #[must_use]
     pub fn over_time<'a>(&self, frames: impl IntoIterator<Item = CanFrame<'a>>) -> Signal {
         let own = frames.into_iter().filter(|frame| frame.id == self.id);
-        Signal::new(own.filter_map(|frame| Some((frame.time_s, self.decode(frame.data)?))))
+        let mut values: Vec<(f64, f64)> = own
+            .filter_map(|frame| Some((frame.time_s, self.decode(frame.data)?)))
+            .collect();
+        self.keep_measured(&mut values, |(_, value)| *value);
+        Signal::new(values)
+    }
+
+    /// Leaves out values beyond the [range](Self::range), by which a bus says that it has none (J1939: all bits set); returns how many. Where
+    /// most are beyond it, it is the range that is wrong, as in many a description, and all stay.
+    pub fn keep_measured<T>(&self, values: &mut Vec<T>, value: impl Fn(&T) -> f64) -> usize {
+        let Some([least, most]) = self.range.filter(|[least, most]| least < most) else {
+            return 0;
+        };
+        // A last digit more or less is rounding of the description's.
+        let slack = 1e-6 * (most - least);
+        let known = least - slack..=most + slack;
+        let beyond = values
+            .iter()
+            .filter(|v| !known.contains(&value(*v)))
+            .count();
+        if 2 * beyond >= values.len() {
+            return 0;
+        }
+        values.retain(|v| known.contains(&value(v)));
+        beyond
     }
 }
 
@@ -104,6 +131,28 @@ mod tests {
         assert_eq!(signal.times_s(), [0.0, 0.01]);
         assert!((signal.values()[0] - 10.0).abs() < 1e-6, "{signal:?}");
         assert!((signal.values()[1] - 20.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_a_bus_sends_for_none_is_no_value() {
+        let mut speed: CanSignal = toml::from_str(CONFIG).unwrap();
+        let (own, later) = (CanId::Standard(0x158), [0x0e, 0x10, 0]);
+        let frame = |step: u8, data| CanFrame {
+            time_s: 0.01 * f64::from(step),
+            id: own,
+            data,
+        };
+        let none = [0xff, 0xff, 0];
+        let frames: Vec<CanFrame<'_>> = (0..5)
+            .map(|step| frame(step, if step == 0 { &none[..] } else { &later[..] }))
+            .collect();
+        let count = |speed: &CanSignal| speed.over_time(frames.clone()).values().len();
+        assert_eq!(count(&speed), 5, "nothing says its range");
+        speed.range = Some([0.0, 70.0]);
+        assert_eq!(count(&speed), 4);
+        // A description that has no car's speed within its range is wrong itself.
+        speed.range = Some([0.0, 1.0]);
+        assert_eq!(count(&speed), 5);
     }
 
     #[test]

@@ -218,18 +218,19 @@ fn frames(
     track: Option<&MotionModel>,
 ) -> Vec<Frame> {
     let stamps: Vec<i64> = images.iter().map(|(place, _)| place.stamp_ns).collect();
-    let numbered = numbers_by_time(&stamps).into_iter().zip(images);
-    let frame = |(index, (number, (_, time_s)))| Frame {
+    let numbers = numbers_by_time(&stamps);
+    let times_s = images.iter().map(|(_, time_s)| *time_s);
+    let frame = |((index, number), time_s)| Frame {
         drive: drive.to_owned(),
         number,
-        time_s: Some(*time_s),
+        time_s: Some(time_s),
         image: FrameImage::Within {
             file: path.to_owned(),
             index,
         },
-        speed_mps: track.and_then(|t| t.speed_at(*time_s)),
+        speed_mps: track.and_then(|t| t.speed_at(time_s)),
     };
-    (0..).zip(numbered).map(frame).collect()
+    (0..).zip(numbers).zip(times_s).map(frame).collect()
 }
 
 /// Where the vehicle was, exactly: a simulated drive knows it, on the vehicle's clock.

@@ -12,7 +12,12 @@ fn elu(x: &[f32], out: &mut [f32]) {
         terminate!();
     }
     let value = x[at];
-    out[at] = select(value > 0.0f32, value, value.min(0.0f32).exp() - 1.0f32);
+    // NaN stays NaN.
+    out[at] = select(
+        value > 0.0f32 || value.is_nan(),
+        value,
+        value.min(0.0f32).exp() - 1.0f32,
+    );
 }
 
 /// Below 0 the derivative eˣ is the output and 1.
