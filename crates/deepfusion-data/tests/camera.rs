@@ -1,6 +1,6 @@
 //! Where a recording's camera comes from when nobody calibrated it: a field of view, or what the photographs say.
 
-use crate::common::text_of;
+use crate::common::{TinyDrive, folder, text_of};
 use deepfusion_data::{Dataset, Error, OpenOptions, load_photo};
 use deepfusion_hint::Hint;
 use exif::experimental::Writer;
@@ -272,4 +272,24 @@ fn a_fisheye_calibration_is_undone() {
     let k = dataset.intrinsics(0);
     assert!((k.fx - 63.0 / span).abs() < 0.02, "{k:?}");
     assert_eq!(dataset.load_image(0).unwrap().dimensions(), SIZE);
+}
+
+#[test]
+fn a_calibration_that_is_given_goes_before_those_that_are_found() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("drive");
+    folder::write_drive(&folder, 3, 5.0, 0.0);
+    fs::write(folder.join("dataset.toml"), "hfov_deg = 60\n").unwrap();
+    let file = root.path().join("other.txt");
+    fs::write(&file, "40 41 30 9\n").unwrap();
+    let options = OpenOptions {
+        calibration: Some(file),
+        ..OpenOptions::default()
+    };
+    let k = Dataset::open(&folder, &options).unwrap()[0].intrinsics(0);
+    assert_eq!([k.fx, k.fy, k.cx, k.cy], [40.0, 41.0, 30.0, 9.0]);
+    // KITTI raw has its own, and is not read by another.
+    let drive = TinyDrive::default().write(root.path());
+    let refused = Dataset::open(&drive, &options).unwrap_err();
+    assert!(matches!(refused, Error::OwnCalibration { .. }), "{refused}");
 }

@@ -29,7 +29,9 @@ impl PartialEq for Input {
 }
 
 /// Endings of files that hold many images.
-const RECORDINGS: [&str; 8] = ["bag", "mcap", "db3", "mp4", "mkv", "mov", "avi", "hevc"];
+const RECORDINGS: [&str; 10] = [
+    "bag", "mcap", "db3", "mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm",
+];
 
 /// The images that files, folders, patterns and recordings mean: in the order of their paths, each once, then the frames of
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started

@@ -76,6 +76,7 @@ impl PredictionArgs {
         OpenOptions {
             intrinsics: self.intrinsics.map(|k| k.numbers()),
             hfov_deg: self.hfov,
+            calibration: self.calib.clone(),
             topics: self.topics.clone(),
             ..OpenOptions::default()
         }

@@ -112,7 +112,7 @@ fn how_long(estimate: &TimeEstimate) -> String {
         ));
     }
     if estimate.bf16 {
-        line.push_str("; on this processor --set precision=bf16 is nearly twice as fast");
+        line.push_str("; on this processor --set precision=bf16 is faster");
     }
     line.push_str("; --steps N changes the length");
     line

@@ -64,6 +64,9 @@ pub(crate) fn find_camera(
         let given = CameraCalibration::given(given, size, CalibrationSource::Given)?;
         return Ok(given.for_any_size(options.intrinsics.is_none()));
     }
+    if let Some(file) = &options.calibration {
+        return CameraCalibration::read(file, size);
+    }
     if let Some(given) = config.intrinsics {
         return CameraCalibration::given(given, size, config.path.as_path().into());
     }

@@ -4,6 +4,7 @@ use super::camera::Cameras;
 use super::split::Split;
 use super::topic::NamedTopic;
 use deepfusion_geometry::{HFOV_DEG, Intrinsics};
+use std::path::PathBuf;
 
 /// How to open a recording.
 #[derive(Debug, Clone, Default)]
@@ -18,6 +19,9 @@ pub struct OpenOptions {
     /// The images' field of view from left to right in degrees, above 1 and below 170: a pinhole camera with square pixels and
     /// the principal point in the middle ([`Intrinsics::from_hfov`]). Where [`Self::intrinsics`] is given too, that holds.
     pub hfov_deg: Option<f64>,
+    /// A calibration file of the camera ([`crate::CameraCalibration::read`]), instead of the recording's own. Where one of the two above is given,
+    /// too, that holds. Not for layouts that bring their calibration, either.
+    pub calibration: Option<PathBuf>,
     /// The camera of recordings of which nothing says it, in place of an error ([`crate::Dataset::camera_assumed`]): this one at
     /// the images' size ([`Intrinsics::centred_at`]).
     pub assumed_camera: Option<Intrinsics>,
@@ -34,10 +38,10 @@ impl OpenOptions {
     /// Whether the caller says what the camera is.
     #[must_use]
     pub fn gives_camera(&self) -> bool {
-        self.intrinsics.is_some() || self.hfov_deg.is_some()
+        self.intrinsics.is_some() || self.hfov_deg.is_some() || self.calibration.is_some()
     }
 
-    /// fx, fy, cx, cy of the camera that the caller gives, of images of a size in pixels; `None` where nothing is given.
+    /// fx, fy, cx, cy of the camera that the caller gives in numbers, of images of a size in pixels; `None` where none are given.
     pub(crate) fn given_camera(&self, size: (u32, u32)) -> Option<[f64; 4]> {
         let by_view = |hfov_deg| numbers_of_hfov(hfov_deg, size);
         self.intrinsics.or_else(|| self.hfov_deg.map(by_view))

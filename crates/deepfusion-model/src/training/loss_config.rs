@@ -30,7 +30,7 @@ pub struct LossConfig {
     /// β_R: weight of the rotation inside the speed loss. Not read where the pose used for warping is
     /// the vehicle's motion: PoseNet then learns the whole of it, at a weight of its own.
     pub rotation: f64,
-    /// Steps over which λ_v rises from 0; at most a tenth of the run.
+    /// Steps over which λ_v rises from 0; at least an epoch, at most a tenth of the run.
     pub speed_warmup_steps: usize,
     /// Whether pixels that the unwarped source explains better contribute that constant instead.
     pub automask: bool,

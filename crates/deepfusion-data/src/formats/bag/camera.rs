@@ -12,7 +12,7 @@ use crate::{
 use deepfusion_geometry::{Distortion, Intrinsics};
 use deepfusion_rosbag::MessageSource;
 use deepfusion_rosbag::msg::CameraInfo;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The camera by what is given, by the file beside the bag, by CameraInfo, as the profile prints it, or as it is to be assumed: then the
 /// last is true.
@@ -44,10 +44,15 @@ pub(super) fn find(
             field: "the first image's size, for want of one",
         };
         (pinhole(given), place)
+    } else if let Some(file) = &options.calibration {
+        let camera = calibrated(config, file, (width, height), rectified)?;
+        let place = camera.place();
+        (Ok((camera.intrinsics, camera.distortion)), place)
     } else if let Some(camera) = config.camera {
         (pinhole(camera.intrinsics()), place(&config.path, "camera"))
     } else if let Some(file) = &config.calibration {
-        let camera = calibrated(config, file, (width, height), rectified)?;
+        let file = named(config, file)?;
+        let camera = calibrated(config, &file, (width, height), rectified)?;
         let place = camera.place();
         (Ok((camera.intrinsics, camera.distortion)), place)
     } else if let Some(info) = index.camera_info.as_ref().filter(|info| info.k[0] > 0.0) {
@@ -86,25 +91,31 @@ pub(super) fn find(
     Ok((lens, place, assumed))
 }
 
-/// The camera of the calibration file that the file beside the bag names.
+/// The calibration file that the file beside the bag names.
+fn named(config: &BagConfig, file: &Path) -> Result<PathBuf> {
+    let path = config.folder().join(file);
+    if path.is_file() {
+        Ok(path)
+    } else {
+        Err(config.wrong(ConfigProblem::NoFile {
+            key: "calibration",
+            path,
+        }))
+    }
+}
+
+/// The camera of a calibration file.
 fn calibrated(
     config: &BagConfig,
     file: &Path,
     size: (u32, u32),
     rectified: bool,
 ) -> Result<CameraCalibration> {
-    let path = config.folder().join(file);
-    if !path.is_file() {
-        return Err(config.wrong(ConfigProblem::NoFile {
-            key: "calibration",
-            path,
-        }));
-    }
-    let calibration = CameraCalibration::read(&path, size)?;
+    let calibration = CameraCalibration::read(file, size)?;
     // Such a file is of the raw images: rectified ones have another matrix, and no distortion left to take out.
     if rectified && !calibration.distortion.is_none() {
         return Err(Error::CameraFile {
-            by: path.into(),
+            by: file.into(),
             problem: CameraProblem::Rectified {
                 config: config.path.clone(),
             },
