@@ -115,10 +115,11 @@ impl<'a> TargetFinder<'a> {
             start,
         } = started;
         let mut prediction = self.estimator.infer(&prepared)?;
+        let camera = loaded.camera.ok_or(Error::NoCamera)?;
+        self.watch.see_through(&camera);
         if let Some(factor) = self.watch.correction() {
             prediction.scale_depth(factor);
         }
-        let camera = loaded.camera.ok_or(Error::NoCamera)?;
         if !motion.goes_on {
             self.perception.reset();
         }
@@ -134,7 +135,10 @@ impl<'a> TargetFinder<'a> {
             self.perception
                 .detect_with_sigma(&depth, sigma.as_ref(), &k, motion.stamp, &things)?;
         let collision = motion.speed_mps.and_then(|speed| {
-            let vehicle = VehicleShape::default();
+            let vehicle = VehicleShape {
+                camera_yaw_rad: motion.camera_yaw()?,
+                ..VehicleShape::default()
+            };
             time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
         });
         let latency_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -15,6 +15,8 @@ pub struct VehicleShape {
     pub axle_m: f64,
     /// Kept free on each side.
     pub margin_m: f64,
+    /// By how much the camera is turned to the left of the way straight ahead, rad.
+    pub camera_yaw_rad: f64,
 }
 
 impl Default for VehicleShape {
@@ -24,6 +26,7 @@ impl Default for VehicleShape {
             front_m: 1.7,
             axle_m: 1.7,
             margin_m: 0.2,
+            camera_yaw_rad: 0.0,
         }
     }
 }
@@ -43,7 +46,7 @@ const HORIZON_S: f64 = 10.0;
 const STEP_S: f64 = 0.05;
 
 /// The first target that the vehicle's front would touch, at its present speed (m/s) and yaw rate (rad/s, positive to the
-/// left), if every target keeps its velocity; a target of unknown velocity counts as static.
+/// left), if every target keeps its velocity: the likeliest one, where it is not sure yet. What nothing follows counts as static.
 #[must_use]
 pub fn time_to_collision(
     targets: &[Target],
@@ -91,7 +94,12 @@ impl Pose {
     }
 
     fn touches(&self, target: &Target, time_s: f64, vehicle: &VehicleShape) -> bool {
-        let velocity = target.velocity_mps.unwrap_or_default();
+        let velocity = target.velocity_mps.or(target.likely_velocity_mps);
+        let velocity = velocity.unwrap_or_default();
+        // From the camera's axes into those of the vehicle.
+        let (turned, ahead) = vehicle.camera_yaw_rad.sin_cos();
+        let level = |[x, _, z]: [f64; 3]| [ahead * x - turned * z, turned * x + ahead * z];
+        let velocity = level(velocity);
         let half = 0.5 * vehicle.width_m + vehicle.margin_m;
         let (sin, cos) = self.turn.sin_cos();
         let corners = target.corners();
@@ -99,8 +107,9 @@ impl Pose {
         let points: Vec<(f64, f64)> = corners[..4]
             .iter()
             .map(|c| {
-                let x = c[0] + velocity[0] * time_s - self.x;
-                let z = c[2] + velocity[2] * time_s - self.z;
+                let [x, z] = level(*c);
+                let x = x + velocity[0] * time_s - self.x;
+                let z = z + velocity[1] * time_s - self.z;
                 (cos * x + sin * z, -sin * x + cos * z)
             })
             .collect();
@@ -131,6 +140,7 @@ mod tests {
             distance_m: x.hypot(z),
             sigma_m: None,
             velocity_mps: Some(velocity),
+            likely_velocity_mps: None,
             moving: None,
             confidence: 1.0,
             pixels: 1,
@@ -155,6 +165,31 @@ mod tests {
         );
         let faster = [target(1, 0.0, 20.0, [0.0, 0.0, 12.0])];
         assert_eq!(time_to_collision(&faster, 10.0, 0.0, &vehicle), None);
+    }
+
+    #[test]
+    fn what_is_likely_counts_until_it_is_sure() {
+        let vehicle = VehicleShape::default();
+        let mut ahead = target(1, 0.0, 20.0, [0.0; 3]);
+        ahead.velocity_mps = None;
+        assert!(time_to_collision(&[ahead.clone()], 10.0, 0.0, &vehicle).is_some());
+        ahead.likely_velocity_mps = Some([0.0, 0.0, 10.0]);
+        assert_eq!(time_to_collision(&[ahead], 10.0, 0.0, &vehicle), None);
+    }
+
+    #[test]
+    fn the_way_is_the_vehicles_and_not_the_cameras() {
+        // The camera looks five degrees to the left: what is straight ahead of the vehicle is seen to the right.
+        let yaw = 5.0_f64.to_radians();
+        let vehicle = VehicleShape {
+            camera_yaw_rad: yaw,
+            ..VehicleShape::default()
+        };
+        let (right, ahead) = (30.0 * yaw.sin(), 30.0 * yaw.cos());
+        let of =
+            |x: f64, z: f64| time_to_collision(&[target(1, x, z, [0.0; 3])], 10.0, 0.0, &vehicle);
+        assert!(of(right, ahead).is_some());
+        assert_eq!(of(0.0, 30.0), None, "that is 2.6 m to the left of the way");
     }
 
     #[test]

@@ -61,6 +61,7 @@ impl Detection {
                 .relative_error
                 .map(|share| f64::from(share) * distance_m),
             velocity_mps: None,
+            likely_velocity_mps: None,
             moving: None,
             confidence: f64::from(self.confidence),
             pixels: self.pixels,

@@ -73,9 +73,10 @@ impl FreeSpace {
         let width = rays.x.len();
         self.cells.fill(Cell::Unknown);
         let mut witnesses = vec![0u16; self.cells.len()];
-        // Of each column: where the first obstacle stands, and how far the ground is seen, forward, metres.
+        // Of each column: where the first obstacle stands, and from where to where the ground is seen, forward, metres.
         let mut first = vec![f32::INFINITY; width];
         let mut seen = vec![0.0f32; width];
+        let mut from = vec![f32::INFINITY; width];
         for (v, row) in depth.chunks_exact(width).enumerate() {
             for (u, z) in row.iter().enumerate() {
                 if *z <= 0.0 || *z > config.max_depth_m {
@@ -89,6 +90,7 @@ impl FreeSpace {
                     }
                 } else if height < config.min_height_m {
                     seen[u] = seen[u].max(forward);
+                    from[u] = from[u].min(forward);
                 }
             }
         }
@@ -102,7 +104,8 @@ impl FreeSpace {
                     continue;
                 }
                 let u = rays.x.partition_point(|x| *x < right / forward);
-                if (1..width).contains(&u) && forward < first[u] && forward <= seen[u] {
+                let ground_seen = || (from[u]..=seen[u]).contains(&forward);
+                if (1..width).contains(&u) && forward < first[u] && ground_seen() {
                     self.cells[i] = Cell::Free;
                 }
             }

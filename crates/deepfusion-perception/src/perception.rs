@@ -198,6 +198,7 @@ impl Perception {
                 detections
                     .iter()
                     .enumerate()
+                    .filter(|(_, found)| f64::from(found.confidence) >= self.config.min_confidence)
                     .map(|(i, detection)| detection.target(&ground, tracker.new_id(), i))
                     .collect()
             }

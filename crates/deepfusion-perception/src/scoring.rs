@@ -166,6 +166,18 @@ impl Scorer {
 
     /// Adds a frame and returns its assignment.
     pub fn add(&mut self, time_s: f64, targets: &[Target], labels: &[Label]) -> Matched {
+        self.add_but(time_s, targets, labels, &|_| false)
+    }
+
+    /// As [`Self::add`], of a frame in which not everything is labelled: a target that meets no label and is `unlabelled` is neither found nor
+    /// false.
+    pub fn add_but(
+        &mut self,
+        time_s: f64,
+        targets: &[Target],
+        labels: &[Label],
+        unlabelled: &dyn Fn(&Target) -> bool,
+    ) -> Matched {
         let counts = |label: &Label| label.counts && label.distance() <= self.rules.max_distance_m;
         let mut pairs = Vec::new();
         for (i, label) in labels.iter().enumerate() {
@@ -188,6 +200,7 @@ impl Scorer {
         }
         let neither = |target: &Target| {
             target.distance_m > self.rules.max_distance_m
+                || unlabelled(target)
                 || labels
                     .iter()
                     .any(|l| !counts(l) && l.covers(target.center_m))
@@ -282,6 +295,7 @@ mod tests {
             distance_m: norm(center_m),
             sigma_m: None,
             velocity_mps: Some([0.0; 3]),
+            likely_velocity_mps: None,
             moving: Some(false),
             confidence: 1.0,
             pixels: 100,
@@ -300,6 +314,17 @@ mod tests {
             velocity_mps: Some([0.3, 0.0, 0.4]),
             counts,
         }
+    }
+
+    #[test]
+    fn where_nothing_is_labelled_nothing_is_false() {
+        let mut scorer = Scorer::new(ScoringRules::default());
+        let (near, far) = (target(1, [0.0, 1.0, 10.0]), target(2, [0.0, 1.0, 30.0]));
+        let labels = [label(5, [0.0, 1.0, 10.0], true)];
+        let beyond = |t: &Target| t.center_m[2] > 5.0;
+        scorer.add_but(0.0, &[near, far], &labels, &beyond);
+        let score = scorer.score();
+        assert_eq!((score.found, score.false_targets), (1, 0));
     }
 
     #[test]

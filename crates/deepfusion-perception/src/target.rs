@@ -19,6 +19,9 @@ pub struct Target {
     pub sigma_m: Option<f64>,
     /// Over ground, in the camera's axes, m/s; `None` before it could be measured.
     pub velocity_mps: Option<[f64; 3]>,
+    /// The best guess of that velocity, sure or not; `None` where nothing followed it.
+    #[serde(skip)]
+    pub likely_velocity_mps: Option<[f64; 3]>,
     /// Whether it is dynamic (moves over ground); `None` until that is known.
     pub moving: Option<bool>,
     /// Confidence that the target exists, 0 to 1.

@@ -54,6 +54,7 @@ mod tests {
                 distance_m: 9.0,
                 sigma_m: None,
                 velocity_mps: None,
+                likely_velocity_mps: None,
                 moving: None,
                 confidence: 1.0,
                 pixels: 0,

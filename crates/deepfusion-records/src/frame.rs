@@ -96,6 +96,7 @@ mod tests {
                 distance_m: 14.1,
                 sigma_m: None,
                 velocity_mps: Some([0.0, 0.0, -5.0]),
+                likely_velocity_mps: None,
                 moving: Some(true),
                 confidence: 0.9,
                 pixels: 120,

@@ -16,7 +16,7 @@ use crate::devices::ComputeDevice;
     (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. Options override a config file.\n\n\
     Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume continues the run as \
-    configured: --epochs or --steps may make it longer, --data, --val-data and --split say where its recordings are now, and any other \
+    configured: --epochs or --steps may make it longer, --data, --val-data, --split and --val-split say where its recordings are now, and any other \
     option that contradicts it is an error.\n\n\
     Examples:\n  deepfusion train --data kitti/2011_09_26/2011_09_26_drive_0005_sync --preset tiny\n  \
     deepfusion train --data kitti --preset light --epochs 20 --out runs/light\n  \

@@ -16,9 +16,7 @@ use deepfusion_perception::{
 };
 
 pub use self::lidar::gathered;
-pub use self::object_frames::{
-    ObjectFrame, ObjectFrameProblem, is_folder_of, read as read_object_frames,
-};
+pub use self::object_frames::{ObjectFrame, ObjectFrameProblem, is_folder_of, labels_of};
 pub use self::report::TargetReport;
 pub use self::source::{DepthSource, PredictedDepth};
 pub use self::tracklets::{Labels, pixels_within};
@@ -96,6 +94,10 @@ impl TargetEvaluation {
             if !motion.goes_on {
                 self.perception.reset();
             }
+            if motion.stamp.is_none() {
+                // Nothing follows it: another number is no switch.
+                self.scorer.begin_drive();
+            }
             let targets = measured.targets(&mut self.perception, motion.stamp)?;
             // Without such depth nothing says which boxes are seen: such a frame is followed, but not scored.
             if let Some(visibility) = &visibility {
@@ -125,16 +127,20 @@ impl TargetEvaluation {
         each: &mut dyn FnMut(EvaluatedFrame) -> Result<(), E>,
     ) -> Result<(), E> {
         let before = self.score().frames;
-        let frames = read_object_frames(folder)?;
-        let total = frames.len();
-        for (done, frame) in frames.into_iter().enumerate() {
+        let labels = labels_of(folder)?;
+        let total = labels.len();
+        for (done, labels) in labels.iter().enumerate() {
+            let frame = ObjectFrame::read(folder, labels)?;
             self.scorer.begin_drive();
             self.perception.reset();
             let Some(measured) = self.source.of_object_frame(&frame)? else {
                 continue;
             };
             let targets = measured.targets(&mut self.perception, None)?;
-            self.scorer.add(0.0, &targets, &frame.labels);
+            self.scorer
+                .add_but(0.0, &targets, &frame.labels, &|target| {
+                    frame.is_unlabelled(target)
+                });
             let name = frame.image.with_extension("png");
             let name = name.file_name().unwrap_or_default().to_string_lossy();
             each(EvaluatedFrame {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use deepfusion_data::{Error as DataError, MissingPart, image_size};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
-use deepfusion_perception::Label;
+use deepfusion_perception::{Label, Target};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 use super::tracklets::pixels_within;
@@ -25,6 +25,8 @@ pub struct ObjectFrame {
     pub scan: DepthMap,
     /// Its boxes.
     pub labels: Vec<Label>,
+    /// Left, top, right and bottom of the regions in which nobody labelled anything, in pixels.
+    pub unlabelled: Vec<[f64; 4]>,
 }
 
 /// Whether a folder is laid out so.
@@ -35,20 +37,42 @@ pub fn is_folder_of(path: &Path) -> bool {
         .all(|folder| path.join(folder).is_dir())
 }
 
-/// All frames with labels, in the order of their numbers.
+/// The files of labels, one a frame, in the order of their numbers.
 ///
 /// # Errors
-/// A file that is missing or is not what its name says.
-pub fn read(folder: &Path) -> Result<Vec<ObjectFrame>> {
+/// A folder that cannot be read.
+pub fn labels_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let labels = folder.join("label_2");
     let entries = std::fs::read_dir(&labels).map_err(|e| DataError::file(&labels, e))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
     paths.retain(|path| path.extension().is_some_and(|e| e == "txt"));
     paths.sort();
-    paths.iter().map(|path| frame(folder, path)).collect()
+    Ok(paths)
 }
 
-fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
+impl ObjectFrame {
+    /// The frame of a file of labels.
+    ///
+    /// # Errors
+    /// A file that is missing or is not what its name says.
+    pub fn read(folder: &Path, labels: &Path) -> Result<Self> {
+        read(folder, labels)
+    }
+
+    /// Whether a target's centre is seen where nobody labelled anything.
+    #[must_use]
+    pub fn is_unlabelled(&self, target: &Target) -> bool {
+        let pixel = self.camera.project(&Vector3::from(target.center_m));
+        pixel.is_some_and(|p| {
+            let mut regions = self.unlabelled.iter();
+            regions.any(|[left, top, right, bottom]| {
+                (*left..=*right).contains(&p.x) && (*top..=*bottom).contains(&p.y)
+            })
+        })
+    }
+}
+
+fn read(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
     let name = labels.file_stem().unwrap_or_default().to_string_lossy();
     let image = ["png", "jpg"]
         .map(|ending| folder.join(format!("image_2/{name}.{ending}")))
@@ -82,7 +106,7 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         dense: false,
     };
     let text = std::fs::read_to_string(labels).map_err(|e| DataError::file(labels, e))?;
-    let mut found = Vec::new();
+    let (mut found, mut unlabelled) = (Vec::new(), Vec::new());
     for (number, line) in text
         .lines()
         .enumerate()
@@ -94,6 +118,7 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
                 problem: ObjectFrameProblem::Label { line: number + 1 },
             })?;
         if class == "DontCare" {
+            unlabelled.extend(rectangle(line));
             continue;
         }
         let seen = pixels_within(&label, &visibility, &camera, LEAST_POINTS);
@@ -105,7 +130,15 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         camera,
         scan: visibility.depth,
         labels: found,
+        unlabelled,
     })
+}
+
+/// Left, top, right and bottom of a line's rectangle.
+fn rectangle(line: &str) -> Option<[f64; 4]> {
+    let numbers = line.split_whitespace().skip(4).take(4);
+    let numbers: Vec<f64> = numbers.map(str::parse).collect::<Result<_, _>>().ok()?;
+    numbers.try_into().ok()
 }
 
 /// A line: type, truncated, occluded, alpha, four of the rectangle, height, width, length, x, y, z of the bottom in camera
@@ -196,6 +229,7 @@ mod tests {
         assert!((label.center_m[0] - 0.53).abs() < 1e-9);
         assert!((label.center_m[1] - (1.49 - 1.425)).abs() < 1e-9);
         assert_eq!(label.yaw_rad, -1.56);
+        assert_eq!(rectangle(line), Some([599.41, 156.4, 629.75, 189.25]));
         assert!(parse("Car 0 1 2", 0, &Vector3::zeros()).is_none());
         assert!(parse("Car a b c d e f g h i j k l m n", 0, &Vector3::zeros()).is_none());
     }

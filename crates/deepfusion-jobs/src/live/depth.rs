@@ -14,8 +14,10 @@ use crate::{Error, Input, Result};
 
 /// What came of a live source's depth. `E` is what fails.
 pub struct LiveDepth<E> {
-    /// Name and time of arrival, seconds since 1970, of each frame that was written.
-    written: Vec<(String, Option<f64>)>,
+    /// How many frames were written.
+    frames: usize,
+    /// Name and time of arrival, seconds since 1970, of each of them, where a video is made of them.
+    filmed: Vec<(String, Option<f64>)>,
     /// Why the source was left, or what failed.
     pub ending: Result<LiveEnd, E>,
 }
@@ -27,8 +29,8 @@ struct SeenFrame {
     seen: SeenDepth,
 }
 
-/// Predicts the newest frame of a source again and again, and writes what is kept of each; `written` sees the sidecars. What was written
-/// stays, also where the source is lost. As [`run`].
+/// Predicts the newest frame of a source again and again, and writes what is kept of each; `written` sees the sidecars. `film` says whether
+/// [a video](LiveDepth::write_video) will be made: the frames are remembered for it. What was written stays, also where the source is lost. As [`run`].
 ///
 /// # Panics
 /// Where the thread that writes panics.
@@ -37,13 +39,14 @@ pub fn predict<E: From<Error> + Send>(
     estimator: &mut DepthEstimator,
     address: &Address,
     feed: &mut Feed,
+    film: bool,
     written: impl Fn(&Sidecar) -> Result<(), E> + Sync,
     say: impl Fn(&str),
 ) -> LiveDepth<E> {
     let process = |frame: LiveFrame| -> Result<(SeenFrame, f64), E> {
         Ok(predict_frame(job, estimator, address, frame)?)
     };
-    let done = Mutex::new(Vec::new());
+    let done = Mutex::new((0, Vec::new()));
     let write = |frame: SeenFrame| -> Result<(), E> {
         let SeenFrame {
             input,
@@ -53,13 +56,20 @@ pub fn predict<E: From<Error> + Send>(
         let sidecar = job.writer.write(&input, &loaded, &seen)?;
         let arrived = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
         let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
-        done.push((input.name, arrived));
+        done.0 += 1;
+        if film {
+            done.1.push((input.name, arrived));
+        }
         drop(done);
         written(&sidecar)
     };
     let ending = run(feed, process, write, say);
-    let written = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    LiveDepth { written, ending }
+    let (frames, filmed) = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    LiveDepth {
+        frames,
+        filmed,
+        ending,
+    }
 }
 
 /// What the network says of a frame, and the milliseconds from its arrival to that.
@@ -88,7 +98,7 @@ impl<E> LiveDepth<E> {
     /// Frames that were written.
     #[must_use]
     pub fn frames(&self) -> usize {
-        self.written.len()
+        self.frames
     }
 
     /// The video of the frames beside their depth, each shown for as long as until the next came: [`VIDEO`] in the folder of their pictures.
@@ -97,8 +107,8 @@ impl<E> LiveDepth<E> {
     /// # Errors
     /// What ffmpeg says.
     pub fn write_video(&self, folder: &Path) -> Result<Option<(PathBuf, usize)>> {
-        let times: Vec<Option<f64>> = self.written.iter().map(|(_, time)| *time).collect();
-        let names = self.written.iter().map(|(name, _)| name.as_str());
+        let times: Vec<Option<f64>> = self.filmed.iter().map(|(_, time)| *time).collect();
+        let names = self.filmed.iter().map(|(name, _)| name.as_str());
         let pictures = DepthOutput::SideBySide.ending();
         write_one_video(folder, names.zip(shown_for(&times)), pictures, VIDEO)
     }

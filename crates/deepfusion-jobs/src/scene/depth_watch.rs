@@ -42,6 +42,9 @@ impl DepthWatch {
         prediction: &mut Prediction,
     ) -> Option<ScaleRecord> {
         let motion = self.motions.next(input);
+        if let Some(camera) = &camera {
+            self.watch.see_through(camera);
+        }
         if let Some(factor) = self.watch.correction() {
             prediction.scale_depth(factor);
         }

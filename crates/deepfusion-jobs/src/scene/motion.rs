@@ -27,6 +27,22 @@ pub struct Motion {
     pub goes_on: bool,
     /// Which way is down in the camera, where its mount is known.
     pub down_in_cam: Option<Vector3<f64>>,
+    /// Which way is straight ahead of the vehicle in the camera, where its mount is known.
+    pub ahead_in_cam: Option<Vector3<f64>>,
+}
+
+/// Cosine of the angle from which on a camera does not look ahead: sixty degrees.
+const LOOKS_ASIDE: f64 = 0.5;
+
+impl Motion {
+    /// By how much the camera looks to the left of the way straight ahead, rad; 0 where nothing says its mount, `None` for one that looks to
+    /// the side or back.
+    #[must_use]
+    pub fn camera_yaw(&self) -> Option<f64> {
+        let ahead = self.ahead_in_cam.unwrap_or(Vector3::z());
+        let yaw = ahead.x.atan2(ahead.z);
+        (yaw.cos() > LOOKS_ASIDE).then_some(yaw)
+    }
 }
 
 /// Whether a recording says how its camera moved.
@@ -60,8 +76,10 @@ impl MotionTracker {
             let dt = frame.time_s? - dataset.frames()[last].time_s?;
             Some((world_from_cam * motion, motion, dt))
         });
-        // The first frame of a recording whose motion is known begins a way.
-        let begun = motion_known(dataset).then(Se3::identity);
+        // The first frame of a recording whose motion is known begins a way, and the first after a gap another one; in the gap each stands
+        // for itself.
+        let begins = motion_known(dataset) && frame.speed_mps.is_some();
+        let begun = begins.then(Se3::identity);
         let world_from_cam = step.map(|(pose, ..)| pose).or(begun);
         let stamp = world_from_cam
             .zip(frame.time_s)
@@ -83,6 +101,9 @@ impl MotionTracker {
             down_in_cam: dataset
                 .cam_from_vehicle()
                 .map(|cam| -cam.rotate(&Vector3::z())),
+            ahead_in_cam: dataset
+                .cam_from_vehicle()
+                .map(|cam| cam.rotate(&Vector3::x())),
         }
     }
 }
@@ -130,6 +151,19 @@ impl StraightWay {
 mod tests {
     use super::*;
     use std::time::Duration;
+
+    #[test]
+    fn a_camera_that_looks_back_has_nothing_ahead() {
+        let looking = |x: f64, z: f64| Motion {
+            ahead_in_cam: Some(Vector3::new(x, 0.0, z)),
+            ..Motion::default()
+        };
+        assert_eq!(Motion::default().camera_yaw(), Some(0.0));
+        let left = looking(0.1, 0.995).camera_yaw().unwrap();
+        assert!((left - 0.1).abs() < 0.001, "{left}");
+        assert_eq!(looking(0.0, -1.0).camera_yaw(), None);
+        assert_eq!(looking(-1.0, 0.1).camera_yaw(), None);
+    }
 
     #[test]
     fn a_given_speed_is_a_way_straight_ahead() {

@@ -80,8 +80,9 @@ impl ScaleWatch {
         }
     }
 
-    /// Begins anew where another camera begins: nothing that was learned of the last one holds for it.
-    fn reset_for_new_camera(&mut self, camera: &Intrinsics) {
+    /// Begins anew where another camera begins: nothing that was learned of the last one holds for it. To be said before the
+    /// [correction](Self::correction) of its first frame is asked for.
+    pub fn see_through(&mut self, camera: &Intrinsics) {
         if self
             .camera
             .replace(*camera)
@@ -90,6 +91,7 @@ impl ScaleWatch {
             self.monitor = ScaleMonitor::new(self.config.clone());
             self.correction = self.correct.then(ScaleCorrection::default);
             self.last = None;
+            self.drifted = false;
         }
     }
 
@@ -114,7 +116,7 @@ impl ScaleWatch {
         }
         // A frame that stands for itself moves by nothing that is known.
         motion.stamp?;
-        self.reset_for_new_camera(camera);
+        self.see_through(camera);
         let width = WIDTH.min(camera.width);
         let height = (width * camera.height).div_ceil(camera.width).max(1);
         let later = Arc::new(RoadTexture::from(&grey_image(image, width, height)));

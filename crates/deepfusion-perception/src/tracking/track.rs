@@ -14,6 +14,9 @@ const GUESS: f64 = 0.05;
 /// Largest weight of a size or a heading, so that it can still change.
 const MOST_WEIGHT: f64 = 40.0;
 
+/// The same of the height of what moves.
+const MOVING_HEIGHT_WEIGHT: f64 = 6.0;
+
 /// Largest sum of a class' votes, in sightings of score 1, so that it can still change.
 const MOST_VOTES: f32 = 5.0;
 
@@ -159,6 +162,10 @@ impl Track {
         let (centre, crossed) = self.centre_of(measurement);
         self.filter.update(Vector2::new(centre.x, centre.z), noise);
         let place = &measurement.detection.place;
+        if self.is_moving() {
+            // On a slope it climbs, and the world's down is the first camera's: the height follows within a few frames.
+            self.y.weight = self.y.weight.min(MOVING_HEIGHT_WEIGHT);
+        }
         self.y.add(centre.y, 4.0);
         for i in 0..2 {
             let k = if crossed { 1 - i } else { i };
@@ -197,11 +204,12 @@ impl Track {
 
     fn judge_motion(&mut self) {
         let doubt = self.filter.speed_deviation();
-        if doubt > MAX_SPEED_SIGMA_MPS {
-            return;
-        }
         let speed = self.filter.velocity().norm();
         let limit = MOVING_MPS[usize::from(self.moving == Some(true))];
+        // A car far away is known to drive long before its speed is known well.
+        if doubt > MAX_SPEED_SIGMA_MPS && speed <= limit + 2.0 * doubt {
+            return;
+        }
         self.moving = Some(speed > limit.max(2.0 * doubt));
     }
 
@@ -230,11 +238,12 @@ impl Track {
     pub(super) fn target(&self, cam_from_world: &Se3) -> Target {
         let centre = cam_from_world.transform(&self.centre());
         let velocity = self.filter.velocity();
+        let likely = cam_from_world.rotate(&Vector3::new(velocity.x, 0.0, velocity.y));
         let velocity = match self.moving {
             None => None,
             // What stands has no speed; the filter's is what its box was off from frame to frame.
             Some(false) => Some(Vector3::zeros()),
-            Some(true) => Some(cam_from_world.rotate(&Vector3::new(velocity.x, 0.0, velocity.y))),
+            Some(true) => Some(likely),
         };
         let axis = self.axis();
         let mut along = cam_from_world.rotate(&Vector3::new(axis.cos(), 0.0, axis.sin()));
@@ -260,6 +269,7 @@ impl Track {
                 .relative_error
                 .map(|share| f64::from(share) * centre.norm()),
             velocity_mps: velocity.map(Into::into),
+            likely_velocity_mps: Some(velocity.unwrap_or(likely).into()),
             moving: self.moving,
             confidence: (self.confidence * proven * fading).clamp(0.0, 1.0),
             class: self.kind.as_ref().map(|kind| kind.class.clone()),

@@ -41,7 +41,15 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
             Ok(())
         }
     };
-    let seen = live::predict(&job, &mut estimator, address, &mut feed, written, say);
+    let seen = live::predict(
+        &job,
+        &mut estimator,
+        address,
+        &mut feed,
+        args.video(),
+        written,
+        say,
+    );
     warn_of_end(address, &seen.ending);
     if let Some(figures) = feed.summary() {
         let ended = seen.ending.as_ref();
