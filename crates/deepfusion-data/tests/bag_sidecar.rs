@@ -100,6 +100,21 @@ fn a_speed_on_the_bus_is_not_mixed_with_a_topics() {
     }
 }
 
+/// All bits set is J1939's way to say that there is no value: here 655.35 km/h.
+#[test]
+fn a_value_that_a_bus_has_not_is_no_speed() {
+    let drive = Drive::new(BY_DBC, |bag| {
+        bag.can("/can", &ten_mps()).can("/can", &frame(0x158, -1));
+        bag.can("/can", &ten_mps());
+    });
+    near(drive.speed(), 10.0);
+    let said = text_of(open(&drive.bag).unwrap().warnings());
+    says(
+        &said,
+        &["can.speed: 25 values beyond the signal's range left out"],
+    );
+}
+
 #[test]
 fn requests_and_error_frames_carry_no_speed() {
     let drive = Drive::new(INLINE, |bag| {

@@ -273,11 +273,11 @@ mod tests {
             ("2019-09-22 12:00:00", Clock::Free, None),
             ("later", Clock::Date, None),
         ] {
-            assert_eq!(
-                time_on_clock(word, clock, midnight + 5 * SECOND, 0),
-                ns,
-                "{word}"
-            );
+            let first = match clock {
+                Clock::Date => midnight + 5 * SECOND,
+                _ => 5 * SECOND,
+            };
+            assert_eq!(time_on_clock(word, clock, first, 0), ns, "{word}");
         }
     }
 

@@ -5,7 +5,7 @@ use crate::log::{Clock, DriveLog, Speed};
 use crate::note::{ClockNote, LogNote};
 use deepfusion_fs::{PartialFolder, write_atomically};
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// What a drive's folder is made of.
@@ -114,8 +114,14 @@ impl DriveFolder<'_> {
     ) -> std::result::Result<Vec<LogNote>, E> {
         self.check(out)?;
         let trial = PartialFolder::beside(out).map_err(|e| Error::file(out, e))?;
-        self.write_into(trial.path(), out)?;
-        self.camera_ahead_s = measure(trial.path())?;
+        // Of the drive's own name, which errors say.
+        let folder = trial
+            .path()
+            .join(out.file_name().unwrap_or(out.as_os_str()));
+        std::fs::create_dir(&folder).map_err(|e| Error::file(&folder, e))?;
+        link_files(out, &folder)?;
+        self.write_into(&folder, out)?;
+        self.camera_ahead_s = measure(&folder)?;
         drop(trial);
         Ok(self.write(out)?)
     }
@@ -172,6 +178,27 @@ impl DriveFolder<'_> {
         }
         Ok(text)
     }
+}
+
+/// Puts the files of a folder, where there is one, into another: when its images were taken, or its calibration.
+fn link_files(from: &Path, to: &Path) -> Result<()> {
+    let entries = match std::fs::read_dir(from) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(Error::file(from, e)),
+    };
+    for entry in entries {
+        let file = entry.map_err(|e| Error::file(from, e))?.path();
+        let Some(name) = file.file_name().filter(|_| file.is_file()) else {
+            continue;
+        };
+        let place = to.join(name);
+        // A video is not to be copied for it; file systems without links are rare.
+        let linked = std::fs::hard_link(&file, &place);
+        let copied = linked.or_else(|_| std::fs::copy(&file, &place).map(|_| ()));
+        copied.map_err(|e| Error::file(&file, e))?;
+    }
+    Ok(())
 }
 
 /// The table of speeds; with their standard deviations where every one has one.
@@ -266,6 +293,30 @@ mod tests {
             let target = target.with_extension("said");
             folder(&log, Some(first_ns)).write(&target).unwrap();
         }
+    }
+
+    #[test]
+    fn what_is_measured_on_has_the_files_of_the_folder() {
+        let at = tempfile::tempdir().unwrap();
+        let out = at.path().join("drive");
+        std::fs::create_dir(&out).unwrap();
+        std::fs::write(out.join("frames.csv"), "time_s,file\n").unwrap();
+        let log = log(Clock::Date, 1_777_636_800_000_000_000);
+        let mut drive = folder(&log, None);
+        let stopped: Result<Vec<LogNote>> = drive.write_measured(&out, |trial| {
+            let there = |name: &str| trial.join(name).is_file();
+            assert!(there("frames.csv") && there("speed.csv") && there("dataset.toml"));
+            assert!(!out.join("dataset.toml").exists(), "it looks finished");
+            Err(Error::NoStart { first_ns: 0 })
+        });
+        assert!(stopped.is_err());
+        let left = || std::fs::read_dir(at.path()).unwrap().count();
+        assert_eq!((left(), std::fs::read_dir(&out).unwrap().count()), (1, 1));
+        let written: Result<Vec<LogNote>> = drive.write_measured(&out, |_| Ok(Some(0.25)));
+        written.unwrap();
+        let config = std::fs::read_to_string(out.join("dataset.toml")).unwrap();
+        assert!(config.contains("camera_ahead_s = 0.25"), "{config}");
+        assert_eq!(left(), 1);
     }
 
     #[test]

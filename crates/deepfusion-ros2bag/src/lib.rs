@@ -16,6 +16,7 @@ mod bag;
 mod damage;
 mod mcap;
 mod metadata;
+mod packed;
 mod problem;
 #[cfg(feature = "ros2-sqlite")]
 mod sqlite;
@@ -24,8 +25,7 @@ mod storage;
 pub use bag::{Ros2Bag, is_ros2_bag};
 pub use damage::{BagDamage, FileDamage};
 pub use mcap::{ChunkProblem, McapDamage, McapProblem, RecordProblem};
-#[cfg(feature = "ros2-sqlite")]
-pub use problem::PackedProblem;
+pub use packed::PackedProblem;
 pub use problem::StorageProblem;
 #[cfg(feature = "ros2-sqlite")]
 pub use sqlite::DatabaseDamage;

@@ -3,13 +3,11 @@
 #[cfg(feature = "ros2-sqlite")]
 mod sqlite;
 
-#[cfg(feature = "ros2-sqlite")]
-pub use self::sqlite::PackedProblem;
-
 use crate::mcap::ChunkProblem;
+use crate::packed::PackedProblem;
 use crate::storage::COPY_AGAIN;
 use deepfusion_hint::Hint;
-use deepfusion_rosbag::Error;
+use deepfusion_rosbag::{Error, Time};
 use std::path::Path;
 
 /// The only key of `metadata.yaml` that is read.
@@ -38,6 +36,16 @@ pub enum StorageProblem {
         at: usize,
         /// What is wrong with it.
         problem: ChunkProblem,
+    },
+    /// A message of an MCAP file that was compressed by itself cannot be unpacked.
+    #[error("{topic}, a message of {time}: {problem}")]
+    PackedMessage {
+        /// Its topic.
+        topic: String,
+        /// When it was recorded.
+        time: Time,
+        /// What is wrong with it.
+        problem: PackedProblem,
     },
     /// SQLite cannot read the database.
     #[cfg(feature = "ros2-sqlite")]
@@ -82,6 +90,7 @@ impl Hint for StorageProblem {
             Self::NotMcap => "give the recording's own .mcap file",
             Self::Metadata(_) => "`ros2 bag reindex FOLDER` writes it anew",
             Self::Chunk { .. } => COPY_AGAIN,
+            Self::PackedMessage { .. } => "the message is damaged",
             #[cfg(feature = "ros2-sqlite")]
             Self::Sqlite(e) => sqlite::remedy(e),
             #[cfg(feature = "ros2-sqlite")]

@@ -8,13 +8,15 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// A folder of each kind, one of its files, and files alone.
-const SAME: [&str; 10] = [
+const SAME: [&str; 12] = [
     "sqlite",
     "sqlite/sqlite.db3",
     "sqlite_packed",
     "sqlite_packed/sqlite_packed.db3",
     "mcap",
     "mcap/mcap.mcap",
+    "mcap_packed",
+    "mcap_packed/mcap_packed.mcap",
     "none.mcap",
     "lz4.mcap",
     "zstd.mcap",

@@ -174,7 +174,7 @@ impl Bag {
     /// # Errors
     /// [`Error::Chunk`] if that index data is damaged.
     pub fn topics(&self) -> Result<Vec<TopicInfo>> {
-        topic::topics(self)
+        Ok(topic::topics(self))
     }
 
     /// The messages that `selection` asks for, in time order.

@@ -4,8 +4,7 @@ use crate::chunk::Chunk;
 use crate::connection::Connection;
 use crate::entry;
 use crate::index::ChunkInfo;
-use crate::problem::Fault;
-use crate::{Error, Result, Time, content};
+use crate::{Time, content};
 
 /// A topic's content in a bag.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,12 +35,12 @@ impl TopicInfo {
 }
 
 /// The topics of `bag`, by name.
-pub(crate) fn topics(bag: &Bag) -> Result<Vec<TopicInfo>> {
+pub(crate) fn topics(bag: &Bag) -> Vec<TopicInfo> {
     let mut topics = group(bag.connections());
     for topic in &mut topics {
-        topic.range = range(bag, &topic.name)?;
+        topic.range = range(bag, &topic.name);
     }
-    Ok(topics)
+    topics
 }
 
 /// Connections gathered by topic, without their times.
@@ -67,8 +66,9 @@ pub(crate) fn group(connections: &[Connection]) -> Vec<TopicInfo> {
     topics
 }
 
-/// The times of a topic's first and last message.
-fn range(bag: &Bag, topic: &str) -> Result<Option<(Time, Time)>> {
+/// The times of a topic's first and last message. Of a chunk that cannot be read, those of the whole chunk count: who reads its messages is
+/// told what is wrong with it, and the rest of the bag is not lost.
+fn range(bag: &Bag, topic: &str) -> Option<(Time, Time)> {
     let of_topic = |place: u32| bag.connections()[place as usize].topic == topic;
     let mut chunks: Vec<&ChunkInfo> = bag
         .chunks()
@@ -86,32 +86,28 @@ fn range(bag: &Bag, topic: &str) -> Result<Option<(Time, Time)>> {
         if first.is_some_and(|first| info.first > first) {
             break;
         }
-        first = times(bag, info, of_topic)?
-            .min()
-            .into_iter()
-            .chain(first)
-            .min();
+        let found = times(bag, info, of_topic);
+        let earliest = found.map_or(Some(info.first), Iterator::min);
+        first = earliest.into_iter().chain(first).min();
     }
     chunks.sort_by_key(|info| std::cmp::Reverse(info.last));
     for info in &chunks {
         if last.is_some_and(|last| info.last < last) {
             break;
         }
-        last = times(bag, info, of_topic)?
-            .max()
-            .into_iter()
-            .chain(last)
-            .max();
+        let found = times(bag, info, of_topic);
+        let latest = found.map_or(Some(info.last), Iterator::max);
+        last = latest.into_iter().chain(last).max();
     }
-    Ok(first.zip(last))
+    first.zip(last)
 }
 
-/// The times of a chunk's messages of one topic; of a chunk with index data, by that alone.
+/// The times of a chunk's messages of one topic; of a chunk with index data, by that alone. `None` where it cannot be read.
 fn times(
     bag: &Bag,
     info: &ChunkInfo,
     of_topic: impl Fn(u32) -> bool,
-) -> Result<impl Iterator<Item = Time>> {
+) -> Option<impl Iterator<Item = Time>> {
     let (file, places): (&[u8], _) = (bag.source(), bag.places());
     let entries = if info.scanned {
         content::open(
@@ -129,11 +125,5 @@ fn times(
         Chunk::read(file, info.position)
             .and_then(|chunk| entry::indexed(file, chunk.end, info, places, of_topic))
     };
-    let failed = |fault: Fault| Error::Chunk {
-        path: bag.path().to_owned(),
-        offset: info.position,
-        messages: info.messages(),
-        problem: fault.elsewhere(),
-    };
-    Ok(entries.map_err(failed)?.into_iter().map(|e| e.time))
+    Some(entries.ok()?.into_iter().map(|e| e.time))
 }

@@ -2,7 +2,7 @@
 
 use crate::light::GroundLight;
 use crate::primitive::{Primitive, V3};
-use crate::render::{Air, Eye, FrameSolid, Shader, Surface, gather};
+use crate::render::{Air, Eye, FrameSolid, LARGEST_M, Shader, Surface, gather};
 use crate::scene::World;
 use crate::texture::noise::hash;
 use deepfusion_geometry::Se3;
@@ -48,7 +48,8 @@ impl<'a> Scanner<'a> {
         (reach, pixel): (f32, f32),
     ) -> Self {
         let position = world_from_sensor.translation();
-        let all = gather(world, moving, &position);
+        // It turns: what is behind counts as well, a large thing's middle included.
+        let all = gather(world, moving, &position, reach + LARGEST_M);
         let first_moving = all.len() - moving.len();
         let mut solids: Vec<(FrameSolid, f32, f32, Option<u32>)> = all
             .into_iter()

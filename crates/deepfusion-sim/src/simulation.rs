@@ -309,12 +309,9 @@ impl Simulation {
         let velo_from_imu = self.rig.velo_from_imu;
         let motion = BodyMotion::at(|t| self.imu_at(t) * velo_from_imu.inverse(), time_s);
         let later_s = time_s + VELOCITY_STEP_S;
-        let cars = |time_s| self.traffic.solids(&self.world, time_s);
+        // Those that are there now, a millisecond later too: each is held against itself.
+        let cars = |at_s| self.traffic.solids_at(&self.world, at_s, time_s);
         let (mut now, mut later) = (cars(time_s), cars(later_s));
-        // A car that leaves the street within the millisecond is taken as gone.
-        if now.len() != later.len() {
-            now.clone_from(&later);
-        }
         let people = |at_s| self.riders.solids(&self.world, at_s, time_s);
         now.extend(people(time_s));
         later.extend(people(later_s));

@@ -186,11 +186,12 @@ impl Traffic {
         self.cars.len()
     }
 
-    /// The cars that are on the street at a time.
+    /// The cars that are on the street at a time, each where it is `at_s`.
     fn present<'a>(
         &'a self,
         world: &'a World,
         time_s: f64,
+        at_s: f64,
     ) -> impl Iterator<Item = (usize, &'a MovingCar, [f64; 3], f64)> {
         self.cars
             .iter()
@@ -205,7 +206,7 @@ impl Traffic {
                 if !world.crowd.is_empty() && !fits(world, car, s) {
                     return None;
                 }
-                let (x, y, heading) = road.world(s, car.lateral);
+                let (x, y, heading) = road.world(car.s + car.speed * at_s, car.lateral);
                 let turn = if car.speed > 0.0 {
                     0.0
                 } else {
@@ -217,7 +218,12 @@ impl Traffic {
 
     /// Their solids at a time.
     pub(crate) fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
-        self.present(world, time_s)
+        self.solids_at(world, time_s, time_s)
+    }
+
+    /// The solids at a time of the cars that are on the street at another.
+    pub(crate) fn solids_at(&self, world: &World, at_s: f64, present_s: f64) -> Vec<Primitive> {
+        self.present(world, present_s, at_s)
             .flat_map(|(_, car, base, heading)| {
                 world.models[car.model].solids(base, heading, car.seed, true)
             })
@@ -226,7 +232,7 @@ impl Traffic {
 
     /// Their boxes and velocities at a time.
     pub(crate) fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
-        self.present(world, time_s)
+        self.present(world, time_s, time_s)
             .map(|(index, car, base, heading)| {
                 let size = world.models[car.model].size.map(f64::from);
                 // Constant speed along the centreline, so faster on the outside of a bend.

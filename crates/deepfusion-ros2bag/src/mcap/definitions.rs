@@ -14,6 +14,11 @@ pub(super) struct Definitions {
 }
 
 impl Definitions {
+    /// How many schemas there are.
+    pub(super) fn schemas(&self) -> usize {
+        self.schemas.len()
+    }
+
     /// Adds a record; `None` if it is malformed. The first channel of a number counts.
     pub(super) fn add(&mut self, op: u8, content: &[u8]) -> Option<()> {
         let mut fields = Fields(content);

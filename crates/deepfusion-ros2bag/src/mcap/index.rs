@@ -1,6 +1,6 @@
 //! A file's summary, which is at its end.
 
-use super::chunk::{self, indexed_times, walk};
+use super::chunk::indexed_times;
 use super::damage::McapProblem;
 use super::definitions::Definitions;
 use super::record::{Fields, MAGIC, TAIL, op, record};
@@ -11,6 +11,7 @@ use deepfusion_rosbag::Time;
 /// Numbers of the statistics record that say whether the summary is complete.
 struct Statistics {
     messages: u64,
+    schemas: u64,
     channels: u64,
     chunks: u64,
     /// Messages by channel.
@@ -73,8 +74,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<McapProblem>> {
     };
     let complete = statistics.chunks == chunks.len() as u64
         && statistics.channels == definitions.channels.len() as u64
+        && statistics.schemas == definitions.schemas() as u64
         && (statistics.messages == 0 || !chunks.is_empty());
-    if !complete {
+    // Without message indexes the times of a topic are found by unpacking chunk after chunk, of every topic: going through the file once is less.
+    let indexed = chunks.iter().all(|chunk| chunk.channels.is_some());
+    if !complete || !indexed {
         return Err(None);
     }
     for (id, count) in &statistics.counts {
@@ -94,11 +98,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Index, Option<McapProblem>> {
 
 fn read_statistics(content: &[u8]) -> Option<Statistics> {
     let mut fields = Fields(content);
-    let (messages, _schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
+    let (messages, schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
     let (_attachments, _metadata, chunks) = (fields.u32()?, fields.u32()?, fields.u32()?);
     let (_first, _last) = (fields.u64()?, fields.u64()?);
     Some(Statistics {
         messages,
+        schemas: u64::from(schemas),
         channels: u64::from(channels),
         chunks: u64::from(chunks),
         counts: fields.map()?,
@@ -136,7 +141,7 @@ fn set_ranges(bytes: &[u8], index: &mut Index, indexes: &[Indexes]) {
         .map(|(id, place)| (*id, *place))
         .collect();
     for (id, place) in ids {
-        let times = |i: usize| times_in(bytes, &index.chunks[i], &indexes[i], id);
+        let times = |i: usize| times_in(bytes, &indexes[i], id);
         let mut range: Option<(Time, Time)> = None;
         for &i in &by_first {
             if range.is_some_and(|(first, _)| index.chunks[i].first > first) {
@@ -155,21 +160,10 @@ fn set_ranges(bytes: &[u8], index: &mut Index, indexes: &[Indexes]) {
 }
 
 /// The times of a channel's first and last message in a chunk.
-fn times_in(bytes: &[u8], info: &ChunkInfo, indexes: &Indexes, id: u16) -> Option<(Time, Time)> {
-    let times: Vec<Time> = match &info.channels {
-        Some(channels) if !channels.contains(&id) => return None,
-        Some(_) => {
-            let (_, offset) = indexes.0.iter().find(|(channel, _)| *channel == id)?;
-            let found = record(bytes, usize::try_from(*offset).ok()?).ok()??;
-            let sound = found.op == op::MESSAGE_INDEX;
-            sound.then(|| indexed_times(found.content, id))??
-        }
-        None => {
-            let (content, _) = chunk::open(&bytes[info.from..info.to]);
-            let messages = walk(content.bytes()).messages;
-            let of_channel = messages.iter().filter(|m| m.channel == id);
-            of_channel.map(|m| m.time).collect()
-        }
-    };
+fn times_in(bytes: &[u8], indexes: &Indexes, id: u16) -> Option<(Time, Time)> {
+    let (_, offset) = indexes.0.iter().find(|(channel, _)| *channel == id)?;
+    let found = record(bytes, usize::try_from(*offset).ok()?).ok()??;
+    let sound = found.op == op::MESSAGE_INDEX;
+    let times: Vec<Time> = sound.then(|| indexed_times(found.content, id))??;
     Some((*times.iter().min()?, *times.iter().max()?))
 }

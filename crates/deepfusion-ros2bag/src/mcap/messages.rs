@@ -2,8 +2,9 @@
 
 use super::chunk::{self, ChunkProblem, Content, Entry};
 use super::{ChunkInfo, McapFile};
+use crate::packed::{is_packed, unpack};
 use crate::problem::StorageProblem;
-use deepfusion_rosbag::{Error, Message, Result, Selection, Time};
+use deepfusion_rosbag::{Error, Message, Result, Selection, Serialization, Time};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
 use std::sync::Arc;
@@ -122,28 +123,52 @@ impl<'a> Iterator for Messages<'a> {
         let index = &self.file.index;
         let channel = &index.channels[*index.places.get(&entry.channel)?];
         let (path, connection) = (&*self.file.path, &channel.connection);
+        let stored = &chunk.content.bytes()[entry.range.clone()];
         let message = match &chunk.content {
-            Content::Stored(bytes) => Message::stored(
+            _ if channel.serialization == Serialization::Cdr && is_packed(stored) => {
+                let unpacked = unpack(stored).map(|bytes| {
+                    let range = 0..bytes.len();
+                    let bytes = Arc::new(bytes);
+                    Message::held(
+                        path,
+                        connection,
+                        entry.time,
+                        channel.serialization,
+                        bytes,
+                        range,
+                    )
+                });
+                unpacked.map_err(|problem| {
+                    let (topic, time) = (connection.topic.clone(), entry.time);
+                    let problem = StorageProblem::PackedMessage {
+                        topic,
+                        time,
+                        problem,
+                    };
+                    problem.of(path)
+                })
+            }
+            Content::Stored(bytes) => Ok(Message::stored(
                 path,
                 connection,
                 entry.time,
                 channel.serialization,
                 &bytes[entry.range],
-            ),
-            Content::Unpacked(bytes) => Message::held(
+            )),
+            Content::Unpacked(bytes) => Ok(Message::held(
                 path,
                 connection,
                 entry.time,
                 channel.serialization,
                 Arc::clone(bytes),
                 entry.range,
-            ),
+            )),
         };
         match chunk.entries.as_slice().first() {
             Some(following) => chunk.next.0 = following.time,
             None => drop(PeekMut::pop(top)),
         }
-        Some(Ok(message))
+        Some(message)
     }
 }
 

@@ -1,23 +1,7 @@
-//! What SQLite says of a database, and what is wrong with a packed message of one.
+//! What SQLite says of a database.
 
-use crate::storage::{COPY_AGAIN, MOST_BYTES};
+use crate::storage::COPY_AGAIN;
 use rusqlite::ErrorCode;
-use std::io;
-
-/// Why a message that was compressed by itself cannot be unpacked.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PackedProblem {
-    /// It is larger than a message may be.
-    #[error("{MOST_BYTES} bytes or more unpacked")]
-    TooLarge,
-    /// No decoder can be set up.
-    #[error("{0}")]
-    Decoder(#[source] io::Error),
-    /// Its bytes are damaged.
-    #[error("cannot be unpacked: {0}")]
-    Unpack(#[source] io::Error),
-}
 
 /// What an error of SQLite's means for a bag.
 pub(super) fn said(e: &rusqlite::Error) -> String {

@@ -1,19 +1,16 @@
 //! Messages from rows: first their positions, some thousand at a time, then each one's bytes.
 
 use super::{SqliteFile, failed};
-use crate::problem::{PackedProblem, StorageProblem};
-use crate::storage::MOST_BYTES;
+use crate::packed::{is_packed, unpack};
+use crate::problem::StorageProblem;
 use deepfusion_rosbag::{Message, Result, Selection, Time};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, params};
 use std::collections::VecDeque;
-use std::io::Read;
 use std::sync::Arc;
 
 /// Number of rows requested at once, keys only.
 const PAGE: i64 = 4096;
-/// The first bytes of a Zstandard frame, with which a CDR message never begins.
-const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 /// The key of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,7 +164,7 @@ impl<'a> Rows<'a> {
         let file = self.file;
         let channel = &file.channels[key.topic as usize];
         let bytes = bytes(&file.database(), key.id).map_err(|e| failed(&file.path, e))?;
-        let bytes = if bytes.starts_with(&ZSTD) {
+        let bytes = if is_packed(&bytes) {
             unpack(&bytes).map_err(|problem| {
                 let (topic, row) = (channel.connection.topic.clone(), key.id);
                 let problem = StorageProblem::Message {
@@ -202,19 +199,6 @@ fn bytes(database: &Connection, id: i64) -> rusqlite::Result<Vec<u8>> {
             other.data_type(),
         )),
     })
-}
-
-/// A message that was compressed by itself.
-fn unpack(bytes: &[u8]) -> std::result::Result<Vec<u8>, PackedProblem> {
-    let mut message = Vec::new();
-    let decoder =
-        zstd::stream::read::Decoder::with_buffer(bytes).map_err(PackedProblem::Decoder)?;
-    let read = decoder.take(MOST_BYTES).read_to_end(&mut message);
-    match read {
-        Ok(_) if (message.len() as u64) < MOST_BYTES => Ok(message),
-        Ok(_) => Err(PackedProblem::TooLarge),
-        Err(e) => Err(PackedProblem::Unpack(e)),
-    }
 }
 
 impl<'a> Iterator for Rows<'a> {

@@ -5,7 +5,7 @@ python crates/deepfusion-ros2bag/tests/reference/ros2_reference.py [FOLDER WITH 
 
 Writes beside itself the messages of `deepfusion-rosbag`'s reference (every type, times that go back and forth), every
 other one of a topic big-endian:
-- sqlite/, sqlite_packed/ (each message compressed), mcap/: as rosbags records them, with metadata.yaml
+- sqlite/, sqlite_packed/ (each message compressed), mcap/, mcap_packed/: as rosbags records them, with metadata.yaml
 - none.mcap, lz4.mcap, zstd.mcap: many small chunks; bare.mcap: neither chunks nor a summary
 - every_type.json: what rosbags reads from them, all values
 and, with the folder of real bags, real_bags.json (every topic's digest, values of the types that are known).
@@ -125,6 +125,7 @@ def main():
         by_rosbags("sqlite", recorded, StoragePlugin.SQLITE3),
         by_rosbags("sqlite_packed", recorded, StoragePlugin.SQLITE3, compress=True),
         by_rosbags("mcap", recorded, StoragePlugin.MCAP),
+        by_rosbags("mcap_packed", recorded, StoragePlugin.MCAP, compress=True),
     ]
     files = [
         by_mcap("none.mcap", recorded, CompressionType.NONE),
@@ -136,7 +137,7 @@ def main():
     key = lambda m: (m["time"], m["topic"])
     for result in results:
         result["messages"].sort(key=key)
-    assert results[0] == results[1] == results[2]
+    assert results[0] == results[1] == results[2] == results[3]
     ros1.HERE = HERE
     ros1.save("every_type.json", results[0])
     for path in [*files, *(f for folder in folders for f in folder.iterdir())]:

@@ -22,9 +22,13 @@ pub(crate) use shade::Shader;
 use shade::encode_srgb;
 use tiles::TILE;
 
-/// Solids farther along the street than this are not drawn, metres: ahead and behind.
+/// Solids farther ahead along the street than this are not drawn, metres.
 const AHEAD: f32 = 420.0;
-const BEHIND: f32 = 70.0;
+/// The same behind it, for what looks ahead.
+pub(crate) const BEHIND: f32 = 70.0;
+
+/// No solid but the hills around reaches farther from its middle, metres.
+pub(crate) const LARGEST_M: f32 = 60.0;
 
 /// Ground beyond this depth counts as horizon, metres.
 const FARTHEST_GROUND: f32 = 600.0;
@@ -97,10 +101,15 @@ pub(crate) struct FrameSolid {
     pub nearest: f32,
 }
 
-/// The solids around a place on the street (ahead and behind it along the street), and those that move.
-pub(crate) fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Primitive> {
+/// The solids around a place on the street (ahead of it, and as far `behind` it along the street), and those that move.
+pub(crate) fn gather(
+    world: &World,
+    moving: &[Primitive],
+    eye: &Vector3<f64>,
+    behind: f32,
+) -> Vec<Primitive> {
     let s = world.road.locate(eye.x, eye.y).s;
-    let from = world.along.partition_point(|a| *a < s - BEHIND);
+    let from = world.along.partition_point(|a| *a < s - behind);
     let to = world.along.partition_point(|a| *a < s + AHEAD);
     world.primitives[from..to]
         .iter()
@@ -293,7 +302,7 @@ pub(crate) fn render(
         intrinsics: k,
         folds: &Folds::default(),
     };
-    let solids = gather(world, moving, &world_from_cam.translation());
+    let solids = gather(world, moving, &world_from_cam.translation(), BEHIND);
     let exposure = expose(&input, solids, Cores::All, Edges::EachRay);
     Picture {
         rgb: encode(&exposure.light, k.width, k.height),

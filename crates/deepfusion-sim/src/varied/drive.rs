@@ -156,7 +156,7 @@ impl DriveLook {
             intrinsics: &self.drawn.camera.intrinsics,
             folds: &folds,
         };
-        let solids = render::gather(world, moving, &world_from_cam.translation());
+        let solids = render::gather(world, moving, &world_from_cam.translation(), render::BEHIND);
         let mut exposure = render::expose(&input, solids, Cores::All, Edges::EachRay);
         wet::reflect(&input, &mut exposure);
         Picture {

@@ -131,6 +131,14 @@ pub enum MotionWarning {
         /// The median of their standard deviations, m/s.
         sigma_mps: f64,
     },
+    /// Values that a signal has by its description never: the bus's way to say that it has none.
+    #[error("{key}: {} beyond the signal's range left out", count_of(*frames, "value"))]
+    BeyondRange {
+        /// The signal's key in the file beside the bag.
+        key: &'static str,
+        /// How many.
+        frames: usize,
+    },
     /// No frame of the bus holds a signal that was named.
     #[error("{key}: no CAN frame {} holds a value of it", number(*id))]
     SilentSignal {
@@ -259,6 +267,13 @@ mod tests {
                 turns(false, 6),
                 "the vehicle's turns (yaw, roll and pitch) are not recorded: they are taken from the images (6 of 10 pairs), 0.25 degrees of \
                  pitch from one to the next (median)",
+            ),
+            (
+                MotionWarning::BeyondRange {
+                    key: "can.speed",
+                    frames: 1,
+                },
+                "can.speed: 1 value beyond the signal's range left out",
             ),
             (
                 silent(CanId::Standard(0x158)),

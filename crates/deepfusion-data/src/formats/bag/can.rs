@@ -107,6 +107,30 @@ impl Can {
         }
     }
 
+    /// Leaves out values beyond their signal's range ([`CanSignal::keep_measured`]), with a warning each.
+    pub(super) fn keep_measured(
+        &self,
+        speeds: &mut Vec<(i64, f64)>,
+        angles: &mut Vec<(i64, f64)>,
+    ) -> Vec<DataWarning> {
+        let signals = [
+            ("can.speed", &self.speed, speeds),
+            ("can.steering", &self.steering, angles),
+        ];
+        let mut warnings = Vec::new();
+        for (key, signal, values) in signals {
+            let Some((signal, factor)) = signal else {
+                continue;
+            };
+            let beyond = signal.keep_measured(values, |(_, value)| value / factor);
+            if beyond > 0 {
+                let frames = beyond;
+                warnings.push(MotionWarning::BeyondRange { key, frames }.into());
+            }
+        }
+        warnings
+    }
+
     /// Signals without a value: they are configured, so no other source was looked for.
     pub(super) fn silent(&self, speeds: usize, angles: usize) -> Vec<DataWarning> {
         let signals = [

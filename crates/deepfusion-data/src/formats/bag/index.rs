@@ -116,10 +116,12 @@ impl Index {
             let most = config.vehicle.max_gap_s;
             index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
         }
+        let beyond = can.keep_measured(&mut index.speed_mps, &mut index.steering_rad);
         // The one place where the vehicle's speeds are scaled, whichever message held them.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
         index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
         index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
+        index.silent.extend(beyond);
         if let Some(video) = &mut index.video {
             if video.count != index.images.len() {
                 return Err(Error::Image {

@@ -226,11 +226,12 @@ fn lorry(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> CarModel {
     let length = l - cab - 0.4;
     let middle = f64::from(0.5 * length - 0.5 * l);
     parts.block([l - 0.8, 0.9, 0.35], [-0.3, 0.0, 0.6], kit.dark);
-    match rng.random_range(0..5) {
+    let top = match rng.random_range(0..5) {
         0 => {
             // A flat bed with something on it.
             parts.block([length, w, 0.5], [middle, 0.0, 0.95], plain);
             parts.block([0.6 * length, 0.8 * w, 1.0], [middle, 0.0, 1.45], load);
+            2.45
         }
         1 => {
             let tank = Shape::Ellipsoid {
@@ -240,12 +241,14 @@ fn lorry(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> CarModel {
                 .parts
                 .push((tank, [middle, 0.0, f64::from(0.5 * (h + 1.1))], plain));
             parts.block([length, 1.2, 0.3], [middle, 0.0, 0.95], kit.dark);
+            size[2]
         }
         _ => {
             let material = if rng.random_bool(0.5) { load } else { plain };
             parts.block([length, w, h - 1.0], [middle, 0.0, 1.0], material);
+            size[2]
         }
-    }
+    };
     parts.wheels(
         &[0.5 * l - 0.9, -0.28 * l, -0.28 * l - 1.15],
         0.5 * w,
@@ -254,7 +257,7 @@ fn lorry(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> CarModel {
     );
     CarModel {
         class: ObjectClass::Truck,
-        size: [size[0], size[1] + 0.02, size[2].max(cab_height)],
+        size: [size[0], size[1] + 0.02, top.max(cab_height)],
         parts: parts.parts,
     }
 }

@@ -2,7 +2,7 @@ use super::site::{Spot, boxed};
 use super::sweep::{ROAD, ROOMS};
 use super::*;
 use crate::primitive::{Primitive, Shape};
-use crate::render::gather;
+use crate::render::{BEHIND, LARGEST_M, gather};
 use crate::road::Road;
 use nalgebra::Vector3;
 
@@ -161,14 +161,14 @@ fn large_things_are_found() {
             hills += world.far.len();
             for s in [-50.0, 0.0, 120.0] {
                 let (x, y, _) = world.road.world(s, -1.65);
-                let seen = gather(&world, &[], &Vector3::new(x, y, 1.6));
+                let seen = gather(&world, &[], &Vector3::new(x, y, 1.6), BEHIND);
                 for far in &world.far {
                     assert!(seen.iter().any(|solid| solid.position == far.position));
                 }
             }
             for solid in &world.primitives {
                 let (hx, hy, ..) = solid.bounds(&world.hulls);
-                assert!(hx.hypot(hy) < 60.0, "{solid:?}");
+                assert!(hx.hypot(hy) < LARGEST_M, "{solid:?}");
             }
         }
     }
