@@ -104,10 +104,10 @@ pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
 }
 
 /// A moment as a user writes it, in nanoseconds on a log's clock: seconds as a number, a date, or a time of day. A date without a zone is
-/// one of the log's own; a time of day is the one nearest to the log's first time, `first_ns`. Of a log of local dates the clock is the one after
-/// [`in_zone`](crate::DriveLog::in_zone), `zone_s` ahead of UTC; `first_ns` is the one before it.
+/// one of the log's own; a time of day is the one within the log, whose first and last times are `span_ns`, or nearest to it. Of a log of local
+/// dates the result is on its clock after [`in_zone`](crate::DriveLog::in_zone), `zone_s` ahead of UTC; `span_ns` is the one before it.
 #[must_use]
-pub fn time_on_clock(word: &str, clock: Clock, first_ns: i64, zone_s: i64) -> Option<i64> {
+pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64) -> Option<i64> {
     let word = word.trim();
     if word.parse::<f64>().is_ok() {
         return number_ns(word, 1_000_000_000);
@@ -119,24 +119,28 @@ pub fn time_on_clock(word: &str, clock: Clock, first_ns: i64, zone_s: i64) -> Op
     match (date(word), clock) {
         (Some((ns, true)), Clock::Date | Clock::LocalDate) => Some(ns),
         (Some((ns, false)), Clock::Date | Clock::LocalDate) => Some(of_local(ns)),
-        (Some((ns, _)), Clock::TimeOfDay) => Some(nearest_day(ns, first_ns)),
+        (Some((ns, _)), Clock::TimeOfDay) => Some(nearest_day(ns, span_ns)),
         (Some(_), Clock::Free | Clock::Video) => None,
         (None, Clock::Date | Clock::LocalDate | Clock::TimeOfDay) => {
-            Some(of_local(nearest_day(time_of_day(word)?, first_ns)))
+            Some(of_local(nearest_day(time_of_day(word)?, span_ns)))
         }
         // Some apps count the seconds of a day on, past midnight.
-        (None, Clock::Free) if (DAY_NS / 2..DAY_NS).contains(&first_ns) => {
-            Some(nearest_day(time_of_day(word)?, first_ns))
+        (None, Clock::Free) if (DAY_NS / 2..DAY_NS).contains(&span_ns.0) => {
+            Some(nearest_day(time_of_day(word)?, span_ns))
         }
         (None, Clock::Free | Clock::Video) => time_of_day(word),
     }
 }
 
-/// The moment at this time of a day that is nearest to another moment: a log that begins before midnight has its video after it.
-fn nearest_day(ns: i64, to_ns: i64) -> i64 {
-    let ahead = (ns - to_ns).rem_euclid(DAY_NS);
-    let back = if ahead > DAY_NS / 2 { DAY_NS } else { 0 };
-    to_ns.saturating_add(ahead - back)
+/// The moment at this time of a day that is within a span, or nearest to it: a log that begins before midnight has its video after it.
+fn nearest_day(ns: i64, (first_ns, last_ns): (i64, i64)) -> i64 {
+    let after = first_ns.saturating_add((ns - first_ns).rem_euclid(DAY_NS));
+    let before = after.saturating_sub(DAY_NS);
+    let (late, early) = (
+        after.saturating_sub(last_ns),
+        first_ns.saturating_sub(before),
+    );
+    if late > early { before } else { after }
 }
 
 /// A written number of a unit, to the last digit: an f64 of seconds since 1970 has a quarter of a microsecond.
@@ -277,7 +281,7 @@ mod tests {
                 Clock::Date => midnight + 5 * SECOND,
                 _ => 5 * SECOND,
             };
-            assert_eq!(time_on_clock(word, clock, first, 0), ns, "{word}");
+            assert_eq!(time_on_clock(word, clock, (first, first), 0), ns, "{word}");
         }
     }
 
@@ -296,10 +300,25 @@ mod tests {
                 700 * day + 11 * 3600,
             ),
             (0, "00:01:30", Clock::Free, 90),
+            (
+                700 * day + 10,
+                "13:00:00",
+                Clock::Date,
+                699 * day + 13 * 3600,
+            ),
         ] {
-            let ns = time_on_clock(word, clock, first_s * SECOND, 0);
+            // Ten minutes.
+            let span = (first_s * SECOND, (first_s + 600) * SECOND);
+            let ns = time_on_clock(word, clock, span, 0);
             assert_eq!(ns, Some(expected_s * SECOND), "{word} of {clock:?}");
         }
+    }
+
+    #[test]
+    fn a_moment_of_a_long_day_is_within_the_log() {
+        let (morning, evening) = (6 * 3600 * SECOND, 20 * 3600 * SECOND);
+        let ns = time_on_clock("19:00:00", Clock::Date, (morning, evening), 0);
+        assert_eq!(ns, Some(19 * 3600 * SECOND));
     }
 
     #[test]
@@ -309,12 +328,12 @@ mod tests {
         let first = noon + 7200 * SECOND;
         for word in ["14:00:00", "2019-09-22 14:00:00", "2019-09-22T12:00:00Z"] {
             assert_eq!(
-                time_on_clock(word, Clock::LocalDate, first, zone_s),
+                time_on_clock(word, Clock::LocalDate, (first, first), zone_s),
                 Some(noon),
                 "{word}"
             );
         }
-        let utc = time_on_clock("12:00:00", Clock::Date, noon, zone_s);
+        let utc = time_on_clock("12:00:00", Clock::Date, (noon, noon), zone_s);
         assert_eq!(utc, Some(noon), "a clock that says its zone stays as it is");
     }
 

@@ -21,12 +21,18 @@ pub fn may_hold_log(path: &Path) -> bool {
 }
 
 /// Reads several logs of one drive: the speeds of the first, with the turns of the first that has some. What the options name is looked for in
-/// the first, and in the others where they have it. `None` for no log at all.
+/// the first, and in the others where they have it. `zone_s`: how far the clocks of
+/// logs that name none are ahead of UTC, in seconds, where that is said. `None` for no log at all; else the log with the first one's own clock,
+/// as it was before it was brought to UTC.
 ///
 /// # Errors
 /// As [`read`]; [`crate::Error::OtherClock`] where the turns are on a clock of another kind than the speeds.
-pub fn read_all(paths: &[PathBuf], options: &ReadOptions) -> Result<Option<DriveLog>> {
-    let mut merged: Option<DriveLog> = None;
+pub fn read_all(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+    zone_s: Option<i64>,
+) -> Result<Option<(DriveLog, Clock)>> {
+    let mut merged: Option<(DriveLog, Clock)> = None;
     for path in paths {
         let log = match read(path, options) {
             // Columns of the log that gives the speeds.
@@ -36,10 +42,18 @@ pub fn read_all(paths: &[PathBuf], options: &ReadOptions) -> Result<Option<Drive
             }) if merged.is_some() => read(path, &options.without_columns())?,
             read => read?,
         };
+        let own = log.clock;
+        let log = match zone_s {
+            Some(ahead_s) => log.in_zone(ahead_s),
+            None => log,
+        };
         match &mut merged {
-            None => merged = Some(log),
-            Some(first) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
-                if first.clock != log.clock {
+            None => merged = Some((log, own)),
+            Some((first, _)) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
+                // Dates without a zone are taken for UTC, where none is given.
+                let of_dates = |clock| matches!(clock, Clock::Date | Clock::LocalDate);
+                let both_dates = of_dates(first.clock) && of_dates(log.clock);
+                if first.clock != log.clock && !both_dates {
                     return Err(Error::OtherClock { path: path.clone() });
                 }
                 if log.clock == Clock::Free {

@@ -80,7 +80,7 @@ impl Silhouette {
         silhouette.top = silhouette.top.max(above.top());
         // What was taken for a flying pixel lies between the two sides of an edge.
         let across = if config.edge_jump > 0.0 {
-            (2.0 * config.edge_radius).ceil() as usize
+            (2.0 * config.edge_radius * width as f32 / 640.0).ceil() as usize
         } else {
             0
         };

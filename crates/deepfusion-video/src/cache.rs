@@ -15,6 +15,9 @@ pub(crate) struct Origin {
     /// Which of several streams of the file; `None` of a video.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stream: Option<String>,
+    /// Width and height of the frames where they are not as the file has them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    size: Option<(u32, u32)>,
 }
 
 const ORIGIN: &str = "origin.json";
@@ -31,6 +34,7 @@ impl Origin {
             modified_ns: 0,
             frames,
             stream,
+            size: None,
         };
         if place.is_dir() {
             for entry in std::fs::read_dir(place).map_err(failed)? {
@@ -45,6 +49,11 @@ impl Origin {
             origin.add(place)?;
         }
         Ok(origin)
+    }
+
+    /// The same with frames of another size than the file has.
+    pub(crate) fn with_size(self, size: Option<(u32, u32)>) -> Self {
+        Self { size, ..self }
     }
 
     fn add(&mut self, file: &Path) -> Result<()> {

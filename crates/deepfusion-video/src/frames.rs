@@ -82,7 +82,8 @@ impl VideoFrames {
         let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
         if !*decoded {
             let frames = self.probed.frames;
-            let origin = Origin::of(&self.file, frames, None)?;
+            let size = (!self.probed.square).then_some(self.probed.size);
+            let origin = Origin::of(&self.file, frames, None)?.with_size(size);
             keep(&self.cache, &origin, |part| {
                 decode(&self.file, part, &self.probed)
             })?;

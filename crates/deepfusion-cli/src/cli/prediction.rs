@@ -1,6 +1,7 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use deepfusion_data::kitti::Calibration;
 use deepfusion_data::{NamedTopic, OpenOptions};
 use deepfusion_eval::PostProcess;
 use deepfusion_motion::ScaleMonitorConfig;
@@ -70,13 +71,19 @@ pub(crate) struct PredictionArgs {
     pub engine: EngineArgs,
 }
 
+/// Whether a calibration is KITTI's, of a date: its recordings have it themselves, and it is of no others.
+fn is_kitti(path: &Path) -> bool {
+    let file = path.file_name();
+    path.is_dir() || file.is_some_and(|name| name == Calibration::CAM_TO_CAM)
+}
+
 impl PredictionArgs {
     /// How recordings among the inputs are opened.
     pub(crate) fn open_options(&self) -> OpenOptions {
         OpenOptions {
             intrinsics: self.intrinsics.map(|k| k.numbers()),
             hfov_deg: self.hfov,
-            calibration: self.calib.clone(),
+            calibration: self.calib.clone().filter(|path| !is_kitti(path)),
             topics: self.topics.clone(),
             ..OpenOptions::default()
         }

@@ -3,7 +3,7 @@ use std::path::Path;
 use deepfusion_data::OpenOptions;
 use deepfusion_hint::count_of;
 use deepfusion_logs::{
-    Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, read_all, time_on_clock,
+    Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, Speed, read_all, time_on_clock,
 };
 
 use super::clocks;
@@ -27,18 +27,22 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         dbc: args.dbc.clone(),
     };
     // clap asks for one log at least.
-    let mut log = read_all(&args.logs, &options)?.ok_or(CliError::NoMedia)?;
+    let read = read_all(&args.logs, &options, args.zone)?;
+    let (log, own_clock) = read.ok_or(CliError::NoMedia)?;
     let start_ns = match &args.start {
         None => None,
         Some(word) => {
-            let first = log.speeds.first().map_or(0, |s| s.ns);
-            let ns = time_on_clock(word, log.clock, first, args.zone.unwrap_or(0));
+            let zone_s = args
+                .zone
+                .filter(|_| own_clock == Clock::LocalDate)
+                .unwrap_or(0);
+            let own =
+                |s: Option<&Speed>| s.map_or(0, |s| s.ns.saturating_add(1_000_000_000 * zone_s));
+            let span = (own(log.speeds.first()), own(log.speeds.last()));
+            let ns = time_on_clock(word, own_clock, span, zone_s);
             Some(ns.ok_or_else(|| CliError::NotOnClock { word: word.clone() })?)
         }
     };
-    if let Some(ahead_s) = args.zone {
-        log = log.in_zone(ahead_s);
-    }
     if log.clock == Clock::Video && args.start.is_none() && args.clock_offset.is_none() {
         of_its_own_video(args)?;
     }

@@ -206,7 +206,9 @@ impl Reportable for deepfusion_data::Error {
                 "--intrinsics fx,fy,cx,cy, or --hfov DEGREES; `deepfusion calibrate` measures a camera from a checkerboard; the last resort is \
                  `train --intrinsics learn`, on drives with bends",
             ),
-            Self::OwnCalibration { .. } => Some("leave --intrinsics and --hfov out".into()),
+            Self::OwnCalibration { .. } => {
+                Some("leave --intrinsics, --hfov and --calib out".into())
+            }
             Self::Topic {
                 choice: Some(topic),
                 ..

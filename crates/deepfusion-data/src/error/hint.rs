@@ -65,7 +65,7 @@ impl Hint for Error {
                     config.display()
                 ));
             }
-            Self::OwnCalibration { .. } => "open it without intrinsics",
+            Self::OwnCalibration { .. } => "open it without a camera of your own",
             Self::CameraFile { problem, .. } => return Some(problem.remedy()),
             Self::Columns { problem, .. } => return Some(problem.remedy()),
             Self::Topic { problem, .. } => return Some(problem.remedy()),

@@ -55,6 +55,9 @@ pub struct CanSignal {
     pub range: Option<[f64; 2]>,
 }
 
+/// Different values at most by which a bus says that it has none.
+const MOST_SENTINELS: usize = 3;
+
 impl CanSignal {
     /// The physical value in the data of a frame with this signal's identifier; `None` if the frame
     /// does not carry it, or is too short.
@@ -84,8 +87,9 @@ impl CanSignal {
         Signal::new(values)
     }
 
-    /// Leaves out values beyond the [range](Self::range), by which a bus says that it has none (J1939: all bits set); returns how many. Where
-    /// most are beyond it, it is the range that is wrong, as in many a description, and all stay.
+    /// Leaves out values beyond the [range](Self::range), by which a bus says that it has none or an error (J1939: all bits set, or all but the
+    /// last); returns how many. Where those are many different ones, or most, it is the range that is wrong, as in many a description, and all
+    /// stay.
     pub fn keep_measured<T>(&self, values: &mut Vec<T>, value: impl Fn(&T) -> f64) -> usize {
         let Some([least, most]) = self.range.filter(|[least, most]| least < most) else {
             return 0;
@@ -97,6 +101,15 @@ impl CanSignal {
             .iter()
             .filter(|v| !known.contains(&value(*v)))
             .count();
+        let mut different: Vec<f64> = Vec::new();
+        for value in values.iter().map(&value).filter(|v| !known.contains(v)) {
+            if !different.contains(&value) {
+                different.push(value);
+            }
+            if different.len() > MOST_SENTINELS {
+                return 0;
+            }
+        }
         if 2 * beyond >= values.len() {
             return 0;
         }
@@ -153,6 +166,12 @@ mod tests {
         // A description that has no car's speed within its range is wrong itself.
         speed.range = Some([0.0, 1.0]);
         assert_eq!(count(&speed), 5);
+        // So is one that only fits a car that stands.
+        let drives: Vec<[u8; 3]> = (0..20_u8).map(|i| [i.saturating_sub(12), 0, 0]).collect();
+        let frames = (0..)
+            .zip(&drives)
+            .map(|(step, data)| frame(step, &data[..]));
+        assert_eq!(speed.over_time(frames).values().len(), 20);
     }
 
     #[test]

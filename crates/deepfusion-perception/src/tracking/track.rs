@@ -70,6 +70,8 @@ pub(super) struct Track {
     pub unseen_s: f64,
     /// Whether it counts as dynamic.
     moving: Option<bool>,
+    /// Whether that was decided by a speed that was known well.
+    motion_sure: bool,
     /// Confidence of the last detection.
     confidence: f64,
     /// The class with the most votes, and their sum.
@@ -102,6 +104,7 @@ impl Track {
             hits: 1,
             unseen_s: 0.0,
             moving: None,
+            motion_sure: false,
             confidence: f64::from(measurement.detection.confidence),
             kind: measurement.detection.kind.clone(),
             relative_error: measurement.detection.relative_error,
@@ -205,11 +208,15 @@ impl Track {
     fn judge_motion(&mut self) {
         let doubt = self.filter.speed_deviation();
         let speed = self.filter.velocity().norm();
-        let limit = MOVING_MPS[usize::from(self.moving == Some(true))];
-        // A car far away is known to drive long before its speed is known well.
-        if doubt > MAX_SPEED_SIGMA_MPS && speed <= limit + 2.0 * doubt {
+        if doubt > MAX_SPEED_SIGMA_MPS {
+            // A car far away is known to drive long before its speed is known well, as long as it looks like that.
+            if !self.motion_sure {
+                self.moving = (speed > MOVING_MPS[0] + 2.0 * doubt).then_some(true);
+            }
             return;
         }
+        self.motion_sure = true;
+        let limit = MOVING_MPS[usize::from(self.moving == Some(true))];
         self.moving = Some(speed > limit.max(2.0 * doubt));
     }
 

@@ -166,7 +166,9 @@ impl Recording for BagRecording {
     }
 
     fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
-        let vehicle_from_cam = self.cam_from_vehicle.inverse();
+        // Where nothing says how the camera looks it may have been aimed since.
+        let cam_from_vehicle = dataset.cam_from_vehicle().unwrap_or(self.cam_from_vehicle);
+        let vehicle_from_cam = cam_from_vehicle.inverse();
         let mut paths = Vec::new();
         let pose = |frame: &usize| {
             let time_s = dataset.frames()[*frame].time_s?;

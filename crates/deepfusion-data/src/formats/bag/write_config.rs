@@ -83,7 +83,14 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
     if let Some(can) = own.get_mut("can").and_then(Value::as_table_mut) {
         remove_named_signals(can, &topics);
     }
-    if options.gives_camera() {
+    let given = options.calibration.as_ref();
+    let given = given.filter(|_| options.intrinsics.is_none() && options.hfov_deg.is_none());
+    if let Some(file) = given {
+        let file = std::path::absolute(file).map_err(|e| Error::file(file, e))?;
+        own.remove("camera");
+        let file = file.to_string_lossy().into_owned();
+        own.insert("calibration".into(), file.into());
+    } else if options.gives_camera() {
         let k = open_bag(bag.clone(), options)?.intrinsics(0);
         let mut camera = Table::new();
         for (key, value) in [("fx", k.fx), ("fy", k.fy), ("cx", k.cx), ("cy", k.cy)] {

@@ -23,7 +23,9 @@ pub(super) fn oxts_paths(
 ) -> Result<Vec<CameraPath>> {
     // Names what is missing, if something is.
     dataset.ego()?;
-    let imu_from_cam = calibration.require_cam_from_imu()?.inverse();
+    // Where nothing says how the camera looks it may have been aimed since.
+    let cam_from_imu = calibration.require_cam_from_imu()?;
+    let imu_from_cam = dataset.cam_from_vehicle().unwrap_or(cam_from_imu).inverse();
     let origin_ns = dataset.origin_ns().unwrap_or_default();
     let mut packets = read_packets(&dataset.folder().join("oxts"), origin_ns)?;
     for (_, packet) in &mut packets {
