@@ -9,6 +9,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 const MOVING_MPS: [f64; 2] = [1.0, 0.5];
 /// Largest standard deviation of the speed for that decision, m/s.
 const MAX_SPEED_SIGMA_MPS: f64 = 0.7;
+/// Standard deviations of the speed by which what is in doubt must be faster to count as dynamic: at two, boxes that predicted depth throws about
+/// do.
+const IN_DOUBT: f64 = 4.0;
 /// Weight of a value that was completed, not measured.
 const GUESS: f64 = 0.05;
 /// Largest weight of a size or a heading, so that it can still change.
@@ -211,7 +214,8 @@ impl Track {
         if doubt > MAX_SPEED_SIGMA_MPS {
             // A car far away is known to drive long before its speed is known well, as long as it looks like that.
             if !self.motion_sure {
-                self.moving = (speed > MOVING_MPS[0] + 2.0 * doubt).then_some(true);
+                let surely = speed > MOVING_MPS[0] + IN_DOUBT * doubt;
+                self.moving = surely.then_some(true);
             }
             return;
         }
