@@ -56,7 +56,65 @@ impl ObjectFrame {
     /// # Errors
     /// A file that is missing or is not what its name says.
     pub fn read(folder: &Path, labels: &Path) -> Result<Self> {
-        read(folder, labels)
+        let name = labels.file_stem().unwrap_or_default().to_string_lossy();
+        let image = ["png", "jpg"]
+            .map(|ending| folder.join(format!("image_2/{name}.{ending}")))
+            .into_iter()
+            .find(|path| path.exists())
+            .ok_or_else(|| DataError::Missing {
+                path: folder.join(format!("image_2/{name}.png")),
+                part: MissingPart::LabelledImage,
+            })?;
+        let calib = Calib::read(&folder.join(format!("calib/{name}.txt")))?;
+        let (width, height) = image_size(&image)?;
+        let p2 = calib.p2;
+        let pinhole = [(0, 0), (1, 1), (0, 2), (1, 2)].map(|place| p2[place]);
+        let camera = Intrinsics::from_numbers(pinhole, (width, height));
+        // P2 = K·[I | t]: t is what camera 2 lies off the labels' camera 0.
+        let offset = camera.inverse_matrix() * p2.column(3);
+        let cloud = PointCloud::read_kitti_bin(&folder.join(format!("velodyne/{name}.bin")))?;
+        let mut scan = DepthMap::empty(width as usize, height as usize);
+        for point in cloud.xyz.iter().filter(|p| p[0] >= 0.0) {
+            let p = Vector3::from(point.map(f64::from)).push(1.0);
+            let in_cam = calib.rectified * (calib.cam_from_velo * p) + offset;
+            if let Some(pixel) = camera.project(&in_cam) {
+                let (u, v) = (pixel.x.round(), pixel.y.round());
+                if u >= 0.0 && v >= 0.0 && u < f64::from(width) && v < f64::from(height) {
+                    scan.set_nearest(u as usize, v as usize, in_cam.z as f32);
+                }
+            }
+        }
+        let visibility = VisibilityDepth {
+            depth: scan,
+            dense: false,
+        };
+        let text = std::fs::read_to_string(labels).map_err(|e| DataError::file(labels, e))?;
+        let (mut found, mut unlabelled) = (Vec::new(), Vec::new());
+        for (number, line) in text
+            .lines()
+            .enumerate()
+            .filter(|(_, l)| !l.trim().is_empty())
+        {
+            let (class, mut label) =
+                parse(line, number as u64, &offset).ok_or_else(|| Error::ObjectFrame {
+                    path: labels.to_owned(),
+                    problem: ObjectFrameProblem::Label { line: number + 1 },
+                })?;
+            if class == "DontCare" {
+                unlabelled.extend(rectangle(line));
+                continue;
+            }
+            let seen = pixels_within(&label, &visibility, &camera, LEAST_POINTS);
+            label.counts = counts(&label, class, seen, LEAST_POINTS);
+            found.push(label);
+        }
+        Ok(Self {
+            image,
+            camera,
+            scan: visibility.depth,
+            labels: found,
+            unlabelled,
+        })
     }
 
     /// Whether a target's centre is seen where nobody labelled anything.
@@ -70,68 +128,6 @@ impl ObjectFrame {
             })
         })
     }
-}
-
-fn read(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
-    let name = labels.file_stem().unwrap_or_default().to_string_lossy();
-    let image = ["png", "jpg"]
-        .map(|ending| folder.join(format!("image_2/{name}.{ending}")))
-        .into_iter()
-        .find(|path| path.exists())
-        .ok_or_else(|| DataError::Missing {
-            path: folder.join(format!("image_2/{name}.png")),
-            part: MissingPart::LabelledImage,
-        })?;
-    let calib = Calib::read(&folder.join(format!("calib/{name}.txt")))?;
-    let (width, height) = image_size(&image)?;
-    let p2 = calib.p2;
-    let pinhole = [(0, 0), (1, 1), (0, 2), (1, 2)].map(|place| p2[place]);
-    let camera = Intrinsics::from_numbers(pinhole, (width, height));
-    // P2 = K·[I | t]: t is what camera 2 lies off the labels' camera 0.
-    let offset = camera.inverse_matrix() * p2.column(3);
-    let cloud = PointCloud::read_kitti_bin(&folder.join(format!("velodyne/{name}.bin")))?;
-    let mut scan = DepthMap::empty(width as usize, height as usize);
-    for point in cloud.xyz.iter().filter(|p| p[0] >= 0.0) {
-        let p = Vector3::from(point.map(f64::from)).push(1.0);
-        let in_cam = calib.rectified * (calib.cam_from_velo * p) + offset;
-        if let Some(pixel) = camera.project(&in_cam) {
-            let (u, v) = (pixel.x.round(), pixel.y.round());
-            if u >= 0.0 && v >= 0.0 && u < f64::from(width) && v < f64::from(height) {
-                scan.set_nearest(u as usize, v as usize, in_cam.z as f32);
-            }
-        }
-    }
-    let visibility = VisibilityDepth {
-        depth: scan,
-        dense: false,
-    };
-    let text = std::fs::read_to_string(labels).map_err(|e| DataError::file(labels, e))?;
-    let (mut found, mut unlabelled) = (Vec::new(), Vec::new());
-    for (number, line) in text
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| !l.trim().is_empty())
-    {
-        let (class, mut label) =
-            parse(line, number as u64, &offset).ok_or_else(|| Error::ObjectFrame {
-                path: labels.to_owned(),
-                problem: ObjectFrameProblem::Label { line: number + 1 },
-            })?;
-        if class == "DontCare" {
-            unlabelled.extend(rectangle(line));
-            continue;
-        }
-        let seen = pixels_within(&label, &visibility, &camera, LEAST_POINTS);
-        label.counts = counts(&label, class, seen, LEAST_POINTS);
-        found.push(label);
-    }
-    Ok(ObjectFrame {
-        image,
-        camera,
-        scan: visibility.depth,
-        labels: found,
-        unlabelled,
-    })
 }
 
 /// Left, top, right and bottom of a line's rectangle.
