@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
 use deepfusion_hint::count_of;
@@ -12,6 +12,15 @@ use crate::failure::Result;
 use crate::interrupt;
 use crate::output;
 use crate::progress::{Progress, say};
+
+/// What was made, for scripts.
+#[derive(serde::Serialize)]
+struct Made<'a> {
+    written: &'a [PathBuf],
+    frames: usize,
+    /// Whole seconds by which all times are later than the input's.
+    moved_s: i64,
+}
 
 /// `deepfusion data convert`.
 pub(super) fn run(args: &ConvertArgs) -> Result<()> {
@@ -67,11 +76,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     }
     let frames: usize = datasets.iter().map(|d| d.frames().len()).sum();
     if args.json {
-        return output::print_json(&serde_json::json!({
-            "written": paths,
-            "frames": frames,
-            "moved_s": moved_s,
-        }));
+        return output::print_json(&Made {
+            written: &paths,
+            frames,
+            moved_s,
+        });
     }
     say(&format!("{} written", count_of(frames, "frame")));
     for path in &paths {

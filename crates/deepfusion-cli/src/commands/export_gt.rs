@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use deepfusion_data::{Dataset, OpenOptions, export_gt};
 use deepfusion_hint::count_of;
 use deepfusion_jobs::evaluation::{check_used, expected_frames};
@@ -11,6 +13,16 @@ use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
+
+/// What was made, for scripts.
+#[derive(serde::Serialize)]
+struct Made<'a> {
+    file: &'a Path,
+    frames: usize,
+    /// Frames of the split, where one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected: Option<usize>,
+}
 
 /// `deepfusion data export-gt`.
 pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
@@ -55,12 +67,10 @@ pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
         warnings::warn_once(shortfall.to_string());
     }
     if args.json {
-        let file = &args.out;
-        return output::print_json(&match expected {
-            Some(expected) => {
-                serde_json::json!({ "file": file, "frames": written, "expected": expected })
-            }
-            None => serde_json::json!({ "file": file, "frames": written }),
+        return output::print_json(&Made {
+            file: &args.out,
+            frames: written,
+            expected,
         });
     }
     say(&match expected {

@@ -13,6 +13,18 @@ use crate::failure::Result;
 use crate::progress::say;
 use crate::{interrupt, output};
 
+/// What was read and written, for scripts.
+#[derive(serde::Serialize)]
+struct Imported<'a> {
+    format: String,
+    speeds: usize,
+    yaw_rates: usize,
+    duration_s: f64,
+    fastest_mps: f64,
+    notes: Vec<String>,
+    written: &'a Path,
+}
+
 /// `deepfusion data import`.
 pub(super) fn run(args: &ImportArgs) -> Result<()> {
     let named = [&args.video, &args.images, &args.calibration];
@@ -72,15 +84,20 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         .map_or(0.0, |(a, b)| (b.ns - a.ns) as f64 * 1e-9);
     let fastest_mps = log.speeds.iter().map(|s| s.mps).fold(0.0, f64::max);
     if args.json {
-        return output::print_json(&serde_json::json!({
-            "format": log.format.to_string(),
-            "speeds": log.speeds.len(),
-            "yaw_rates": log.yaw_rates.len(),
-            "duration_s": duration_s,
-            "fastest_mps": fastest_mps,
-            "notes": log.notes.iter().chain(&notes).map(LogNote::to_string).collect::<Vec<_>>(),
-            "written": args.out,
-        }));
+        return output::print_json(&Imported {
+            format: log.format.to_string(),
+            speeds: log.speeds.len(),
+            yaw_rates: log.yaw_rates.len(),
+            duration_s,
+            fastest_mps,
+            notes: log
+                .notes
+                .iter()
+                .chain(&notes)
+                .map(LogNote::to_string)
+                .collect(),
+            written: &args.out,
+        });
     }
     say(&format!(
         "{}: {} in {duration_s:.1} s, at most {fastest_mps:.1} m/s ({:.0} km/h); {}",

@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use crate::cli::{SimulateArgs, SimulateFormat, Size};
 use crate::error::CliError;
 use crate::failure::Result;
@@ -10,6 +12,19 @@ use deepfusion_sim::{
     BagSettings, DrawnDrive, Scene, Sensors, SimConfig, Simulation, VariedConflict, write_bag,
     write_kitti,
 };
+
+/// What was made, for scripts.
+#[derive(serde::Serialize)]
+struct Made<'a> {
+    drive: &'a Path,
+    frames: usize,
+    size: [u32; 2],
+    seed: u64,
+    moving_cars: usize,
+    /// What was drawn for a varied drive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    varied: Option<&'a DrawnDrive>,
+}
 
 /// `deepfusion simulate`.
 pub(super) fn run(args: &SimulateArgs) -> Result<()> {
@@ -39,17 +54,14 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     };
     drop(progress);
     if args.json {
-        let mut made = serde_json::json!({
-            "drive": drive,
-            "frames": config.frames,
-            "size": [config.width, config.height],
-            "seed": config.seed,
-            "moving_cars": simulation.moving_cars(),
+        return output::print_json(&Made {
+            drive: &drive,
+            frames: config.frames,
+            size: [config.width, config.height],
+            seed: config.seed,
+            moving_cars: simulation.moving_cars(),
+            varied: simulation.drawn(),
         });
-        if let Some(drawn) = simulation.drawn() {
-            made["varied"] = serde_json::json!(drawn);
-        }
-        return output::print_json(&made);
     }
     say(&format!(
         "{} of {}x{} written",

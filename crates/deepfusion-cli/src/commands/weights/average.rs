@@ -1,10 +1,23 @@
+use std::path::Path;
+
 use deepfusion_jobs::averaging::{Kinship, StatisticsSpread, average};
+use deepfusion_model::AveragedNetwork;
 
 use crate::cli::AverageArgs;
 use crate::failure::Result;
 use crate::model::warn_of_hidden;
 use crate::output;
 use crate::progress::say;
+
+/// What was made, for scripts.
+#[derive(serde::Serialize)]
+struct Made<'a> {
+    checkpoint: &'a Path,
+    networks: &'a [AveragedNetwork],
+    /// Whether all began from the same trained network.
+    related: bool,
+    statistics: Option<&'a StatisticsSpread>,
+}
 
 /// `deepfusion weights average`.
 pub(crate) fn run(args: &AverageArgs) -> Result<()> {
@@ -45,12 +58,12 @@ pub(crate) fn run(args: &AverageArgs) -> Result<()> {
         );
     }
     if args.json {
-        return output::print_json(&serde_json::json!({
-            "checkpoint": made.checkpoint,
-            "networks": made.networks,
-            "related": made.kinship == Kinship::Network,
-            "statistics": made.statistics,
-        }));
+        return output::print_json(&Made {
+            checkpoint: &made.checkpoint,
+            networks: &made.networks,
+            related: made.kinship == Kinship::Network,
+            statistics: made.statistics.as_ref(),
+        });
     }
     output::print(&format!("{}\n", made.checkpoint.display()))
 }

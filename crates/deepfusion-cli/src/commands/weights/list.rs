@@ -1,5 +1,5 @@
 use deepfusion_jobs::importing::{KNOWN, KnownWeights};
-use deepfusion_weights::Card;
+use deepfusion_weights::{Card, CardSummary};
 
 use crate::failure::Result;
 use crate::output;
@@ -12,15 +12,21 @@ const RUN: KnownWeights = KnownWeights {
     terms: "yours",
 };
 
+/// What is listed, for scripts.
+#[derive(serde::Serialize)]
+struct Listing<'a> {
+    embedded: Vec<CardSummary<'a>>,
+    importable: Vec<&'a KnownWeights>,
+}
+
 /// `deepfusion weights list`.
 pub(crate) fn run(json: bool) -> Result<()> {
     let networks = deepfusion_weights::all()?;
     if json {
-        let embedded: Vec<_> = networks.iter().map(|n| n.card.summary()).collect();
-        let importable: Vec<_> = KNOWN.iter().chain([&RUN]).collect();
-        return output::print_json(
-            &serde_json::json!({"embedded": embedded, "importable": importable}),
-        );
+        return output::print_json(&Listing {
+            embedded: networks.iter().map(|n| n.card.summary()).collect(),
+            importable: KNOWN.iter().chain([&RUN]).collect(),
+        });
     }
     let mut text = "Embedded, for --model NAME and --init NAME:\n".to_owned();
     if networks.is_empty() {
