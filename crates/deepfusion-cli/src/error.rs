@@ -163,6 +163,12 @@ pub(crate) enum CliError {
         /// What was given.
         input: String,
     },
+    /// Tables that would be written into the file of the pictures beside them.
+    #[error("{}: the file of the pictures beside the tables, which are asked for under the same name", path.display())]
+    TablesInPicture {
+        /// The file.
+        path: PathBuf,
+    },
     /// Outputs were to go into a file.
     #[error("{}: a file, and a folder is to be written there", path.display())]
     NotAFolder {
@@ -307,6 +313,7 @@ impl Reportable for CliError {
                 if unreadable < recordings { ", or give the others by themselves" } else { "" }
             )),
             Self::OutputsAlone { .. } => Some("give the images themselves, or another folder for the outputs".into()),
+            Self::TablesInPicture { .. } => Some("give --out another ending, as .html or .txt".into()),
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),

@@ -79,8 +79,20 @@ pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf>
     Ok(folder)
 }
 
-/// Fails where a file could not be written for want of its folder: an error before long work, not after it.
-pub(crate) fn require_folder_of(file: &Path) -> Result<()> {
+/// Fails where a file is there that may not be replaced, or could not be written for want of its folder: an error before long work, not after it.
+pub(crate) fn require_new(file: &Path, overwrite: bool) -> Result<()> {
+    if file.exists() && (!overwrite || file.is_dir()) {
+        return Err(crate::error::CliError::Exists {
+            path: file.to_owned(),
+            remedy: "choose another name, or give --overwrite to replace a file",
+        }
+        .into());
+    }
+    require_folder_of(file)
+}
+
+/// Fails where a file could not be written for want of its folder.
+fn require_folder_of(file: &Path) -> Result<()> {
     match file.parent() {
         Some(folder) if folder != Path::new("") && !folder.is_dir() => {
             let missing = std::io::Error::from(ErrorKind::NotFound);

@@ -2,10 +2,11 @@
 
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::text_of;
-use deepfusion_data::{Dataset, Error, OpenOptions, inspect};
+use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_kitti, inspect};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::Frame;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -496,6 +497,33 @@ fn a_twist_without_a_yaw_rate_has_a_speed() {
     near(now_and_then.speed(), 10.0);
     near(now_and_then.turn_rad(), 0.5 * 0.2);
     assert!(open(&now_and_then.bag).unwrap().yaw_known());
+}
+
+/// Rates say how the vehicle turned between two images, and not how it stands: their sum since the bag's begin, which a bias or a ramp makes ever
+/// greater, rolls no bend.
+#[test]
+fn rates_of_roll_and_pitch_tilt_a_pair_alone() {
+    let drive = Drive::new("", |bag| {
+        bag.tumbling_twist("/twist", 10.0, [0.0, 1.5, 1.0]);
+    });
+    let dataset = open(&drive.bag).unwrap();
+    let track = dataset.track().unwrap();
+    for from_s in [0.1, 0.7] {
+        let moved = track.motion(from_s, from_s + 0.1).unwrap();
+        near(moved.yaw_rad, 0.1);
+        near(moved.tilt_rad[0], 0.0);
+        near(moved.tilt_rad[1], 0.15);
+    }
+    // And so in a copy in KITTI's layout.
+    let out = drive.folder.path().join("copy");
+    let whole = std::slice::from_ref(&dataset);
+    convert_to_kitti(whole, &out, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let copy = Dataset::open(&out, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    let moved = copy.track().unwrap().motion(0.7, 0.8).unwrap();
+    near(moved.tilt_rad[0], 0.0);
+    near(moved.tilt_rad[1], 0.15);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
 
+use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
 
 /// The endings of images.
@@ -80,10 +81,11 @@ pub fn find_inputs(
         let path = path.clone();
         return Err(deepfusion_data::Error::NoSuchPath { path }.into());
     }
+    let recordings = each_once(recordings);
     opened(&recordings);
     let mut inputs = named(found);
-    let used: HashSet<String> = inputs.iter().map(|i| i.name.to_lowercase()).collect();
-    inputs.extend(frames_of(recordings, &used));
+    let images: Vec<String> = inputs.iter().map(|i| i.name.to_lowercase()).collect();
+    inputs.extend(frames_of(recordings, &images));
     Ok(inputs)
 }
 
@@ -109,19 +111,42 @@ fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Datase
     }
 }
 
-/// The selected frames of recordings. They are named by their numbers, after the recording's name where there are others.
-fn frames_of(mut recordings: Vec<Dataset>, used: &HashSet<String>) -> Vec<Input> {
+/// Sorts recordings, and drops those given twice.
+fn each_once(mut recordings: Vec<Dataset>) -> Vec<Dataset> {
     recordings.sort_by(|a, b| a.folder().cmp(b.folder()).then(a.name().cmp(b.name())));
-    let alone = recordings.len() == 1 && used.is_empty();
+    let mut seen = HashSet::new();
+    recordings.retain(|dataset| {
+        let folder = dataset.folder();
+        let folder = std::fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+        let first = dataset.frames().first().map(|frame| frame.number);
+        let (name, camera) = (dataset.name().to_owned(), dataset.camera());
+        seen.insert((folder, name, camera, first))
+    });
+    recordings
+}
+
+/// The selected frames of recordings. They are named by their numbers, after the recording's name where there are others: a name that is another's
+/// too has a number, and so has one with which names of `images`, in small letters, begin.
+fn frames_of(recordings: Vec<Dataset>, images: &[String]) -> Vec<Input> {
+    let alone = recordings.len() == 1 && images.is_empty();
+    let mut names = UniqueNames::default();
     let mut inputs = Vec::new();
     for dataset in recordings {
         let dataset = Arc::new(dataset);
+        let prefix = names.take_if(dataset.name(), |name| {
+            let begins = |image: &String| {
+                image
+                    .strip_prefix(name)
+                    .is_some_and(|rest| rest.starts_with('-'))
+            };
+            !images.iter().any(begins)
+        });
         for index in dataset.selected() {
             let frame = &dataset.frames()[*index];
             let name = if alone {
                 format!("{:010}", frame.number)
             } else {
-                format!("{}-{:010}", dataset.name(), frame.number)
+                format!("{prefix}-{:010}", frame.number)
             };
             inputs.push(Input {
                 path: frame.image.path().to_owned(),
@@ -159,19 +184,10 @@ fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     paths.sort();
     let mut seen = HashSet::new();
     paths.retain(|p| seen.insert(std::path::absolute(p).unwrap_or_else(|_| p.clone())));
-    let mut used = HashSet::new();
+    let mut used = UniqueNames::default();
     let name = |path: &PathBuf| {
-        let stem = path
-            .file_stem()
-            .map_or("image".into(), |s| s.to_string_lossy().into_owned());
-        let mut name = stem.clone();
-        let mut number = 1;
-        // In small letters: to some file systems `A` and `a` are the same.
-        while !used.insert(name.to_lowercase()) {
-            number += 1;
-            name = format!("{stem}-{number}");
-        }
-        name
+        let stem = path.file_stem();
+        used.take(&stem.map_or("image".into(), |s| s.to_string_lossy()))
     };
     let names: Vec<String> = paths.iter().map(name).collect();
     let both = paths.into_iter().zip(names);
@@ -215,6 +231,44 @@ mod tests {
         let absolute = std::path::absolute("a/0.png").unwrap();
         let twice = ["./a/0.png", "a/0.png", absolute.to_str().unwrap()];
         assert_eq!(names(&twice), ["0"]);
+    }
+
+    /// A folder of one frame with tables beside it.
+    fn write_drive(folder: &Path) {
+        let images = folder.join("images");
+        std::fs::create_dir_all(&images).unwrap();
+        let image = image::RgbImage::from_pixel(64, 32, image::Rgb([90, 120, 60]));
+        image.save(images.join("0.png")).unwrap();
+        std::fs::write(folder.join("frames.csv"), "time_s,file\n0.5,0.png\n").unwrap();
+        std::fs::write(folder.join("intrinsics.txt"), "40 40 32 16\n").unwrap();
+    }
+
+    #[test]
+    fn recordings_of_the_same_name_do_not_overwrite_each_other() {
+        let root = tempfile::tempdir().unwrap();
+        let drive = |name: &str| {
+            let folder = root.path().join(name);
+            write_drive(&folder);
+            folder.display().to_string()
+        };
+        let (monday, tuesday) = (drive("monday/drive"), drive("tuesday/Drive"));
+        let names = |of: &[&String]| -> Vec<String> {
+            let arguments: Vec<String> = of.iter().map(|of| (*of).clone()).collect();
+            let inputs = find_inputs(&arguments, &OpenOptions::default(), |_| ()).unwrap();
+            inputs.into_iter().map(|input| input.name).collect()
+        };
+        let both = ["drive-0000000000", "Drive-2-0000000000"];
+        assert_eq!(names(&[&monday, &tuesday]), both);
+        assert_eq!(names(&[&tuesday, &monday]), both);
+        // Given twice it is one.
+        assert_eq!(names(&[&monday, &monday]), ["0000000000"]);
+        // An image may have the name of a frame.
+        let image = root.path().join("drive-0000000000.png");
+        std::fs::copy(root.path().join("monday/drive/images/0.png"), &image).unwrap();
+        assert_eq!(
+            names(&[&image.display().to_string(), &monday]),
+            ["drive-0000000000", "drive-2-0000000000"]
+        );
     }
 
     /// A comma2k19 segment has a picture for an overview beside its video.

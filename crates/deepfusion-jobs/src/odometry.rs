@@ -16,6 +16,7 @@ pub use self::warning::OdometryWarning;
 
 use crate::Result;
 use crate::files::write;
+use crate::unique_names::UniqueNames;
 
 /// Exact poses of simulated drives.
 const EXACT_POSES: &str = "poses.txt";
@@ -64,6 +65,7 @@ pub fn tracks(
     let both_cameras = datasets.iter().any(|d| d.camera() != datasets[0].camera());
     let mut done = 0;
     let mut tracks = Vec::new();
+    let mut names = UniqueNames::default();
     for (dataset, path, several) in stretches {
         let mut motions = Vec::new();
         let mut images: Vec<Vec<f32>> = Vec::new();
@@ -78,7 +80,7 @@ pub fn tracks(
             progress(done, total);
         }
         motions.extend(predictor.motions(&images));
-        let name = track_name(dataset, &path, several, both_cameras);
+        let name = names.take(&track_name(dataset, &path, several, both_cameras));
         let track = TrackPair::new(name, path.world_from_cam, chain(&motions))?;
         tracks.push(track.with_times(path.times_s));
     }

@@ -35,7 +35,7 @@ pub(crate) struct CalibrateArgs {
     /// The calibration file to write.
     #[arg(long, value_name = "FILE.yaml", value_parser = yaml, default_value = "camera.yaml")]
     pub out: PathBuf,
-    /// Replace the file if it is there.
+    /// Replace the files of --out and --report if they are there.
     #[arg(long)]
     pub overwrite: bool,
     /// Also write a page: the numbers, where corners were seen, every view and its error.

@@ -28,6 +28,9 @@ pub(crate) struct CompareArgs {
     /// Write to this file instead of stdout.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Replace files that are there.
+    #[arg(long, requires = "out")]
+    pub overwrite: bool,
     /// Also predict images of this recording with every RUN, side by side: a PNG beside --out, and in the HTML.
     #[arg(long, value_name = "PATH", requires = "out", requires = "runs")]
     pub pictures: Option<PathBuf>,

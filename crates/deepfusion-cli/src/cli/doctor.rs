@@ -69,6 +69,9 @@ pub(crate) struct DoctorArgs {
     /// Also write a page with plots over time and measured depth on images.
     #[arg(long, value_name = "FILE.html", requires = "path")]
     pub report: Option<PathBuf>,
+    /// Replace the page if it is there.
+    #[arg(long, requires = "report")]
+    pub overwrite: bool,
     /// Also print every figure that was measured.
     #[arg(long, short, requires = "path")]
     pub verbose: bool,

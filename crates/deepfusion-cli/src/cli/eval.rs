@@ -107,6 +107,9 @@ pub(crate) struct EvalArgs {
     /// Also write a page that opens offline: tables, charts, best and worst frames, learning curves, settings.
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
+    /// Replace the files of --report and --points-out if they are there.
+    #[arg(long)]
+    pub overwrite: bool,
     /// Predicted values that are NaN, infinite or not above 0 mean "none here": leave them out and count them.
     #[arg(long)]
     pub allow_holes: bool,

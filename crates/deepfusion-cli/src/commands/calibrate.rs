@@ -6,7 +6,6 @@ use deepfusion_jobs::board::{SearchProgress, find_views};
 
 use crate::cli::CalibrateArgs;
 use crate::commands::command_line;
-use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
@@ -18,15 +17,8 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         args.board.height as usize,
         args.square,
     )?;
-    if args.out.exists() && !args.overwrite {
-        return Err(CliError::Exists {
-            path: args.out.clone(),
-            remedy: "choose another --out, or give --overwrite to replace it",
-        }
-        .into());
-    }
     for file in std::iter::once(&args.out).chain(&args.report) {
-        output::require_folder_of(file)?;
+        output::require_new(file, args.overwrite)?;
     }
     let mut progress = Progress::new("looking for the board");
     let seen = find_views(

@@ -1,6 +1,6 @@
 //! `deepfusion compare`: evaluations side by side.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Cameras, save_png};
 use deepfusion_eval::compare::{Evaluation, Tables, published_tables, run_tables};
@@ -19,18 +19,18 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion compare`.
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
-    if let Some(file) = &args.out {
-        output::require_folder_of(file)?;
+    let sheet = pictures_beside(args)?;
+    for file in args.out.iter().chain(&sheet) {
+        output::require_new(file, args.overwrite)?;
     }
     let mut tables = run_tables(&Evaluation::collect(&args.runs)?);
     if args.published {
         tables = tables.and(published_tables()?);
     }
-    let rows = match (&args.pictures, &args.out) {
-        (Some(recording), Some(out)) => {
+    let rows = match (&args.pictures, &sheet) {
+        (Some(recording), Some(path)) => {
             let rows = pictures(args, recording)?;
-            let path = out.with_extension("png");
-            save_png(&model_sheet(&rows, &DepthScale::default()), &path)?;
+            save_png(&model_sheet(&rows, &DepthScale::default()), path)?;
             say(&format!("pictures  {}", path.display()));
             rows
         }
@@ -46,6 +46,18 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         Some(path) => output::write(path, text),
         None => output::print(&text),
     }
+}
+
+/// The file of the pictures, where there are any: that of the tables with the ending of a PNG.
+fn pictures_beside(args: &CompareArgs) -> Result<Option<PathBuf>> {
+    let (Some(_), Some(out)) = (&args.pictures, &args.out) else {
+        return Ok(None);
+    };
+    let sheet = out.with_extension("png");
+    if sheet == *out {
+        return Err(CliError::TablesInPicture { path: sheet }.into());
+    }
+    Ok(Some(sheet))
 }
 
 fn html(args: &CompareArgs, tables: &Tables, rows: &[Vec<Tile>]) -> Result<String> {

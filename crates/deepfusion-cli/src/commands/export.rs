@@ -4,7 +4,6 @@ use deepfusion_onnx::check::PICTURES;
 use serde::Serialize;
 
 use crate::cli::ExportArgs;
-use crate::error::CliError;
 use crate::failure::Result;
 use crate::model;
 use crate::output;
@@ -35,13 +34,7 @@ struct CheckReport {
 /// `deepfusion export`.
 pub(super) fn run(args: &ExportArgs) -> Result<()> {
     let out = &args.out;
-    if out.exists() && (!args.overwrite || out.is_dir()) {
-        return Err(CliError::Exists {
-            path: out.clone(),
-            remedy: "choose another name, or give --overwrite to replace a file",
-        }
-        .into());
-    }
+    output::require_new(out, args.overwrite)?;
     let network = model::chosen(args.model.as_deref())?.load(args.set.as_deref())?;
     let size = args.size.map(Into::into);
     let exported = export(&network, size, args.check_with.as_deref(), out)?;

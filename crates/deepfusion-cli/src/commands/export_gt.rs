@@ -9,7 +9,6 @@ use super::clocks;
 use super::recordings::open_recordings;
 use super::warnings;
 use crate::cli::ExportGtArgs;
-use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
@@ -26,13 +25,7 @@ struct Made<'a> {
 
 /// `deepfusion data export-gt`.
 pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
-    if args.out.exists() && !args.overwrite {
-        return Err(CliError::Exists {
-            path: args.out.clone(),
-            remedy: "pass --overwrite to replace it, or choose another name",
-        }
-        .into());
-    }
+    output::require_new(&args.out, args.overwrite)?;
     let mut options = OpenOptions {
         camera: args.camera,
         split: read_split(args.split.as_deref())?,

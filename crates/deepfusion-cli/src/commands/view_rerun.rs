@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::cli::ViewArgs;
+#[cfg(not(feature = "rerun"))]
 use crate::error::CliError;
 use crate::failure::Result;
 
@@ -12,14 +13,7 @@ pub(super) fn run(args: &ViewArgs, file: &Path) -> Result<()> {
     use crate::progress::{Progress, say};
     use crate::{interrupt, output};
 
-    if file.exists() && (!args.overwrite || file.is_dir()) {
-        return Err(CliError::Exists {
-            path: file.to_owned(),
-            remedy: "choose another name, or give --overwrite to replace a file",
-        }
-        .into());
-    }
-    output::require_folder_of(file)?;
+    output::require_new(file, args.overwrite)?;
     let folder = deepfusion_view::Folder::open(&args.folder)?;
     interrupt::catch("stopping; nothing is written");
     let mut bar = Progress::new("writing");

@@ -188,6 +188,24 @@ impl TinyBag {
         })
     }
 
+    /// A twist with rates about all three axes, rad/s.
+    pub(crate) fn tumbling_twist(
+        &mut self,
+        topic: &str,
+        speed_mps: f64,
+        [x, y, z]: [f64; 3],
+    ) -> &mut Self {
+        self.stream(topic, |header| {
+            let mut twist = TwistStamped {
+                header,
+                ..TwistStamped::default()
+            };
+            twist.twist.linear.x = speed_mps;
+            twist.twist.angular = Vector3 { x, y, z };
+            twist
+        })
+    }
+
     /// An inertial unit that lies flat and turns to the left, rad/s.
     pub(crate) fn imu(&mut self, topic: &str, yaw_rate: f64) -> &mut Self {
         self.imu_along_z(topic, yaw_rate, 9.81)

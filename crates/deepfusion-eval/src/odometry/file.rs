@@ -83,7 +83,7 @@ impl PoseFile {
     }
 
     /// The predicted poses of `self` beside the true ones of `truth`. Two files with times are matched by the nearest
-    /// time within 10 ms, poses without a partner left out; otherwise line by line.
+    /// time within 10 ms, each pose at most once, poses without a partner left out; otherwise line by line.
     ///
     /// # Errors
     /// [`TrackError`] where the numbers of lines differ, or fewer than two times agree.
@@ -102,8 +102,11 @@ impl PoseFile {
             return Ok(pair.with_times(times_s.clone()));
         }
         let (mut true_poses, mut predicted, mut times_s) = (Vec::new(), Vec::new(), Vec::new());
-        for (pose, time_s) in self.poses.iter().zip(&self.times_s) {
-            if let Some(partner) = nearest(&truth.times_s, *time_s) {
+        for (i, (pose, time_s)) in self.poses.iter().zip(&self.times_s).enumerate() {
+            // Of several that are nearest to one true pose, as those of a faster path are, the nearest.
+            if let Some(partner) = nearest(&truth.times_s, *time_s)
+                && nearest(&self.times_s, truth.times_s[partner]) == Some(i)
+            {
                 predicted.push(*pose);
                 times_s.push(*time_s);
                 true_poses.push(truth.poses[partner]);

@@ -20,8 +20,8 @@ pub struct WorsenedCheck {
     pub check: Check,
     /// What it gave before.
     pub before: f64,
-    /// What it gives now.
-    pub after: f64,
+    /// What it gives now; `None` where depth is so wrong, or so poor, that too few frames still give anything.
+    pub after: Option<f64>,
 }
 
 /// What is compared.
@@ -39,7 +39,7 @@ pub enum Check {
 }
 
 impl Verdict {
-    /// The checks that `after` passes less well than this one, of the same frames; `None` where none of them can be compared.
+    /// The checks that `after` passes less well than this one, of the same frames, or gives no figure for any more; `None` where this one gave none.
     #[must_use]
     pub fn worse(&self, after: &Self) -> Option<Vec<WorsenedCheck>> {
         let checks = [
@@ -51,12 +51,13 @@ impl Verdict {
         let mut compared = false;
         let mut worse = Vec::new();
         for check in checks {
-            let (Some(before), Some(after)) = (self.of(check), after.of(check)) else {
+            let Some(before) = self.of(check) else {
                 continue;
             };
             compared = true;
+            let after = after.of(check).filter(|_| !self.lost_pairs(check, after));
             // NaN is worse than any.
-            if after.is_nan() || after > check.most(before) {
+            if after.is_none_or(|after| after.is_nan() || after > check.most(before)) {
                 worse.push(WorsenedCheck {
                     check,
                     before,
@@ -65,6 +66,12 @@ impl Verdict {
             }
         }
         compared.then_some(worse)
+    }
+
+    /// Whether most of the pairs of frames that a figure was the mean of are in sight of each other no longer: the few that are say nothing of them.
+    fn lost_pairs(&self, check: Check, after: &Self) -> bool {
+        let pairs = |of: &Self| of.without_truth.reprojection.map_or(0, |r| r.pairs);
+        check == Check::Reprojection && 2 * pairs(after) < pairs(self)
     }
 
     /// What a check gives; lower is better.
@@ -87,8 +94,11 @@ impl fmt::Display for WorsenedCheck {
             before,
             after,
         } = *self;
-        let (before, after) = (check.figure(before), check.figure(after));
-        write!(f, "{check} {after} after {before}")
+        let before = check.figure(before);
+        match after {
+            Some(after) => write!(f, "{check} {} after {before}", check.figure(after)),
+            None => write!(f, "{check} unknown after {before}"),
+        }
     }
 }
 
@@ -163,6 +173,25 @@ mod tests {
             names(before.worse(&verdict(f64::NAN, 0.03, 0.05))),
             [Check::Reprojection]
         );
-        assert_eq!(before.worse(&Verdict::default()), None);
+        assert_eq!(Verdict::default().worse(&before), None);
+    }
+
+    /// Depth so near that every pixel leaves the picture has no reprojection error at all.
+    #[test]
+    fn what_gives_no_figure_any_more_is_worse() {
+        let before = verdict(0.10, 0.03, 0.05);
+        let mut blind = verdict(0.10, 0.01, 0.05);
+        blind.scale_certificate = None;
+        blind.without_truth.reprojection = None;
+        let worse = before.worse(&blind).unwrap();
+        assert_eq!(
+            worse[0].to_string(),
+            "reprojection error unknown after 0.1000"
+        );
+        assert_eq!(names(Some(worse)), [Check::Reprojection, Check::Scale]);
+        let mut few = verdict(0.05, 0.03, 0.05);
+        few.without_truth.reprojection.as_mut().unwrap().pairs = 14;
+        assert_eq!(names(before.worse(&few)), [Check::Reprojection]);
+        assert_eq!(names(before.worse(&Verdict::default())).len(), 3);
     }
 }

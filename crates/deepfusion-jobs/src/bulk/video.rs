@@ -6,6 +6,7 @@ use std::sync::Arc;
 use deepfusion_video::{VideoPicture, shown_for, write_video};
 
 use super::manifest::Manifest;
+use crate::unique_names::UniqueNames;
 use crate::{Error, Input, Result};
 
 /// What the name of a video ends with.
@@ -79,11 +80,6 @@ pub fn write_one_video<'a>(
     Ok(Some((folder.join(name), pictures.len())))
 }
 
-/// The name of a recording's video.
-fn video_name(of: &str) -> String {
-    format!("{}{VIDEO_ENDING}", of.replace(['/', '\\'], "-"))
-}
-
 /// The inputs of each video and its name, numbered where two recordings share one.
 fn videos(inputs: &[Input]) -> Vec<(String, &[Input])> {
     let same = |a: &Input, b: &Input| match (&a.frame, &b.frame) {
@@ -91,23 +87,13 @@ fn videos(inputs: &[Input]) -> Vec<(String, &[Input])> {
         (None, None) => true,
         _ => false,
     };
-    let mut named: Vec<(String, &[Input])> = Vec::new();
-    for inputs in inputs.chunk_by(same) {
+    let mut names = UniqueNames::default();
+    let named = inputs.chunk_by(same).map(|inputs| {
         let recording = inputs[0].frame.as_ref().map(|(dataset, _)| dataset.name());
-        let of = recording.unwrap_or(IMAGES);
-        let numbered = |n: usize| match n {
-            1 => video_name(of),
-            _ => video_name(&format!("{of}-{n}")),
-        };
-        let free = |name: &String| {
-            named
-                .iter()
-                .all(|(other, _)| !other.eq_ignore_ascii_case(name))
-        };
-        let name = (1..).map(numbered).find(free).unwrap_or_default();
-        named.push((name, inputs));
-    }
-    named
+        let name = names.take(&recording.unwrap_or(IMAGES).replace(['/', '\\'], "-"));
+        (format!("{name}{VIDEO_ENDING}"), inputs)
+    });
+    named.collect()
 }
 
 fn time_s(input: &Input) -> Option<f64> {
@@ -137,6 +123,5 @@ mod tests {
             ("images_video.mp4", 2)
         );
         assert!(videos(&[]).is_empty());
-        assert_eq!(video_name("a/b"), "a-b_video.mp4");
     }
 }

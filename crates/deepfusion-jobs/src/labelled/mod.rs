@@ -21,6 +21,7 @@ pub use self::report::TargetReport;
 pub use self::source::{DepthSource, PredictedDepth};
 pub use self::tracklets::{Labels, pixels_within};
 use crate::scene::MotionTracker;
+use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
 
 /// Exact depth of simulated drives.
@@ -31,6 +32,8 @@ pub struct TargetEvaluation {
     source: DepthSource,
     perception: Perception,
     scorer: Scorer,
+    /// Of drives, and of frames that are of none.
+    names: UniqueNames,
 }
 
 /// A frame that was looked at.
@@ -55,6 +58,7 @@ impl TargetEvaluation {
             source,
             perception: Perception::new(config),
             scorer: Scorer::new(ScoringRules::default()),
+            names: UniqueNames::default(),
         }
     }
 
@@ -83,6 +87,7 @@ impl TargetEvaluation {
         let mut motions = MotionTracker::default();
         let before = self.score().frames;
         self.scorer.begin_drive();
+        let name = self.names.take(dataset.name());
         let frames = dataset.selected();
         for (done, index) in frames.iter().enumerate() {
             let visibility = visibility(dataset, *index)?;
@@ -107,7 +112,7 @@ impl TargetEvaluation {
             }
             let number = dataset.frames()[*index].number;
             each(EvaluatedFrame {
-                name: format!("{}-{number:010}.png", dataset.name()),
+                name: format!("{name}-{number:010}.png"),
                 targets: &targets,
                 camera: dataset.intrinsics(*index),
                 image: &|| dataset.load_image(*index),
@@ -141,10 +146,10 @@ impl TargetEvaluation {
                 .add_but(0.0, &targets, &frame.labels, &|target| {
                     frame.is_unlabelled(target)
                 });
-            let name = frame.image.with_extension("png");
-            let name = name.file_name().unwrap_or_default().to_string_lossy();
+            let name = frame.image.file_stem().unwrap_or_default();
+            let name = self.names.take(&name.to_string_lossy());
             each(EvaluatedFrame {
-                name: name.into_owned(),
+                name: format!("{name}.png"),
                 targets: &targets,
                 camera: frame.camera,
                 image: &|| Ok(deepfusion_data::load_rgb(&frame.image)?),

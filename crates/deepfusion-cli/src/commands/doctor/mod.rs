@@ -42,6 +42,9 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     if is_log {
         return log(path, args);
     }
+    if let Some(file) = &args.report {
+        output::require_new(file, args.overwrite)?;
+    }
     let mut options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,

@@ -106,10 +106,15 @@ fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<
     }
 }
 
-/// Whether depth is compared with ground truth: there is some, or a figure was asked for that needs it, which is an error where there is none.
+/// Whether depth is compared with ground truth: there is some, or something was asked for that needs it, which is an error where there is none.
 fn with_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
-    let needs_truth = args.gt_depth == GtKind::Annotated || args.points_out.is_some();
-    needs_truth || args.gt.is_some() || has_truth(datasets, args.gt_depth)
+    let needs_truth = args.gt_depth == GtKind::Annotated
+        || args.gt.is_some()
+        || args.points_out.is_some()
+        || args.calibrate_uncertainty
+        || args.calibrate_confidence
+        || args.trivial.is_some();
+    needs_truth || has_truth(datasets, args.gt_depth)
 }
 
 /// Compares depth with ground truth, beside the mean-depth baseline.

@@ -20,7 +20,7 @@ use crate::progress::{Progress, say};
 /// `deepfusion eval`.
 pub(super) fn run(args: &EvalArgs) -> Result<()> {
     for file in [&args.report, &args.points_out].into_iter().flatten() {
-        output::require_folder_of(file)?;
+        output::require_new(file, args.overwrite)?;
     }
     let found = match (&args.pred, args.pred_kind, &args.gt) {
         (Some(predictions), Some(kind), Some(truth)) => EvaluationOutcome {

@@ -107,7 +107,7 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
         track = VehicleTrack::new(&speeds).with_yaw_rate(&turns, VehicleTrack::MAX_GAP_S);
     }
     if index.tilt_rates.iter().any(|(_, rates)| *rates != [0.0; 2]) {
-        track = track.with_tilt(&roll_and_pitch(index, origin_ns));
+        track = track.with_tilt_rates(&tilt_rates(index, origin_ns), VehicleTrack::MAX_GAP_S);
     }
     Motion {
         track: track.into(),
@@ -115,22 +115,14 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
     }
 }
 
-/// Roll and pitch by their rates: from any start, since only their change counts.
-fn roll_and_pitch(index: &Index, origin_ns: i64) -> Vec<(f64, f64, f64)> {
-    let finite = |(_, rates): &&(i64, [f64; 2])| rates.iter().all(|rate| rate.is_finite());
-    // One NaN would make NaN of the sum of all after it.
-    let mut rates: Vec<_> = index.tilt_rates.iter().filter(finite).copied().collect();
+/// The rates of roll and pitch, each at its time. They are integrated over a pair of frames alone: the sum of all before it would tilt the vehicle by
+/// the rates' bias, and on a ramp by the turns themselves.
+fn tilt_rates(index: &Index, origin_ns: i64) -> Vec<(f64, [f64; 2])> {
+    let mut rates = index.tilt_rates.clone();
     rates.sort_by_key(|(ns, _)| *ns);
-    let mut tilt = [0.0; 2];
-    let mut last: Option<&(i64, [f64; 2])> = None;
-    let mut samples = Vec::with_capacity(rates.len());
-    for reading in &rates {
-        if let Some((before_ns, before)) = last {
-            let half_s = 0.5e-9 * (reading.0 - before_ns) as f64;
-            tilt = [0, 1].map(|i| tilt[i] + half_s * (before[i] + reading.1[i]));
-        }
-        last = Some(reading);
-        samples.push(((reading.0 - origin_ns) as f64 * 1e-9, tilt[0], tilt[1]));
-    }
-    samples
+    let at_s = |ns: i64| (ns - origin_ns) as f64 * 1e-9;
+    rates
+        .into_iter()
+        .map(|(ns, rates)| (at_s(ns), rates))
+        .collect()
 }

@@ -75,7 +75,8 @@ impl OxtsPacket {
 }
 
 /// Reads the packets of an `oxts` folder as a track of forward speed (`vf`), yaw rate (`wz`), roll and pitch over
-/// seconds from `origin_ns`. Packets that are not there leave a gap.
+/// seconds from `origin_ns`. Packets that are not there leave a gap. Where every packet is level to the last digit and rates (`wx`, `wy`) are given, as
+/// in copies of drives whose vehicle says its rates alone, the track has these.
 ///
 /// # Errors
 /// [`Error::Missing`] without the folder, its time stamps or any packet; [`Error::TimeStamp`],
@@ -90,6 +91,12 @@ pub fn read_oxts(folder: &Path, origin_ns: i64) -> Result<VehicleTrack> {
     };
     let packets = read_packets(folder, origin_ns)?;
     let track = VehicleTrack::new(&packets.iter().map(sample).collect::<Vec<_>>());
+    let tilt_rates = |packet: &OxtsPacket| [packet.rate_radps[0], packet.rate_radps[1]];
+    let level = packets.iter().all(|(_, p)| p.attitude_rad[..2] == [0.0; 2]);
+    if level && packets.iter().any(|(_, p)| tilt_rates(p) != [0.0; 2]) {
+        let rates = packets.iter().map(|(time_s, p)| (*time_s, tilt_rates(p)));
+        return Ok(track.with_tilt_rates(&rates.collect::<Vec<_>>(), VehicleTrack::MAX_GAP_S));
+    }
     Ok(track.with_tilt(&packets.iter().map(tilt).collect::<Vec<_>>()))
 }
 
