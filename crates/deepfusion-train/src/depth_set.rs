@@ -257,6 +257,25 @@ impl DepthSet {
         recorded.map(of_frame).or_else(simulated)
     }
 
+    /// The camera of every frame with its place in `data.sets`, at the images' own sizes, and those that simulated views always have.
+    pub(crate) fn cameras(&self) -> impl Iterator<Item = (usize, Intrinsics)> {
+        let of_frame = |f: &DepthFrame| {
+            let camera = self.datasets[f.dataset].intrinsics(f.frame);
+            (self.set_of[f.dataset], camera)
+        };
+        let held = self.simulated.iter().flat_map(|source| {
+            let cameras = source.endless.config().cameras.iter();
+            cameras.map(|camera| (source.set, camera.intrinsics))
+        });
+        self.frames.iter().map(of_frame).chain(held)
+    }
+
+    /// Whether views are simulated by cameras that are drawn with them.
+    pub(crate) fn draws_cameras(&self) -> bool {
+        let drawn = |s: &SimulatedViews| s.endless.config().cameras.is_empty();
+        self.simulated.iter().any(drawn)
+    }
+
     /// The part that belongs to one set of `data.sets`.
     #[must_use]
     pub fn of_set(&self, set: usize) -> Self {

@@ -317,6 +317,15 @@ impl SampleSet {
         self.samples.first().map(of).or_else(|| self.depth.camera())
     }
 
+    /// The camera of every sample with its place in `data.sets`, at the images' own sizes.
+    pub(crate) fn cameras(&self) -> impl Iterator<Item = (usize, Intrinsics)> {
+        let of = |sample: &Sample| {
+            let camera = self.datasets[sample.dataset].intrinsics(sample.snippet.target);
+            (self.set_of[sample.dataset], camera)
+        };
+        self.samples.iter().map(of).chain(self.depth.cameras())
+    }
+
     /// Whether there is nothing to learn from.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -383,14 +383,15 @@ impl Start {
     }
 }
 
-/// The configuration of a packed network's run; its metres are no matter here, of whichever data set.
+/// The configuration of a packed network's run; its PoseNet's metres are no matter here, of whichever data set.
 fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     let origin = || network.card.name.clone().into();
     let read = TrainConfig::from_run_table(network.card.config.clone());
-    let (config, _) = read.map_err(|e| ModelError::ConfigFile {
+    let (mut config, found) = read.map_err(|e| ModelError::ConfigFile {
         path: origin(),
         reason: e.into(),
     })?;
+    config.canonical_focal_px = config.canonical_focal_px.or(found.canonical_focal_px);
     Ok(config)
 }
 

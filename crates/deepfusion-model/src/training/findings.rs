@@ -26,6 +26,9 @@ pub struct TrainFindings {
     /// The camera trained with, at the size of its images; `None` for imported weights. Several cameras: the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
+    /// f_c as `canonical_focal_px`, where that is absent and the training data has several focal lengths: the first camera's, at network size.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub canonical_focal_px: Option<f64>,
     /// How well that camera is known, where the run learned it; written when it ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned_camera: Option<LearnedCamera>,
@@ -80,7 +83,7 @@ impl TrainFindings {
         Ok(found.unwrap_or_default())
     }
 
-    /// The configuration with the metres per unit that it leaves open.
+    /// The configuration with the metres per unit and the focal length that it leaves open.
     #[must_use]
     pub fn complete(&self, mut config: TrainConfig) -> TrainConfig {
         let fill = |open: &mut f64, found: Option<f64>| {
@@ -88,6 +91,7 @@ impl TrainFindings {
                 *open = found.unwrap_or(0.0);
             }
         };
+        config.canonical_focal_px = config.canonical_focal_px.or(self.canonical_focal_px);
         fill(&mut config.pose_net.metres_per_unit, self.metres_per_unit);
         for set in &mut config.data.sets {
             fill(

@@ -3,9 +3,13 @@
 use super::validation::no_samples;
 use crate::{Error, SampleSet, TrainConfig, TrainWarning, ViewMotion};
 use burn::tensor::Device;
+use deepfusion_geometry::Intrinsics;
 use deepfusion_model::{SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, supports};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A share by which focal lengths may differ and count as one: KITTI's days of recording are within 1 %.
+const FOCAL_TOLERANCE: f64 = 0.02;
 
 /// Metres per unit of PoseNet's translation; 1 without video, where it does not matter.
 fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
@@ -27,13 +31,40 @@ pub(super) fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings
             camera: own.camera(),
         }
     });
+    let several = config.canonical_focal_px.is_none() && has_several_focal_lengths(config, train);
     TrainFindings {
+        canonical_focal_px: several.then(|| first_focal_px(config, train)).flatten(),
         metres_per_unit: unit(config.pose_net.metres_per_unit, train),
         camera: train.camera(),
         learned_camera: None,
         sets: sets.collect(),
         averaged: Vec::new(),
     }
+}
+
+/// Whether a pixel of known size would be of different depths, so that the network's metres need a focal length to be those of: cameras of one data set
+/// differ, or their images are shown in parts or at other sizes, or simulated cameras are drawn.
+fn has_several_focal_lengths(config: &TrainConfig, train: &SampleSet) -> bool {
+    let augmented = config.augmentation.zoom > 1.0 || !config.augmentation.sizes.is_empty();
+    if !train.depth.is_empty() && (augmented || train.depth.draws_cameras()) {
+        return true;
+    }
+    let mut sets: BTreeMap<usize, f64> = BTreeMap::new();
+    train.cameras().any(|(set, camera)| {
+        let fy = focal_px(config, &camera);
+        let first = *sets.entry(set).or_insert(fy);
+        (fy / first - 1.0).abs() > FOCAL_TOLERANCE
+    })
+}
+
+fn first_focal_px(config: &TrainConfig, train: &SampleSet) -> Option<f64> {
+    train.camera().map(|camera| focal_px(config, &camera))
+}
+
+/// f_y at network size.
+fn focal_px(config: &TrainConfig, camera: &Intrinsics) -> f64 {
+    let size = config.size;
+    camera.resized(size.width as u32, size.height as u32).fy
 }
 
 /// # Errors
