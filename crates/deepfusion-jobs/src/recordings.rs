@@ -110,13 +110,21 @@ pub fn camera_word(camera: Cameras) -> &'static str {
 /// # Errors
 /// As [`open_recordings`].
 pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
-    open_sets(
-        config,
-        RecordingRole::Training,
-        open_with_yaw,
-        &mut |_, _| (),
-    )
+    let opened_by: (OpenFn, OpenFn) = (open_aimed, open_with_yaw);
+    open_sets(config, RecordingRole::Training, opened_by, &mut |_, _| ())
 }
+
+/// The same for what takes nothing of the vehicle's motion: no image is read.
+///
+/// # Errors
+/// As [`open_recordings`].
+pub fn plain_training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
+    let opened_by: (OpenFn, OpenFn) = (open_recordings, open_recordings);
+    open_sets(config, RecordingRole::Training, opened_by, &mut |_, _| ())
+}
+
+/// How recordings are opened.
+type OpenFn = fn(&[PathBuf], &OpenOptions) -> Result<Vec<Dataset>>;
 
 /// What recordings are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,14 +153,14 @@ pub fn open_for(
     role: RecordingRole,
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
 ) -> Result<Vec<(usize, Dataset)>> {
-    open_sets(config, role, open_with_turns, opened)
+    open_sets(config, role, (open_aimed, open_with_turns), opened)
 }
 
-/// The recordings of a role, those whose turns the images are to show opened by `open_turned`.
+/// The recordings of a role, those whose turns the images are to show opened by `open_turned`, the others by `open_plain`.
 fn open_sets(
     config: &TrainConfig,
     role: RecordingRole,
-    open_turned: fn(&[PathBuf], &OpenOptions) -> Result<Vec<Dataset>>,
+    (open_plain, open_turned): (OpenFn, OpenFn),
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
 ) -> Result<Vec<(usize, Dataset)>> {
     let data = &config.data;
@@ -160,7 +168,7 @@ fn open_sets(
         if takes_turns(config, set) {
             open_turned(paths, options)
         } else {
-            open_aimed(paths, options)
+            open_plain(paths, options)
         }
     };
     if data.sets.is_empty() {

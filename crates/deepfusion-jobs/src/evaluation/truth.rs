@@ -10,7 +10,7 @@ use deepfusion_geometry::DepthMap;
 use deepfusion_model::TrainConfig;
 use deepfusion_runtime::Prediction;
 
-use crate::recordings::training_recordings;
+use crate::recordings::plain_training_recordings;
 use crate::{Error, Result};
 
 /// Pixels taken of each frame by [`known_pixels`], at most.
@@ -86,7 +86,7 @@ pub fn baseline_from_arrays(path: &Path) -> Result<MeanDepthBaseline> {
 /// The mean-depth baseline from the recordings a model was trained on, where they are still there.
 #[must_use]
 pub fn baseline_from_training(config: &TrainConfig, kind: GtKind) -> Option<MeanDepthBaseline> {
-    let recordings = training_recordings(config).ok()?;
+    let recordings = plain_training_recordings(config).ok()?;
     let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
     baseline_from_datasets(&datasets, kind).ok()
 }
