@@ -7,6 +7,7 @@ mod asked_recordings;
 mod event_line;
 mod other_meaning;
 mod plan;
+mod pose_unit;
 pub mod resume;
 mod run_log;
 mod start;
