@@ -288,6 +288,13 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
+    /// A folder for an adapted network that no other one can be renamed to.
+    #[cfg(feature = "train")]
+    #[error("{}: is a mount point, which a finished run cannot take the place of", path.display())]
+    MountPoint {
+        /// The folder.
+        path: PathBuf,
+    },
     /// An interrupted adaptation with other settings.
     #[cfg(feature = "train")]
     #[error("{}: already exists", path.display())]

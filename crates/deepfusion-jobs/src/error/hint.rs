@@ -99,6 +99,8 @@ impl Hint for Error {
                 Some("choose another folder: what was adapted before stays".into())
             }
             #[cfg(feature = "train")]
+            Self::MountPoint { .. } => Some("choose a folder in it".into()),
+            #[cfg(feature = "train")]
             Self::OtherSettings { .. } => Some(
                 "it was left by an adaptation with other settings: give those to go on with it, or remove it".into(),
             ),

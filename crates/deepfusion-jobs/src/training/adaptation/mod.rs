@@ -109,7 +109,7 @@ impl AdaptSettings {
 /// Fails where a folder for an adapted network is not new: an error before long work, not after it.
 ///
 /// # Errors
-/// [`Error::AdaptedBefore`].
+/// [`Error::AdaptedBefore`], [`Error::MountPoint`]; a link to nothing.
 pub fn require_new(out: &Path) -> Result<()> {
     Folders::of(out).map(|_| ())
 }
