@@ -7,6 +7,7 @@ use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
 
+use crate::drives::first_of_drive;
 use crate::evaluation::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files;
 use crate::{Error, ModelFacts, Result, StaleCalibration};
@@ -118,6 +119,7 @@ pub fn measure(
     (protocol, correct_focal): (&Protocol, bool),
     calibrate: bool,
 ) -> Result<Option<(IntervalFactors, PathBuf)>> {
+    let drives = first_of_drive(datasets);
     let mut samples = Vec::new();
     for ImageRef(set, frame) in &evaluated.places {
         let dataset = &datasets[*set];
@@ -137,7 +139,7 @@ pub fn measure(
                 depth_m: predicted,
                 scale: f64::from(log_scale[at]).exp(),
                 error: (predicted / z).ln().abs(),
-                drive: *set,
+                drive: drives[*set],
             });
         }
     }
