@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Dataset;
-use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
+use deepfusion_eval::{IntervalFactors, IntervalSample, Intervals, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
 
@@ -107,7 +107,7 @@ pub fn without_unsure(depth: &DepthMap, sigma: &DepthMap, most: f64) -> DepthMap
 }
 
 /// Adds to an evaluation whether the network's intervals hold on its frames; with `calibrate` finds new factors on them, keeps
-/// those beside the run, and gives them with their file.
+/// those beside the run, gives them with their file, and marks what they hold of the same frames.
 ///
 /// # Errors
 /// What cannot be read, predicted or written.
@@ -152,6 +152,9 @@ pub fn measure(
         kept = Some((found.clone(), write(&found, estimator.step, run)?));
         factors = found;
     }
-    evaluated.report.intervals = factors.measure(&samples);
+    evaluated.report.intervals = factors.measure(&samples).map(|measured| Intervals {
+        in_sample: kept.is_some(),
+        ..measured
+    });
     Ok(kept)
 }
