@@ -281,6 +281,13 @@ pub enum Error {
         /// In the configuration.
         expected: String,
     },
+    /// A run, or a table of runs, that another process writes.
+    #[cfg(feature = "train")]
+    #[error("{}: another process is at work there", folder.display())]
+    AtWork {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A folder for an adapted network that is not new.
     #[cfg(feature = "train")]
     #[error("{}: already exists", path.display())]

@@ -95,6 +95,10 @@ impl Hint for Error {
             }
             Self::NoFramework => Some("build it with the feature `train`".into()),
             #[cfg(feature = "train")]
+            Self::AtWork { .. } => {
+                Some("wait for it, stop it first, or choose another folder".into())
+            }
+            #[cfg(feature = "train")]
             Self::AdaptedBefore { .. } => {
                 Some("choose another folder: what was adapted before stays".into())
             }

@@ -10,6 +10,7 @@ use deepfusion_model::weights::{read_bytes, write_safetensors};
 use deepfusion_model::{Checkpoint, CheckpointKind, RunFolder, TrainConfig};
 use deepfusion_runtime::ModelSource;
 
+use super::super::RunLock;
 use crate::files::write;
 use crate::{Error, Result};
 
@@ -49,6 +50,18 @@ impl Folders {
     /// Where is learned.
     pub(super) fn work(&self) -> &Path {
         &self.work
+    }
+
+    /// The lock of what is there; none where nothing is.
+    ///
+    /// # Errors
+    /// [`Error::AtWork`] where another process learns there.
+    pub(super) fn lock(&self) -> Result<Option<RunLock>> {
+        if self.work.is_dir() {
+            RunLock::take(&self.work).map(Some)
+        } else {
+            Ok(None)
+        }
     }
 
     /// The run that was interrupted with the same settings; what it left before its first checkpoint is removed.
