@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
 use deepfusion::jobs::training::resume::{MovedRecordings, ResumeRequest, go_on_with};
-use deepfusion::jobs::training::{RunLog, Start, StartReport};
+use deepfusion::jobs::training::{RunLock, RunLog, Start, StartReport};
 use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
 use deepfusion::train::{Control, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
 use numpy::ndarray::{Array2, Array3};
@@ -112,7 +112,7 @@ pub(crate) fn train<'py>(
         if let Some(workers) = &asked.workers {
             workers.all_begun(begun.is_ok())?;
         }
-        let mut trainer = begun?;
+        let (mut trainer, _lock) = begun?;
         let listen = &mut |event| listener.hear(event, stop);
         let summary = trainer.run(listen)?;
         Ok((summary, warnings.skipped))
@@ -143,14 +143,14 @@ fn begin(
     asked: &TrainRequest,
     warnings: &mut Warnings,
     listener: &mut Listener,
-) -> Result<Trainer, Failure> {
-    let trainer = opened(asked, warnings)?;
+) -> Result<(Trainer, Option<RunLock>), Failure> {
+    let (trainer, lock) = opened(asked, warnings)?;
     listener.warn(warnings);
     // The first worker's log is of all of them.
     if asked.workers.as_ref().is_none_or(|w| w.rank == 0) {
         listener.keep_log(&trainer)?;
     }
-    Ok(trainer)
+    Ok((trainer, lock))
 }
 
 /// What may not be meant of the recordings.
@@ -178,8 +178,11 @@ pub(crate) fn warning_of(start: &StartReport) -> Option<String> {
     }
 }
 
-/// The trainer that is asked for.
-fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Failure> {
+/// The trainer that is asked for, and of the first worker the lock of the run's folder.
+fn opened(
+    asked: &TrainRequest,
+    warnings: &mut Warnings,
+) -> Result<(Trainer, Option<RunLock>), Failure> {
     let place = device::named(&asked.device)?;
     let device = device::open(place)?;
     let workers: Box<dyn Workers> = match &asked.workers {
@@ -190,6 +193,7 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
     let mut warn = |warning| warnings.add(warning);
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
+        let lock = lock_of(&folder, leads)?;
         let config = go_on_with(&folder.read_settings()?, &asked.to_resume(place.compute())?)?;
         config.validate()?;
         let sets = open_samples(&config, &mut |_, _| (), &mut warn)?;
@@ -199,7 +203,7 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
         if leads {
             folder.write_config(&settings, &folder.read_findings()?)?;
         }
-        return Ok(trainer);
+        return Ok((trainer, lock));
     }
     if leads && holds_something(&asked.out) {
         return Err(Failure {
@@ -219,18 +223,22 @@ fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Fail
     } else {
         RunFolder::of_another(&asked.out)
     };
-    Ok(Trainer::create_among(
-        workers,
-        config,
-        folder,
-        sets,
-        &device,
-        |model| {
-            start.initialise(model, &device, &mut |start| {
-                warnings.others.extend(warning_of(&start));
-            })
-        },
-    )?)
+    let lock = lock_of(&folder, leads)?;
+    let trainer = Trainer::create_among(workers, config, folder, sets, &device, |model| {
+        start.initialise(model, &device, &mut |start| {
+            warnings.others.extend(warning_of(&start));
+        })
+    })?;
+    Ok((trainer, lock))
+}
+
+/// The lock of a run's folder, of the worker that writes there.
+fn lock_of(folder: &RunFolder, leads: bool) -> Result<Option<RunLock>, Failure> {
+    Ok(if leads {
+        Some(RunLock::take(folder.path())?)
+    } else {
+        None
+    })
 }
 
 /// Whether there is anything at a path but an empty folder.

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use crate::failure::{Context, Result};
-use deepfusion_fs::unused;
+use deepfusion_fs::create_unused;
 pub(crate) use deepfusion_jobs::dates::now;
 pub(crate) use deepfusion_jobs::name_of;
 
@@ -63,10 +63,10 @@ pub(crate) fn make_folder(folder: &Path) -> Result<()> {
 /// The folder a command writes to: the one asked for, or a new `runs/<command>-<time>`. It is made; a folder that holds
 /// something already is refused.
 pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {
-    let folder = match asked {
-        Some(folder) => folder.to_owned(),
-        None => unused(&PathBuf::from("runs").join(format!("{command}-{}", now()))),
+    let Some(folder) = asked else {
+        return new_run_folder(Path::new("runs"), command);
     };
+    let folder = folder.to_owned();
     let failed = |e| deepfusion_data::Error::file(&folder, e);
     std::fs::create_dir_all(&folder).map_err(failed)?;
     if std::fs::read_dir(&folder).map_err(failed)?.next().is_some() {
@@ -77,6 +77,14 @@ pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf>
         .into());
     }
     Ok(folder)
+}
+
+/// A new folder by the command and the time, which of two commands that start at once each has for itself.
+fn new_run_folder(runs: &Path, command: &str) -> Result<PathBuf> {
+    make_folder(runs)?;
+    let folder = runs.join(format!("{command}-{}", now()));
+    let made = create_unused(&folder);
+    Ok(made.map_err(|e| deepfusion_data::Error::file(&folder, e))?)
 }
 
 /// Fails where a file is there that may not be replaced, or could not be written for want of its folder: an error before long work, not after it.
@@ -118,6 +126,15 @@ mod tests {
         );
         std::fs::write(run.join("file"), "x").unwrap();
         assert!(run_folder(Some(&run), "demo").is_err());
-        assert_eq!(unused(&run), folder.path().join("run-2"));
+    }
+
+    #[test]
+    fn two_that_start_at_once_have_a_folder_each() {
+        let folder = tempfile::tempdir().unwrap();
+        let runs = folder.path().join("runs");
+        let first = new_run_folder(&runs, "train").unwrap();
+        let second = new_run_folder(&runs, "train").unwrap();
+        assert!(first != second && first.is_dir() && second.is_dir());
+        assert_eq!(second.parent(), Some(runs.as_path()));
     }
 }

@@ -482,6 +482,26 @@ fn what_cannot_be_trained_on_is_an_error() {
     fails(at, "train --data sim", &["m/s"]);
 }
 
+/// Two processes would write into each other's log and checkpoints.
+#[cfg(unix)]
+#[test]
+fn a_run_is_gone_on_with_by_one_process_at_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    ok(
+        at,
+        "train --data sim --size 96x64 --batch 1 --steps 1 --init none --out run",
+    );
+    let kept = fs::read(at.join("run/config.toml")).unwrap();
+    let at_work = deepfusion_fs::FolderLock::take(&at.join("run")).unwrap();
+    let resume = "train --out run --resume --steps 2";
+    fails(at, resume, &["run", "another process is at work"]);
+    assert_eq!(fs::read(at.join("run/config.toml")).unwrap(), kept);
+    drop(at_work);
+    ok(at, resume);
+}
+
 /// Imported encoders start a network whose other parts the import does not have. PoseNet's unit is the new data's: the
 /// import has never seen a metre.
 #[test]

@@ -143,9 +143,14 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
         at,
         "predict --model sure other --save sigma,npy --out word --json",
     )[0];
-    ok(at, &format!("{eval} --calibrate-uncertainty"));
+    let found = ok(at, &format!("{eval} --calibrate-uncertainty")).stdout;
+    assert!(
+        found.contains("(the pixels they were calibrated on)"),
+        "{found}"
+    );
     assert!(at.join("sure/uncertainty.toml").exists());
     let held = json(at, &format!("{eval} --json"));
+    assert!(held["intervals"].get("in_sample").is_none(), "{held}");
     assert_eq!(held["intervals"]["calibrated"], true);
     // Measured where they were found, they hold what they promise, to the pixels that share a score.
     for [level, coverage, width] in levels(&held) {

@@ -230,6 +230,7 @@ impl IntervalFactors {
         }
         Some(Intervals {
             calibrated: self.is_calibrated(),
+            in_sample: false,
             n: all.len(),
             levels: of(&all),
             ranges,
@@ -242,6 +243,9 @@ impl IntervalFactors {
 pub struct Intervals {
     /// Whether the network's word was corrected on held-out drives first.
     pub calibrated: bool,
+    /// Whether that was done on these very pixels: they then hold what they promise, whatever others do.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub in_sample: bool,
     /// Pixels.
     pub n: usize,
     /// For each level.
@@ -360,6 +364,22 @@ mod tests {
         let measured = IntervalFactors::uncalibrated().measure(&uneven).unwrap();
         let expected = 0.5 * (1.0 - 0.5f64.powf(0.5) + 0.5);
         assert!((measured.levels[0].coverage - expected).abs() < 5e-3);
+    }
+
+    /// The key is there only where it says something; files of before are without it.
+    #[test]
+    fn the_pixels_of_the_calibration_are_marked() {
+        let drive = samples(500, 0.2, 0.1, 5.0, 0);
+        let factors = IntervalFactors::calibrate(&drive).unwrap();
+        let mut measured = factors.measure(&drive).unwrap();
+        for in_sample in [false, true] {
+            measured.in_sample = in_sample;
+            let text = serde_json::to_string(&measured).unwrap();
+            assert_eq!(text.contains("\"in_sample\":true"), in_sample);
+            assert_eq!(text.contains("in_sample"), in_sample);
+            let read: Intervals = serde_json::from_str(&text).unwrap();
+            assert_eq!(read.in_sample, in_sample);
+        }
     }
 
     #[test]

@@ -127,7 +127,9 @@ impl Report {
 
 /// A line a level.
 fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Result {
-    let whose = if intervals.calibrated {
+    let whose = if intervals.in_sample {
+        "the pixels they were calibrated on"
+    } else if intervals.calibrated {
         "calibrated"
     } else {
         "as the network says, not calibrated"

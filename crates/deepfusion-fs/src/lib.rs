@@ -1,6 +1,7 @@
 //! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut.
 
 mod content;
+mod folder_lock;
 mod in_the_way;
 mod machine;
 mod made_folders;
@@ -10,8 +11,9 @@ mod partial_folder;
 mod sync;
 
 pub use content::Content;
+pub use folder_lock::FolderLock;
 pub use in_the_way::{InTheWay, Unfinished, in_the_way};
-pub use names::{moved_path, unused};
+pub use names::{create_unused, moved_path, unused};
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
 pub use partial_folder::PartialFolder;
 pub use sync::{publish, publish_folder, sync_files, sync_folder};

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
 use std::hash::{BuildHasher, Hasher};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The longest part of a temporary name that stands for the target, in bytes. File systems have names of up to 255 bytes, of which the dots, a
@@ -49,22 +50,42 @@ pub fn moved_path(path: PathBuf, from: &Path, to: &Path) -> PathBuf {
 /// `path`, or `path-2`, `path-3` … where that is taken.
 #[must_use]
 pub fn unused(path: &Path) -> PathBuf {
-    let numbered = |n: u32| {
+    numbered(path)
+        .find(|p| !p.exists())
+        .unwrap_or_else(|| path.to_owned())
+}
+
+/// Makes the folder `path`, or `path-2`, `path-3` … where that is taken, in a folder that is there. Of two processes that ask at once each has its
+/// own.
+///
+/// # Errors
+/// What the system says.
+pub fn create_unused(path: &Path) -> io::Result<PathBuf> {
+    for folder in numbered(path) {
+        match std::fs::create_dir(&folder) {
+            Ok(()) => return Ok(folder),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::ErrorKind::AlreadyExists.into())
+}
+
+/// `path`, `path-2`, `path-3` and so on.
+fn numbered(path: &Path) -> impl Iterator<Item = PathBuf> {
+    (1_u32..).map(move |n| {
         if n == 1 {
             path.to_owned()
         } else {
             PathBuf::from(format!("{}-{n}", path.display()))
         }
-    };
-    (1..)
-        .map(numbered)
-        .find(|p| !p.exists())
-        .unwrap_or_else(|| path.to_owned())
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashSet;
 
     #[test]
     fn a_name_that_is_taken_gets_a_number() {
@@ -75,6 +96,20 @@ mod tests {
         assert_eq!(unused(&path), second);
         std::fs::create_dir(&second).unwrap();
         assert_eq!(unused(&path), dir.path().join("run-3"));
+    }
+
+    /// All that ask at once look before any of them makes its folder.
+    #[test]
+    fn folders_that_are_made_at_once_are_each_ones_own() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run");
+        let made: HashSet<PathBuf> = std::thread::scope(|scope| {
+            let asked = [(); 8].map(|()| scope.spawn(|| create_unused(&path).unwrap()));
+            asked.into_iter().map(|made| made.join().unwrap()).collect()
+        });
+        assert_eq!(made.len(), 8);
+        assert!(made.iter().all(|folder| folder.is_dir()));
+        assert!(create_unused(&dir.path().join("no/run")).is_err());
     }
 
     #[test]

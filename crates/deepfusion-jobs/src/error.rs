@@ -281,10 +281,24 @@ pub enum Error {
         /// In the configuration.
         expected: String,
     },
+    /// A run, or a table of runs, that another process writes.
+    #[cfg(feature = "train")]
+    #[error("{}: another process is at work there", folder.display())]
+    AtWork {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A folder for an adapted network that is not new.
     #[cfg(feature = "train")]
     #[error("{}: already exists", path.display())]
     AdaptedBefore {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A folder for an adapted network that no other one can be renamed to.
+    #[cfg(feature = "train")]
+    #[error("{}: is a mount point, which a finished run cannot take the place of", path.display())]
+    MountPoint {
         /// The folder.
         path: PathBuf,
     },

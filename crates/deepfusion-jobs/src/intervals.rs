@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Dataset;
-use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
+use deepfusion_eval::{IntervalFactors, IntervalSample, Intervals, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
 
+use crate::drives::first_of_drive;
 use crate::evaluation::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files;
 use crate::{Error, ModelFacts, Result, StaleCalibration};
@@ -106,7 +107,7 @@ pub fn without_unsure(depth: &DepthMap, sigma: &DepthMap, most: f64) -> DepthMap
 }
 
 /// Adds to an evaluation whether the network's intervals hold on its frames; with `calibrate` finds new factors on them, keeps
-/// those beside the run, and gives them with their file.
+/// those beside the run, gives them with their file, and marks what they hold of the same frames.
 ///
 /// # Errors
 /// What cannot be read, predicted or written.
@@ -118,6 +119,7 @@ pub fn measure(
     (protocol, correct_focal): (&Protocol, bool),
     calibrate: bool,
 ) -> Result<Option<(IntervalFactors, PathBuf)>> {
+    let drives = first_of_drive(datasets);
     let mut samples = Vec::new();
     for ImageRef(set, frame) in &evaluated.places {
         let dataset = &datasets[*set];
@@ -137,7 +139,7 @@ pub fn measure(
                 depth_m: predicted,
                 scale: f64::from(log_scale[at]).exp(),
                 error: (predicted / z).ln().abs(),
-                drive: *set,
+                drive: drives[*set],
             });
         }
     }
@@ -150,6 +152,9 @@ pub fn measure(
         kept = Some((found.clone(), write(&found, estimator.step, run)?));
         factors = found;
     }
-    evaluated.report.intervals = factors.measure(&samples);
+    evaluated.report.intervals = factors.measure(&samples).map(|measured| Intervals {
+        in_sample: kept.is_some(),
+        ..measured
+    });
     Ok(kept)
 }

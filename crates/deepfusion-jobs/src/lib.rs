@@ -58,6 +58,7 @@ pub mod demo;
 #[cfg(feature = "train")]
 pub mod device_check;
 pub mod devices;
+mod drives;
 pub mod duration;
 pub mod engine;
 mod error;

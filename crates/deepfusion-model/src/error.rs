@@ -296,4 +296,7 @@ pub enum CheckpointLacks {
     /// The decoder of the flow.
     #[error("it has no flow decoder, and this configuration trains one")]
     FlowDecoder,
+    /// PoseNet.
+    #[error("it has no PoseNet, and this configuration has one")]
+    PoseNet,
 }

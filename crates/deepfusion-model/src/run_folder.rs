@@ -200,6 +200,15 @@ impl RunFolder {
         Checkpoint::of(&path, &read_safetensors_under(&path, "no tensor's name")?)
     }
 
+    /// Whether a checkpoint holds a PoseNet: not that of a run which left it out, nor of an imported depth network.
+    ///
+    /// # Errors
+    /// [`Error::Network`] for a file that cannot be read.
+    pub fn has_pose_net(&self, kind: CheckpointKind) -> Result<bool, Error> {
+        let path = self.checkpoint_path(kind);
+        Ok(!read_safetensors_under(&path, "pose.")?.tensors.is_empty())
+    }
+
     /// The camera that a checkpoint's network learned with, at the size of its images; `set` as for [`TrainConfig::for_set`]. Of a run
     /// that learns its camera, the one of that step.
     ///

@@ -26,8 +26,8 @@ pub trait Checkpoints {
     /// The networks, the optimiser if it was saved, and the training progress.
     ///
     /// # Errors
-    /// [`ModelError::Checkpoint`] for a file of another version, or one without the flow decoder that training needs;
-    /// [`Error::Model`] for one of another architecture or whose moments do not fit its parameters, naming the first tensor
+    /// [`ModelError::Checkpoint`] for a file of another version; [`ModelError::NotResumable`] for one without the PoseNet of the
+    /// configuration, or without the flow decoder that training needs; [`Error::Model`] for one of another architecture or whose moments do not fit its parameters, naming the first tensor
     /// that differs.
     fn load(
         &self,
@@ -95,10 +95,18 @@ impl Checkpoints for RunFolder {
         let all = weights::read_safetensors_under(&path, "")?;
         let state = Checkpoint::of(&path, &all)?;
         let named = |prefix: &str| -> Weights { all.under(prefix) };
+        let pose = named("pose.");
+        if pose.tensors.is_empty() && !config.leaves_pose_net_out() {
+            return Err(ModelError::NotResumable {
+                path,
+                reason: CheckpointLacks::PoseNet,
+            }
+            .into());
+        }
         let mut model = Model::new(config, device)?;
         model.depth_net = weights::apply(model.depth_net, &named("depth."))?;
         if let Some(pose_net) = model.pose_net.take() {
-            model.pose_net = Some(weights::apply(pose_net, &named("pose."))?);
+            model.pose_net = Some(weights::apply(pose_net, &pose)?);
         }
         let new_decoder = take_flow_decoder(&mut model, &named("flow."))?;
         if let Some(focal) = model.focal.take() {
@@ -150,7 +158,7 @@ impl Checkpoints for RunFolder {
         model.depth_net = depth_net;
         let (mut new_pose_net, mut new_masks) = (false, false);
         if let Some(pose_net) = model.pose_net.take() {
-            // Of a run that left PoseNet out there is none.
+            // Of a run that left PoseNet out there is none, nor of an imported depth network.
             new_pose_net = pose.tensors.is_empty();
             model.pose_net = Some(if new_pose_net {
                 pose_net

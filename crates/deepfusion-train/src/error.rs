@@ -189,7 +189,9 @@ impl Hint for Error {
                     .into(),
             ),
             Self::NoPoseNet { .. } => Some(
-                "it learned by the vehicle's motion alone (`freeze` names `pose`); without that it learns a PoseNet, too".into(),
+                "it learned by the vehicle's motion alone (`freeze` names `pose`), or is an imported depth network; a run that starts from it \
+                 without that has a PoseNet, too"
+                    .into(),
             ),
             Self::Precision { .. } => Some("set `precision` so in the configuration".into()),
             Self::Threads { .. } => Some(

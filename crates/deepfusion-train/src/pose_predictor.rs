@@ -27,18 +27,22 @@ impl PosePredictor {
     /// one. `set` names one of the data sets the run learned from, where it learned several.
     ///
     /// # Errors
-    /// [`Error::NoPoseNet`] for a run that left it out; [`deepfusion_model::Error::EncodersOnly`]; as [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
+    /// [`Error::NoPoseNet`] for a run that left it out, or an imported depth network; [`deepfusion_model::Error::EncodersOnly`]; as [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
     pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
         let config = folder.read_config()?;
         let camera = folder.read_findings()?.camera_of(&config, set);
         let config = config.for_set(set)?;
         let checkpoint = kind.unwrap_or_else(|| folder.preferred());
+        let none = || Error::NoPoseNet {
+            run: path.to_owned(),
+        };
+        if !folder.has_pose_net(checkpoint)? {
+            return Err(none());
+        }
         let (model, _, state) = folder.load(checkpoint, &config, device)?;
         state.require_trained(&folder.checkpoint_path(checkpoint))?;
-        let pose_net = model.pose_net.ok_or_else(|| Error::NoPoseNet {
-            run: path.to_owned(),
-        })?;
+        let pose_net = model.pose_net.ok_or_else(none)?;
         Ok(Self {
             config,
             camera,

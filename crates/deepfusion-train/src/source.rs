@@ -73,6 +73,19 @@ fn keep_apart(
     retain_where_some_stay(samples, |sample| sample.dataset, unseen);
 }
 
+/// Leaves out of training what shows a held-out target as the other camera's view: where a split selects frames of each camera, other moments of each
+/// are held out. A recording of which nothing would be left keeps what it has.
+fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample]) {
+    let held = held_out.iter().map(|s| (s.dataset, s.snippet.target));
+    let held: HashSet<(usize, usize)> = held.collect();
+    let shows = |sample: &Sample| {
+        let view = sample.stereo.as_ref();
+        view.is_some_and(|view| held.contains(&(view.dataset, view.frame)))
+    };
+    let shown: Vec<bool> = samples.iter().map(shows).collect();
+    retain_where_some_stay(samples, |sample| sample.dataset, |i| !shown[i]);
+}
+
 /// Keeps what `keep` says, by place, and all of each data set of which it would leave nothing.
 fn retain_where_some_stay<T>(
     all: &mut Vec<T>,
@@ -137,6 +150,7 @@ impl SampleSet {
         };
         let (set_of, train) = shared(train);
         let (mut samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
+        leave_out_held_views(&mut samples, &held_out);
         if let (true, Some(first)) = (config.stereo, samples.first())
             && samples.iter().all(|sample| sample.stereo.is_none())
         {

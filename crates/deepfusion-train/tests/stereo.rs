@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use deepfusion_data::{Cameras, Dataset, OpenOptions};
+use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions, Split};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     BatchLoader, Error, Model, NoStereo, Preset, Reprojection, SampleSet, Schedule, TrainConfig,
@@ -46,6 +46,59 @@ fn settings() -> TrainConfig {
 
 fn samples(config: &TrainConfig, drive: &Path, camera: Cameras) -> Result<SampleSet, Error> {
     Ok(SampleSet::split(config, opened(drive, camera), None)?.0)
+}
+
+/// A split may hold out moments of one camera that it has the other learn from: there they are no second view.
+#[test]
+fn a_held_out_target_is_no_view_in_training() {
+    let folder = tempfile::tempdir().unwrap();
+    let street = Simulation::new(&SimConfig {
+        seed: 5,
+        frames: 10,
+        width: 96,
+        height: 64,
+        scan_every: 0,
+        stereo_baseline_m: BASELINE_M,
+        ..SimConfig::default()
+    })
+    .unwrap();
+    let mut go_on = |_: usize, _: usize| ControlFlow::Continue(());
+    let drive = write_kitti(&street, &folder.path().join("sim"), &mut go_on).unwrap();
+    let name = opened(&drive, Cameras::Both)[0].split_name().to_owned();
+    let mut lines: Vec<String> = (0..9).map(|i| format!("{name} {i} l")).collect();
+    lines.extend((0..5).map(|i| format!("{name} {i} r")));
+    let file = folder.path().join("split.txt");
+    std::fs::write(&file, lines.join("\n")).unwrap();
+    let options = OpenOptions {
+        camera: Cameras::Both,
+        split: Some(Split::read(&file).unwrap()),
+        ..OpenOptions::default()
+    };
+    let datasets = Dataset::open(&drive, &options).unwrap();
+    let mut config = settings();
+    config.validation_share = 0.3;
+    let (train, held, _) = SampleSet::split(&config, datasets, None).unwrap();
+    let of = |set: &SampleSet| -> Vec<(Camera, u64)> {
+        let place = |sample: &deepfusion_train::Sample| {
+            let dataset = &set.datasets[sample.dataset];
+            let frame = &dataset.frames()[sample.snippet.target];
+            (dataset.camera(), frame.number)
+        };
+        set.samples.iter().map(place).collect()
+    };
+    let each = |camera: Camera, numbers: &[u64]| -> Vec<(Camera, u64)> {
+        numbers.iter().map(|number| (camera, *number)).collect()
+    };
+    let (left, right) = (Camera::Left, Camera::Right);
+    assert_eq!(
+        of(&held),
+        [each(left, &[6, 7, 8]), each(right, &[3, 4])].concat()
+    );
+    // The left camera's 3 and 4 would show the right one's.
+    assert_eq!(
+        of(&train),
+        [each(left, &[0, 1, 2]), each(right, &[0, 1])].concat()
+    );
 }
 
 /// Each camera's frame is explained by the other's, by its exact depth, at the calibrated baseline and at no other; mirrored or not.

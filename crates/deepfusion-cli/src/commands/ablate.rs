@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use deepfusion_data::OpenOptions;
+use deepfusion_jobs::training::RunLock;
 use deepfusion_jobs::training::ablation::{
     OpenRun, Plan, PlanRequest, Run, RunResult, TableDecides, table, text,
 };
@@ -30,6 +31,8 @@ pub(super) fn run(args: &AblateArgs) -> Result<()> {
         let plan = request(args)?.plan().map_err(in_options)?;
         (output::run_folder(args.out.as_deref(), "ablate")?, plan)
     };
+    // Another process would remove a row that has no checkpoint yet.
+    let _lock = RunLock::take(&out)?;
     let configs = plan.row_configs()?;
     open_samples(&configs[0]).map_err(|error| {
         if args.resume {

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use deepfusion_hint::count_of;
 use deepfusion_jobs::training::{
-    AskedRecordings, Pace, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
+    AskedRecordings, Pace, RunLock, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
     leaves_turns_unused,
 };
 use deepfusion_model::{RunFolder, TrainConfig};
@@ -22,25 +22,29 @@ use crate::{devices, interrupt, output};
 pub(super) fn run(args: &TrainArgs) -> Result<()> {
     let device = devices::open(args.device)?;
     let resumed = match (&args.out, args.resume) {
-        (Some(out), true) => Some(RunFolder::open(out)?.0),
+        (Some(out), true) => {
+            let (folder, _) = RunFolder::open(out)?;
+            let lock = RunLock::take(folder.path())?;
+            Some((folder, lock))
+        }
         _ => None,
     };
     let mut config = match &resumed {
-        Some(folder) => resume::with_options(&folder.read_settings()?, args)?,
+        Some((folder, _)) => resume::with_options(&folder.read_settings()?, args)?,
         None => request(args)?.config(|datasets| clocks::measured(datasets.iter()))?,
     };
     config.validate()?;
     let sets = open_samples(&config).map_err(|error| match &resumed {
-        Some(folder) => resume::where_recordings_are(error, &config, folder.path()),
+        Some((folder, _)) => resume::where_recordings_are(error, &config, folder.path()),
         None => error,
     })?;
-    let mut trainer = match resumed {
-        Some(folder) => {
+    let (mut trainer, _lock) = match resumed {
+        Some((folder, lock)) => {
             let settings = config.clone();
             let trainer = Trainer::resume(config, folder.clone(), sets, &device)?;
             // Only settings with which the run goes on.
             folder.write_config(&settings, &folder.read_findings()?)?;
-            trainer
+            (trainer, lock)
         }
         None => {
             // A file says what its run starts from, if anything.
@@ -57,9 +61,11 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
             start.record_in(&mut config)?;
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
-            Trainer::create(config, folder, sets, &device, |model| {
+            let lock = RunLock::take(folder.path())?;
+            let trainer = Trainer::create(config, folder, sets, &device, |model| {
                 start.initialise(model, &device, &mut print_default_start)
-            })?
+            })?;
+            (trainer, lock)
         }
     };
     say(&TrainingPlan::of(&trainer).to_string());

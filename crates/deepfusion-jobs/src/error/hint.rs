@@ -95,9 +95,15 @@ impl Hint for Error {
             }
             Self::NoFramework => Some("build it with the feature `train`".into()),
             #[cfg(feature = "train")]
+            Self::AtWork { .. } => {
+                Some("wait for it, stop it first, or choose another folder".into())
+            }
+            #[cfg(feature = "train")]
             Self::AdaptedBefore { .. } => {
                 Some("choose another folder: what was adapted before stays".into())
             }
+            #[cfg(feature = "train")]
+            Self::MountPoint { .. } => Some("choose a folder in it".into()),
             #[cfg(feature = "train")]
             Self::OtherSettings { .. } => Some(
                 "it was left by an adaptation with other settings: give those to go on with it, or remove it".into(),

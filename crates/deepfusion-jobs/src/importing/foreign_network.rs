@@ -106,14 +106,16 @@ fn of_networks(imported: Imported, device: &Device) -> Result<(TrainConfig, Mode
     let pose_net = match imported.pose {
         Some((pose_config, pose_net)) => {
             config.pose_net = pose_config;
-            pose_net
+            Some(pose_net)
         }
+        // The checkpoint has none, so that a run which starts from it has a new one, in a unit of its own data.
         None => {
             config.pose_net = PoseNetConfig {
                 explainability: config.pose_net.explainability,
+                metres_per_unit: 0.0,
                 ..PoseNetConfig::monodepth2(config.depth_net.encoder.depth)
             };
-            PoseNet::new(&config.pose_net, device)?
+            None
         }
     };
     let model = Model::with_networks(&config, imported.depth_net, pose_net, device);
@@ -136,6 +138,65 @@ fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::training::Start;
+    use deepfusion_model::{CheckpointLacks, Error as ModelError};
+    use deepfusion_train::{Error as TrainError, PosePredictor};
+
+    /// Who starts from a depth network alone has a new PoseNet, in the unit of its own data; from both, the unit that theirs speaks of.
+    #[test]
+    fn a_pose_net_that_the_files_lack_is_in_no_checkpoint() {
+        let device = Device::flex();
+        let at = tempfile::tempdir().unwrap();
+        let mut depth_config = DepthNetConfig::monodepth2(deepfusion_nn::ResNetDepth::ResNet18);
+        depth_config.encoder = depth_config.encoder.with_base_width(8);
+        depth_config.decoder.widths = [16, 16, 8, 8, 8];
+        let mut pose_config = PoseNetConfig::monodepth2(deepfusion_nn::ResNetDepth::ResNet18);
+        pose_config.encoder = pose_config.encoder.with_base_width(8);
+        for whole in [true, false] {
+            let pose_net = PoseNet::new(&pose_config, &device).unwrap();
+            let imported = Imported {
+                depth_config: depth_config.clone(),
+                depth_net: DepthNet::new(&depth_config, &device).unwrap(),
+                pose: whole.then(|| (pose_config.clone(), pose_net)),
+                input_size: None,
+            };
+            let (config, model) = of_networks(imported, &device).unwrap();
+            let network = ForeignNetwork {
+                config,
+                model,
+                encoders_only: false,
+            };
+            let path = at.path().join(whole.to_string());
+            network.write(&path).unwrap();
+            let (run, _) = RunFolder::open(&path).unwrap();
+            assert_eq!(run.has_pose_net(CheckpointKind::Last).unwrap(), whole);
+            let stored = run.read_config().unwrap();
+            assert_eq!(stored.pose_net.metres_per_unit > 0.0, whole);
+
+            let mut config = Preset::Monodepth2.config();
+            Start::Path(path.clone()).record_in(&mut config).unwrap();
+            let unit = if whole { 0.01 } else { 0.0 };
+            assert_eq!(config.pose_net.metres_per_unit, unit);
+
+            config.depth_net = depth_config.clone();
+            config.pose_net = pose_config.clone();
+            let (_, new) = run
+                .load_networks(CheckpointKind::Last, &config, &device)
+                .unwrap();
+            assert_eq!(new.contains(&"PoseNet"), !whole, "{new:?}");
+
+            let predictor = PosePredictor::load(&path, None, &device);
+            let refused = matches!(predictor, Err(TrainError::NoPoseNet { .. }));
+            assert_eq!(refused, !whole);
+            let resumed = run.load(CheckpointKind::Last, &stored, &device);
+            let lacks = ModelError::NotResumable {
+                path: run.checkpoint_path(CheckpointKind::Last),
+                reason: CheckpointLacks::PoseNet,
+            };
+            let found = resumed.err().map(|error| error.to_string());
+            assert_eq!(found, (!whole).then(|| lacks.to_string()));
+        }
+    }
 
     #[test]
     fn a_networks_layers_say_its_preset() {

@@ -3,6 +3,8 @@
 use deepfusion_geometry::DepthRange;
 use deepfusion_model::{InputNormalisation, TrainConfig};
 
+use super::pose_unit::mixed_units;
+
 /// How weights fit a network that reads images or says depths in another way than the one that they were learned in.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -50,6 +52,17 @@ pub enum OtherMeaning {
         /// Of which they are.
         is: DepthRange,
     },
+    /// PoseNet's motions are of several units, by the data sets that it learned from.
+    #[error(
+        "the PoseNet to start from says motions in units of {least_m} m to {most_m} m, by its data sets, and these recordings are none of those: \
+         it takes their mean and has to learn the length anew (name the set's unit as metres_per_unit to keep it)"
+    )]
+    PoseUnits {
+        /// The least of them, metres.
+        least_m: f64,
+        /// The largest.
+        most_m: f64,
+    },
 }
 
 impl OtherMeaning {
@@ -78,6 +91,12 @@ impl OtherMeaning {
             all.push(Self::Range { was, is });
         }
         all
+    }
+
+    /// The same of a PoseNet that is taken over.
+    pub(super) fn of_pose_net(theirs: &TrainConfig, own: &TrainConfig) -> Option<Self> {
+        let [least_m, most_m] = mixed_units(theirs, own)?;
+        Some(Self::PoseUnits { least_m, most_m })
     }
 }
 

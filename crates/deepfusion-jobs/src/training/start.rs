@@ -15,7 +15,7 @@ use deepfusion_runtime::{
 use deepfusion_train::{Checkpoints, Device, Error as TrainError, Model};
 use deepfusion_weights::Shipped;
 
-use super::OtherMeaning;
+use super::{OtherMeaning, pose_unit};
 use crate::held_out::is_run;
 use crate::{Error, Result};
 
@@ -277,8 +277,8 @@ impl Start {
         })
     }
 
-    /// Writes down in a run's configuration what it starts from, so that it can be repeated, and takes the unit that a run's PoseNet
-    /// speaks of.
+    /// Writes down in a run's configuration what it starts from, so that it can be repeated, and takes the units that a run's PoseNet
+    /// speaks of where they are open.
     ///
     /// # Errors
     /// As [`RunFolder::read_config`] and [`RunFolder::read_state`] of the run it starts from.
@@ -300,14 +300,10 @@ impl Start {
         self.take_focal_length(config)?;
         if let Self::Path(path) = self
             && let Some((folder, kind)) = run_of(path)?
-            && config.pose_net.metres_per_unit == 0.0
             && !folder.read_state(kind)?.encoders_only
+            && folder.has_pose_net(kind)?
         {
-            let its = folder.read_config()?;
-            if !its.leaves_pose_net_out() {
-                // Its PoseNet speaks of this unit.
-                config.pose_net.metres_per_unit = its.pose_net.metres_per_unit;
-            }
+            pose_unit::inherit(&folder.read_config()?, config);
         }
         Ok(())
     }
@@ -371,6 +367,13 @@ impl Start {
                 let learned = !folder.read_state(kind)?.encoders_only;
                 let theirs = folder.read_config()?;
                 for warning in OtherMeaning::all(&theirs, model.config(), learned) {
+                    report(StartReport::OtherMeaning(warning));
+                }
+                if model.pose_net.is_some()
+                    && learned
+                    && folder.has_pose_net(kind)?
+                    && let Some(warning) = OtherMeaning::of_pose_net(&theirs, model.config())
+                {
                     report(StartReport::OtherMeaning(warning));
                 }
                 let device = device.clone().autodiff();

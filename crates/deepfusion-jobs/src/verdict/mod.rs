@@ -91,6 +91,7 @@ pub fn verdict(
 ) -> Result<Verdict> {
     let plan = plan(datasets, unseen, options.blocks);
     let total = plan.frames();
+    let certifying = plan.certifying(datasets);
     let mut gathered = GatheredEvidence::default();
     let mut done = 0;
     for block in &plan.blocks {
@@ -105,7 +106,7 @@ pub fn verdict(
             done += 1;
             progress(done, total);
         }
-        gathered.close_block(points);
+        gathered.close_block(points, certifying.contains(&block.dataset));
     }
     let mut verdict = gathered.verdict(&plan, unseen, total, options);
     verdict.without_truth.road_speeds = speeds::road_speeds(datasets, &plan)?;
@@ -132,9 +133,10 @@ impl GatheredEvidence {
         self.flip.extend(evidence.flip);
     }
 
-    /// `points`: depth as predicted, and the logarithm of the factor that it wants.
-    fn close_block(&mut self, points: Vec<(f64, f64)>) {
-        if points.len() >= LEAST_POINTS
+    /// `points`: depth as predicted, and the logarithm of the factor that it wants; `certifies`: whether the certificate counts the block.
+    fn close_block(&mut self, points: Vec<(f64, f64)>, certifies: bool) {
+        if certifies
+            && points.len() >= LEAST_POINTS
             && let Some(block) = block_scale(&points)
         {
             self.blocks.push(block);

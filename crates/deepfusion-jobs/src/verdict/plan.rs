@@ -1,10 +1,13 @@
 //! Which frames are looked at, and which ones before them they are compared with.
 
+use std::collections::{HashMap, HashSet};
+
 use deepfusion_data::Dataset;
 use deepfusion_eval::verdict::NoCertificate;
 use deepfusion_geometry::Se3;
 
 use super::Unseen;
+use crate::drives::first_of_drive;
 
 /// Ways from a frame to the ones before it that it is compared with, metres: near things move enough by the first, far ones by the last.
 const WAYS_M: [f64; 3] = [0.6, 2.5, 7.0];
@@ -53,6 +56,17 @@ impl Plan {
     #[must_use]
     pub fn frames(&self) -> usize {
         self.blocks.iter().map(|b| b.targets.len()).sum()
+    }
+
+    /// The data sets whose blocks the certificate counts: of each drive the first camera that is looked at. The other one sees the same road at the
+    /// same time, and its blocks would count as independent ones.
+    pub(super) fn certifying(&self, datasets: &[Dataset]) -> HashSet<usize> {
+        let drives = first_of_drive(datasets);
+        let mut first = HashMap::new();
+        for block in &self.blocks {
+            first.entry(drives[block.dataset]).or_insert(block.dataset);
+        }
+        first.into_values().collect()
     }
 
     pub(super) fn all_seen(&self) -> bool {
@@ -191,6 +205,46 @@ fn evenly<T>(items: Vec<T>, most: usize) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_data::{Cameras, OpenOptions};
+    use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn of_two_cameras_of_a_drive_one_certifies() {
+        let at = tempfile::tempdir().unwrap();
+        let simulation = Simulation::new(&SimConfig {
+            frames: 3,
+            width: 160,
+            height: 96,
+            scan_every: 0,
+            stereo_baseline_m: 0.5,
+            ..SimConfig::default()
+        })
+        .unwrap();
+        let mut go_on = |_: usize, _: usize| ControlFlow::Continue(());
+        let drive = write_kitti(&simulation, at.path(), &mut go_on).unwrap();
+        let options = OpenOptions {
+            camera: Cameras::Both,
+            ..OpenOptions::default()
+        };
+        let datasets = Dataset::open(&drive, &options).unwrap();
+        assert_eq!(first_of_drive(&datasets), [0, 0]);
+        let certifying = |of: [usize; 4]| {
+            let block = |dataset| Block {
+                dataset,
+                targets: Vec::new(),
+            };
+            let blocks = of.map(block).into();
+            let plan = Plan {
+                blocks,
+                nothing: None,
+            };
+            plan.certifying(&datasets)
+        };
+        assert_eq!(certifying([0, 0, 1, 1]), HashSet::from([0]));
+        // Training saw all of the first.
+        assert_eq!(certifying([1; 4]), HashSet::from([1]));
+    }
 
     #[test]
     fn an_even_choice() {

@@ -27,11 +27,19 @@ pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
     from_video && learned && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
 }
 
-/// Where a network has a PoseNet of which [`pose_net_is_metric`] holds, as it is loaded; `config`: its run's.
+/// Where a network has a PoseNet of which [`pose_net_is_metric`] holds, as it is loaded; `config`: its run's. An imported depth network has none.
 #[must_use]
 pub fn metric_pose_net<'a>(model: &'a ModelSource, config: &TrainConfig) -> Option<&'a Path> {
     match model {
-        ModelSource::Run { given, .. } => pose_net_is_metric(config).then_some(given.as_path()),
+        ModelSource::Run {
+            given,
+            folder,
+            kind,
+        } => {
+            // A file that cannot be read says so when it is loaded.
+            let has_one = || folder.has_pose_net(*kind).unwrap_or(true);
+            (pose_net_is_metric(config) && has_one()).then_some(given.as_path())
+        }
         ModelSource::Packed { .. } => None,
     }
 }

@@ -218,7 +218,9 @@ fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
 
 /// What intervals of each level hold.
 fn interval_rows(intervals: &Intervals) -> Vec<Vec<String>> {
-    let whose = if intervals.calibrated {
+    let whose = if intervals.in_sample {
+        ", of the pixels they were calibrated on"
+    } else if intervals.calibrated {
         ""
     } else {
         ", not calibrated"

@@ -10,6 +10,7 @@ use deepfusion_model::weights::{read_bytes, write_safetensors};
 use deepfusion_model::{Checkpoint, CheckpointKind, RunFolder, TrainConfig};
 use deepfusion_runtime::ModelSource;
 
+use super::super::RunLock;
 use crate::files::write;
 use crate::{Error, Result};
 
@@ -27,25 +28,40 @@ pub(super) struct Folders {
 
 impl Folders {
     /// Those of `out`, which must be new.
-    pub(super) fn of(out: &Path) -> Result<Self> {
-        let taken = match fs::read_dir(out) {
+    pub(super) fn of(given: &Path) -> Result<Self> {
+        let out = resolved(given)?;
+        let path = || given.to_owned();
+        let taken = match fs::read_dir(&out) {
             Ok(mut entries) => entries.next().is_some(),
             Err(_) => out.exists(),
         };
         if taken {
-            return Err(Error::AdaptedBefore {
-                path: out.to_owned(),
-            });
+            return Err(Error::AdaptedBefore { path: path() });
+        }
+        if is_mount_point(&out) {
+            return Err(Error::MountPoint { path: path() });
         }
         Ok(Self {
-            out: out.to_owned(),
-            work: beside(out, ".adapting"),
+            work: beside(&out, ".adapting"),
+            out,
         })
     }
 
     /// Where is learned.
     pub(super) fn work(&self) -> &Path {
         &self.work
+    }
+
+    /// The lock of what is there; none where nothing is.
+    ///
+    /// # Errors
+    /// [`Error::AtWork`] where another process learns there.
+    pub(super) fn lock(&self) -> Result<Option<RunLock>> {
+        if self.work.is_dir() {
+            RunLock::take(&self.work).map(Some)
+        } else {
+            Ok(None)
+        }
     }
 
     /// The run that was interrupted with the same settings; what it left before its first checkpoint is removed.
@@ -154,11 +170,34 @@ pub fn undo(out: &Path) -> Result<()> {
     publish(&weights, &folder.checkpoint_path(CheckpointKind::Best))
 }
 
-/// `out` with an ending.
+/// The folder itself: without a slash behind its name, and of a link, on which no folder is renamed, what it points at.
+fn resolved(given: &Path) -> Result<PathBuf> {
+    let out: PathBuf = given.components().collect();
+    if out.is_symlink() || out.file_name().is_none() {
+        return Ok(fs::canonicalize(&out).map_err(|e| DataError::file(given, e))?);
+    }
+    Ok(out)
+}
+
+/// Whether a folder is there and is another file system's than the one around it: nothing is renamed to it.
+#[cfg(unix)]
+fn is_mount_point(folder: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let device = |path: &Path| fs::metadata(path).map(|found| found.dev()).ok();
+    let (own, around) = (device(folder), device(&folder.join("..")));
+    own.zip(around).is_some_and(|(own, around)| own != around)
+}
+
+#[cfg(not(unix))]
+fn is_mount_point(_: &Path) -> bool {
+    false
+}
+
+/// `out` with an ending to its name.
 fn beside(out: &Path, end: &str) -> PathBuf {
-    let mut name = out.as_os_str().to_owned();
+    let mut name = out.file_name().unwrap_or_default().to_owned();
     name.push(end);
-    name.into()
+    out.with_file_name(name)
 }
 
 /// Renames a file; its content and its new name are on the disk once this returns.
@@ -169,4 +208,58 @@ fn publish(from: &Path, to: &Path) -> Result<()> {
 fn copy(from: &Path, to: &Path) -> Result<()> {
     let bytes = fs::read(from).map_err(|e| DataError::file(from, e))?;
     Ok(write(to, bytes)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_work_lies_beside_whatever_way_the_folder_is_named() {
+        let at = tempfile::tempdir().unwrap();
+        let at = at.path();
+        for given in ["mine", "mine/", "mine/.", "./mine//"] {
+            let folders = Folders::of(&at.join(given)).unwrap();
+            assert_eq!(folders.work(), at.join("mine.adapting"), "{given}");
+            fs::create_dir(folders.work()).unwrap();
+            assert_eq!(folders.keep().unwrap(), at.join("mine"), "{given}");
+            fs::remove_dir(at.join("mine")).unwrap();
+        }
+        assert_eq!(
+            beside(Path::new("mine/"), ".refused"),
+            Path::new("mine.refused")
+        );
+        // An empty folder is new; one with something in it is not.
+        fs::create_dir(at.join("mine")).unwrap();
+        Folders::of(&at.join("mine/")).unwrap();
+        fs::write(at.join("mine/file"), "x").unwrap();
+        let error = Folders::of(&at.join("mine/")).err().unwrap();
+        assert!(matches!(error, Error::AdaptedBefore { .. }), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_a_link_points_at_is_replaced() {
+        let at = tempfile::tempdir().unwrap();
+        let at = fs::canonicalize(at.path()).unwrap();
+        let (link, target) = (at.join("link"), at.join("disk/mine"));
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        let error = Folders::of(&link).err().unwrap().to_string();
+        assert!(error.contains("link"), "what is not there: {error}");
+        fs::create_dir_all(&target).unwrap();
+        let folders = Folders::of(&link).unwrap();
+        assert_eq!(folders.work(), at.join("disk/mine.adapting"));
+        fs::create_dir(folders.work()).unwrap();
+        fs::write(folders.work().join("config.toml"), "").unwrap();
+        folders.keep().unwrap();
+        assert!(link.join("config.toml").exists() && link.is_symlink());
+        assert!(!is_mount_point(&target));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_mount_point_is_told_from_a_folder() {
+        assert!(is_mount_point(Path::new("/proc")));
+        assert!(!is_mount_point(Path::new("/no such folder")));
+    }
 }

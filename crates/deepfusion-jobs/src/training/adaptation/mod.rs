@@ -10,6 +10,7 @@ mod outcome;
 mod recipe;
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use deepfusion_data::{Cameras, Dataset, NamedTopic, OpenOptions};
 use deepfusion_eval::verdict::Verdict;
@@ -22,7 +23,7 @@ pub use self::outcome::{Outcome, Refusal};
 pub use self::recipe::assumed_camera;
 
 use self::folders::Folders;
-use super::{Start, StartReport};
+use super::{RunLock, Start, StartReport};
 use crate::held_out::unseen_frames;
 use crate::model_facts::ModelFacts as _;
 use crate::recordings::{open_aimed, open_with_turns};
@@ -109,7 +110,7 @@ impl AdaptSettings {
 /// Fails where a folder for an adapted network is not new: an error before long work, not after it.
 ///
 /// # Errors
-/// [`Error::AdaptedBefore`].
+/// [`Error::AdaptedBefore`], [`Error::MountPoint`]; a link to nothing.
 pub fn require_new(out: &Path) -> Result<()> {
     Folders::of(out).map(|_| ())
 }
@@ -127,6 +128,8 @@ pub struct Adaptation {
     device: Device,
     held_out: HeldOut,
     before: Verdict,
+    /// Of the folder where is learned, once that has begun.
+    lock: Mutex<Option<RunLock>>,
 }
 
 impl Adaptation {
@@ -173,6 +176,7 @@ impl Adaptation {
             device: device.clone(),
             held_out,
             before,
+            lock: Mutex::default(),
         })
     }
 
@@ -193,7 +197,8 @@ impl Adaptation {
     /// What learns; it goes on where an adaptation with the same settings was interrupted.
     ///
     /// # Errors
-    /// [`Error::OtherSettings`] where one with other settings was; as [`open_samples`], and the trainer's.
+    /// [`Error::OtherSettings`] where one with other settings was; [`Error::AtWork`] where another process learns there; as [`open_samples`],
+    /// and the trainer's.
     pub fn trainer(
         &self,
         opened: OpenedCallback,
@@ -202,16 +207,29 @@ impl Adaptation {
     ) -> Result<Trainer> {
         let sets = open_samples(&self.config, opened, warn)?;
         let config = self.config.clone();
+        self.hold(None);
+        // Before anything of it is removed.
+        let lock = self.folders.lock()?;
         Ok(match self.folders.begun(&config)? {
-            Some(folder) => Trainer::resume(config, folder, sets, &self.device)?,
+            Some(folder) => {
+                self.hold(lock);
+                Trainer::resume(config, folder, sets, &self.device)?
+            }
             None => {
                 let folder = RunFolder::create(self.folders.work())?;
+                self.hold(self.folders.lock()?);
                 self.folders.keep_start(&self.given)?;
                 Trainer::create(config, folder, sets, &self.device, |model| {
                     self.start.initialise(model, &self.device, report)
                 })?
             }
         })
+    }
+
+    /// Keeps other processes out of the folder where is learned.
+    fn hold(&self, lock: Option<RunLock>) {
+        let mut held = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        *held = lock;
     }
 
     /// The run that the trainer writes, until it is judged.

@@ -32,11 +32,7 @@ pub(super) fn config(
     opened: &[Dataset],
 ) -> Result<TrainConfig> {
     let own = estimator.config();
-    let learned_from_drives = if own.data.sets.is_empty() {
-        own.data.learn.from_motion()
-    } else {
-        own.data.sets.iter().any(|set| set.learn.from_motion())
-    };
+    let learned_from_drives = learned_from_drives(own, estimator.training_camera().is_some());
     let mut config = if learned_from_drives {
         own.clone()
     } else {
@@ -109,6 +105,17 @@ pub(super) fn config(
     }
     assign(&mut config, &settings.set)?;
     Ok(config)
+}
+
+/// Whether the network's own run learned from drives. Imported weights, which know no camera, have the settings of a preset that does, and
+/// no metres: the vehicle's motion gives them some.
+fn learned_from_drives(own: &TrainConfig, knows_camera: bool) -> bool {
+    let from_motion = if own.data.sets.is_empty() {
+        own.data.learn.from_motion()
+    } else {
+        own.data.sets.iter().any(|set| set.learn.from_motion())
+    };
+    from_motion && knows_camera
 }
 
 /// The settings but for those of single elements of lists, which may not be there yet.
@@ -235,6 +242,18 @@ fn simulated(config: &TrainConfig, cameras: Vec<SimulatedCamera>) -> DataSetConf
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An import has Monodepth2's settings, and warps by its own PoseNet's motion alone if those are taken for what it learned by.
+    #[test]
+    fn imported_weights_have_not_learned_from_drives() {
+        let mut config = Preset::Monodepth2.config();
+        assert!(learned_from_drives(&config, true));
+        assert!(!learned_from_drives(&config, false));
+        config.data.learn = Learn::Depth;
+        assert!(!learned_from_drives(&config, true));
+        config.data.sets = vec![DataSetConfig::default()];
+        assert!(learned_from_drives(&config, true));
+    }
 
     #[test]
     fn sizes_hardly_squeeze_the_image() {

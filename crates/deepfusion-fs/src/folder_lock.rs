@@ -1,0 +1,30 @@
+//! A folder that one process at a time works in.
+
+use std::fs::{File, TryLockError};
+use std::path::Path;
+
+/// Held while a folder is worked in, so that nobody else does. The system frees it with the process, however that ends.
+///
+/// It is the folder itself that is locked: no file is added to it, and one that is renamed stays locked. Elsewhere than on Unix, where a folder is
+/// not opened as a file, nothing is locked.
+#[derive(Debug)]
+pub struct FolderLock {
+    _folder: Option<File>,
+}
+
+impl FolderLock {
+    /// Takes the lock of a folder that is there.
+    ///
+    /// # Errors
+    /// [`TryLockError::WouldBlock`] where another has it; else what the system says: some network file systems do not lock folders.
+    pub fn take(folder: &Path) -> Result<Self, TryLockError> {
+        if !cfg!(unix) {
+            return Ok(Self { _folder: None });
+        }
+        let folder = File::open(folder).map_err(TryLockError::Error)?;
+        folder.try_lock()?;
+        Ok(Self {
+            _folder: Some(folder),
+        })
+    }
+}

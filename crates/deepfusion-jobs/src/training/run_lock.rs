@@ -1,0 +1,65 @@
+//! That one process at a time writes to the folder of a run, or of a table of runs.
+
+use std::fs::TryLockError;
+use std::path::Path;
+
+use deepfusion_fs::FolderLock;
+
+use crate::{Error, Result};
+
+/// Held while a run's folder is written to; of several workers the first one has it.
+#[derive(Debug)]
+pub struct RunLock {
+    _lock: Option<FolderLock>,
+}
+
+impl RunLock {
+    /// Takes the lock of a folder that is there. Where it cannot be locked, that is a warning ([`tracing::warn`]).
+    ///
+    /// # Errors
+    /// [`Error::AtWork`] where another process has it.
+    pub fn take(folder: &Path) -> Result<Self> {
+        let lock = match FolderLock::take(folder) {
+            Ok(lock) => Some(lock),
+            Err(TryLockError::WouldBlock) => {
+                let folder = folder.to_owned();
+                return Err(Error::AtWork { folder });
+            }
+            Err(TryLockError::Error(error)) => {
+                tracing::warn!(
+                    "{}: cannot be locked ({error}): let one process at a time work there",
+                    folder.display()
+                );
+                None
+            }
+        };
+        Ok(Self { _lock: lock })
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use deepfusion_hint::Hint as _;
+    use std::fs;
+
+    #[test]
+    fn a_folder_is_ones_own_until_it_is_let_go() {
+        let at = tempfile::tempdir().unwrap();
+        let (run, renamed) = (at.path().join("run"), at.path().join("renamed"));
+        fs::create_dir(&run).unwrap();
+        let lock = RunLock::take(&run).unwrap();
+        let error = RunLock::take(&run).unwrap_err();
+        assert!(error.to_string().contains("another process"), "{error}");
+        assert!(error.hint().unwrap().contains("wait"));
+        // Nothing of it is in the way of others, and it goes with the folder.
+        assert_eq!(fs::read_dir(&run).unwrap().count(), 0);
+        fs::rename(&run, &renamed).unwrap();
+        let error = RunLock::take(&renamed).unwrap_err();
+        assert!(matches!(error, Error::AtWork { .. }), "{error}");
+        fs::create_dir(&run).unwrap();
+        RunLock::take(&run).unwrap();
+        drop(lock);
+        RunLock::take(&renamed).unwrap();
+    }
+}
