@@ -34,7 +34,7 @@ mod noise;
 
 pub use activation::{channel_sums, elu, elu_backward};
 pub use adam::{AdamStep, adam, sum_of_squares};
-pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward, batch_norm_inference};
+pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward};
 pub use conv::{
     ConvShape, Precision, conv2d, conv2d_backward_input, conv2d_backward_weight, has_bf16,
 };
