@@ -15,11 +15,11 @@ use deepfusion_perception::{
     Label, Perception, PerceptionConfig, Scorer, ScoringRules, Target, TargetScore,
 };
 
-pub use self::lidar::gathered;
-pub use self::object_frames::{ObjectFrame, ObjectFrameProblem, is_folder_of, labels_of};
+use self::object_frames::{ObjectFrame, labels_of};
+pub use self::object_frames::{ObjectFrameProblem, is_folder_of};
 pub use self::report::TargetReport;
 pub use self::source::{DepthSource, PredictedDepth};
-pub use self::tracklets::{Labels, pixels_within};
+use self::tracklets::Labels;
 use crate::scene::MotionTracker;
 use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
@@ -170,11 +170,11 @@ impl TargetEvaluation {
 }
 
 /// Depth that says how much of a box is seen.
-pub struct VisibilityDepth {
+struct VisibilityDepth {
     /// At the image's size.
-    pub depth: DepthMap,
+    depth: DepthMap,
     /// Every pixel, or a scan's points only.
-    pub dense: bool,
+    dense: bool,
 }
 
 /// The exact depth of a simulated frame, else its scan; `None` where there is neither.
@@ -196,8 +196,7 @@ fn visibility(dataset: &Dataset, index: usize) -> Result<Option<VisibilityDepth>
 }
 
 /// Whether a label is to be found: a free-standing thing of a target's size of which enough is seen.
-#[must_use]
-pub fn counts(label: &Label, class: &str, points: usize, least: usize) -> bool {
+fn counts(label: &Label, class: &str, points: usize, least: usize) -> bool {
     /// The simulator's things that are no targets, and KITTI's regions without labels.
     const NEITHER: [&str; 5] = ["Pole", "Tree", "Building", "Fence", "DontCare"];
     let [length, width, height] = label.size_m;
