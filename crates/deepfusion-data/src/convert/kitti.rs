@@ -50,8 +50,7 @@ pub fn convert_to_kitti(
     super::parts::require_empty(out)?;
     let moved_s = seconds_to_move(datasets);
     let start_ns = at_ns(first, 0.0, moved_s);
-    let (year, month, day) = date(start_ns.div_euclid(86_400_000_000_000));
-    let date_name = format!("{year:04}_{month:02}_{day:02}");
+    let date_name = date(start_ns);
     let date_folder = out.join(&date_name);
     let partial = PartialFolder::beside(&date_folder).map_err(|e| Error::file(out, e))?;
     let names = write_date(datasets, partial.path(), &date_name, moved_s, progress)
