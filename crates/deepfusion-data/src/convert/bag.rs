@@ -1,11 +1,8 @@
-use super::parts::{
-    Converted, SIMULATED, at_ns, cam_from_scanner, go_on, moving_at, points, seconds_to_move,
-};
+use super::parts::{Converted, SIMULATED, at_ns, go_on, moving_at, points, seconds_to_move};
 use crate::{Dataset, Error, GtKind, ImageProblem, Result, TopicProblem};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
-    CameraInfo, CompressedImage, Header, PointCloud2, RegionOfInterest, Twist, TwistStamped,
-    Vector3,
+    CameraInfo, CompressedImage, Header, PointCloud2, Twist, TwistStamped, Vector3,
 };
 use deepfusion_rosbag::{BagWriter, Compression, Time, WriterOptions};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -171,21 +168,7 @@ fn png(dataset: &Dataset, frame: usize) -> Result<Vec<u8>> {
 
 fn camera_info(dataset: &Dataset, header: Header) -> CameraInfo {
     let k = dataset.intrinsics(0);
-    CameraInfo {
-        header,
-        height: k.height,
-        width: k.width,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [
-            k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,
-        ],
-        binning_x: 0,
-        binning_y: 0,
-        roi: RegionOfInterest::default(),
-    }
+    CameraInfo::pinhole(header, [k.fx, k.fy, k.cx, k.cy], (k.width, k.height))
 }
 
 fn describe(dataset: &Dataset) -> String {
@@ -203,7 +186,7 @@ fn describe(dataset: &Dataset) -> String {
         let (t, r) = (three(pose.translation()), three(pose.axis_angle()));
         let _ = writeln!(text, "\n[{name}]\ntranslation = {t}\nrotation = {r}");
     };
-    add("cam_from_lidar", &cam_from_scanner());
+    add("cam_from_lidar", &Se3::cam_from_body_axes());
     // A guess is left out: the bag's reader makes the same one, and says so.
     if let Some(pose) = dataset
         .cam_from_vehicle()

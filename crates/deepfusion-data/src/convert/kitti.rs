@@ -1,7 +1,6 @@
 use super::calendar::{date, stamp};
 use super::parts::{
-    Converted, Moving, SIMULATED, at_ns, cam_from_scanner, go_on, moving_at, points,
-    seconds_to_move,
+    Converted, Moving, SIMULATED, at_ns, go_on, moving_at, points, seconds_to_move,
 };
 use crate::dataset_toml::FolderConfig;
 use crate::{Dataset, Error, MotionModel, Result, VehicleTrack, save_png};
@@ -305,7 +304,7 @@ fn write_calibration(folder: &Path, k: &Intrinsics, cam_from_vehicle: Option<Se3
         numbers(projection)
     );
     super::parts::write_text(&folder.join("calib_cam_to_cam.txt"), &text)?;
-    let scanner = cam_from_scanner();
+    let scanner = Se3::cam_from_body_axes();
     super::parts::write_text(&folder.join("calib_velo_to_cam.txt"), &rigid(&scanner))?;
     if let Some(cam_from_vehicle) = cam_from_vehicle {
         let scanner_from_vehicle = scanner.inverse() * cam_from_vehicle;
