@@ -9,7 +9,7 @@ use deepfusion_perception::{Label, Target};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 use super::tracklets::pixels_within;
-use super::{VisibilityDepth, counts};
+use super::visibility::{VisibilityDepth, counts};
 use crate::{Error, Result};
 
 /// Points of the scan from which on a label counts.

@@ -6,7 +6,7 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_perception::Label;
 use nalgebra::Vector3;
 
-use super::{VisibilityDepth, counts};
+use super::visibility::{VisibilityDepth, counts};
 use crate::Result;
 
 /// Pixels of a box in an image of 640×192 from which on it counts, where every pixel's depth is known.
