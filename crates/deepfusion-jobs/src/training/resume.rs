@@ -191,7 +191,7 @@ fn same_start(run: &TrainConfig, asked: &Path) -> Result<()> {
     // `none`, and the names of embedded networks, are no paths.
     let asked = match (Start::is_none(asked), &run.init_sha256) {
         (true, _) | (false, Some(_)) => asked.to_owned(),
-        (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.to_owned()),
+        (false, None) => deepfusion_fs::absolute(asked),
     };
     let found = run.init.as_deref().map_or("none".into(), path_text);
     same(Setting::Init, path_text(&asked), found)
