@@ -46,7 +46,9 @@ pub use depthwise::{
     DepthwiseShape, depthwise, depthwise_backward_input, depthwise_backward_weight,
 };
 pub use gelu::{GELU_END, GELU_SERIES, gelu, gelu_backward, gelu_exact};
-pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
+pub use photometric::{
+    PhotometricShape, SSIM_C1, SSIM_C2, photometric_error, photometric_error_backward,
+};
 pub use position::position_code;
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
 pub use resize::{Filter, Resizer};
