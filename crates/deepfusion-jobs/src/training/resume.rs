@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Cameras;
-use deepfusion_model::{InputSize, Learn, Preset, TrainConfig, ViewMotion};
+use deepfusion_model::{Error as ModelError, InputSize, Learn, Preset, TrainConfig, ViewMotion};
 
 use super::Start;
 use crate::recordings::camera_word;
@@ -142,28 +142,27 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
         let found = run.view_motion.name();
         same(Setting::ViewMotion, motion.name().into(), found.into())?;
     }
-    for term in with {
-        let mut other = run.clone();
-        other.with(term)?;
-        if other != *run {
-            return contradicts(Setting::With, term.clone(), RunHas::WithoutIt);
-        }
-    }
-    for term in without {
-        let mut other = run.clone();
-        other.without(term)?;
-        if other != *run {
-            return contradicts(Setting::Without, term.clone(), RunHas::WithIt);
-        }
-    }
-    for assignment in assignments {
-        let mut other = run.clone();
-        other.set(assignment)?;
-        if other != *run {
-            let asked = assignment.clone();
-            return contradicts(Setting::Assignment, asked, RunHas::AnotherValue);
-        }
-    }
+    changes_nothing(
+        run,
+        with,
+        Setting::With,
+        RunHas::WithoutIt,
+        TrainConfig::with,
+    )?;
+    changes_nothing(
+        run,
+        without,
+        Setting::Without,
+        RunHas::WithIt,
+        TrainConfig::without,
+    )?;
+    changes_nothing(
+        run,
+        assignments,
+        Setting::Assignment,
+        RunHas::AnotherValue,
+        TrainConfig::set,
+    )?;
     if let Some(asked) = init {
         same_start(run, asked)?;
     }
@@ -185,6 +184,24 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
         (config.epochs, config.steps, config.min_steps) = (*epochs, None, 0);
     }
     Ok(config)
+}
+
+/// Refuses each of these that would change the run.
+fn changes_nothing(
+    run: &TrainConfig,
+    asked: &[String],
+    setting: Setting,
+    has: RunHas,
+    change: impl Fn(&mut TrainConfig, &str) -> std::result::Result<(), ModelError>,
+) -> Result<()> {
+    for one in asked {
+        let mut other = run.clone();
+        change(&mut other, one)?;
+        if other != *run {
+            return contradicts(setting, one.clone(), has);
+        }
+    }
+    Ok(())
 }
 
 fn same_start(run: &TrainConfig, asked: &Path) -> Result<()> {
