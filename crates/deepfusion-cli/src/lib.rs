@@ -17,7 +17,6 @@ mod engine;
 mod error;
 mod failure;
 mod interrupt;
-mod jobs;
 mod model;
 mod output;
 mod progress;

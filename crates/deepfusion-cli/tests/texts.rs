@@ -171,7 +171,7 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
             &[
                 "predict", "--model", "m", "i.png", "--out", "o", "--shard", "5/4",
             ],
-            "no part 5 of 4",
+            "no shard 5 of 4",
         ),
     ] {
         let run = deepfusion(args);

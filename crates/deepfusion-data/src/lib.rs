@@ -16,6 +16,7 @@ mod dataset_toml;
 mod error;
 mod formats;
 mod logs;
+mod names;
 mod truth;
 
 pub use camera::{CalibrationSource, CameraCalibration, Lens, calibration_near, camera_info_yaml};

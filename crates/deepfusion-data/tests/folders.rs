@@ -471,7 +471,7 @@ fn what_lies_in_a_recordings_folder_and_is_not_read_is_named() {
     // By itself it is all there is.
     assert_eq!(said(&at.join("second")), "");
 
-    // KITTI's drives, and a film of them; what is in a drive is its own.
+    // KITTI's drives, and a video of them; what is in a drive is its own.
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());
     write_drive(&drive.join("extra"), 4, 10.0, 0.0);

@@ -225,12 +225,6 @@ pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis> {
     })
 }
 
-/// Examines one drive.
-#[must_use]
-pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
-    examine_among(dataset, false)
-}
-
 /// Examines a drive of several, of which another one trains or not.
 fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
     let survey = Survey::of(dataset);

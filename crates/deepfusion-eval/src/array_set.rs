@@ -220,7 +220,7 @@ fn array(path: &Path, name: ArrayName, bytes: &[u8]) -> Result<ArrayD<f64>> {
         path: path.to_owned(),
         reason,
     };
-    // The reader allocates for as many numbers, and as long a header, as it is told that there are.
+    // The reader allocates for as many numbers, and as long a header, as the file says that there are.
     match NpyHeader::parse(bytes) {
         Ok(header) if header.item_bytes().is_none() || header.fits(bytes.len() as u64) => {}
         Err(NpyHeaderProblem::NotNpy) => return Err(wrong(ArrayProblem::NotArrays)),

@@ -262,7 +262,7 @@ impl Evaluator {
             mean_depth_baseline: None,
             scenarios: Vec::new(),
             skipped: self.skipped.clone(),
-            truth_sha256: Some(hex(&self.truth.clone().finalize())),
+            truth_sha256: Some(format!("{:x}", self.truth.clone().finalize())),
         })
     }
 
@@ -391,8 +391,4 @@ struct Pixel {
 
 fn median_of(pixels: &[Pixel], value: fn(&Pixel) -> f64) -> Option<f64> {
     median(&pixels.iter().map(value).collect::<Vec<_>>())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

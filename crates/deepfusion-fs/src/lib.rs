@@ -13,7 +13,7 @@ mod sync;
 pub use content::Content;
 pub use folder_lock::FolderLock;
 pub use in_the_way::{InTheWay, Unfinished, in_the_way};
-pub use names::{create_unused, moved_path, unused};
+pub use names::{absolute, create_unused, moved_path, unused};
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
 pub use partial_folder::PartialFolder;
 pub use sync::{publish, publish_folder, sync_files, sync_folder};

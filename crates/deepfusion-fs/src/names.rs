@@ -47,6 +47,12 @@ pub fn moved_path(path: PathBuf, from: &Path, to: &Path) -> PathBuf {
     moved.unwrap_or(path)
 }
 
+/// A path from the root. An empty one stays, and any one whose working directory is gone: opening it then says so.
+#[must_use]
+pub fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
 /// `path`, or `path-2`, `path-3` … where that is taken.
 #[must_use]
 pub fn unused(path: &Path) -> PathBuf {
@@ -126,6 +132,14 @@ mod tests {
             let longest = temporary.file_name().unwrap().len() + ".lock".len();
             assert!(longest <= 255, "{longest}");
         }
+    }
+
+    #[test]
+    fn a_path_is_made_absolute_and_an_empty_one_stays() {
+        let made = absolute(Path::new("a/b"));
+        assert!(made.is_absolute() && made.ends_with("a/b"), "{made:?}");
+        assert_eq!(absolute(&made), made);
+        assert_eq!(absolute(Path::new("")), Path::new(""));
     }
 
     #[test]

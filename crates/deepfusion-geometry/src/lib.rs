@@ -12,6 +12,7 @@ mod depth_range;
 mod distortion;
 mod intrinsics;
 mod npy;
+mod pose_text;
 mod se3;
 mod trajectory;
 
@@ -20,5 +21,6 @@ pub use depth_range::DepthRange;
 pub use distortion::{Distortion, NoDistortion};
 pub use intrinsics::{HFOV_DEG, ImplausibleCamera, Intrinsics};
 pub use npy::{NpyHeader, NpyHeaderProblem};
+pub use pose_text::{kitti_line, scientific};
 pub use se3::Se3;
 pub use trajectory::{StampedPose, Trajectory};

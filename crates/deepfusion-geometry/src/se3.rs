@@ -22,6 +22,13 @@ impl Se3 {
         ))
     }
 
+    /// A camera's axes (x right, y down, z forward) from those of a body or a scanner (x forward, y left, z up) at the same place.
+    #[must_use]
+    pub fn cam_from_body_axes() -> Self {
+        let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+        Self::from_parts(&axes, Vector3::zeros())
+    }
+
     /// From an axis-angle vector (radians) and a translation (metres).
     #[must_use]
     pub fn from_axis_angle(axis_angle: Vector3<f64>, translation: Vector3<f64>) -> Self {
@@ -202,6 +209,12 @@ mod tests {
             let seen = a_from_b.mirrored_x().transform(&mirror(p));
             prop_assert!((seen - mirror(a_from_b.transform(&p))).norm() < 1e-9);
         }
+    }
+
+    #[test]
+    fn ahead_of_the_body_is_ahead_of_the_camera() {
+        let seen = Se3::cam_from_body_axes().transform(&Vector3::new(5.0, 2.0, 1.0));
+        assert!((seen - Vector3::new(-2.0, -1.0, 5.0)).norm() < 1e-12);
     }
 
     /// The exponential of a constant twist is the limit of many small steps along it.

@@ -3,7 +3,7 @@
 use super::files;
 use crate::{Error, ImageProblem, Result};
 use deepfusion_geometry::DepthMap;
-use image::{DynamicImage, ImageBuffer, Luma};
+use image::{DynamicImage, ImageBuffer, ImageFormat, Luma};
 use std::path::Path;
 
 const STEPS_PER_M: f32 = 256.0;
@@ -50,15 +50,7 @@ pub fn write_depth_png(depth: &DepthMap, path: &Path) -> Result<()> {
         let problem = format!("{} depths are no {width}x{height} map", depth.data.len());
         Error::file(path, std::io::Error::other(problem))
     })?;
-    deepfusion_fs::write_unsynced(
-        path,
-        |e| Error::file(path, e),
-        |out| {
-            image
-                .write_to(out, image::ImageFormat::Png)
-                .map_err(|e| files::write_failed(path, e))
-        },
-    )
+    files::write_png(path, |out| image.write_to(out, ImageFormat::Png))
 }
 
 #[cfg(test)]

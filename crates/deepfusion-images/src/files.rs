@@ -2,8 +2,9 @@
 
 use super::jpeg;
 use crate::{Error, ImageProblem, Result};
-use image::{DynamicImage, ImageError, ImageReader, RgbImage};
-use std::io::{BufRead, Cursor, Seek};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader, ImageResult, RgbImage};
+use std::fs::File;
+use std::io::{BufRead, BufWriter, Cursor, Seek};
 use std::path::Path;
 
 /// Reads a PNG or JPEG, told apart by content, as 8-bit RGB. Grey becomes RGB, 16 bits become 8, an
@@ -48,7 +49,7 @@ pub(crate) fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
 /// # Errors
 /// As [`load_rgb`]; a file cut off after its header is not noticed here.
 pub fn image_size(path: &Path) -> Result<(u32, u32)> {
-    let file = std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
+    let file = File::open(path).map_err(|e| Error::file(path, e))?;
     let mut input = std::io::BufReader::new(file);
     let begin = input.fill_buf().map_err(|e| Error::file(path, e))?;
     if !jpeg::is_jpeg(begin) {
@@ -105,19 +106,26 @@ fn truncated(path: &Path) -> Error {
 /// # Errors
 /// [`Error::File`] where writing fails.
 pub fn save_png(image: &RgbImage, path: &Path) -> Result<()> {
+    write_png(path, |out| image.write_to(out, ImageFormat::Png))
+}
+
+/// Writes a PNG, whole or not at all, by what puts it into a file.
+///
+/// # Errors
+/// [`Error::File`] where writing fails.
+pub(crate) fn write_png(
+    path: &Path,
+    encode: impl FnOnce(&mut BufWriter<File>) -> ImageResult<()>,
+) -> Result<()> {
     deepfusion_fs::write_unsynced(
         path,
         |e| Error::file(path, e),
-        |out| {
-            image
-                .write_to(out, image::ImageFormat::Png)
-                .map_err(|e| write_failed(path, e))
-        },
+        |out| encode(out).map_err(|e| write_failed(path, e)),
     )
 }
 
 /// The system's error inside an encoder's, named by file.
-pub(crate) fn write_failed(path: &Path, error: ImageError) -> Error {
+fn write_failed(path: &Path, error: ImageError) -> Error {
     match error {
         ImageError::IoError(source) => Error::file(path, source),
         other => Error::file(path, std::io::Error::other(other)),

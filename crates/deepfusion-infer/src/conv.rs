@@ -110,6 +110,12 @@ pub(crate) struct Runs {
 }
 
 impl Runs {
+    /// Whether some of the elements are none of the inputs.
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) fn read_on(&self) -> bool {
+        self.sources.iter().any(Option::is_none)
+    }
+
     /// The runs of a convolution over a view whose first channels are the logical ones named by
     /// `channel_of` (physical → logical); runs are at most `most` long and multiples of `multiple`, of which fewer
     /// than one only fill up.

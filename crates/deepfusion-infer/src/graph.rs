@@ -262,13 +262,6 @@ impl Graph {
         self.nodes.iter().enumerate().map(of).collect()
     }
 
-    /// The total in GFLOP, two operations per multiply-add.
-    #[must_use]
-    pub fn gflop(&self, width: usize, height: usize) -> f64 {
-        let all = self.multiply_adds(width, height);
-        all.iter().map(|count| *count as f64).sum::<f64>() * 2e-9
-    }
-
     /// How often an operation wants the image to be halved without a rest. Convolutions round up, and what follows them may be cut;
     /// what is doubled is doubled whole.
     fn exact_halvings(&self, node: usize, op: &Op) -> u32 {

@@ -13,6 +13,7 @@ mod statistics;
 
 use std::path::{Path, PathBuf};
 
+use deepfusion_fs::absolute;
 use deepfusion_model::weights::{Weights, read_safetensors_under, write_safetensors};
 use deepfusion_model::{
     AveragedNetwork, Checkpoint, CheckpointKind, Error as ModelError, RunFolder, StoredNetwork,
@@ -184,7 +185,6 @@ fn mean(networks: &[(&Weights, f64)]) -> Weights {
 }
 
 fn origin((source, share): (&ModelSource, &f64)) -> AveragedNetwork {
-    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let share = *share;
     match source {
         ModelSource::Run { folder, kind, .. } => AveragedNetwork {

@@ -5,6 +5,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
+use deepfusion_fs::absolute;
 
 use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
@@ -183,7 +184,7 @@ fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     let mut paths: Vec<PathBuf> = paths.iter().map(|p| without_dots(p)).collect();
     paths.sort();
     let mut seen = HashSet::new();
-    paths.retain(|p| seen.insert(std::path::absolute(p).unwrap_or_else(|_| p.clone())));
+    paths.retain(|p| seen.insert(absolute(p)));
     let mut used = UniqueNames::default();
     let name = |path: &PathBuf| {
         let stem = path.file_stem();

@@ -95,37 +95,6 @@ fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [May
     filled(out, x.iter().map(normalised));
 }
 
-/// Normalises with given statistics (inference, or frozen during training).
-///
-/// # Shapes
-/// As [`batch_norm`]; `saved` holds C means and variances.
-///
-/// # Panics
-/// When a length does not fit.
-pub fn batch_norm_inference(
-    x: &[f32],
-    gamma: &[f32],
-    beta: &[f32],
-    saved: &BatchNormSaved,
-    area: usize,
-    epsilon: f32,
-    relu: bool,
-    out: &mut [impl Slot],
-) {
-    let channels = gamma.len();
-    planes(x.len(), channels, area);
-    assert_eq!(out.len(), x.len(), "output length");
-    room(out)
-        .par_chunks_mut(area)
-        .zip(x.par_chunks(area))
-        .enumerate()
-        .for_each(|(i, (out, x))| {
-            let c = i % channels;
-            let scale = gamma[c] / (saved.variance[c] + epsilon).sqrt();
-            apply(x, saved.mean[c], scale, beta[c], relu, out);
-        });
-}
-
 /// Gradients of [`batch_norm`]: with M values a channel and g = ∂y (zero where the ReLU cut),
 /// ∂β = Σg, ∂γ = Σg·x̂, ∂x = γ/σ·(g − ∂β/M − x̂·∂γ/M). Returns (∂γ, ∂β).
 ///
@@ -270,10 +239,6 @@ mod tests {
             for (a, b) in y.iter().zip(exact(&x64, &gamma64, &beta64, relu)) {
                 assert!((f64::from(*a) - b).abs() < 1e-5, "{a} {b}");
             }
-            let mut again = vec![0.0; x.len()];
-            batch_norm_inference(&x, &gamma, &beta, &saved, AREA, 1e-5, relu, &mut again);
-            assert_eq!(y, again);
-
             let mut gx = vec![0.0; x.len()];
             let (ggamma, gbeta) = batch_norm_backward(
                 &x, &gamma, &beta, &saved, &weights, AREA, 1e-5, relu, &mut gx,

@@ -34,7 +34,7 @@ mod noise;
 
 pub use activation::{channel_sums, elu, elu_backward};
 pub use adam::{AdamStep, adam, sum_of_squares};
-pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward, batch_norm_inference};
+pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward};
 pub use conv::{
     ConvShape, Precision, conv2d, conv2d_backward_input, conv2d_backward_weight, has_bf16,
 };
@@ -46,7 +46,9 @@ pub use depthwise::{
     DepthwiseShape, depthwise, depthwise_backward_input, depthwise_backward_weight,
 };
 pub use gelu::{GELU_END, GELU_SERIES, gelu, gelu_backward, gelu_exact};
-pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
+pub use photometric::{
+    PhotometricShape, SSIM_C1, SSIM_C2, photometric_error, photometric_error_backward,
+};
 pub use position::position_code;
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
 pub use resize::{Filter, Resizer};

@@ -4,6 +4,11 @@ use crate::box_filter::{adjoint3x3, mean3x3};
 use num_traits::Float;
 use rayon::prelude::*;
 
+/// The first constant of SSIM, (0.01·L)² for values up to L = 1: it steadies the quotient of the means.
+pub const SSIM_C1: f64 = 1e-4;
+/// The second constant of SSIM, (0.03·L)²: it steadies the quotient of the variances.
+pub const SSIM_C2: f64 = 9e-4;
+
 /// Sizes and weights of the photometric error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhotometricShape {
@@ -69,7 +74,7 @@ struct Terms<T> {
 impl<T: Float> Terms<T> {
     #[inline]
     fn new(mu_a: T, mu_b: T, aa: T, bb: T, ab: T) -> Self {
-        let (c1, c2) = (constant::<T>(1e-4), constant::<T>(9e-4));
+        let (c1, c2) = (constant::<T>(SSIM_C1), constant::<T>(SSIM_C2));
         let two = T::one() + T::one();
         Self {
             a1: two * mu_a * mu_b + c1,

@@ -15,7 +15,7 @@ pub struct GoproLens {
     pub digital: char,
     /// What it sees from corner to corner (`ZFOV`), in degrees.
     pub diagonal_deg: f64,
-    /// Width and height of the film as it was taken (`VRES`), in pixels.
+    /// Width and height of the video as it was taken (`VRES`), in pixels.
     pub size: (u32, u32),
     /// Whether the picture was zoomed into (`DZST` above 0; `DZOM` only says that it could have been).
     pub zoomed: bool,
@@ -48,8 +48,8 @@ impl GoproLens {
         self.digital == 'L'
     }
 
-    /// Focal length of the linear lens in a film of this size, in pixels: half the diagonal over the tangent of half the angle. `None` for
-    /// other lenses, for a film that was zoomed or cut to another shape, and for an angle that is none.
+    /// Focal length of the linear lens in a video of this size, in pixels: half the diagonal over the tangent of half the angle. `None` for
+    /// other lenses, for a video that was zoomed or cut to another shape, and for an angle that is none.
     #[must_use]
     pub fn focal_px(&self, (width, height): (u32, u32)) -> Option<f64> {
         let shape = |(w, h): (u32, u32)| f64::from(w.max(h)) / f64::from(w.min(h).max(1));
@@ -63,7 +63,7 @@ impl GoproLens {
     }
 }
 
-/// How far a film's shape may be from the one it was taken with, as a share: encoders cut sides to multiples of 16.
+/// How far a video's shape may be from the one it was taken with, as a share: encoders cut sides to multiples of 16.
 const SAME_SHAPE: f64 = 0.02;
 
 /// Levels of entries within entries: devices, and the streams of one; a damaged file may claim any number.

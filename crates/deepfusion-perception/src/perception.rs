@@ -115,21 +115,7 @@ impl Perception {
         stamp: Option<Stamp>,
         instances: &[Instance],
     ) -> Result<Surroundings> {
-        if let Some(problem) = k.implausible() {
-            return Err(problem.into());
-        }
-        let size = (k.width as usize, k.height as usize);
-        for map in [Some(depth), sigma].into_iter().flatten() {
-            if (map.width, map.height) != size || map.data.len() != size.0 * size.1 {
-                return Err(Error::Size {
-                    found: (map.width, map.height),
-                    expected: size,
-                });
-            }
-        }
-        for instance in instances {
-            instance.check(size)?;
-        }
+        check(depth, sigma, k, instances)?;
         if self.rays.as_ref().is_none_or(|(before, _)| before != k) {
             self.rays = Some((*k, Rays::of(k)));
             self.ground = None;
@@ -178,30 +164,19 @@ impl Perception {
         }
         if let Some(sigma) = sigma {
             for detection in &mut detections {
-                detection.weigh(&depth.data, &sigma.data, size.0);
+                detection.weigh(&depth.data, &sigma.data, depth.width);
             }
         }
-        let mut targets = match stamp {
-            Some(stamp) => self.tracker.step(
-                &detections,
-                &FrameContext {
-                    time_s: stamp.time_s,
-                    world_from_cam: stamp.world_from_cam,
-                    depth: &depth.data,
-                    rays,
-                    ground: &ground,
-                },
-                &self.config,
-            ),
-            None => {
-                let tracker = &mut self.tracker;
-                detections
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, found)| f64::from(found.confidence) >= self.config.min_confidence)
-                    .map(|(i, detection)| detection.target(&ground, tracker.new_id(), i))
-                    .collect()
-            }
+        let frame = stamp.map(|stamp| FrameContext {
+            time_s: stamp.time_s,
+            world_from_cam: stamp.world_from_cam,
+            depth: &depth.data,
+            rays,
+            ground: &ground,
+        });
+        let mut targets = match frame {
+            Some(frame) => self.tracker.step(&detections, &frame, &self.config),
+            None => unfollowed(&mut self.tracker, &detections, &ground, &self.config),
         };
         targets.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
         self.ground = Some(ground.clone());
@@ -211,4 +186,44 @@ impl Perception {
             targets,
         })
     }
+}
+
+/// Refuses a camera that is implausible, and what does not have its size.
+fn check(
+    depth: &DepthMap,
+    sigma: Option<&DepthMap>,
+    k: &Intrinsics,
+    instances: &[Instance],
+) -> Result<()> {
+    if let Some(problem) = k.implausible() {
+        return Err(problem.into());
+    }
+    let size = (k.width as usize, k.height as usize);
+    for map in [Some(depth), sigma].into_iter().flatten() {
+        if (map.width, map.height) != size || map.data.len() != size.0 * size.1 {
+            return Err(Error::Size {
+                found: (map.width, map.height),
+                expected: size,
+            });
+        }
+    }
+    for instance in instances {
+        instance.check(size)?;
+    }
+    Ok(())
+}
+
+/// The targets of an image that is independent of others: each has a new id and no velocity.
+fn unfollowed(
+    tracker: &mut Tracker,
+    detections: &[Detection],
+    ground: &Ground,
+    config: &PerceptionConfig,
+) -> Vec<Target> {
+    detections
+        .iter()
+        .enumerate()
+        .filter(|(_, found)| f64::from(found.confidence) >= config.min_confidence)
+        .map(|(i, detection)| detection.target(ground, tracker.new_id(), i))
+        .collect()
 }

@@ -1,5 +1,6 @@
 //! The common interface of both kinds of file.
 
+pub(crate) use deepfusion_rosbag::hull;
 use deepfusion_rosbag::{
     Connection, MessageIter, Selection, Serialization, SourceDamage, Time, TopicInfo,
 };
@@ -75,37 +76,7 @@ impl Channel {
     }
 }
 
-/// From the earlier to the later.
-pub(crate) fn hull(a: Option<(Time, Time)>, b: Option<(Time, Time)>) -> Option<(Time, Time)> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
-        (one, None) | (None, one) => one,
-    }
-}
-
 /// Channels gathered by topic, in order of names.
 pub(crate) fn topics<'a>(channels: impl Iterator<Item = &'a Channel>) -> Vec<TopicInfo> {
-    let mut topics: Vec<TopicInfo> = Vec::new();
-    for Channel {
-        connection, range, ..
-    } in channels
-    {
-        match topics.iter_mut().find(|t| t.name == connection.topic) {
-            Some(topic) => {
-                topic.connections += 1;
-                topic.count += connection.count;
-                topic.range = hull(topic.range, *range);
-            }
-            None => topics.push(TopicInfo {
-                name: connection.topic.clone(),
-                type_name: connection.type_name.clone(),
-                md5: connection.md5.clone(),
-                connections: 1,
-                count: connection.count,
-                range: *range,
-            }),
-        }
-    }
-    topics.sort_by(|a, b| a.name.cmp(&b.name));
-    topics
+    TopicInfo::gather(channels.map(|channel| (&channel.connection, channel.range)))
 }

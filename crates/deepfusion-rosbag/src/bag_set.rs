@@ -2,7 +2,7 @@ use crate::bag::{Bag, BagOptions};
 use crate::connection::Connection;
 use crate::message::Message;
 use crate::messages::Messages;
-use crate::topic::{self, TopicInfo};
+use crate::topic::{self, TopicInfo, hull};
 use crate::{Error, Result, Selection, Time};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -92,7 +92,7 @@ impl BagSet {
     /// The times of the first and the last message; `None` without any.
     #[must_use]
     pub fn time_range(&self) -> Option<(Time, Time)> {
-        hull(self.bags.iter().filter_map(Bag::time_range))
+        self.bags.iter().map(Bag::time_range).fold(None, hull)
     }
 
     /// The topics of all bags by name, with type, count, time range and rate.
@@ -108,7 +108,7 @@ impl BagSet {
         let mut topics = topic::group(&self.connections);
         for topic in &mut topics {
             let same = each.iter().flatten().filter(|t| t.name == topic.name);
-            topic.range = hull(same.filter_map(|t| t.range));
+            topic.range = same.map(|t| t.range).fold(None, hull);
         }
         Ok(topics)
     }
@@ -146,10 +146,6 @@ impl BagSet {
             active: Vec::new(),
         })
     }
-}
-
-fn hull(ranges: impl Iterator<Item = (Time, Time)>) -> Option<(Time, Time)> {
-    ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 /// The messages of a [`BagSet`] in time order; see [`Messages`] for errors. It uses the memory of all bags whose

@@ -55,5 +55,5 @@ pub use scan::{Damage, ScanReason};
 pub use selection::Selection;
 pub use source_damage::SourceDamage;
 pub use time::Time;
-pub use topic::TopicInfo;
+pub use topic::{TopicInfo, hull};
 pub use writer::{BagWriter, ConnectionId, WriterOptions};

@@ -32,6 +32,33 @@ impl TopicInfo {
         let seconds = last.seconds_since(first);
         (self.count > 1 && seconds > 0.0).then(|| (self.count - 1) as f64 / seconds)
     }
+
+    /// Connections gathered by topic, in order of names; each with the times of its first and last message.
+    #[must_use]
+    pub fn gather<'a>(
+        connections: impl IntoIterator<Item = (&'a Connection, Option<(Time, Time)>)>,
+    ) -> Vec<Self> {
+        let mut topics: Vec<Self> = Vec::new();
+        for (connection, range) in connections {
+            match topics.iter_mut().find(|t| t.name == connection.topic) {
+                Some(topic) => {
+                    topic.connections += 1;
+                    topic.count += connection.count;
+                    topic.range = hull(topic.range, range);
+                }
+                None => topics.push(Self {
+                    name: connection.topic.clone(),
+                    type_name: connection.type_name.clone(),
+                    md5: connection.md5.clone(),
+                    connections: 1,
+                    count: connection.count,
+                    range,
+                }),
+            }
+        }
+        topics.sort_by(|a, b| a.name.cmp(&b.name));
+        topics
+    }
 }
 
 /// The topics of `bag`, by name.
@@ -45,29 +72,20 @@ pub(crate) fn topics(bag: &Bag) -> Vec<TopicInfo> {
 
 /// Connections gathered by topic, without their times.
 pub(crate) fn group(connections: &[Connection]) -> Vec<TopicInfo> {
-    let mut topics: Vec<TopicInfo> = Vec::new();
-    for connection in connections {
-        match topics.iter_mut().find(|t| t.name == connection.topic) {
-            Some(topic) => {
-                topic.connections += 1;
-                topic.count += connection.count;
-            }
-            None => topics.push(TopicInfo {
-                name: connection.topic.clone(),
-                type_name: connection.type_name.clone(),
-                md5: connection.md5.clone(),
-                connections: 1,
-                count: connection.count,
-                range: None,
-            }),
-        }
-    }
-    topics.sort_by(|a, b| a.name.cmp(&b.name));
-    topics
+    TopicInfo::gather(connections.iter().map(|connection| (connection, None)))
 }
 
-/// The times of a topic's first and last message. Of a chunk that cannot be read, those of the whole chunk count: who reads its messages is
-/// told what is wrong with it, and the rest of the bag is not lost.
+/// From the earlier first to the later last time of two ranges.
+#[must_use]
+pub fn hull(a: Option<(Time, Time)>, b: Option<(Time, Time)>) -> Option<(Time, Time)> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
+        (one, None) | (None, one) => one,
+    }
+}
+
+/// The times of a topic's first and last message. Of a chunk that cannot be read, those of the whole chunk count: reading its
+/// messages reports what is wrong with it, and the rest of the bag is not lost.
 fn range(bag: &Bag, topic: &str) -> Option<(Time, Time)> {
     let of_topic = |place: u32| bag.connections()[place as usize].topic == topic;
     let mut chunks: Vec<&ChunkInfo> = bag

@@ -1,16 +1,17 @@
 //! Writes a drive in the layout of KITTI's raw recordings.
 
+use crate::files::{
+    encode, encode_depth, encode_rgb, io, make_folder, require_empty, write_file, write_with,
+};
 use crate::oxts::DATA_FORMAT;
 use crate::rig::CAM2_FROM_CAM0_X;
 use crate::{Error, Result, SimFrame, Simulation, tracklets};
-use deepfusion_fs::{InTheWay, PartialFolder};
+use deepfusion_fs::PartialFolder;
 use deepfusion_geometry::cloud::PointCloud;
-use deepfusion_geometry::{DepthMap, Se3};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use deepfusion_geometry::{DepthMap, Se3, kitti_line, scientific};
+use image::ExtendedColorType;
+use image::codecs::png::FilterType;
 use rayon::prelude::*;
-use std::fs;
-use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -55,18 +56,6 @@ pub fn write_kitti(
     let moved = partial.commit();
     moved.map_err(io(&date, "move the finished drive here"))?;
     Ok(date.join(drive))
-}
-
-/// Refuses an output folder that holds something; there may be none.
-pub(crate) fn require_empty(out: &Path) -> Result<()> {
-    let found = deepfusion_fs::in_the_way(out);
-    match found.map_err(io(out, "use this as the output folder"))? {
-        None => Ok(()),
-        Some(InTheWay::Content) => Err(Error::OutputNotEmpty {
-            path: out.to_owned(),
-        }),
-        Some(InTheWay::Unfinished(unfinished)) => Err(unfinished.into()),
-    }
 }
 
 /// Writes below `date`; returns the drive folder's name.
@@ -146,7 +135,7 @@ fn write_all(
     }
     write_file(&drive.join("oxts/dataformat.txt"), DATA_FORMAT.as_bytes())?;
     let poses: String = (0..frames)
-        .map(|i| pose_line(&simulation.world_from_cam(i)))
+        .map(|i| kitti_line(&simulation.world_from_cam(i)) + "\n")
         .collect();
     write_file(&drive.join("poses.txt"), poses.as_bytes())?;
     let tracklets = tracklets::to_xml(simulation);
@@ -158,84 +147,8 @@ fn write_all(
     Ok(name)
 }
 
-pub(crate) fn io<'a>(
-    path: &'a Path,
-    action: &'static str,
-) -> impl Fn(std::io::Error) -> Error + 'a {
-    move |source| Error::Io {
-        path: path.to_owned(),
-        action,
-        source,
-    }
-}
-
-fn make_folder(path: &Path) -> Result<()> {
-    fs::create_dir_all(path).map_err(io(path, "make this folder"))
-}
-
-/// Writes a file of the drive, of which nothing is seen before all of it is on the disk.
-fn write_with(
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<()>,
-) -> Result<()> {
-    let failed = io(path, "write this file");
-    let file = fs::File::create(path).map_err(&failed)?;
-    let mut writer = BufWriter::with_capacity(1 << 16, file);
-    fill(&mut writer)?;
-    writer.flush().map_err(&failed)
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_with(path, |w| {
-        w.write_all(bytes).map_err(io(path, "write this file"))
-    })
-}
-
-fn encode(
-    out: impl Write,
-    path: &Path,
-    bytes: &[u8],
-    (width, height): (u32, u32),
-    colour: ExtendedColorType,
-    filter: FilterType,
-) -> Result<()> {
-    PngEncoder::new_with_quality(out, CompressionType::Fast, filter)
-        .write_image(bytes, width, height, colour)
-        .map_err(|error| match error {
-            image::ImageError::IoError(source) => io(path, "write this file")(source),
-            source => Error::Encode {
-                path: path.to_owned(),
-                source,
-            },
-        })
-}
-
-/// A PNG of a picture; `path` is named in errors.
-pub(crate) fn encode_rgb(out: impl Write, path: &Path, rgb: &image::RgbImage) -> Result<()> {
-    let colour = ExtendedColorType::Rgb8;
-    let size = rgb.dimensions();
-    encode(out, path, rgb.as_raw(), size, colour, FilterType::Sub)
-}
-
 fn write_png(path: &Path, frame: &SimFrame) -> Result<()> {
     write_with(path, |writer| encode_rgb(writer, path, &frame.rgb))
-}
-
-/// KITTI's 16-bit depth: metres × 256, 0 where there is none.
-pub(crate) fn encode_depth(out: impl Write, path: &Path, depth: &DepthMap) -> Result<()> {
-    let bytes: Vec<u8> = depth
-        .data
-        .iter()
-        .flat_map(|d| {
-            let value = (f64::from(*d) * 256.0).round();
-            let value = if value < 65_536.0 { value as u16 } else { 0 };
-            // The encoder takes the machine's own byte order.
-            value.to_ne_bytes()
-        })
-        .collect();
-    let size = (depth.width as u32, depth.height as u32);
-    let colour = ExtendedColorType::L16;
-    encode(out, path, &bytes, size, colour, FilterType::Sub)
 }
 
 fn write_depth(path: &Path, depth: &DepthMap) -> Result<()> {
@@ -286,30 +199,6 @@ fn timestamp(seconds: f64) -> String {
 fn numbers(values: impl IntoIterator<Item = f64>) -> String {
     let words: Vec<String> = values.into_iter().map(scientific).collect();
     words.join(" ")
-}
-
-/// C's `%.12e`, which KITTI's tools print (with fewer digits).
-fn scientific(value: f64) -> String {
-    let text = format!("{value:.12e}");
-    match text.split_once('e') {
-        Some((mantissa, exponent)) => {
-            let (sign, digits) = match exponent.strip_prefix('-') {
-                Some(digits) => ('-', digits),
-                None => ('+', exponent),
-            };
-            format!("{mantissa}e{sign}{digits:0>2}")
-        }
-        None => text,
-    }
-}
-
-fn rows(pose: &Se3) -> Vec<f64> {
-    let matrix = pose.matrix();
-    (0..12).map(|i| matrix[(i / 4, i % 4)]).collect()
-}
-
-fn pose_line(pose: &Se3) -> String {
-    numbers(rows(pose)) + "\n"
 }
 
 fn write_calibration(simulation: &Simulation, date: &Path) -> Result<()> {
@@ -375,13 +264,6 @@ fn rigid(pose: &Se3) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_look_like_kitti_s() {
-        assert_eq!(scientific(721.5377), "7.215377000000e+02");
-        assert_eq!(scientific(-0.00125), "-1.250000000000e-03");
-        assert_eq!(scientific(0.0), "0.000000000000e+00");
-    }
 
     #[test]
     fn time_stamps_run_over_minutes_and_days() {

@@ -28,6 +28,7 @@ mod can;
 mod config;
 mod crown;
 mod error;
+mod files;
 mod fmcw;
 mod imu;
 mod kitti;

@@ -117,7 +117,7 @@ impl Traffic {
         }
     }
 
-    /// Leaves out whoever would meet something that stands, on a varied street, within 150 m before the camera of a drive: nobody
+    /// Leaves out whoever would drive into something that stands, on a varied street, within 150 m before the camera of a drive: nobody
     /// vanishes there at any of these times, seconds. Changes nothing on a plain street.
     pub(crate) fn keep_passing(&mut self, world: &World, drive: &Drive, times: &[f64]) {
         if world.crowd.is_empty() {

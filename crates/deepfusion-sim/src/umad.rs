@@ -1,14 +1,14 @@
 //! Writes a drive as a bag with UMAD's sensors.
 
+use crate::files::{encode_depth, encode_rgb, io, require_empty};
 use crate::fmcw::{self, SCAN_RATE_HZ};
-use crate::kitti::{encode_depth, encode_rgb, io, require_empty};
 use crate::rig::Rig;
 use crate::{Error, ExpectedSetting, Result, Simulation};
 use deepfusion_fs::PartialFolder;
 use deepfusion_rosbag::msg::{
     AckermannDrive, AckermannDriveStamped, CameraInfo, CompressedImage, Header, Imu, Odometry,
-    Point, PointCloud2, Pose, PoseWithCovariance, Quaternion, RegionOfInterest, Twist,
-    TwistStamped, TwistWithCovariance, Vector3,
+    Point, PointCloud2, Pose, PoseWithCovariance, Quaternion, Twist, TwistStamped,
+    TwistWithCovariance, Vector3,
 };
 use deepfusion_rosbag::{BagWriter, Compression, ConnectionId, Time, WriterOptions};
 use rayon::prelude::*;
@@ -295,21 +295,7 @@ impl Picture {
 
 fn camera_info(simulation: &Simulation, header: Header) -> CameraInfo {
     let k = simulation.intrinsics();
-    CameraInfo {
-        header,
-        height: k.height,
-        width: k.width,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [
-            k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,
-        ],
-        binning_x: 0,
-        binning_y: 0,
-        roi: RegionOfInterest::default(),
-    }
+    CameraInfo::pinhole(header, [k.fx, k.fy, k.cx, k.cy], (k.width, k.height))
 }
 
 fn odometry(simulation: &Simulation, frame: usize) -> Odometry {

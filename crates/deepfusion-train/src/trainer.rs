@@ -350,8 +350,6 @@ impl Trainer {
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
             if due || stopped || save {
                 self.share_statistics()?;
-            }
-            if due || stopped || save {
                 let reported = if due || stopped {
                     let shares = [low_view.value(), moving.value()];
                     self.report(listen, panel, shares, due).and_then(|()| {

@@ -99,7 +99,7 @@ fn depth_learns_the_same_without_pose_net() {
     assert!(depth_weights(&resumed) == depth_weights(&whole));
 }
 
-/// Its checkpoint holds no PoseNet: who asks for one is told so, and a run that starts from it has a new one.
+/// Its checkpoint holds no PoseNet: asking for one is an error, and a run that starts from it has a new one.
 #[test]
 fn its_checkpoint_has_none() {
     let folder = tempfile::tempdir().unwrap();

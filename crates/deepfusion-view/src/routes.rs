@@ -16,9 +16,9 @@ use std::path::Path;
 
 use deepfusion_hint::Hint;
 use deepfusion_render::{ColourMap, DepthScale};
-use serde_json::{Value, json};
+use serde::Serialize;
 
-use crate::folder::{FrameFile, frame_json, picture_of, targets_of};
+use crate::folder::{FrameFile, Track, frame_json, picture_of, targets_of};
 use crate::http::{Request, Response};
 use crate::{DepthFile, Error, Folder, FolderKind, assets, training};
 
@@ -66,32 +66,80 @@ impl Routes {
         }
     }
 
-    fn session(&self) -> Value {
-        let runs = self.folders.iter().map(|folder| {
-            json!({
-                "name": folder.name(),
-                "path": folder.path().display().to_string(),
-                "kind": match folder.kind() { FolderKind::Predictions => "predictions", FolderKind::Training => "training" },
-            })
-        });
-        let table = |map: ColourMap| -> Vec<[u8; 3]> {
-            (0..=255u8)
-                .map(|i| map.colour(f32::from(i) / 255.0).0)
-                .collect()
-        };
-        let scale = DepthScale::default();
-        json!({
-            "version": env!("CARGO_PKG_VERSION"),
-            "runs": runs.collect::<Vec<_>>(),
-            "colours": {
-                "turbo": table(ColourMap::Turbo),
-                "magma": table(ColourMap::Magma),
-                "diverging": table(ColourMap::Diverging),
+    fn session(&self) -> Session {
+        let runs = self.folders.iter().map(|folder| Run {
+            kind: match folder.kind() {
+                FolderKind::Predictions => "predictions",
+                FolderKind::Training => "training",
             },
-            // From near to far by the logarithm of metres, as the pictures that `predict` writes.
-            "depth_scale": { "near_m": scale.near_m, "far_m": scale.far_m, "colours": depth_colours(&scale) },
-        })
+            name: folder.name(),
+            path: folder.path().display().to_string(),
+        });
+        let scale = DepthScale::default();
+        Session {
+            colours: Colours {
+                diverging: table(ColourMap::Diverging),
+                magma: table(ColourMap::Magma),
+                turbo: table(ColourMap::Turbo),
+            },
+            depth_scale: ScaleColours {
+                colours: depth_colours(&scale),
+                far_m: scale.far_m,
+                near_m: scale.near_m,
+            },
+            runs: runs.collect(),
+            version: env!("CARGO_PKG_VERSION"),
+        }
     }
+}
+
+/// What the page asks for first.
+#[derive(Debug, Serialize)]
+struct Session {
+    colours: Colours,
+    depth_scale: ScaleColours,
+    runs: Vec<Run>,
+    version: &'static str,
+}
+
+/// The colour maps, each as a [`table`].
+#[derive(Debug, Serialize)]
+struct Colours {
+    diverging: Vec<[u8; 3]>,
+    magma: Vec<[u8; 3]>,
+    turbo: Vec<[u8; 3]>,
+}
+
+/// From near to far by the logarithm of metres, as the pictures that `predict` writes.
+#[derive(Debug, Serialize)]
+struct ScaleColours {
+    colours: Vec<[u8; 3]>,
+    far_m: f32,
+    near_m: f32,
+}
+
+/// A folder that is shown.
+#[derive(Debug, Serialize)]
+struct Run {
+    kind: &'static str,
+    name: String,
+    path: String,
+}
+
+/// The targets of consecutive frames.
+#[derive(Debug, Serialize)]
+struct Tracks {
+    /// Place of the first frame.
+    from: usize,
+    /// One a frame; none where it has no targets.
+    tracks: Vec<Option<Track>>,
+}
+
+/// A map's colours at 256 places evenly from 0 to 1.
+fn table(map: ColourMap) -> Vec<[u8; 3]> {
+    (0..=255u8)
+        .map(|i| map.colour(f32::from(i) / 255.0).0)
+        .collect()
 }
 
 /// The depth scale's colours at 256 places evenly from near to far.
@@ -114,8 +162,8 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
             let from = request.number("from").unwrap_or(0) as usize;
             let count = request.number("count").unwrap_or(1).min(MOST_TRACK_FRAMES) as usize;
             let entries = folder.entries(from, count);
-            let tracks: Vec<_> = entries.iter().map(|e| targets_of(path, e)).collect();
-            Response::json(&json!({ "from": from, "tracks": tracks }))
+            let tracks = entries.iter().map(|e| targets_of(path, e)).collect();
+            Response::json(&Tracks { from, tracks })
         }
         [what @ ("frame" | "depth" | "sigma" | "image"), name] if !training => {
             match folder.entry(name) {
@@ -139,7 +187,7 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
                 },
             }
         }
-        ["training"] if training => sent(training::run_json(path).map(|v| Response::json(&v))),
+        ["training"] if training => sent(training::read(path).map(|run| Response::json(&run))),
         ["panel", name] if training => match training::panel(path, name) {
             Some(panel) => file(&panel, "image/png"),
             None => nothing(),

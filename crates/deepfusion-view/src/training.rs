@@ -1,8 +1,9 @@
 //! A training run: its learning curve and its panels.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::{ContentProblem, Error, Result};
 
@@ -14,8 +15,24 @@ pub(crate) fn is_run(folder: &Path) -> bool {
     folder.join("log.csv").is_file()
 }
 
+/// Numbers of the log by column; none where a row has no finite one.
+type Columns = BTreeMap<String, Vec<Option<f64>>>;
+
+/// A run as the page gets it.
+#[derive(Debug, Serialize)]
+pub(crate) struct TrainingRun {
+    /// The columns' names, in the log's order.
+    columns: Vec<String>,
+    /// The panels' file names.
+    panels: Vec<String>,
+    /// The column that counts the steps.
+    step_column: String,
+    train: Columns,
+    validation: Columns,
+}
+
 /// The log as columns, and the panels' names. A long log is thinned evenly for the steps; validations all stay.
-pub(crate) fn run_json(folder: &Path) -> Result<Value> {
+pub(crate) fn read(folder: &Path) -> Result<TrainingRun> {
     let path = folder.join("log.csv");
     let failed = |e: csv::Error| Error::content(&path, e);
     // A last line that is being written has too few fields: it is left out.
@@ -57,25 +74,20 @@ pub(crate) fn run_json(folder: &Path) -> Result<Value> {
         .enumerate()
         .filter(|(i, _)| i % stride == 0 || *i == last);
     let train: Vec<&Vec<Option<f64>>> = kept.map(|(_, row)| row).collect();
-    let table = |rows: &[&Vec<Option<f64>>]| -> Value {
-        let columns = header.iter().enumerate().filter(|(i, _)| *i != split);
-        columns
-            .map(|(i, name)| {
-                (
-                    name.clone(),
-                    json!(rows.iter().map(|r| r[i]).collect::<Vec<_>>()),
-                )
-            })
-            .collect::<serde_json::Map<_, _>>()
-            .into()
+    let columns = || header.iter().enumerate().filter(move |(i, _)| *i != split);
+    let table = |rows: &[&Vec<Option<f64>>]| -> Columns {
+        let column = |i: usize| -> Vec<Option<f64>> { rows.iter().map(|r| r[i]).collect() };
+        columns()
+            .map(|(i, name)| (name.clone(), column(i)))
+            .collect()
     };
-    Ok(json!({
-        "step_column": header[step],
-        "columns": header.iter().enumerate().filter(|(i, _)| *i != split).map(|(_, name)| name).collect::<Vec<_>>(),
-        "train": table(&train),
-        "validation": table(&validation.iter().collect::<Vec<_>>()),
-        "panels": panels(folder),
-    }))
+    Ok(TrainingRun {
+        columns: columns().map(|(_, name)| name.clone()).collect(),
+        panels: panels(folder),
+        step_column: header[step].clone(),
+        train: table(&train),
+        validation: table(&validation.iter().collect::<Vec<_>>()),
+    })
 }
 
 /// The panels' file names, in order.

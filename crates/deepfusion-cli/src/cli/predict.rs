@@ -26,7 +26,7 @@ pub(crate) struct PredictArgs {
     /// Which images, through which network, to where.
     #[command(flatten)]
     pub prediction: PredictionArgs,
-    /// What to write for every image [default: depth-png,color; of films and bags image, too].
+    /// What to write for every image [default: depth-png,color; of videos and bags image, too].
     #[arg(long, value_parser = names::depth_output(), value_delimiter = ',')]
     pub save: Option<Vec<DepthOutput>>,
     /// Leave out points of the cloud beyond this depth, in metres.

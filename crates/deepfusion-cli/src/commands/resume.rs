@@ -8,8 +8,7 @@ use deepfusion_model::TrainConfig;
 use super::clocks;
 use crate::cli::TrainArgs;
 use crate::error::CliError;
-use crate::failure::{Failure, Result};
-use crate::jobs::option_of;
+use crate::failure::{Failure, Result, option_of};
 
 /// A run's configuration with what was asked for.
 pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {

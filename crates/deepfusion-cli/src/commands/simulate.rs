@@ -129,7 +129,7 @@ fn check_varied(args: &SimulateArgs) -> Result<(), CliError> {
 fn fewer_cars(asked: usize, driving: usize) -> Option<String> {
     let drive = if driving == 1 { "drives" } else { "drive" };
     (driving < asked).then(|| {
-        format!("--moving-cars {asked}: only {driving} {drive}, the others would meet something that stands on this street")
+        format!("--moving-cars {asked}: only {driving} {drive}, the others would drive into something that stands on this street")
     })
 }
 

@@ -1,7 +1,7 @@
 //! How a command fails: `error: …`, what caused it, `hint: …`, and the exit code.
 
-mod context;
 mod findings;
+mod jobs;
 mod libraries;
 
 use std::error::Error;
@@ -12,12 +12,28 @@ use std::process::ExitCode;
 
 use anstyle::{AnsiColor, Style};
 
-pub(crate) use context::Context;
 pub use findings::in_options;
+#[cfg(feature = "train")]
+pub(crate) use jobs::option_of;
 pub(crate) use libraries::set_in_file;
 
 /// What a command returns.
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
+
+/// Results that can say what was being done, and with which file, when something failed.
+pub(crate) trait Context<T> {
+    /// Puts `what` before an error.
+    ///
+    /// # Errors
+    /// The same, as a [`Failure`].
+    fn context(self, what: impl Into<String>) -> Result<T>;
+}
+
+impl<T, E: Into<Failure>> Context<T> for std::result::Result<T, E> {
+    fn context(self, what: impl Into<String>) -> Result<T> {
+        self.map_err(|error| error.into().context(what))
+    }
+}
 
 /// An error that a command can end with, in the words of the command line: a library knows settings, this one the options that
 /// set them.

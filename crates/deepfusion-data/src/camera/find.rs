@@ -4,6 +4,7 @@ use super::calibration::CameraCalibration;
 use super::source::CalibrationSource;
 use crate::dataset::numbers_of_hfov;
 use crate::dataset_toml::FolderConfig;
+use crate::names::name_of;
 use crate::{CameraProblem, CameraWarning, DataWarning, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_images::{ExifCamera, exif_camera};
 use deepfusion_logs::GoproLens;
@@ -135,7 +136,7 @@ fn by_exif(
                 problem: CameraProblem::Zoomed {
                     said: camera.by,
                     other_said: first.by,
-                    other: name(path),
+                    other: name_of(path),
                 },
             });
         }
@@ -176,9 +177,4 @@ fn by_gopro(
         focal_px,
     };
     Ok(Some((calibration, warning)))
-}
-
-fn name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
 }

@@ -1,13 +1,10 @@
-use super::parts::{
-    Converted, SIMULATED, at_ns, cam_from_scanner, go_on, moving_at, points, seconds_to_move,
-};
-use crate::{Dataset, Error, GtKind, ImageProblem, Result, TopicProblem};
+use super::parts::{Converted, SIMULATED, at_ns, go_on, moving_at, points, seconds_to_move};
+use crate::{Dataset, Error, GtKind, ImageProblem, MotionModel, Result, TopicProblem};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
-    CameraInfo, CompressedImage, Header, PointCloud2, RegionOfInterest, Twist, TwistStamped,
-    Vector3,
+    CameraInfo, CompressedImage, Header, PointCloud2, Twist, TwistStamped, Vector3,
 };
-use deepfusion_rosbag::{BagWriter, Compression, Time, WriterOptions};
+use deepfusion_rosbag::{BagWriter, Compression, ConnectionId, Time, WriterOptions};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
@@ -71,25 +68,8 @@ pub fn convert_to_bag(
     } else {
         None
     };
-    if let (Some(topic), Some(track)) = (speed_topic, dataset.track()) {
-        for (seq, &time_s) in track.times_s().iter().enumerate() {
-            let Some(moving) = moving_at(dataset, time_s) else {
-                continue;
-            };
-            let [x, y, z] = moving.rates_radps;
-            let along = |x| Vector3 {
-                x,
-                ..Vector3::default()
-            };
-            let message = TwistStamped {
-                header: header(time(time_s), seq, "vehicle"),
-                twist: Twist {
-                    linear: along(moving.speed_mps),
-                    angular: Vector3 { x, y, z },
-                },
-            };
-            bag.write(topic, time(time_s), &message)?;
-        }
+    if let Some(topic) = speed_topic {
+        write_speeds(dataset, &mut bag, topic, time)?;
     }
     let frames: Vec<usize> = (0..times.len()).collect();
     let mut done = 0;
@@ -112,16 +92,7 @@ pub fn convert_to_bag(
             bag.write(image_topic, stamp, &image)?;
             bag.write(info_topic, stamp, &camera_info(dataset, header("camera")))?;
             if let (Some(topic), Some(points)) = (cloud_topic, points) {
-                let column = |axis: usize| -> Vec<f32> { points.iter().map(|p| p[axis]).collect() };
-                let (x, y, z) = (column(0), column(1), column(2));
-                let columns: [(&str, &[f32]); 3] = [("x", &x), ("y", &y), ("z", &z)];
-                let cloud = PointCloud2::from_columns(header("lidar"), &columns);
-                let cloud = cloud.map_err(|e| Error::Topic {
-                    path: out.to_owned(),
-                    problem: Box::new(TopicProblem::Cloud(e)),
-                    choice: None,
-                })?;
-                bag.write(topic, stamp, &cloud)?;
+                bag.write(topic, stamp, &cloud(header("lidar"), points, out)?)?;
             }
         }
         done += batch.len();
@@ -138,6 +109,47 @@ pub fn convert_to_bag(
     Ok(Converted {
         paths: vec![out.to_owned()],
         moved_s,
+    })
+}
+
+/// Writes how the vehicle moves at each time of its track; `time` is the bag's of a time of the recording.
+fn write_speeds(
+    dataset: &Dataset,
+    bag: &mut BagWriter,
+    topic: ConnectionId,
+    time: impl Fn(f64) -> Time,
+) -> Result<()> {
+    let times_s = dataset.track().map(MotionModel::times_s);
+    for (seq, &time_s) in times_s.unwrap_or_default().iter().enumerate() {
+        let Some(moving) = moving_at(dataset, time_s) else {
+            continue;
+        };
+        let [x, y, z] = moving.rates_radps;
+        let along = |x| Vector3 {
+            x,
+            ..Vector3::default()
+        };
+        let message = TwistStamped {
+            header: header(time(time_s), seq, "vehicle"),
+            twist: Twist {
+                linear: along(moving.speed_mps),
+                angular: Vector3 { x, y, z },
+            },
+        };
+        bag.write(topic, time(time_s), &message)?;
+    }
+    Ok(())
+}
+
+/// Points as a message; `out` is named in errors.
+fn cloud(header: Header, points: &[[f32; 3]], out: &Path) -> Result<PointCloud2<'static>> {
+    let column = |axis: usize| -> Vec<f32> { points.iter().map(|p| p[axis]).collect() };
+    let (x, y, z) = (column(0), column(1), column(2));
+    let columns: [(&str, &[f32]); 3] = [("x", &x), ("y", &y), ("z", &z)];
+    PointCloud2::from_columns(header, &columns).map_err(|e| Error::Topic {
+        path: out.to_owned(),
+        problem: Box::new(TopicProblem::Cloud(e)),
+        choice: None,
     })
 }
 
@@ -171,21 +183,7 @@ fn png(dataset: &Dataset, frame: usize) -> Result<Vec<u8>> {
 
 fn camera_info(dataset: &Dataset, header: Header) -> CameraInfo {
     let k = dataset.intrinsics(0);
-    CameraInfo {
-        header,
-        height: k.height,
-        width: k.width,
-        distortion_model: "plumb_bob".into(),
-        d: vec![0.0; 5],
-        k: [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0],
-        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [
-            k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,
-        ],
-        binning_x: 0,
-        binning_y: 0,
-        roi: RegionOfInterest::default(),
-    }
+    CameraInfo::pinhole(header, [k.fx, k.fy, k.cx, k.cy], (k.width, k.height))
 }
 
 fn describe(dataset: &Dataset) -> String {
@@ -203,7 +201,7 @@ fn describe(dataset: &Dataset) -> String {
         let (t, r) = (three(pose.translation()), three(pose.axis_angle()));
         let _ = writeln!(text, "\n[{name}]\ntranslation = {t}\nrotation = {r}");
     };
-    add("cam_from_lidar", &cam_from_scanner());
+    add("cam_from_lidar", &Se3::cam_from_body_axes());
     // A guess is left out: the bag's reader makes the same one, and says so.
     if let Some(pose) = dataset
         .cam_from_vehicle()

@@ -1,7 +1,6 @@
 use super::calendar::{date, stamp};
 use super::parts::{
-    Converted, Moving, SIMULATED, at_ns, cam_from_scanner, go_on, moving_at, points,
-    seconds_to_move,
+    Converted, Moving, SIMULATED, at_ns, go_on, moving_at, points, seconds_to_move,
 };
 use crate::dataset_toml::FolderConfig;
 use crate::{Dataset, Error, MotionModel, Result, VehicleTrack, save_png};
@@ -50,8 +49,7 @@ pub fn convert_to_kitti(
     super::parts::require_empty(out)?;
     let moved_s = seconds_to_move(datasets);
     let start_ns = at_ns(first, 0.0, moved_s);
-    let (year, month, day) = date(start_ns.div_euclid(86_400_000_000_000));
-    let date_name = format!("{year:04}_{month:02}_{day:02}");
+    let date_name = date(start_ns);
     let date_folder = out.join(&date_name);
     let partial = PartialFolder::beside(&date_folder).map_err(|e| Error::file(out, e))?;
     let names = write_date(datasets, partial.path(), &date_name, moved_s, progress)
@@ -306,7 +304,7 @@ fn write_calibration(folder: &Path, k: &Intrinsics, cam_from_vehicle: Option<Se3
         numbers(projection)
     );
     super::parts::write_text(&folder.join("calib_cam_to_cam.txt"), &text)?;
-    let scanner = cam_from_scanner();
+    let scanner = Se3::cam_from_body_axes();
     super::parts::write_text(&folder.join("calib_velo_to_cam.txt"), &rigid(&scanner))?;
     if let Some(cam_from_vehicle) = cam_from_vehicle {
         let scanner_from_vehicle = scanner.inverse() * cam_from_vehicle;

@@ -3,16 +3,9 @@
 use crate::{Dataset, Error, GtKind, MotionModel, Result};
 use deepfusion_fs::InTheWay;
 use deepfusion_geometry::Se3;
-use nalgebra::{Matrix3, Vector3};
 use std::io::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-
-/// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
-pub(super) fn cam_from_scanner() -> Se3 {
-    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-    Se3::from_parts(&axes, Vector3::zeros())
-}
 
 /// A frame's measured depth as points of a scanner at the camera's place, x forward, y left, z up, in metres: each
 /// projects back to the pixel it came from. `None` where the frame has no depth.
@@ -21,7 +14,7 @@ pub(super) fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32;
         return Ok(None);
     };
     let k = dataset.intrinsics(frame);
-    let scanner_from_cam = cam_from_scanner().inverse();
+    let scanner_from_cam = Se3::cam_from_body_axes().inverse();
     let mut points = Vec::new();
     for (index, z) in depth.data.iter().enumerate().filter(|(_, z)| **z > 0.0) {
         let (u, v) = (index % depth.width, index / depth.width);
@@ -132,15 +125,4 @@ pub(super) fn moving_at(dataset: &Dataset, time_s: f64) -> Option<Moving> {
         rates_radps: rates.unwrap_or_default(),
         tilt_rad: track.tilt(time_s).unwrap_or_default(),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ahead_of_the_scanner_is_ahead_of_the_camera() {
-        let seen = cam_from_scanner().transform(&Vector3::new(5.0, 2.0, 1.0));
-        assert!((seen - Vector3::new(-2.0, -1.0, 5.0)).norm() < 1e-12);
-    }
 }

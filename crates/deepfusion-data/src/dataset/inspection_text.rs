@@ -1,6 +1,6 @@
 //! An inspection in words.
 
-use super::inspection::{Inspection, SpeedRange, Unreadable};
+use super::inspection::{DriveInspection, Inspection, SpeedRange, Stream, Unreadable};
 use super::kind::DatasetKind;
 use deepfusion_hint::count_of;
 use std::fmt;
@@ -25,79 +25,8 @@ impl fmt::Display for Inspection {
                 k.fx, k.fy, k.cx, k.cy
             )?;
         }
-        let known = |value: Option<f64>, unit: &str| match value {
-            Some(value) => format!("{:.1} {unit}", unsigned_zero(value)),
-            None => "unknown".into(),
-        };
-        let speed = |range: Option<SpeedRange>| match range {
-            Some(r) => {
-                let [min, max, mean] = [r.min, r.max, r.mean].map(unsigned_zero);
-                format!("{min:.1} to {max:.1} m/s, mean {mean:.1}")
-            }
-            None => "unknown".into(),
-        };
-        for drive in &self.drives {
-            // Only KITTI numbers its cameras.
-            match self.kind {
-                DatasetKind::KittiRaw => writeln!(f, "\n{} (camera {})", drive.name, drive.camera)?,
-                _ => writeln!(f, "\n{}", drive.name)?,
-            }
-            writeln!(
-                f,
-                "  frames    {}{}",
-                drive.frames,
-                missing(&drive.missing_frames)
-            )?;
-            writeln!(
-                f,
-                "  driven    {} in {}, turned {}",
-                known(drive.distance_m, "m"),
-                known(drive.duration_s, "s"),
-                known(drive.turn_rad.map(f64::to_degrees), "degrees")
-            )?;
-            writeln!(f, "  speed     {}", speed(drive.speed_mps))?;
-            let ms = |seconds: f64| 1e3 * seconds;
-            if drive.camera_ahead_s != 0.0 {
-                writeln!(
-                    f,
-                    "  clocks    camera ahead by {:.0} ms as was said, taken off its times",
-                    ms(drive.camera_ahead_s)
-                )?;
-            }
-            if let Some(offset) = drive.time_offset {
-                writeln!(
-                    f,
-                    "  clocks    vehicle less camera {:.0} ms, standard error {:.0} ms",
-                    ms(offset.vehicle_minus_camera_s),
-                    ms(offset.std_error_s)
-                )?;
-            }
-            writeln!(f, "  pairs     {} usable for training", drive.usable_pairs)?;
-            if let Some(why) = &drive.why_no_pairs {
-                writeln!(f, "            {why}")?;
-            }
-            writeln!(
-                f,
-                "  scans     {} with ground truth",
-                count_of(drive.scans, "frame")
-            )?;
-            for mount in &drive.mounts {
-                let three = |v: [f64; 3], digits: usize| {
-                    v.map(|x| format!("{:.digits$}", unsigned_zero(x)))
-                        .join(", ")
-                };
-                writeln!(
-                    f,
-                    "  mount     {}: {} m, turned by {} rad; {}",
-                    mount.name,
-                    three(mount.translation, 3),
-                    three(mount.rotation, 4),
-                    mount.source
-                )?;
-            }
-            for warning in &drive.warnings {
-                writeln!(f, "  note      {warning}")?;
-            }
+        for one in &self.drives {
+            drive(f, self.kind, one)?;
         }
         for Unreadable { path, error } in &self.unreadable {
             writeln!(f, "\n{}\n  cannot be read: {error}", path.display())?;
@@ -105,25 +34,107 @@ impl fmt::Display for Inspection {
         if self.drives.is_empty() {
             return Ok(());
         }
-        let width = self.streams.iter().map(|s| s.name.len()).max().unwrap_or(0);
-        let width = width.max("stream".len());
+        streams(f, &self.streams)
+    }
+}
+
+/// A drive's lines.
+fn drive(f: &mut fmt::Formatter<'_>, kind: DatasetKind, drive: &DriveInspection) -> fmt::Result {
+    let known = |value: Option<f64>, unit: &str| match value {
+        Some(value) => format!("{:.1} {unit}", unsigned_zero(value)),
+        None => "unknown".into(),
+    };
+    let speed = |range: Option<SpeedRange>| match range {
+        Some(r) => {
+            let [min, max, mean] = [r.min, r.max, r.mean].map(unsigned_zero);
+            format!("{min:.1} to {max:.1} m/s, mean {mean:.1}")
+        }
+        None => "unknown".into(),
+    };
+    // Only KITTI numbers its cameras.
+    match kind {
+        DatasetKind::KittiRaw => writeln!(f, "\n{} (camera {})", drive.name, drive.camera)?,
+        _ => writeln!(f, "\n{}", drive.name)?,
+    }
+    writeln!(
+        f,
+        "  frames    {}{}",
+        drive.frames,
+        missing(&drive.missing_frames)
+    )?;
+    writeln!(
+        f,
+        "  driven    {} in {}, turned {}",
+        known(drive.distance_m, "m"),
+        known(drive.duration_s, "s"),
+        known(drive.turn_rad.map(f64::to_degrees), "degrees")
+    )?;
+    writeln!(f, "  speed     {}", speed(drive.speed_mps))?;
+    let ms = |seconds: f64| 1e3 * seconds;
+    if drive.camera_ahead_s != 0.0 {
         writeln!(
             f,
-            "\n{:width$}  {:11}  {:>6}  {:>7}  {:>4}",
-            "stream", "type", "count", "rate", "gaps"
+            "  clocks    camera ahead by {:.0} ms as was said, taken off its times",
+            ms(drive.camera_ahead_s)
         )?;
-        for s in &self.streams {
-            let rate = s
-                .rate_hz
-                .map_or_else(|| "-".into(), |r| format!("{r:.1} Hz"));
-            writeln!(
-                f,
-                "{:width$}  {:11}  {:>6}  {rate:>7}  {:>4}",
-                s.name, s.kind, s.count, s.gaps
-            )?;
-        }
-        Ok(())
     }
+    if let Some(offset) = drive.time_offset {
+        writeln!(
+            f,
+            "  clocks    vehicle less camera {:.0} ms, standard error {:.0} ms",
+            ms(offset.vehicle_minus_camera_s),
+            ms(offset.std_error_s)
+        )?;
+    }
+    writeln!(f, "  pairs     {} usable for training", drive.usable_pairs)?;
+    if let Some(why) = &drive.why_no_pairs {
+        writeln!(f, "            {why}")?;
+    }
+    writeln!(
+        f,
+        "  scans     {} with ground truth",
+        count_of(drive.scans, "frame")
+    )?;
+    for mount in &drive.mounts {
+        let three = |v: [f64; 3], digits: usize| {
+            v.map(|x| format!("{:.digits$}", unsigned_zero(x)))
+                .join(", ")
+        };
+        writeln!(
+            f,
+            "  mount     {}: {} m, turned by {} rad; {}",
+            mount.name,
+            three(mount.translation, 3),
+            three(mount.rotation, 4),
+            mount.source
+        )?;
+    }
+    for warning in &drive.warnings {
+        writeln!(f, "  note      {warning}")?;
+    }
+    Ok(())
+}
+
+/// The table of the streams.
+fn streams(f: &mut fmt::Formatter<'_>, streams: &[Stream]) -> fmt::Result {
+    let width = streams.iter().map(|s| s.name.len()).max().unwrap_or(0);
+    let width = width.max("stream".len());
+    writeln!(
+        f,
+        "\n{:width$}  {:11}  {:>6}  {:>7}  {:>4}",
+        "stream", "type", "count", "rate", "gaps"
+    )?;
+    for s in streams {
+        let rate = s
+            .rate_hz
+            .map_or_else(|| "-".into(), |r| format!("{r:.1} Hz"));
+        writeln!(
+            f,
+            "{:width$}  {:11}  {:>6}  {rate:>7}  {:>4}",
+            s.name, s.kind, s.count, s.gaps
+        )?;
+    }
+    Ok(())
 }
 
 /// A value that one decimal shows as 0 or −0 as 0.

@@ -5,7 +5,7 @@
 //! the car hardly moved have none. Cameras 0 and 1, whose images are rectified, are the left and the right one; 2 and 3 are fisheyes.
 
 use super::kitti::{Fields, TimeStamps, numbered_files, optional};
-use super::shared::files::{both_names, folders, name_of};
+use super::shared::files::{by_either_name, folders, name_of};
 use super::shared::plain::{PlainParts, open_each};
 use super::shared::pose_track::speed_log;
 use super::shared::poses::read_poses;
@@ -41,13 +41,7 @@ pub(crate) struct Drive {
 
 /// The drives at a path: those of a root, of its `data_2d_raw`, or the drive itself.
 pub(crate) fn find(path: &Path) -> Result<Vec<Drive>> {
-    for folder in both_names(path)? {
-        let found = find_named(folder)?;
-        if !found.is_empty() {
-            return Ok(found);
-        }
-    }
-    Ok(Vec::new())
+    by_either_name(path, find_named)
 }
 
 fn find_named(folder: PathBuf) -> Result<Vec<Drive>> {

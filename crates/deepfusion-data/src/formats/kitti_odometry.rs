@@ -5,7 +5,7 @@
 //! said where the cameras are on the car, which is KITTI raw's.
 
 use super::kitti::{Fields, cam_from_cam0, numbered_files, optional};
-use super::shared::files::{both_names, folders, name_of};
+use super::shared::files::{by_either_name, folders, name_of};
 use super::shared::plain::{PlainParts, open_each};
 use super::shared::pose_track::{cam_from_vehicle, speed_log};
 use super::shared::poses::read_poses;
@@ -30,13 +30,7 @@ const VEHICLE_IN_CAM0: [f64; 3] = [-0.314, 0.719, -1.089];
 
 /// The sequences at a path: the folder itself, those in `sequences`, or those in it.
 pub(crate) fn find(path: &Path) -> Result<Vec<PathBuf>> {
-    for folder in both_names(path)? {
-        let found = find_named(folder)?;
-        if !found.is_empty() {
-            return Ok(found);
-        }
-    }
-    Ok(Vec::new())
+    by_either_name(path, find_named)
 }
 
 fn find_named(folder: PathBuf) -> Result<Vec<PathBuf>> {

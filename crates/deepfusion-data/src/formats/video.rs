@@ -117,7 +117,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         Some(known) => numbers_by_time(&known),
         None => (0..video.count() as u64).collect(),
     };
-    // Neither matters to a film alone.
+    // Neither matters to a video alone.
     if start_s.is_none() && speeds.is_some() {
         warnings.push(TimesWarning::VideoOnTablesClock.into());
     }

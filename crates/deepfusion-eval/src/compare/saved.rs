@@ -139,7 +139,7 @@ impl SavedEvaluation {
             Some(fixed) => format!("{decides} scale {}", fixed.factor),
             None => decides,
         };
-        let digest = hex(&Sha256::digest(decides));
+        let digest = format!("{:x}", Sha256::digest(decides));
         let checkpoint = self.model.checkpoint.trim_end_matches(".safetensors");
         names.push(slug(checkpoint));
         names.push(digest[..8].to_owned());
@@ -186,14 +186,10 @@ pub fn sha256_of_file(path: &Path) -> Result<String> {
     let mut buffer = vec![0; 1 << 16];
     loop {
         match file.read(&mut buffer).map_err(failed)? {
-            0 => return Ok(hex(&digest.finalize())),
+            0 => return Ok(format!("{:x}", digest.finalize())),
             n => digest.update(&buffer[..n]),
         }
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Letters and digits, everything else as one dash; at most 40.

@@ -4,7 +4,7 @@ use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
 /// Poses of a snippet of the absolute trajectory error.
-pub const ATE_POSES: usize = 5;
+const ATE_POSES: usize = 5;
 /// Pairs in which the camera truly moves less say nothing about the scale, in metres.
 const MOVING_M: f64 = 0.05;
 

@@ -14,10 +14,10 @@ mod table;
 
 pub use error::{PoseFileError, PoseLineProblem, TrackError};
 pub use file::{PoseFile, PoseFormat};
-pub use local::{ATE_POSES, Local};
+pub use local::Local;
 pub use pose_text::{kitti_text, tum_text};
 pub use report::{LengthRow, OdometryReport, TrackRow};
-pub use segments::{KITTI_LENGTHS_M, SHORT_LENGTHS_M, SegmentError, Segments};
+pub use segments::{SegmentError, Segments};
 
 use deepfusion_geometry::Se3;
 

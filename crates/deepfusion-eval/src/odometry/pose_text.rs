@@ -1,7 +1,7 @@
 //! Lines of pose files.
 
 use super::{PoseFormat, PoseLineProblem};
-use deepfusion_geometry::Se3;
+use deepfusion_geometry::{Se3, kitti_line};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write as _;
 
@@ -85,11 +85,7 @@ fn from_quaternion(v: &[f64]) -> Result<Se3, PoseLineProblem> {
 pub fn kitti_text(poses: &[Se3]) -> String {
     let mut text = String::new();
     for pose in poses {
-        let matrix = pose.matrix();
-        let words: Vec<String> = (0..12)
-            .map(|i| scientific(matrix[(i / 4, i % 4)]))
-            .collect();
-        text += &words.join(" ");
+        text += &kitti_line(pose);
         text.push('\n');
     }
     text
@@ -111,30 +107,12 @@ pub fn tum_text(poses: &[Se3], times_s: &[f64]) -> String {
     text
 }
 
-/// w, x, y, z of the rotation.
+/// w, x, y, z of the rotation; of the two quaternions that mean it, the one whose w is not negative.
 fn quaternion(pose: &Se3) -> [f64; 4] {
-    let v = pose.axis_angle();
-    let half = 0.5 * v.norm();
-    // sin(θ/2)/θ, whose limit at 0 is ½.
-    let factor = if half < 1e-9 {
-        0.5
+    let wxyz = pose.quaternion();
+    if wxyz[0] < 0.0 {
+        wxyz.map(|q| -q)
     } else {
-        half.sin() / (2.0 * half)
-    };
-    [half.cos(), v.x * factor, v.y * factor, v.z * factor]
-}
-
-/// C's `%.12e`.
-fn scientific(value: f64) -> String {
-    let text = format!("{value:.12e}");
-    match text.split_once('e') {
-        Some((mantissa, exponent)) => {
-            let (sign, digits) = match exponent.strip_prefix('-') {
-                Some(digits) => ('-', digits),
-                None => ('+', exponent),
-            };
-            format!("{mantissa}e{sign}{digits:0>2}")
-        }
-        None => text,
+        wxyz
     }
 }

@@ -2,9 +2,9 @@ use super::{TrackPair, distances};
 use deepfusion_geometry::Se3;
 
 /// Lengths of KITTI's odometry benchmark, in metres.
-pub const KITTI_LENGTHS_M: [u32; 8] = [100, 200, 300, 400, 500, 600, 700, 800];
+const KITTI_LENGTHS_M: [u32; 8] = [100, 200, 300, 400, 500, 600, 700, 800];
 /// Lengths where no drive is 100 m long.
-pub const SHORT_LENGTHS_M: [u32; 5] = [10, 20, 30, 40, 50];
+pub(super) const SHORT_LENGTHS_M: [u32; 5] = [10, 20, 30, 40, 50];
 /// KITTI's devkit starts a stretch at every tenth frame (each second); on short drives every frame counts.
 const KITTI_STEP: usize = 10;
 

@@ -1,4 +1,5 @@
-use super::{OdometryReport, SHORT_LENGTHS_M};
+use super::OdometryReport;
+use super::segments::SHORT_LENGTHS_M;
 use deepfusion_hint::count_of;
 use std::fmt;
 

@@ -99,8 +99,8 @@ impl ConvForm<Bf16> for Amx {
     }
 
     fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
-        let all = self.runs.sources.iter().all(Option::is_some);
-        (!all).then_some((&self.geometry, &self.runs))
+        let own = (&self.geometry, &self.runs);
+        self.runs.read_on().then_some(own)
     }
 
     /// # Safety

@@ -64,7 +64,7 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
     let Ok((folder, kind)) = RunFolder::open(path) else {
         // A run that is not there any more still has its name; a file of a ResNet is no run.
         if !path.is_file() {
-            found.insert(Ancestor::Network(name_of(path)));
+            found.insert(Ancestor::Network(place_of(path)));
         }
         return;
     };
@@ -74,7 +74,7 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
         return;
     }
     // Once around is enough.
-    if !found.insert(Ancestor::Network(name_of(folder.path()))) {
+    if !found.insert(Ancestor::Network(place_of(folder.path()))) {
         return;
     }
     let findings = folder.read_findings().unwrap_or_default();
@@ -102,7 +102,7 @@ fn first_weights(config: &TrainConfig) -> Option<Ancestor> {
 }
 
 /// A run's folder, by whichever way it was named.
-fn name_of(path: &Path) -> String {
+fn place_of(path: &Path) -> String {
     let folder = match path.extension() {
         Some(end) if end == "safetensors" => path.parent().unwrap_or(path),
         _ => path,

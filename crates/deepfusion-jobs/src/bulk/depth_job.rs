@@ -78,7 +78,7 @@ impl<'a> DepthJob<'a> {
     /// What there is of the job in its folder.
     #[must_use]
     pub fn bulk(&self, shard: Shard, overwrite: bool, videos: bool) -> BulkJob<'_> {
-        // Of a frame of a film more is kept than of a photograph: whatever it may be.
+        // Of a frame of a video more is kept than of a photograph: whatever it may be.
         let save = self.writer.outputs.of_image(false).into_iter();
         BulkJob {
             folder: self.writer.folder,

@@ -1,14 +1,14 @@
-//! A part of the images, for several runs that share them.
+//! A shard of the images, for several runs that share them.
 
 use std::fmt;
 use std::str::FromStr;
 
 use deepfusion_hint::Hint;
 
-/// One part of a work shared among several runs, written `2/8`.
+/// One shard of a work that several runs share, written `2/8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// Which part, counted from 1.
+    /// Which shard, counted from 1.
     pub index: usize,
     /// Of how many.
     pub count: usize,
@@ -18,9 +18,9 @@ impl Shard {
     /// All of it.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// This part of `all`: every `count`-th, so that parts are as large as each other to one item, and long
+    /// This shard of `all`: every `count`-th, so that shards are as large as each other to one item, and long
     /// images in one folder are shared too.
-    pub fn part_of<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
+    pub fn select<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
         all.iter().skip(self.index - 1).step_by(self.count)
     }
 }
@@ -45,7 +45,7 @@ pub enum NoShard {
         count: usize,
     },
     /// There are fewer.
-    #[error("there is no part {index} of {count}")]
+    #[error("there is no shard {index} of {count}")]
     Beyond {
         /// Which was named.
         index: usize,
@@ -102,8 +102,8 @@ mod tests {
             ("1", "expected I/N, the I-th of N shards, such as 2/8"),
             ("0/0", "expected I/N, the I-th of N shards, such as 2/8"),
             ("0/8", "shards are counted from 1: the first of 8 is 1/8"),
-            ("9/8", "there is no part 9 of 8"),
-            ("1/0", "there is no part 1 of 0"),
+            ("9/8", "there is no shard 9 of 8"),
+            ("1/0", "there is no shard 1 of 0"),
         ] {
             assert_eq!(text.parse::<Shard>().unwrap_err().to_string(), why);
         }
@@ -112,17 +112,17 @@ mod tests {
     }
 
     proptest! {
-        /// Every item is in exactly one part, and no part is larger than another by more than one.
+        /// Every item is in exactly one shard, and no shard is larger than another by more than one.
         #[test]
         fn shards_partition(items in 0usize..200, count in 1usize..20) {
             let all: Vec<usize> = (0..items).collect();
-            let parts = (1..=count).map(|index| {
-                Shard { index, count }.part_of(&all).copied().collect::<Vec<_>>()
+            let shards = (1..=count).map(|index| {
+                Shard { index, count }.select(&all).copied().collect::<Vec<_>>()
             });
-            let parts: Vec<_> = parts.collect();
-            let sizes = parts.iter().map(Vec::len);
+            let shards: Vec<_> = shards.collect();
+            let sizes = shards.iter().map(Vec::len);
             prop_assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= 1);
-            let mut together = parts.concat();
+            let mut together = shards.concat();
             together.sort_unstable();
             prop_assert_eq!(together, all);
         }

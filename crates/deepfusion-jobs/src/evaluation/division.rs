@@ -8,20 +8,19 @@ const GAP: f64 = 0.1;
 
 /// Images by index, in two parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Division {
+pub(super) struct Division {
     /// Those to learn from.
-    pub learned: Vec<usize>,
+    pub(super) learned: Vec<usize>,
     /// Those to judge by.
-    pub held_out: Vec<usize>,
+    pub(super) held_out: Vec<usize>,
     /// Whether the parts are of different drives, and not two parts of one.
-    pub by_drive: bool,
+    pub(super) by_drive: bool,
 }
 
 /// Divides images, each with its drive and its frame's number: by drives where there are several and neither side comes out
 /// small, else into the first and the last part of all, with a gap between them. Neighbouring frames are near copies of each
 /// other: with every second frame held out, what is judged would have been learned. A single image is learned from.
-#[must_use]
-pub fn divide<D: PartialEq>(images: &[(D, u64)]) -> Division {
+pub(super) fn divide<D: PartialEq>(images: &[(D, u64)]) -> Division {
     by_drives(images).unwrap_or_else(|| by_parts(images))
 }
 

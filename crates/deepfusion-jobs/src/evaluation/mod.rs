@@ -32,7 +32,6 @@ pub use self::chosen_images::{ChosenImage, Standing, chosen_images};
 pub use self::comparison::Comparison;
 pub use self::comparison_page::comparison_page;
 pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
-pub use self::division::{Division, divide};
 pub use self::measurement::{Measurement, MeasurementRequest};
 pub use self::model_sheet::ModelSheet;
 pub use self::outcome::EvaluationOutcome;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Cameras, Dataset};
 use deepfusion_eval::compare::{FrameScore, MeasuredOn, ModelFile, SAVED_VERSION, SavedEvaluation};
+use deepfusion_fs::absolute;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::{Evaluated, MeasurementRequest};
@@ -78,9 +79,4 @@ impl EvaluationRequest<'_> {
             images: evaluated.images.iter().map(FrameScore::from).collect(),
         })
     }
-}
-
-/// A path from the root; one whose working directory is gone stays.
-fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }

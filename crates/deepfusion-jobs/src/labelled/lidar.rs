@@ -9,8 +9,7 @@ const ASPECT: f64 = 1.7;
 
 /// Gathers a scan's points (at the image's size) into cells large enough to hold some each, the nearest point of each,
 /// with the camera of that coarser image.
-#[must_use]
-pub fn gathered(scan: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics) {
+pub(super) fn gathered(scan: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics) {
     let rows = scan.data.chunks_exact(scan.width.max(1));
     let first = rows.clone().position(|row| row.iter().any(|d| *d > 0.0));
     // The sky, where no scanner looks, does not count.

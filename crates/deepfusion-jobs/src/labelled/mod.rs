@@ -5,27 +5,26 @@ mod object_frames;
 mod report;
 mod source;
 mod tracklets;
+mod visibility;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use deepfusion_data::{Dataset, RgbImage, kitti::GtKind, read_depth_png};
-use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_data::{Dataset, RgbImage};
+use deepfusion_geometry::Intrinsics;
 use deepfusion_perception::{
-    Label, Perception, PerceptionConfig, Scorer, ScoringRules, Target, TargetScore,
+    Perception, PerceptionConfig, Scorer, ScoringRules, Target, TargetScore,
 };
 
-pub use self::lidar::gathered;
-pub use self::object_frames::{ObjectFrame, ObjectFrameProblem, is_folder_of, labels_of};
+use self::object_frames::{ObjectFrame, labels_of};
+pub use self::object_frames::{ObjectFrameProblem, is_folder_of};
 pub use self::report::TargetReport;
 pub use self::source::{DepthSource, PredictedDepth};
-pub use self::tracklets::{Labels, pixels_within};
+use self::tracklets::Labels;
+use self::visibility::visibility;
 use crate::scene::MotionTracker;
 use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
-
-/// Exact depth of simulated drives.
-const EXACT_DEPTH: &str = "proj_depth/groundtruth/image_02";
 
 /// Looks at labelled frames, and scores the targets that it finds.
 pub struct TargetEvaluation {
@@ -167,43 +166,4 @@ impl TargetEvaluation {
             path: path.to_owned(),
         })
     }
-}
-
-/// Depth that says how much of a box is seen.
-pub struct VisibilityDepth {
-    /// At the image's size.
-    pub depth: DepthMap,
-    /// Every pixel, or a scan's points only.
-    pub dense: bool,
-}
-
-/// The exact depth of a simulated frame, else its scan; `None` where there is neither.
-fn visibility(dataset: &Dataset, index: usize) -> Result<Option<VisibilityDepth>> {
-    let frame = &dataset.frames()[index];
-    let exact = dataset
-        .folder()
-        .join(EXACT_DEPTH)
-        .join(format!("{:010}.png", frame.number));
-    if exact.is_file() {
-        let depth = read_depth_png(&exact)?;
-        return Ok(Some(VisibilityDepth { depth, dense: true }));
-    }
-    let scan = dataset.ground_truth(index, GtKind::Z)?;
-    Ok(scan.map(|depth| VisibilityDepth {
-        depth,
-        dense: false,
-    }))
-}
-
-/// Whether a label is to be found: a free-standing thing of a target's size of which enough is seen.
-#[must_use]
-pub fn counts(label: &Label, class: &str, points: usize, least: usize) -> bool {
-    /// The simulator's things that are no targets, and KITTI's regions without labels.
-    const NEITHER: [&str; 5] = ["Pole", "Tree", "Building", "Fence", "DontCare"];
-    let [length, width, height] = label.size_m;
-    !NEITHER.contains(&class)
-        && (0.4..=4.5).contains(&height)
-        && length <= 13.0
-        && width <= 3.5
-        && points >= least
 }

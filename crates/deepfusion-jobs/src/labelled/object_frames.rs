@@ -9,24 +9,24 @@ use deepfusion_perception::{Label, Target};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 use super::tracklets::pixels_within;
-use super::{VisibilityDepth, counts};
+use super::visibility::{VisibilityDepth, counts};
 use crate::{Error, Result};
 
 /// Points of the scan from which on a label counts.
 const LEAST_POINTS: usize = 15;
 
 /// One labelled frame.
-pub struct ObjectFrame {
+pub(super) struct ObjectFrame {
     /// The image.
-    pub image: PathBuf,
+    pub(super) image: PathBuf,
     /// Of the image.
-    pub camera: Intrinsics,
+    pub(super) camera: Intrinsics,
     /// The scan in the image, metres.
-    pub scan: DepthMap,
+    pub(super) scan: DepthMap,
     /// Its boxes.
-    pub labels: Vec<Label>,
+    pub(super) labels: Vec<Label>,
     /// Left, top, right and bottom of the regions in which nobody labelled anything, in pixels.
-    pub unlabelled: Vec<[f64; 4]>,
+    pub(super) unlabelled: Vec<[f64; 4]>,
 }
 
 /// Whether a folder is laid out so.
@@ -41,7 +41,7 @@ pub fn is_folder_of(path: &Path) -> bool {
 ///
 /// # Errors
 /// A folder that cannot be read.
-pub fn labels_of(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn labels_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let labels = folder.join("label_2");
     let entries = std::fs::read_dir(&labels).map_err(|e| DataError::file(&labels, e))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
@@ -55,7 +55,7 @@ impl ObjectFrame {
     ///
     /// # Errors
     /// A file that is missing or is not what its name says.
-    pub fn read(folder: &Path, labels: &Path) -> Result<Self> {
+    pub(super) fn read(folder: &Path, labels: &Path) -> Result<Self> {
         let name = labels.file_stem().unwrap_or_default().to_string_lossy();
         let image = ["png", "jpg"]
             .map(|ending| folder.join(format!("image_2/{name}.{ending}")))
@@ -118,8 +118,7 @@ impl ObjectFrame {
     }
 
     /// Whether a target's centre is seen where nobody labelled anything.
-    #[must_use]
-    pub fn is_unlabelled(&self, target: &Target) -> bool {
+    pub(super) fn is_unlabelled(&self, target: &Target) -> bool {
         let pixel = self.camera.project(&Vector3::from(target.center_m));
         pixel.is_some_and(|p| {
             let mut regions = self.unlabelled.iter();

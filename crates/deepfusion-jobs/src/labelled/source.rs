@@ -6,7 +6,9 @@ use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp, Target, working_depth};
 use deepfusion_runtime::{DepthEstimator, Preparer};
 
-use super::{ObjectFrame, VisibilityDepth, gathered};
+use super::lidar::gathered;
+use super::object_frames::ObjectFrame;
+use super::visibility::VisibilityDepth;
 use crate::{Result, intervals};
 
 /// Where the measured depth comes from.

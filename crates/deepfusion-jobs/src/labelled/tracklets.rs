@@ -6,7 +6,7 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_perception::Label;
 use nalgebra::Vector3;
 
-use super::{VisibilityDepth, counts};
+use super::visibility::{VisibilityDepth, counts};
 use crate::Result;
 
 /// Pixels of a box in an image of 640×192 from which on it counts, where every pixel's depth is known.
@@ -17,7 +17,7 @@ const LEAST_POINTS: usize = 15;
 const REACH: u64 = 2;
 
 /// The boxes of a drive.
-pub struct Labels {
+pub(super) struct Labels {
     tracklets: Vec<Tracklet>,
     cam_from_velo: Se3,
 }
@@ -27,7 +27,7 @@ impl Labels {
     ///
     /// # Errors
     /// Where there are none of either.
-    pub fn read(dataset: &Dataset) -> Result<Self> {
+    pub(super) fn read(dataset: &Dataset) -> Result<Self> {
         let folder = dataset.folder();
         let tracklets = Tracklet::read(&folder.join(Tracklet::FILE))?;
         let date = folder.parent().unwrap_or(folder);
@@ -43,8 +43,12 @@ impl Labels {
     }
 
     /// The boxes of a frame.
-    #[must_use]
-    pub fn of(&self, dataset: &Dataset, index: usize, visibility: &VisibilityDepth) -> Vec<Label> {
+    pub(super) fn of(
+        &self,
+        dataset: &Dataset,
+        index: usize,
+        visibility: &VisibilityDepth,
+    ) -> Vec<Label> {
         let number = dataset.frames()[index].number;
         let k = dataset.intrinsics(index);
         let of_tracklet = |(object, tracklet): (usize, &Tracklet)| {
@@ -106,8 +110,7 @@ impl Labels {
 }
 
 /// How many pixels with depth lie in a box, up to `enough`. The box's lowest 2 cm are the road.
-#[must_use]
-pub fn pixels_within(
+pub(super) fn pixels_within(
     label: &Label,
     visibility: &VisibilityDepth,
     k: &Intrinsics,

@@ -29,7 +29,7 @@ struct SeenFrame {
     seen: SeenDepth,
 }
 
-/// Predicts the newest frame of a source again and again, and writes what is kept of each; `written` sees the sidecars. `film` says whether
+/// Predicts the newest frame of a source again and again, and writes what is kept of each; `written` sees the sidecars. `video` says whether
 /// [a video](LiveDepth::write_video) will be made: the frames are remembered for it. What was written stays, also where the source is lost. As [`run`].
 ///
 /// # Panics
@@ -39,7 +39,7 @@ pub fn predict<E: From<Error> + Send>(
     estimator: &mut DepthEstimator,
     address: &Address,
     feed: &mut Feed,
-    film: bool,
+    video: bool,
     written: impl Fn(&Sidecar) -> Result<(), E> + Sync,
     say: impl Fn(&str),
 ) -> LiveDepth<E> {
@@ -57,7 +57,7 @@ pub fn predict<E: From<Error> + Send>(
         let arrived = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
         let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
         done.0 += 1;
-        if film {
+        if video {
             done.1.push((input.name, arrived));
         }
         drop(done);

@@ -35,7 +35,7 @@ pub enum DepthOutput {
     Pcd,
     /// The encoder's features and attention masks on the image.
     Features,
-    /// A film of each recording, of the pictures of [`Self::SideBySide`]; made when they are all there.
+    /// A video of each recording, of the pictures of [`Self::SideBySide`]; made when they are all there.
     Video,
 }
 
@@ -116,16 +116,16 @@ pub struct CloudLimits {
 /// What is kept of every image of a run.
 #[derive(Debug, Clone)]
 pub struct DepthOutputs {
-    /// The forms, beside the sidecar; never a film, which is none of one image.
+    /// The forms, beside the sidecar; never a video, which is none of one image.
     save: Vec<DepthOutput>,
-    /// The images of films, bags and live sources, too, which are no files of their own.
+    /// The images of videos, bags and live sources, too, which are no files of their own.
     pub frames: bool,
     /// Of clouds.
     pub limits: CloudLimits,
 }
 
 impl DepthOutputs {
-    /// What is asked for, each once; for a film the pictures that it is made of. `frames`: see [`Self::frames`].
+    /// What is asked for, each once; for a video the pictures that it is made of. `frames`: see [`Self::frames`].
     #[must_use]
     pub fn of(
         asked: impl IntoIterator<Item = DepthOutput>,

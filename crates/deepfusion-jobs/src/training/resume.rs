@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Cameras;
-use deepfusion_model::{InputSize, Learn, Preset, TrainConfig, ViewMotion};
+use deepfusion_model::{Error as ModelError, InputSize, Learn, Preset, TrainConfig, ViewMotion};
 
 use super::Start;
 use crate::recordings::camera_word;
@@ -142,28 +142,27 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
         let found = run.view_motion.name();
         same(Setting::ViewMotion, motion.name().into(), found.into())?;
     }
-    for term in with {
-        let mut other = run.clone();
-        other.with(term)?;
-        if other != *run {
-            return contradicts(Setting::With, term.clone(), RunHas::WithoutIt);
-        }
-    }
-    for term in without {
-        let mut other = run.clone();
-        other.without(term)?;
-        if other != *run {
-            return contradicts(Setting::Without, term.clone(), RunHas::WithIt);
-        }
-    }
-    for assignment in assignments {
-        let mut other = run.clone();
-        other.set(assignment)?;
-        if other != *run {
-            let asked = assignment.clone();
-            return contradicts(Setting::Assignment, asked, RunHas::AnotherValue);
-        }
-    }
+    changes_nothing(
+        run,
+        with,
+        Setting::With,
+        RunHas::WithoutIt,
+        TrainConfig::with,
+    )?;
+    changes_nothing(
+        run,
+        without,
+        Setting::Without,
+        RunHas::WithIt,
+        TrainConfig::without,
+    )?;
+    changes_nothing(
+        run,
+        assignments,
+        Setting::Assignment,
+        RunHas::AnotherValue,
+        TrainConfig::set,
+    )?;
     if let Some(asked) = init {
         same_start(run, asked)?;
     }
@@ -187,11 +186,29 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
     Ok(config)
 }
 
+/// Refuses each of these that would change the run.
+fn changes_nothing(
+    run: &TrainConfig,
+    asked: &[String],
+    setting: Setting,
+    has: RunHas,
+    change: impl Fn(&mut TrainConfig, &str) -> std::result::Result<(), ModelError>,
+) -> Result<()> {
+    for one in asked {
+        let mut other = run.clone();
+        change(&mut other, one)?;
+        if other != *run {
+            return contradicts(setting, one.clone(), has);
+        }
+    }
+    Ok(())
+}
+
 fn same_start(run: &TrainConfig, asked: &Path) -> Result<()> {
     // `none`, and the names of embedded networks, are no paths.
     let asked = match (Start::is_none(asked), &run.init_sha256) {
         (true, _) | (false, Some(_)) => asked.to_owned(),
-        (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.to_owned()),
+        (false, None) => deepfusion_fs::absolute(asked),
     };
     let found = run.init.as_deref().map_or("none".into(), path_text);
     same(Setting::Init, path_text(&asked), found)

@@ -231,7 +231,7 @@ def gpmf():
         box("stco", full, u32(n, *offsets)),
     )
     media = box("mdia", box("mdhd", full, u32(0, 0, 1001, n * 1001), bytes(4)), box("hdlr", full, bytes(4), b"meta", bytes(13)), box("minf", table))
-    # What is the same for the whole film, and what the lens saw.
+    # What is the same for the whole video, and what the lens saw.
     text = lambda key, value: klv(key, "c", 1, len(value), value.encode())
     settings = nest("DEVC", text("DVNM", "Global Settings") + text("MINF", "HERO11 Black") + text("DZOM", "Y") + klv("DZST", "L", 4, 1, u32(0)) + klv("VRES", "L", 4, 2, u32(1920, 1080)))
     lens = nest("DEVC", text("DVNM", "Large FOV") + klv("ZFOV", "f", 4, 1, struct.pack(">f", 94.0)) + text("VFOV", "L"))

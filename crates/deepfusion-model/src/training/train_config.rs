@@ -3,6 +3,7 @@ use crate::{
     AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
     PoseNetConfig,
 };
+use deepfusion_fs::absolute;
 use deepfusion_kernels::Precision;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -304,14 +305,9 @@ impl DataConfig {
             all.extend(&mut set.validation_split);
         }
         for path in all {
-            *path = absolute(std::mem::take(path));
+            *path = absolute(path);
         }
     }
-}
-
-/// A path from the root. An empty one stays, and any one whose working directory is gone: opening it then says so.
-fn absolute(path: PathBuf) -> PathBuf {
-    std::path::absolute(&path).unwrap_or(path)
 }
 
 impl TrainConfig {
@@ -319,7 +315,7 @@ impl TrainConfig {
     pub fn make_absolute(&mut self) {
         self.data.make_absolute();
         if self.init_sha256.is_none() {
-            self.init = self.init.take().map(absolute);
+            self.init = self.init.as_deref().map(absolute);
         }
     }
 

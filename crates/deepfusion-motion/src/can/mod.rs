@@ -1,8 +1,7 @@
 //! Decodes a vehicle's signals from the frames of its CAN bus.
 //!
 //! [`Dbc`] reads the manufacturer's description (or a community's); a [`CanSignal`] can also be
-//! written into a configuration by hand. [`CanSignal::over_time`] turns a recording into a
-//! [`crate::Signal`].
+//! written into a configuration by hand. [`CanSignal::decode`] reads its value from a frame.
 
 mod dbc;
 mod layout;

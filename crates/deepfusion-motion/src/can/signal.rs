@@ -1,5 +1,4 @@
 use super::BitLayout;
-use crate::Signal;
 use serde::{Deserialize, Serialize};
 
 /// The identifier of a frame on the bus.
@@ -76,17 +75,6 @@ impl CanSignal {
         there.then(|| self.layout.decode(data)).flatten()
     }
 
-    /// The signal over a recording, in its physical unit.
-    #[must_use]
-    pub fn over_time<'a>(&self, frames: impl IntoIterator<Item = CanFrame<'a>>) -> Signal {
-        let own = frames.into_iter().filter(|frame| frame.id == self.id);
-        let mut values: Vec<(f64, f64)> = own
-            .filter_map(|frame| Some((frame.time_s, self.decode(frame.data)?)))
-            .collect();
-        self.keep_measured(&mut values, |(_, value)| *value);
-        Signal::new(values)
-    }
-
     /// Leaves out values beyond the [range](Self::range), by which a bus says that it has none or an error (J1939: all bits set, or all but the
     /// last); returns how many. Where those are many different ones, or most, it is the range that is wrong, as in many a description, and all
     /// stay.
@@ -121,12 +109,23 @@ impl CanSignal {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Signal;
 
     /// A configuration without a DBC file.
     const CONFIG: &str = r#"
         id = 0x158
         layout = { start_bit = 7, length = 16, byte_order = "motorola", scale = 0.0027777778 }
     "#;
+
+    /// The signal over a recording, in its physical unit.
+    fn over_time<'a>(signal: &CanSignal, frames: impl IntoIterator<Item = CanFrame<'a>>) -> Signal {
+        let own = frames.into_iter().filter(|frame| frame.id == signal.id);
+        let mut values: Vec<(f64, f64)> = own
+            .filter_map(|frame| Some((frame.time_s, signal.decode(frame.data)?)))
+            .collect();
+        signal.keep_measured(&mut values, |(_, value)| *value);
+        Signal::new(values)
+    }
 
     #[test]
     fn a_signal_from_a_configuration_over_time() {
@@ -140,7 +139,7 @@ mod tests {
             frame(0.01, own, &[0x1c, 0x20, 0]),
             frame(0.015, own, &[0x1c]),
         ];
-        let signal = speed.over_time(frames);
+        let signal = over_time(&speed, frames);
         assert_eq!(signal.times_s(), [0.0, 0.01]);
         assert!((signal.values()[0] - 10.0).abs() < 1e-6, "{signal:?}");
         assert!((signal.values()[1] - 20.0).abs() < 1e-6);
@@ -159,7 +158,7 @@ mod tests {
         let frames: Vec<CanFrame<'_>> = (0..5)
             .map(|step| frame(step, if step == 0 { &none[..] } else { &later[..] }))
             .collect();
-        let count = |speed: &CanSignal| speed.over_time(frames.clone()).values().len();
+        let count = |speed: &CanSignal| over_time(speed, frames.clone()).values().len();
         assert_eq!(count(&speed), 5, "nothing says its range");
         speed.range = Some([0.0, 70.0]);
         assert_eq!(count(&speed), 4);
@@ -171,7 +170,7 @@ mod tests {
         let frames = (0..)
             .zip(&drives)
             .map(|(step, data)| frame(step, &data[..]));
-        assert_eq!(speed.over_time(frames).values().len(), 20);
+        assert_eq!(over_time(&speed, frames).values().len(), 20);
     }
 
     #[test]

@@ -140,12 +140,6 @@ impl ImuTrack {
         })
     }
 
-    /// Forward acceleration in m/s², without gravity.
-    #[must_use]
-    pub fn forward_acceleration(&self) -> &Signal {
-        &self.forward_mps2
-    }
-
     /// Yaw rate about the vertical, in rad/s, positive to the left, without the standstills' bias.
     #[must_use]
     pub fn yaw_rate(&self) -> &Signal {

@@ -7,7 +7,7 @@ use burn::tensor::{
     module::{avg_pool2d, max_pool2d},
     ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, MaxPoolOptions, PadMode},
 };
-use deepfusion_kernels::{AdamStep, MIN_DEPTH_M, NOWHERE};
+use deepfusion_kernels::{AdamStep, MIN_DEPTH_M, NOWHERE, SSIM_C1, SSIM_C2};
 
 /// [`super::conv2d`].
 #[must_use]
@@ -206,13 +206,13 @@ pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
     let covariance = mean(a.clone().mul(b.clone())).sub(product.clone());
     let numerator = product
         .mul_scalar(2.0)
-        .add_scalar(1e-4)
-        .mul(covariance.mul_scalar(2.0).add_scalar(9e-4));
+        .add_scalar(SSIM_C1)
+        .mul(covariance.mul_scalar(2.0).add_scalar(SSIM_C2));
     let denominator = mu_a
         .powi_scalar(2)
         .add(mu_b.powi_scalar(2))
-        .add_scalar(1e-4)
-        .mul(var_a.add(var_b).add_scalar(9e-4));
+        .add_scalar(SSIM_C1)
+        .mul(var_a.add(var_b).add_scalar(SSIM_C2));
     let dissimilar = numerator
         .div(denominator)
         .neg()

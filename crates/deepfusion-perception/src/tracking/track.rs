@@ -17,7 +17,7 @@ const GUESS: f64 = 0.05;
 /// Largest weight of a size or a heading, so that it can still change.
 const MOST_WEIGHT: f64 = 40.0;
 
-/// The same of the height of what moves.
+/// The same of the height of a dynamic target.
 const MOVING_HEIGHT_WEIGHT: f64 = 6.0;
 
 /// Largest sum of a class' votes, in sightings of score 1, so that it can still change.

@@ -112,6 +112,30 @@ message! {
     roi: RegionOfInterest,
 }
 
+impl CameraInfo {
+    /// Of a pinhole camera without distortion: fx, fy, cx, cy in pixels of an image of this width and height.
+    #[must_use]
+    pub fn pinhole(
+        header: Header,
+        [fx, fy, cx, cy]: [f64; 4],
+        (width, height): (u32, u32),
+    ) -> Self {
+        Self {
+            header,
+            height,
+            width,
+            distortion_model: "plumb_bob".into(),
+            d: vec![0.0; 5],
+            k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+            binning_x: 0,
+            binning_y: 0,
+            roi: RegionOfInterest::default(),
+        }
+    }
+}
+
 message! {
     /// A number that every point of a cloud has.
     #[derive(Eq, Hash)]

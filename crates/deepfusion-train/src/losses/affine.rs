@@ -52,8 +52,7 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
 /// # Shapes
 /// - `coords`: where each pixel lies in the other frame, `[2N, 2, H, W]`, in pixels
 /// - `valid`, `moving`, output: `[2N, 1, H, W]`
-#[must_use]
-pub fn seen_in_both(
+pub(crate) fn seen_in_both(
     coords: &Tensor<4>,
     valid: &Tensor<4, Bool>,
     moving: Option<&Tensor<4, Bool>>,

@@ -21,8 +21,7 @@ pub fn agreement(rigid: Tensor<4>, flow: Tensor<4>, both: &Tensor<4, Bool>) -> T
 ///
 /// # Shapes
 /// - `rigid_error`, `unwarped_error`, output: `[N, 1, H, W]`
-#[must_use]
-pub fn both_explain(
+pub(crate) fn both_explain(
     rigid_error: &Tensor<4>,
     rigid_valid: &Tensor<4, Bool>,
     flow: &FlowView,

@@ -7,8 +7,7 @@ use deepfusion_nn::ops;
 ///
 /// # Shapes
 /// - output: `[1, 2, height, width]`
-#[must_use]
-pub fn pixel_grid([height, width]: [usize; 2], device: &Device) -> Tensor<4> {
+pub(super) fn pixel_grid([height, width]: [usize; 2], device: &Device) -> Tensor<4> {
     ops::flow_coords(Tensor::zeros(
         [1, 2, height, width],
         &device.clone().inner(),
@@ -142,8 +141,7 @@ const EDGE_SHARPNESS: f64 = 10.0;
 /// - `flow`: `[N, 2, H, W]`, H and W at least 3
 /// - `image`: `[N, C, H, W]`
 /// - output: one value
-#[must_use]
-pub fn flow_smoothness(flow: &Tensor<4>, image: &Tensor<4>) -> Tensor<1> {
+fn flow_smoothness(flow: &Tensor<4>, image: &Tensor<4>) -> Tensor<1> {
     let along = |axis: usize| {
         let difference = |t: Tensor<4>| {
             let size = t.dims()[axis];

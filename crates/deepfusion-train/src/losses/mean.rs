@@ -5,8 +5,7 @@ use burn::tensor::{Bool, Tensor};
 /// # Shapes
 /// - `values`: `[N, C, H, W]`
 /// - `mask`: `[N, 1, H, W]`; the mean is over its pixels and all channels
-#[must_use]
-pub fn mean_where(values: Tensor<4>, mask: &Tensor<4, Bool>) -> Tensor<1> {
+pub(super) fn mean_where(values: Tensor<4>, mask: &Tensor<4, Bool>) -> Tensor<1> {
     let [_, channels, _, _] = values.dims();
     let count = mask.clone().float().sum().clamp_min(1.0);
     let outside = mask.clone().bool_not().expand(values.dims());

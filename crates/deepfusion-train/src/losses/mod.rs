@@ -13,12 +13,14 @@ mod smoothness;
 mod speed;
 mod uncertainty;
 
-pub use affine::{affine_invariant, depth_seen_from_target, seen_in_both};
-pub use agreement::{agreement, both_explain};
+pub(crate) use affine::seen_in_both;
+pub use affine::{affine_invariant, depth_seen_from_target};
+pub use agreement::agreement;
+pub(crate) use agreement::both_explain;
 pub use depth::{DepthLoss, DepthTruth, depth, log_depth_error};
 pub use explainability::{explainability, mean_reprojection};
-pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid, visible};
-pub use mean::{mean_where, share};
+pub use flow::{FlowView, flow, flow_view, visible};
+pub use mean::share;
 pub use moving::{RigidView, epipolar_distance, moving_pixels};
 pub use reprojection::{ReprojectionOutput, View, reprojection};
 pub use smoothness::smoothness;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_images::image_size;
 use deepfusion_records::PredictionRecord;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::entry::Entry;
@@ -108,15 +109,24 @@ pub(crate) fn frame_and_problems(folder: &Path, entry: &Entry) -> (Value, Vec<Fr
     (frame, problems)
 }
 
-/// A frame's tracks, short: camera, and id, centre and state of each target; `None` where there are none.
-pub(crate) fn targets_of(folder: &Path, entry: &Entry) -> Option<Value> {
+/// A frame's targets, short.
+#[derive(Debug, Serialize)]
+pub(crate) struct Track {
+    name: String,
+    /// Id, and centre in the camera, in metres.
+    targets: Vec<(u64, [f64; 3])>,
+    /// 3×4, row by row.
+    world_from_cam: Option<[f64; 12]>,
+}
+
+/// A frame's targets; `None` where there are none.
+pub(crate) fn targets_of(folder: &Path, entry: &Entry) -> Option<Track> {
     let frame = SmallFiles::read(folder, entry).targets?.record;
-    let targets = frame.targets.iter().map(|t| json!([t.id, t.center_m]));
-    Some(json!({
-        "name": entry.name,
-        "world_from_cam": frame.camera_motion,
-        "targets": targets.collect::<Vec<_>>(),
-    }))
+    Some(Track {
+        name: entry.name.clone(),
+        targets: frame.targets.iter().map(|t| (t.id, t.center_m)).collect(),
+        world_from_cam: frame.camera_motion,
+    })
 }
 
 /// A frame's picture.

@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) use entry::{Entry, FrameFile};
 #[cfg(feature = "rerun")]
 pub(crate) use frame::frame_and_problems;
-pub(crate) use frame::{frame_json, picture_of, targets_of};
+pub(crate) use frame::{Track, frame_json, picture_of, targets_of};
 pub use problem::FrameProblem;
 #[cfg(feature = "rerun")]
 pub(crate) use small_files::SmallFiles;

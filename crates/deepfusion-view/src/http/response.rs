@@ -3,12 +3,21 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 
+use serde::Serialize;
+
 /// An answer to a request.
 #[derive(Debug, Clone)]
 pub(crate) struct Response {
     pub status: u16,
     pub content_type: &'static str,
     pub body: Cow<'static, [u8]>,
+}
+
+/// What the page shows of a failure.
+#[derive(Debug, Serialize)]
+struct Problem<'a> {
+    error: &'a str,
+    hint: Option<&'a str>,
 }
 
 /// The page talks to its own server alone, and runs no script but the server's files.
@@ -26,16 +35,25 @@ impl Response {
     }
 
     /// A value as JSON.
-    pub(crate) fn json(value: &serde_json::Value) -> Self {
-        Self::ok("application/json", value.to_string().into_bytes())
+    pub(crate) fn json<T: Serialize>(value: &T) -> Self {
+        match serde_json::to_vec(value) {
+            Ok(body) => Self::ok("application/json", body),
+            Err(error) => Self {
+                status: 500,
+                ..Self::ok("text/plain; charset=utf-8", error.to_string().into_bytes())
+            },
+        }
     }
 
     /// A failure, as the page shows it.
     pub(crate) fn problem(status: u16, problem: &str, hint: Option<&str>) -> Self {
-        let value = serde_json::json!({ "error": problem, "hint": hint });
+        let problem = Problem {
+            error: problem,
+            hint,
+        };
         Self {
             status,
-            ..Self::json(&value)
+            ..Self::json(&problem)
         }
     }
 

@@ -112,7 +112,7 @@ fn log(path: &Path, args: &DoctorArgs) -> Result<()> {
 
 fn show(diagnosis: &Diagnosis, args: &DoctorArgs) -> Result<()> {
     if args.json {
-        output::print_json(&serde_json::json!(diagnosis.record()))
+        output::print_json(&diagnosis.record())
     } else {
         output::print(&text(diagnosis, args.verbose))
     }

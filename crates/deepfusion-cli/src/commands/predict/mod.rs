@@ -44,7 +44,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     if prediction.correct_scale && *shard != Shard::WHOLE {
         return Err(CliError::CorrectShard.into());
     }
-    let mine: Vec<&Input> = shard.part_of(&all).collect();
+    let mine: Vec<&Input> = shard.select(&all).collect();
     let mut estimator = engine::load(&model, &prediction.engine)?;
     let job = job(prediction, args.outputs(), &model, &estimator)?;
     let camera_known = !matches!(job.loader.camera, CameraSource::Unknown);

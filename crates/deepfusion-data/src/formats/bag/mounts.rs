@@ -8,7 +8,7 @@ use crate::{
     ConfigProblem, DataWarning, Error, FramesProblem, Mount, MountWarning, NotByFrames, Result,
 };
 use deepfusion_geometry::Se3;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::path::Path;
 
 /// Names of the vehicle's frame, the likelier to be at the rear axle first; the last part of a name counts. REP 105 lets
@@ -93,7 +93,8 @@ impl Mounts {
         }
         Ok(Self {
             camera_assumed: cam_from_vehicle.is_none(),
-            cam_from_vehicle: cam_from_vehicle.unwrap_or_else(looking_ahead),
+            // At the rear axle, looking ahead.
+            cam_from_vehicle: cam_from_vehicle.unwrap_or_else(Se3::cam_from_body_axes),
             cam_from_lidar,
             vehicle_from_imu,
             said: search.mounts,
@@ -406,7 +407,7 @@ impl<'a> ByFrames<'a> {
     fn upright(&self, mount: MountByFrames) -> MountByFrames {
         match mount {
             MountByFrames::Found(body_from, source) if self.body_axes => {
-                MountByFrames::Found(looking_ahead() * body_from, source)
+                MountByFrames::Found(Se3::cam_from_body_axes() * body_from, source)
             }
             other => other,
         }
@@ -422,10 +423,4 @@ impl<'a> ByFrames<'a> {
 
 fn same(a: &Chain, b: &Chain) -> bool {
     Change::between(&a.target_from_source, &b.target_from_source).is_small()
-}
-
-/// A camera at the rear axle that looks ahead: camera axes (right, down, forward) from a body's (forward, left, up).
-fn looking_ahead() -> Se3 {
-    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-    Se3::from_parts(&axes, Vector3::zeros())
 }

@@ -20,8 +20,8 @@ const MARKS: [&str; 9] = [
 ];
 /// How the name of what `predict` keeps of its work ends: videos beside it are outputs.
 const OUTPUTS: &str = ".manifest.json";
-/// How the names of the films end that `predict` makes, of live sources too, whose folder has no such file.
-const OUTPUT_FILM: &str = "_video.mp4";
+/// How the names of the videos end that `predict` makes, of live sources too, whose folder has no such file.
+const OUTPUT_VIDEO: &str = "_video.mp4";
 
 /// What is looked for in a recording's folder.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
         let is_recording = if is_folder {
             wanted.folders && holds_a_recording(&path)
         } else {
-            is_bag(&path) || wanted.videos && is_film(&path)
+            is_bag(&path) || wanted.videos && is_source_video(&path)
         };
         if is_recording {
             found.push(entry.file_name().to_string_lossy().into_owned());
@@ -68,16 +68,16 @@ fn holds_a_recording(folder: &Path) -> bool {
         if name.ends_with(OUTPUTS) {
             return false;
         }
-        let is_file_of_one = !is_hidden(&path) && (is_bag(&path) || is_film(&path));
+        let is_file_of_one = !is_hidden(&path) && (is_bag(&path) || is_source_video(&path));
         found |= MARKS.contains(&&*name) || is_file_of_one;
     }
     found
 }
 
 /// Whether a file is named like a video that is no output.
-fn is_film(path: &Path) -> bool {
+fn is_source_video(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
-    video::is_video(path) && !name.ends_with(OUTPUT_FILM.as_bytes())
+    video::is_video(path) && !name.ends_with(OUTPUT_VIDEO.as_bytes())
 }
 
 fn is_bag(path: &Path) -> bool {

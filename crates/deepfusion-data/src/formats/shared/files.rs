@@ -1,24 +1,36 @@
 //! What is in a folder.
 
+pub(crate) use crate::names::name_of;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
-
-/// A folder's name.
-pub(crate) fn name_of(folder: &Path) -> String {
-    let name = folder.file_name().unwrap_or(folder.as_os_str());
-    name.to_string_lossy().into_owned()
-}
 
 /// The names of a path: as it was given, and with its links resolved, where that is another. Layouts that are recognised by the folders above
 /// look at both: a part of a data set is often a link to another disk.
 ///
 /// # Errors
 /// [`Error::NoSuchPath`], [`Error::File`].
-pub(crate) fn both_names(path: &Path) -> Result<Vec<PathBuf>> {
+fn both_names(path: &Path) -> Result<Vec<PathBuf>> {
     let real = path.canonicalize().map_err(|e| Error::file(path, e))?;
     let given = std::path::absolute(path).ok();
     let given = given.filter(|given| given.file_name().is_some() && *given != real);
     Ok(given.into_iter().chain([real]).collect())
+}
+
+/// What is found by the first of a path's [names](both_names) by which anything is.
+///
+/// # Errors
+/// As [`both_names`], and those of `find`.
+pub(crate) fn by_either_name<T>(
+    path: &Path,
+    find: impl Fn(PathBuf) -> Result<Vec<T>>,
+) -> Result<Vec<T>> {
+    for name in both_names(path)? {
+        let found = find(name)?;
+        if !found.is_empty() {
+            return Ok(found);
+        }
+    }
+    Ok(Vec::new())
 }
 
 /// The PNG and JPEG files of a folder, hidden ones left out; none where there is no such folder.

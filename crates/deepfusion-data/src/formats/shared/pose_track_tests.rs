@@ -109,10 +109,7 @@ fn roll_and_pitch_are_the_poses() {
     };
     let poses: Vec<_> = (0..40).map(at).collect();
     let track = log(&poses).motion(ns(0.0)).unwrap().0;
-    let mount = Se3::from_parts(
-        &Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0),
-        Vector3::zeros(),
-    );
+    let mount = Se3::cam_from_body_axes();
     for i in 5..30_usize {
         let t = i as f64 * 0.1;
         let moved = track

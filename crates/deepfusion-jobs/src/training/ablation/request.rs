@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use deepfusion_data::Cameras;
+use deepfusion_fs::absolute;
 use deepfusion_model::{
     Compute, Error as ModelError, InputSize, Preset, SettingProblem, TrainConfig, ViewMotion,
 };
@@ -88,12 +89,11 @@ impl PlanRequest {
         // Every row begins anew.
         (config.init, config.init_sha256) = (None, None);
         config.make_absolute();
-        let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
         Ok(Plan {
             budget: self.budget.max(1),
             seeds: self.seeds.max(1),
             rows: Row::named(&self.rows)?,
-            eval_data: self.eval_data.iter().map(absolute).collect(),
+            eval_data: self.eval_data.iter().map(|path| absolute(path)).collect(),
             config,
         })
     }

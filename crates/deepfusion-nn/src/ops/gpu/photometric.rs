@@ -7,8 +7,8 @@ use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 
-const C1: f32 = 1e-4;
-const C2: f32 = 9e-4;
+const C1: f32 = deepfusion_kernels::SSIM_C1 as f32;
+const C2: f32 = deepfusion_kernels::SSIM_C2 as f32;
 
 /// The pixel that a coordinate at most one beyond the image means: the image is mirrored without repeating its edge.
 #[cube]

@@ -8,7 +8,7 @@ use deepfusion_jobs::training::resume::{Contradiction, RequestedValue, Setting};
 use deepfusion_jobs::{Error, OtherJob, StaleReason};
 use deepfusion_records::Difference;
 
-use crate::failure::{Exit, Reportable, set_in_file};
+use super::{Exit, Reportable, set_in_file};
 
 impl Reportable for Error {
     /// With the options that are meant.
