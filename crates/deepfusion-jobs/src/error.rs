@@ -69,6 +69,8 @@ pub enum Error {
         expected: usize,
         /// What those have that could be.
         what: &'static str,
+        /// How many of the others are of a camera that was not opened.
+        of_other_camera: usize,
     },
     /// No frame of a recording has both labels and the depth asked for.
     #[error("{}: no frame has the depth that was asked for", path.display())]
