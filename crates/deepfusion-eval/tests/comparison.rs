@@ -107,6 +107,34 @@ fn published_rows_in_every_form() {
     assert_eq!(impossible.count(), 1);
 }
 
+/// The field crops for truth as recorded, and does not for improved truth.
+#[test]
+fn each_kind_of_truth_has_its_own_published_protocol() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |name: &str, protocol: Protocol| {
+        let run = run(folder.path(), name, "kitti", report(1.1, 0.0, protocol));
+        run_tables(&collect(&[run])).tables[0].notes.join("\n")
+    };
+    let of = |gt, crop| Protocol {
+        gt,
+        crop,
+        ..Protocol::default()
+    };
+    let benchmark = "improved ground truth: 2 images instead of 652";
+    let whole = said("whole", of(GroundTruth::Annotated, Crop::None));
+    assert!(whole.contains(&format!("{benchmark}.")), "{whole}");
+    let cropped = said("cropped", of(GroundTruth::Annotated, Crop::Garg));
+    assert!(
+        cropped.contains(&format!("{benchmark}, Garg's crop instead")),
+        "{cropped}"
+    );
+    let recorded = said("recorded", of(GroundTruth::Velodyne, Crop::Garg));
+    assert!(
+        recorded.contains("Eigen tables: 2 images instead of 697."),
+        "{recorded}"
+    );
+}
+
 /// Rows of other protocols or other ground truth never share a table.
 #[test]
 fn grounds_are_kept_apart() {
