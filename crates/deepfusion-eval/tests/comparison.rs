@@ -1,5 +1,6 @@
 //! Run folders and files of evaluations, as tables in every form.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::compare::{
@@ -289,6 +290,51 @@ fn what_is_no_evaluation_is_an_error() {
     assert!(
         error.hint().unwrap().contains("measure it first"),
         "{error}"
+    );
+}
+
+/// What decides the result is in the file's name; what was not asked for is neither there nor in the file.
+#[test]
+fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
+    type Change = fn(&mut MeasuredOn);
+    let folder = tempfile::tempdir().unwrap();
+    let kept = |change: Change| {
+        let mut measured = MeasuredOn {
+            data: vec![PathBuf::from("street")],
+            ..MeasuredOn::default()
+        };
+        change(&mut measured);
+        let saved = SavedEvaluation {
+            format_version: SAVED_VERSION,
+            measured,
+            model: ModelFile::default(),
+            report: report(1.0, 0.0, points()).0,
+            images: Vec::new(),
+        };
+        saved.write(folder.path()).unwrap()
+    };
+    let changes: [Change; 9] = [
+        |_| {},
+        |m| m.intrinsics = Some([500.0, 500.0, 320.0, 240.0]),
+        |m| m.hfov_deg = Some(60.0),
+        |m| m.hfov_deg = Some(90.0),
+        |m| m.camera_ahead_s = Some(-0.06),
+        |m| m.topics = vec!["image=/front".into()],
+        |m| m.topics = vec!["image=/rear".into()],
+        |m| m.allow_holes = true,
+        |m| m.trivial = Some("scans.npz".into()),
+    ];
+    let files: HashSet<PathBuf> = changes.iter().map(|change| kept(*change)).collect();
+    assert_eq!(files.len(), changes.len(), "{files:?}");
+    let plain = std::fs::read_to_string(kept(changes[0])).unwrap();
+    for key in ["intrinsics", "hfov", "ahead", "topics", "allow_holes"] {
+        assert!(!plain.contains(key), "{key}: {plain}");
+    }
+    // So are the files of programs that did not keep these.
+    let read: SavedEvaluation = serde_json::from_str(&plain).unwrap();
+    assert_eq!(
+        folder.path().join("eval").join(read.file_name()),
+        kept(changes[0])
     );
 }
 
