@@ -15,20 +15,18 @@ use std::path::PathBuf;
 pub fn ground_truth_names(datasets: &[Dataset]) -> Vec<Vec<String>> {
     let drives = drive_names(datasets);
     let cameras: HashSet<_> = datasets.iter().map(Dataset::camera).collect();
-    let name = |dataset: &Dataset, frame: usize| {
-        let mut name = String::new();
+    let names = datasets.iter().map(|dataset| {
+        let mut before = String::new();
         if drives.len() > 1 {
-            name += &format!("{}/", drives[&Drive::of(dataset)]);
+            before += &format!("{}/", drives[&Drive::of(dataset)]);
         }
         if cameras.len() > 1 {
-            name += &format!("image_0{}/", dataset.camera().number());
+            before += &format!("image_0{}/", dataset.camera().number());
         }
-        name + &format!("{:010}", dataset.frames()[frame].number)
-    };
-    datasets
-        .iter()
-        .map(|d| d.selected().iter().map(|f| name(d, *f)).collect())
-        .collect()
+        let name = |frame: &usize| format!("{before}{:010}", dataset.frames()[*frame].number);
+        dataset.selected().iter().map(name).collect::<Vec<_>>()
+    });
+    names.collect()
 }
 
 /// What tells drives apart. The two cameras of one are the same.
