@@ -39,7 +39,7 @@ pub(crate) enum CliError {
     #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
     NoRerun,
-    /// A moment that is none on a log's clock.
+    /// A text that cannot be a moment on a log's clock.
     #[error("--start {word}: not a moment on the log's clock")]
     NotOnClock {
         /// What was given.

@@ -27,8 +27,8 @@ fn field(tag: Tag, value: Value) -> Field {
     }
 }
 
-/// What a telephone says of its lens, but for the focal length in 35 mm film.
-fn telephone(make: &str, model: &str, lens_um: u32) -> Vec<Field> {
+/// What a phone says of its lens, but for the focal length in 35 mm film.
+fn phone(make: &str, model: &str, lens_um: u32) -> Vec<Field> {
     let text = |text: &str| Value::Ascii(vec![text.as_bytes().to_vec()]);
     let lens = Rational {
         num: lens_um,
@@ -167,7 +167,7 @@ fn photographs_say_what_their_camera_is() {
         (
             "action camera",
             [
-                telephone("GoPro", "HERO8 Black", 3000),
+                phone("GoPro", "HERO8 Black", 3000),
                 vec![short(Tag::FocalLengthIn35mmFilm, 15)],
             ]
             .concat(),
@@ -176,13 +176,13 @@ fn photographs_say_what_their_camera_is() {
         ),
         (
             "apple",
-            telephone("Apple", "iPhone 14 Pro", 6860),
+            phone("Apple", "iPhone 14 Pro", 6860),
             24.0,
             "the main camera of Apple iPhone 14 Pro, 24.0 mm",
         ),
         (
             "google",
-            telephone("Google", "Pixel 7", 6810),
+            phone("Google", "Pixel 7", 6810),
             // 82° from corner to corner.
             FILM_MM / 2.0 / 41_f64.to_radians().tan(),
             "the main camera of Google Pixel 7, 24.9 mm",
@@ -226,10 +226,10 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
     for (name, block) in [
         ("nothing", vec![]),
         // Its ultra-wide camera, whose view is not in the table.
-        ("other-lens", telephone("Apple", "iPhone 14 Pro", 2220)),
-        ("unknown", telephone("Nobody", "Telephone 1", 4200)),
+        ("other-lens", phone("Apple", "iPhone 14 Pro", 2220)),
+        ("unknown", phone("Nobody", "Telephone 1", 4200)),
         ("zoomed", {
-            let mut block = telephone("Apple", "iPhone 14 Pro", 6860);
+            let mut block = phone("Apple", "iPhone 14 Pro", 6860);
             let twice = Rational { num: 2, denom: 1 };
             block.push(field(Tag::DigitalZoomRatio, Value::Rational(vec![twice])));
             block
@@ -245,7 +245,7 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
         let hint = error.hint().unwrap();
         assert!(hint.contains("hfov_deg") && hint.contains("EXIF"), "{hint}");
     }
-    // A zoom that moved, or a second telephone, in one folder.
+    // A zoom that moved, or a second phone, in one folder.
     let folder = root.path().join("mixed");
     let film = |mm| vec![short(Tag::FocalLengthIn35mmFilm, mm)];
     photographs(&folder, &[film(26), film(26), film(52)]);

@@ -3,8 +3,8 @@
 use crate::common::{self, TinyDrive};
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{
-    Camera, Cameras, Dataset, Error, GtKind, OpenOptions, export_gt, load_rgb, overlay,
-    read_depth_png, write_overlays,
+    Camera, Cameras, Dataset, Error, GtKind, OpenOptions, Split, export_gt, ground_truth_names,
+    load_rgb, overlay, read_depth_png, write_overlays,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -169,6 +169,71 @@ fn several_drives_or_cameras_show_in_the_names() {
         export(&both),
         ["image_02/0000000001", "image_03/0000000001"]
     );
+}
+
+/// The field's lists are shuffled within drives, and a stack of predictions is in the list's order.
+#[test]
+fn scans_are_exported_in_the_order_of_the_split() {
+    let root = tempfile::tempdir().unwrap();
+    let tiny = TinyDrive {
+        frames: (0..4).collect(),
+        scans: (0..4).collect(),
+        ..TinyDrive::default()
+    };
+    for drive in ["a_sync", "b_sync"] {
+        tiny.write_as(root.path(), &format!("2030_01_02/{drive}"));
+    }
+    let list = root.path().join("test_files.txt");
+    let lines = [("b_sync", 3), ("a_sync", 2), ("b_sync", 0), ("a_sync", 1)];
+    let written = lines.map(|(drive, frame)| format!("2030_01_02/{drive} {frame} l\n"));
+    fs::write(&list, written.concat()).unwrap();
+    let options = OpenOptions {
+        split: Some(Split::read(&list).unwrap()),
+        ..OpenOptions::default()
+    };
+    let datasets = Dataset::open(&root.path().join("2030_01_02"), &options).unwrap();
+    let out = root.path().join("gt.npz");
+    let export = |datasets: &[Dataset]| {
+        export_gt(datasets, GtKind::Z, &out, &mut |_, _| {}).unwrap();
+        let mut npz = NpzReader::new(File::open(&out).unwrap()).unwrap();
+        npz.names().unwrap()
+    };
+    let expected = lines.map(|(drive, frame)| format!("{drive}/{frame:010}"));
+    assert_eq!(export(&datasets), expected);
+    // What is not of the split comes after it.
+    let whole = open(&root.path().join("2030_01_02/a_sync"), Cameras::Left);
+    let mixed: Vec<Dataset> = whole.into_iter().chain(datasets).collect();
+    let names = export(&mixed);
+    assert_eq!(names[..4], expected);
+    assert_eq!(names[4..], ["a_sync/0000000000", "a_sync/0000000003"]);
+}
+
+#[test]
+fn drives_of_one_name_keep_their_arrays_apart() {
+    let root = tempfile::tempdir().unwrap();
+    let tiny = TinyDrive {
+        frames: vec![0],
+        scans: vec![0],
+        ..TinyDrive::default()
+    };
+    let [first, second] = ["2030_01_02", "2030_01_03"].map(|date| {
+        open(
+            &tiny.write_as(root.path(), &format!("{date}/a_sync")),
+            Cameras::Left,
+        )
+    });
+    let out = root.path().join("gt.npz");
+    let export = |datasets: &[Dataset]| {
+        export_gt(datasets, GtKind::Z, &out, &mut |_, _| {}).unwrap();
+        names(&mut NpzReader::new(File::open(&out).unwrap()).unwrap())
+    };
+    let both = [first.clone(), second].concat();
+    assert_eq!(export(&both), ["a_sync-2/0000000000", "a_sync/0000000000"]);
+    let backwards: Vec<Dataset> = both.iter().rev().cloned().collect();
+    let by_order = ground_truth_names(&backwards).concat();
+    assert_eq!(by_order, ["a_sync-2/0000000000", "a_sync/0000000000"]);
+    // Given twice it is one.
+    assert_eq!(export(&[first.clone(), first].concat()), ["0000000000"]);
 }
 
 #[test]

@@ -244,7 +244,7 @@ fn what_is_wrong_is_named_with_file_line_and_field() {
         (
             &poses,
             lines(&poses, 3, &|_| "0 ".repeat(12)),
-            &["04.txt:4: pose: its rotation is none"],
+            &["04.txt:4: pose: its matrix is not a rotation"],
         ),
         (
             &calib,

@@ -79,7 +79,7 @@ pub struct Evaluator {
     /// Pixels with ground truth inside the mask, and those of them without prediction.
     masked: usize,
     missing: usize,
-    /// Hole rates of the images that have near pixels, and of their moving pixels.
+    /// Hole rates of the images that have near pixels, and of their dynamic pixels.
     hole_rates: Vec<f64>,
     moving_hole_rates: Vec<f64>,
 }

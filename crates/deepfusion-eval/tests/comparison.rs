@@ -1,5 +1,6 @@
 //! Run folders and files of evaluations, as tables in every form.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::compare::{
@@ -105,6 +106,34 @@ fn published_rows_in_every_form() {
         .iter()
         .filter(|r| r[of("flags")].starts_with("impossible: δ₁ = 0.977"));
     assert_eq!(impossible.count(), 1);
+}
+
+/// The field crops for truth as recorded, and does not for improved truth.
+#[test]
+fn each_kind_of_truth_has_its_own_published_protocol() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |name: &str, protocol: Protocol| {
+        let run = run(folder.path(), name, "kitti", report(1.1, 0.0, protocol));
+        run_tables(&collect(&[run])).tables[0].notes.join("\n")
+    };
+    let of = |gt, crop| Protocol {
+        gt,
+        crop,
+        ..Protocol::default()
+    };
+    let benchmark = "improved ground truth: 2 images instead of 652";
+    let whole = said("whole", of(GroundTruth::Annotated, Crop::None));
+    assert!(whole.contains(&format!("{benchmark}.")), "{whole}");
+    let cropped = said("cropped", of(GroundTruth::Annotated, Crop::Garg));
+    assert!(
+        cropped.contains(&format!("{benchmark}, Garg's crop instead")),
+        "{cropped}"
+    );
+    let recorded = said("recorded", of(GroundTruth::Velodyne, Crop::Garg));
+    assert!(
+        recorded.contains("Eigen tables: 2 images instead of 697."),
+        "{recorded}"
+    );
 }
 
 /// Rows of other protocols or other ground truth never share a table.
@@ -261,6 +290,51 @@ fn what_is_no_evaluation_is_an_error() {
     assert!(
         error.hint().unwrap().contains("measure it first"),
         "{error}"
+    );
+}
+
+/// What decides the result is in the file's name; what was not asked for is neither there nor in the file.
+#[test]
+fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
+    type Change = fn(&mut MeasuredOn);
+    let folder = tempfile::tempdir().unwrap();
+    let kept = |change: Change| {
+        let mut measured = MeasuredOn {
+            data: vec![PathBuf::from("street")],
+            ..MeasuredOn::default()
+        };
+        change(&mut measured);
+        let saved = SavedEvaluation {
+            format_version: SAVED_VERSION,
+            measured,
+            model: ModelFile::default(),
+            report: report(1.0, 0.0, points()).0,
+            images: Vec::new(),
+        };
+        saved.write(folder.path()).unwrap()
+    };
+    let changes: [Change; 9] = [
+        |_| {},
+        |m| m.intrinsics = Some([500.0, 500.0, 320.0, 240.0]),
+        |m| m.hfov_deg = Some(60.0),
+        |m| m.hfov_deg = Some(90.0),
+        |m| m.camera_ahead_s = Some(-0.06),
+        |m| m.topics = vec!["image=/front".into()],
+        |m| m.topics = vec!["image=/rear".into()],
+        |m| m.allow_holes = true,
+        |m| m.trivial = Some("scans.npz".into()),
+    ];
+    let files: HashSet<PathBuf> = changes.iter().map(|change| kept(*change)).collect();
+    assert_eq!(files.len(), changes.len(), "{files:?}");
+    let plain = std::fs::read_to_string(kept(changes[0])).unwrap();
+    for key in ["intrinsics", "hfov", "ahead", "topics", "allow_holes"] {
+        assert!(!plain.contains(key), "{key}: {plain}");
+    }
+    // So are the files of programs that did not keep these.
+    let read: SavedEvaluation = serde_json::from_str(&plain).unwrap();
+    assert_eq!(
+        folder.path().join("eval").join(read.file_name()),
+        kept(changes[0])
     );
 }
 

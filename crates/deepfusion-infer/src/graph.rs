@@ -42,7 +42,7 @@ impl Graph {
     /// bf16.
     ///
     /// # Errors
-    /// [`Error::Ranges`] for a name of no convolution that int8 computes, which is another network's, and a range that is none.
+    /// [`Error::Ranges`] for a name of no convolution that int8 computes, which is another network's, and a range that cannot be one.
     pub fn set_input_ranges(&mut self, ranges: &InputRanges) -> Result<(), Error> {
         let mut found = vec![None; self.nodes.len()];
         let computed = self.int8_nodes();

@@ -51,7 +51,7 @@ pub struct Averaged {
 /// stands for the checkpoint that it prefers. Factors of intervals and ranges for int8 belong to one network's weights and are not taken over.
 ///
 /// # Errors
-/// [`Error::NoMean`] for networks that are not alike, [`Error::Shares`] for shares that are none, [`Error::Occupied`] where `out` holds anything;
+/// [`Error::NoMean`] for networks that are not alike, [`Error::Shares`] for shares that cannot be such, [`Error::Occupied`] where `out` holds anything;
 /// networks that cannot be read.
 pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result<Averaged> {
     let shares = parts_of(models.len(), shares)?;

@@ -148,7 +148,7 @@ impl BoardViews {
     /// The camera that explains the views, and its lens; [`Self::warnings`] say how sure they are.
     ///
     /// # Errors
-    /// As [`Self::require_enough`] and [`calibrate`]; [`BoardError::Undetermined`] for a lens that is none.
+    /// As [`Self::require_enough`] and [`calibrate`]; [`BoardError::Undetermined`] for numbers that cannot be a lens'.
     pub fn calibrate(&self, board: &Board, model: LensModel) -> Result<(Calibration, Distortion)> {
         self.require_enough(board)?;
         let found = calibrate(&self.views, board, self.size, model)?;

@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(of("cuda:1"), Compute::Gpu);
     }
 
-    /// A word that is none is answered with those that are.
+    /// A word that is no device is answered with those that are.
     #[test]
     fn a_wrong_word_is_answered_with_right_ones() {
         let hint = ComputeDevice::chosen("gpu").unwrap_err().hint().unwrap();

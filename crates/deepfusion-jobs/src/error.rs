@@ -36,7 +36,7 @@ pub enum Error {
     /// Pictures of a network's layers, without what shows these.
     #[error("pictures of the network's layers are asked for, and nothing shows what these do")]
     NoLayers,
-    /// A pattern of file names that is none.
+    /// A pattern of file names that cannot be one.
     #[error(transparent)]
     Pattern(#[from] glob::PatternError),
     /// Intrinsics that cannot be the image's.
@@ -69,6 +69,8 @@ pub enum Error {
         expected: usize,
         /// What those have that could be.
         what: &'static str,
+        /// How many of the others are of a camera that was not opened.
+        of_other_camera: usize,
     },
     /// No frame of a recording has both labels and the depth asked for.
     #[error("{}: no frame has the depth that was asked for", path.display())]
@@ -156,7 +158,7 @@ pub enum Error {
         /// Why not.
         source: toml::de::Error,
     },
-    /// Factors of intervals that are none.
+    /// Factors of intervals that cannot be read, or cannot be such.
     #[error("{}", path.display())]
     KeptFactors {
         /// The file, or the network's name.
@@ -197,7 +199,7 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
-    /// Shares of a mean that are none.
+    /// Shares of a mean that cannot be such.
     #[error(
         "{} for {}: one positive number for each is needed",
         count_of(*found, "share"), count_of(*networks, "network")
@@ -415,7 +417,7 @@ pub enum Error {
     /// A file of poses.
     #[error(transparent)]
     PoseFile(#[from] deepfusion_eval::odometry::PoseFileError),
-    /// A path that is none.
+    /// Poses that cannot be a camera's path.
     #[error(transparent)]
     Track(#[from] deepfusion_eval::odometry::TrackError),
     /// A board in pictures.

@@ -44,7 +44,7 @@ const RECORDINGS: [&str; 10] = [
 /// `options`' and its own. `opened` sees the recordings.
 ///
 /// # Errors
-/// [`Error::NoImages`], a pattern that is none, and what cannot be opened.
+/// [`Error::NoImages`], a pattern that cannot be one, and what cannot be opened.
 pub fn find_inputs(
     arguments: &[String],
     options: &OpenOptions,
@@ -97,7 +97,7 @@ fn has_other_pictures(folder: &Path) -> bool {
     Dataset::kind_at(folder).is_ok_and(|kind| such.contains(&kind))
 }
 
-/// Opens a recording; that it is none is an error that names the argument.
+/// Opens a recording; that it cannot be one is an error that names the argument.
 fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
     match Dataset::open(path, options) {
         Ok(datasets) => Ok(datasets),

@@ -87,7 +87,7 @@ pub fn batch_norm(
 
 fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [MaybeUninit<f32>]) {
     let floor = if relu { 0.0 } else { f32::NEG_INFINITY };
-    // `f32::max` would make a number of NaN, and a loss that is none would look like one.
+    // `f32::max` would make a number of NaN, and a loss of NaN would look like a number.
     let normalised = |x: &f32| {
         let y = (x - mean) * scale + beta;
         if y < floor { floor } else { y }

@@ -248,7 +248,7 @@ pub enum SettingProblem {
         /// The list.
         key: String,
     },
-    /// A place that is none.
+    /// A text that cannot be a place in a list.
     #[error("`{part}`: a place in a list is a number in brackets, such as [0]")]
     NoPlace {
         /// The part of the key between two dots.

@@ -33,7 +33,7 @@ pub enum CalibrationProblem {
     /// The system does not give it, or it is no text.
     #[error("{0}")]
     Unread(#[source] Arc<std::io::Error>),
-    /// A text or a table that is none.
+    /// A text or a table that cannot be one.
     #[error("{0}")]
     NotOne(#[source] TomlProblem),
 }

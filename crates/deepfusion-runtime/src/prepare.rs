@@ -203,7 +203,21 @@ mod tests {
         ] {
             assert_eq!(fitting(trained, image.0, image.1), expected, "{image:?}");
         }
-        assert_eq!(fitting(size(640, 192), 640, 480), size(384, 288));
+        // As docs/guides/export-to-onnx.md lists them.
+        for (image, larger, smaller) in [
+            ((1242, 375), (640, 192), (320, 96)),
+            ((1000, 500), (512, 256), (256, 128)),
+            ((1920, 1080), (448, 256), (224, 128)),
+            ((1920, 1200), (448, 288), (224, 128)),
+            ((640, 480), (384, 288), (192, 160)),
+            ((800, 800), (352, 352), (160, 160)),
+            ((1080, 1920), (256, 448), (128, 224)),
+        ] {
+            let fits = |of| fitting(of, image.0, image.1);
+            let both = [fits(size(640, 192)), fits(trained)];
+            let expected = [larger, smaller].map(|(width, height)| size(width, height));
+            assert_eq!(both, expected, "{image:?}");
+        }
         let scaled = |scale| fitting_scaled(size(640, 192), 1242, 375, scale);
         assert_eq!(
             [0.8, 1.0, 1.2].map(scaled),

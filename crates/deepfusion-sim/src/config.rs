@@ -67,7 +67,7 @@ impl Scene {
     /// The scene of a name, of varied worlds' as well.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that is none.
+    /// [`Error::Config`] for a name of no scene.
     pub fn of_varied(name: &str) -> Result<Self> {
         let found = Self::EVERY.into_iter().find(|scene| scene.name() == name);
         found.ok_or_else(|| Error::Config {

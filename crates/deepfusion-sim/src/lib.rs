@@ -21,7 +21,7 @@
 //! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
 //! one. Of a varied drive ([`SimConfig::varied`]) that holds of depth, pose and surfaces, not of what
 //! the air, wet ground, the lens and the sensor do to colours. Shadows under moving cars move with
-//! them; the mask of moving pixels holds the cars and the people who ride and walk. Whatever moves is
+//! them; the mask of dynamic pixels holds the cars and the people who ride and walk. Whatever moves is
 //! a rigid body: nobody pedals or swings their arms.
 
 mod can;

@@ -209,7 +209,7 @@ fn moving_pixels_equal_pytorch() {
         coords: ends,
         visible: everywhere,
     };
-    // The moving pixels of each limit on what cannot stand still, of both, and of none.
+    // The dynamic pixels of each limit on what cannot stand still, of both, and of none.
     for (min_epipolar_px, min_parallax_ratio, name) in [
         (0.5, 0.0, "moving"),
         (0.0, 2.0, "along"),

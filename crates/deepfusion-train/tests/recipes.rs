@@ -15,6 +15,10 @@ fn every_recipe_is_a_configuration() {
                 .map(|on| TrainConfig::read_over_preset(&path, on).unwrap());
             // A recipe gives the same wherever it is followed.
             assert_eq!(processor, gpu, "{}", path.display());
+            // The field's lists for KITTI name frames of both cameras.
+            if path.parent().is_some_and(|at| at.ends_with("kitti")) {
+                assert_eq!(processor.data.camera, "both", "{}", path.display());
+            }
             count += 1;
         }
     }

@@ -114,7 +114,7 @@ fn a_network_learns_from_depth_images_without_a_speed() {
     assert!(last < 0.9 * first, "{first} to {last}");
 }
 
-/// A sensor with fewer pixels, as a telephone's: each of its pixels is four of the colour image.
+/// A sensor with fewer pixels, as a phone's: each of its pixels is four of the colour image.
 #[test]
 fn depth_images_may_have_fewer_pixels_than_the_colour() {
     let folder = tempfile::tempdir().unwrap();

@@ -23,7 +23,7 @@ pub(crate) enum ScanError {
         path: PathBuf,
         source: std::io::Error,
     },
-    /// A file whose name is none of a network.
+    /// A file whose name cannot be a network's.
     Name { path: PathBuf },
     /// One of a network's files without the other.
     Alone {

@@ -93,6 +93,7 @@
 //! | [`logs`] | speeds and turns from GPS tracks, OBD apps, phones, CAN traces, any table |
 //! | [`calibrate`] | a camera from pictures of a checkerboard |
 //! | [`doctor`] | what is wrong with a recording |
+//! | [`images`] | pictures read, resized and written; what a photograph says of its lens |
 //! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | bags of ROS 1, read and written |

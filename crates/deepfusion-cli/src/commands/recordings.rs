@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::Result;
 use deepfusion_data::{Cameras, Dataset, OpenOptions};
-use deepfusion_jobs::evaluation::missing_frames;
+use deepfusion_jobs::evaluation::{MissingReason, missing_frames};
 use deepfusion_jobs::recordings::{self, read_split};
 #[cfg(feature = "train")]
 use deepfusion_jobs::samples::{self, SampleWarning};
@@ -68,6 +68,9 @@ pub(super) fn warn_of_sample(warning: SampleWarning) {
 pub(super) fn print_warnings(options: &OpenOptions, datasets: &[Dataset]) {
     warnings::print(datasets);
     if let Some(missing) = missing_frames(options, datasets) {
-        warnings::warn_once(missing.to_string());
+        warnings::warn_once(match missing.why {
+            MissingReason::OtherCamera(_) => format!("{missing}: add --camera both"),
+            _ => missing.to_string(),
+        });
     }
 }

@@ -85,6 +85,12 @@ impl Reportable for Error {
             Self::Busy { .. } => {
                 Some("wait for it, or share the work with --shard I/N, a different I each".into())
             }
+            Self::Incomplete {
+                of_other_camera: others @ 1..,
+                ..
+            } => Some(format!(
+                "{others} of the split's frames are of the other camera: add --camera both"
+            )),
             Self::Incomplete { .. } => Some(
                 "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
             ),

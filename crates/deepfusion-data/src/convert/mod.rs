@@ -8,11 +8,13 @@ mod bag;
 mod calendar;
 mod ground_truth;
 mod kitti;
+mod names;
 mod overlays;
 mod parts;
 
 pub use bag::convert_to_bag;
-pub use ground_truth::{VELOCITY, export_gt, ground_truth_names};
+pub use ground_truth::{VELOCITY, export_gt};
 pub use kitti::convert_to_kitti;
+pub use names::ground_truth_names;
 pub use overlays::write_overlays;
 pub use parts::Converted;

@@ -495,7 +495,7 @@ impl Dataset {
         self.recording.scan_truth(&self.frames()[frame], kind)
     }
 
-    /// What tells this recording's moving pixels from its static ones: the simulator's masks, KITTI's
+    /// What tells this recording's dynamic pixels from its static ones: the simulator's masks, KITTI's
     /// tracklets together with the car's own motion, or a bag's LiDAR: its radial velocities, else its topic of dynamic
     /// points. `None` where none of these is there, or nothing says how
     /// the car itself moves.

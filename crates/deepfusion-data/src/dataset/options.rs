@@ -54,8 +54,8 @@ impl OpenOptions {
     }
 }
 
-/// fx, fy, cx, cy of images of a size that see `hfov_deg` degrees from left to right. An angle that is none gives numbers that
-/// are no camera, which [`crate::CameraCalibration::given`] refuses.
+/// fx, fy, cx, cy of images of a size that see `hfov_deg` degrees from left to right. An angle that cannot be one gives numbers
+/// that are no camera, which [`crate::CameraCalibration::given`] refuses.
 pub(crate) fn numbers_of_hfov(hfov_deg: f64, size: (u32, u32)) -> [f64; 4] {
     let (least, most) = HFOV_DEG;
     let k = Intrinsics::from_hfov(hfov_deg, size);

@@ -113,7 +113,7 @@ pub trait Recording: fmt::Debug + Send + Sync {
         }))
     }
 
-    /// What tells moving pixels from static ones.
+    /// What tells dynamic pixels from static ones.
     ///
     /// # Errors
     /// Where it is there and cannot be read.

@@ -32,7 +32,7 @@ pub enum SegmentProblem {
         /// How many times there are.
         times: usize,
     },
-    /// A speed that is none.
+    /// A number that cannot be a speed.
     #[error("row {row}: {value} is no speed")]
     NotASpeed {
         /// The row, counted from 0.
@@ -40,7 +40,7 @@ pub enum SegmentProblem {
         /// What it holds.
         value: f64,
     },
-    /// A time that is none, or goes back.
+    /// A number that cannot be a time, or a time that goes back.
     #[error("row {row}: {time_s} s after {last_s} s is no time")]
     NotATime {
         /// The row, counted from 0.

@@ -34,8 +34,8 @@ pub enum CalibrationProblem {
     /// A matrix that turns nothing, or mirrors it.
     #[error("is not a rotation")]
     NotARotation,
-    /// Rows of a motion whose rotation is none.
-    #[error("its rotation is none")]
+    /// Rows of a motion whose matrix is no rotation.
+    #[error("its matrix is not a rotation")]
     NotAMotion,
     /// A projection that is no camera's.
     #[error(transparent)]

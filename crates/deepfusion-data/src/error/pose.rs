@@ -55,7 +55,7 @@ pub enum PoseProblem {
         value: f64,
     },
     /// Its matrix turns nothing, or mirrors it.
-    #[error("its rotation is none")]
+    #[error("its matrix is not a rotation")]
     NoRotation,
     /// There is no line.
     #[error("the file is empty")]
@@ -76,6 +76,6 @@ pub enum PoseFileProblem {
         found: usize,
     },
     /// Its matrix turns nothing, or mirrors it.
-    #[error("its rotation is none")]
+    #[error("its matrix is not a rotation")]
     NoRotation,
 }

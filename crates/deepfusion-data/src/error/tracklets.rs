@@ -106,7 +106,7 @@ pub enum TrackletsProblem {
         /// The text, or its beginning.
         text: String,
     },
-    /// A side of a box that is none.
+    /// A side of a box that cannot be a length.
     #[error("{value} is not a length")]
     NotALength {
         /// What is said, in metres.

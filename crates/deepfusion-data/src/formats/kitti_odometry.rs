@@ -224,7 +224,7 @@ fn poses_of(folder: &Path) -> Option<PathBuf> {
 /// The times of a sequence's frames in nanoseconds, a line each in seconds.
 ///
 /// # Errors
-/// [`Error::Missing`]; [`Error::TimeStamp`] with the number of a line that is none, or not after the one above.
+/// [`Error::Missing`]; [`Error::TimeStamp`] with the number of a line that is no time, or not after the one above.
 fn read_times(path: &Path) -> Result<Vec<i64>> {
     let bytes = std::fs::read(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => Error::Missing {

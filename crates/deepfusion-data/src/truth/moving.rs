@@ -28,7 +28,7 @@ pub struct MovingLabels {
     moving: Arc<dyn MovingPixels>,
 }
 
-/// Finds the moving pixels of a frame's ground truth; one implementation a source of labels.
+/// Finds the dynamic pixels of a frame's ground truth; one implementation a source of labels.
 pub trait MovingPixels: fmt::Debug + Send + Sync {
     /// As [`MovingLabels::pixels`].
     ///

@@ -6,6 +6,7 @@
 //! [`plausibility::check`]. The tables come as [text](Tables::to_text), [CSV](Tables::to_csv), [LaTeX](Tables::to_latex), and as
 //! a section of an HTML page through `deepfusion-render`.
 
+mod eigen;
 mod error;
 mod evaluation;
 mod format;

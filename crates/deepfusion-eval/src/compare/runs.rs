@@ -1,9 +1,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
-use deepfusion_hint::count_of;
+use crate::{Crop, Metrics, PointErrors, RangeBin, Report};
 
+use super::eigen::beside_published;
 use super::evaluation::{Evaluation, Origin};
 use super::plausibility::{Flag, FlagReason, Severity, check, identical};
 use super::table::{Better, Column, Row, Table, Tables, Value};
@@ -82,14 +82,7 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
                  that is known."
             .into(),
     });
-    notes.push(match eigen_differences(report).as_slice() {
-        [] => "Protocol and number of images are those of the published KITTI Eigen tables with ground truth as recorded."
-            .into(),
-        differences => format!(
-            "Not comparable with the published KITTI Eigen tables: {}.",
-            differences.join(", ")
-        ),
-    });
+    notes.push(beside_published(report));
     notes
 }
 
@@ -111,32 +104,6 @@ fn recordings(members: &[&Evaluation]) -> Vec<String> {
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
-}
-
-/// In what a report differs from the field's protocol on KITTI's Eigen images.
-fn eigen_differences(report: &Report) -> Vec<String> {
-    let p = &report.protocol;
-    let mut differences = Vec::new();
-    if report.n != 697 {
-        differences.push(format!("{} instead of 697", count_of(report.n, "image")));
-    }
-    if p.crop != Crop::Garg {
-        differences.push("no Garg crop".into());
-    }
-    if p.cap_m != 80.0 || p.min_m != 1e-3 {
-        differences.push(format!(
-            "{} to {} m instead of 0.001 to 80 m",
-            p.min_m, p.cap_m
-        ));
-    }
-    if p.gt != GroundTruth::Velodyne {
-        differences.push(format!(
-            "{} instead of {}",
-            p.gt.meaning(),
-            GroundTruth::Velodyne.meaning()
-        ));
-    }
-    differences
 }
 
 /// Mean-depth baselines and the names of the evaluations that print them.

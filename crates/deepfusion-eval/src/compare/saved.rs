@@ -41,6 +41,24 @@ pub struct MeasuredOn {
     pub gt: Option<PathBuf>,
     /// Which camera: "2", "3" or "both".
     pub camera: String,
+    /// fx, fy, cx, cy in pixels, where they were given in place of the recordings' own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics: Option<[f64; 4]>,
+    /// The images' field of view from left to right in degrees, where it was given in place of a calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hfov_deg: Option<f64>,
+    /// How far the camera's clock is ahead of the vehicle's in seconds, where that was given or measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_ahead_s: Option<f64>,
+    /// Topics of bags that were named, as `role=topic`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<String>,
+    /// Whether predictions that are no depth were left out.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub allow_holes: bool,
+    /// The file of scans for the mean-depth baseline, where one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trivial: Option<PathBuf>,
     /// What ran the network, and in which numbers.
     pub engine: String,
     /// Which of the data sets that the run learned its metres are of, where it learned several.
@@ -117,8 +135,18 @@ impl SavedEvaluation {
                     .map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
             )
         }));
+        let digest = format!("{:x}", Sha256::digest(self.decides()));
+        let checkpoint = self.model.checkpoint.trim_end_matches(".safetensors");
+        names.push(slug(checkpoint));
+        names.push(digest[..8].to_owned());
+        names.retain(|n| !n.is_empty());
+        format!("{}.json", names.join("-"))
+    }
+
+    /// All that decides the result.
+    fn decides(&self) -> String {
         let measured = &self.measured;
-        let decides = format!(
+        let mut decides = format!(
             "{:?} {:?} {:?} {} {} {:?} {} {:?} {}",
             measured.data,
             measured.split,
@@ -130,21 +158,32 @@ impl SavedEvaluation {
             self.report.protocol,
             self.model.checkpoint,
         );
-        // Named only where it is there: files of earlier evaluations keep their names.
-        let decides = match measured.post_process {
-            Some(how) => format!("{decides} {how:?}"),
-            None => decides,
-        };
-        let decides = match &self.report.fixed_scaled {
-            Some(fixed) => format!("{decides} scale {}", fixed.factor),
-            None => decides,
-        };
-        let digest = format!("{:x}", Sha256::digest(decides));
-        let checkpoint = self.model.checkpoint.trim_end_matches(".safetensors");
-        names.push(slug(checkpoint));
-        names.push(digest[..8].to_owned());
-        names.retain(|n| !n.is_empty());
-        format!("{}.json", names.join("-"))
+        // The rest is named only where it is there: files of earlier evaluations keep their names.
+        if let Some(how) = measured.post_process {
+            decides += &format!(" {how:?}");
+        }
+        if let Some(fixed) = &self.report.fixed_scaled {
+            decides += &format!(" scale {}", fixed.factor);
+        }
+        if let Some(numbers) = measured.intrinsics {
+            decides += &format!(" intrinsics {numbers:?}");
+        }
+        if let Some(degrees) = measured.hfov_deg {
+            decides += &format!(" hfov {degrees}");
+        }
+        if let Some(seconds) = measured.camera_ahead_s {
+            decides += &format!(" ahead {seconds}");
+        }
+        if !measured.topics.is_empty() {
+            decides += &format!(" topics {:?}", measured.topics);
+        }
+        if measured.allow_holes {
+            decides += " holes";
+        }
+        if let Some(baseline) = &measured.trivial {
+            decides += &format!(" trivial {baseline:?}");
+        }
+        decides
     }
 
     /// Writes it into the run's folder, whole or not at all; the file's path.

@@ -15,6 +15,12 @@ impl Hint for Error {
             Self::NoTopic { problem, .. } => {
                 Some(problem.hint().unwrap_or("set `data.topics` so in the configuration".into()))
             }
+            Self::Incomplete {
+                of_other_camera: others @ 1..,
+                ..
+            } => Some(format!(
+                "open both cameras: {others} of the split's frames are of the other one"
+            )),
             Self::Incomplete { .. } => {
                 Some("give the folder that holds every drive that the split names".into())
             }

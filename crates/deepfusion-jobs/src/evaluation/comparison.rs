@@ -39,7 +39,7 @@ impl Comparison {
     /// Compares one image; whether it had a pixel to compare.
     ///
     /// # Errors
-    /// A prediction that is none, or of another shape than the truth.
+    /// A prediction that cannot be one, or is of another shape than the truth.
     pub fn add(&mut self, image: &Sample<'_>) -> Result<bool> {
         let counted = self.method.add_sample(image)?.is_some();
         if let Some((evaluator, baseline)) = &mut self.mean_depth_baseline

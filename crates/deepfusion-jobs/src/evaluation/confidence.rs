@@ -45,7 +45,7 @@ impl Confidence {
     /// That of a run's network at this step. That of another step is not its own: [`Self::stale`].
     ///
     /// # Errors
-    /// A file that is none.
+    /// A file that cannot be one.
     pub fn read(run: &Path, step: usize) -> Result<Option<Self>> {
         Ok(Self::kept(run)?.filter(|kept| kept.step == Some(step)))
     }

@@ -1,9 +1,10 @@
 //! How much of a split could be used.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::path::PathBuf;
 
-use deepfusion_data::{Dataset, OpenOptions, SplitCoverage};
+use deepfusion_data::{Dataset, OpenOptions, Split, SplitCoverage};
 use deepfusion_hint::count_of;
 
 use crate::{Error, Result};
@@ -27,6 +28,8 @@ pub struct Shortfall {
 pub enum MissingReason {
     /// The recordings do not hold them; the first that is missing.
     NotThere(String),
+    /// So many are of a camera that was not opened, as in the field's lists of both; others may be missing as well.
+    OtherCamera(usize),
     /// So many are there without ground truth.
     NoTruth(usize),
 }
@@ -41,6 +44,12 @@ impl fmt::Display for Shortfall {
                 f,
                 "{split}: {used} of its {frames} {} there ({percent:.1} %), the first that is not: {first}",
                 if *used == 1 { "is" } else { "are" }
+            ),
+            MissingReason::OtherCamera(others) => write!(
+                f,
+                "{split}: {used} of its {frames} {} there ({percent:.1} %), {others} more {} of the other camera",
+                if *used == 1 { "is" } else { "are" },
+                if *others == 1 { "is" } else { "are" }
             ),
             MissingReason::NoTruth(without) => write!(
                 f,
@@ -62,8 +71,19 @@ pub fn missing_frames(options: &OpenOptions, datasets: &[Dataset]) -> Option<Sho
         split: split.path.clone(),
         used: coverage.found,
         expected: coverage.expected,
-        why: MissingReason::NotThere(first.to_string()),
+        why: match of_other_camera(split, options) {
+            0 => MissingReason::NotThere(first),
+            others => MissingReason::OtherCamera(others),
+        },
     })
+}
+
+/// How many of a split's frames are of a camera that the options do not open.
+fn of_other_camera(split: &Split, options: &OpenOptions) -> usize {
+    let opened = options.camera.cameras();
+    let entries = split.entries.iter();
+    let others: HashSet<_> = entries.filter(|e| !opened.contains(&e.camera)).collect();
+    others.len()
 }
 
 /// How many frames a split asked for, where there was one.
@@ -89,6 +109,7 @@ pub fn expected_frames(
             } else {
                 "are in the recordings given"
             },
+            of_other_camera: of_other_camera(split, options),
         })
     } else {
         Ok(Some(coverage.expected))
@@ -124,6 +145,7 @@ pub fn check_used(
             } else {
                 "have ground truth"
             },
+            of_other_camera: 0,
         });
     }
     Ok(Some(Shortfall {
@@ -136,4 +158,57 @@ pub fn check_used(
 
 fn percent(part: usize, whole: usize) -> f64 {
     100.0 * part as f64 / whole.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_data::Cameras;
+    use deepfusion_hint::Hint;
+    use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+    use std::fmt::Write as _;
+    use std::ops::ControlFlow;
+
+    /// A list of both cameras, of which one is opened, is not taken for one whose data are missing.
+    #[test]
+    fn frames_of_the_other_camera_are_said_to_be_its() {
+        let at = tempfile::tempdir().unwrap();
+        let simulation = Simulation::new(&SimConfig {
+            frames: 4,
+            width: 64,
+            height: 48,
+            scan_every: 0,
+            stereo_baseline_m: 0.5,
+            ..SimConfig::default()
+        });
+        let go = &mut |_, _| ControlFlow::Continue(());
+        let root = write_kitti(&simulation.unwrap(), &at.path().join("kitti"), go).unwrap();
+        let drive = Dataset::open(&root, &OpenOptions::default()).unwrap();
+        let mut lines = String::new();
+        for (frame, side) in [(0, 'l'), (1, 'r'), (2, 'r'), (1, 'r')] {
+            writeln!(lines, "{} {frame} {side}", drive[0].split_name()).unwrap();
+        }
+        let split = at.path().join("split.txt");
+        std::fs::write(&split, lines).unwrap();
+        let options = |camera| OpenOptions {
+            camera,
+            split: Some(Split::read(&split).unwrap()),
+            ..OpenOptions::default()
+        };
+        let left = options(Cameras::Left);
+        let datasets = Dataset::open(&root, &left).unwrap();
+        let shortfall = missing_frames(&left, &datasets).unwrap();
+        assert_eq!(shortfall.why, MissingReason::OtherCamera(2));
+        let said = shortfall.to_string();
+        let expected =
+            "split.txt: 1 of its 3 frames is there (33.3 %), 2 more are of the other camera";
+        assert!(said.ends_with(expected), "{said}");
+        let error = expected_frames(&left, &datasets, true).unwrap_err();
+        assert!(error.hint().unwrap().contains("both cameras"), "{error}");
+
+        let both = options(Cameras::Both);
+        let datasets = Dataset::open(&root, &both).unwrap();
+        assert_eq!(missing_frames(&both, &datasets), None);
+        assert_eq!(expected_frames(&both, &datasets, true).unwrap(), Some(3));
+    }
 }

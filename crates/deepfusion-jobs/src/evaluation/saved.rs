@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Cameras, Dataset};
+use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_eval::Holes;
 use deepfusion_eval::compare::{FrameScore, MeasuredOn, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_fs::absolute;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
@@ -21,8 +22,8 @@ pub struct EvaluationRequest<'a> {
     pub split: Option<&'a Path>,
     /// What depth is compared with, and how.
     pub measurement: MeasurementRequest<'a>,
-    /// Which cameras.
-    pub camera: Cameras,
+    /// How the recordings were opened.
+    pub options: OpenOptions,
     /// The numbers that the network is computed in.
     pub precision: Precision,
     /// Which of the data sets that the run learned its metres are of.
@@ -51,7 +52,18 @@ impl EvaluationRequest<'_> {
                 data: self.data.iter().map(|path| absolute(path)).collect(),
                 split: self.split.map(absolute),
                 gt: self.measurement.truth.map(absolute),
-                camera: camera_word(self.camera).into(),
+                camera: camera_word(self.options.camera).into(),
+                intrinsics: self.options.intrinsics,
+                hfov_deg: self.options.hfov_deg,
+                camera_ahead_s: self.options.camera_ahead_s,
+                topics: self
+                    .options
+                    .topics
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect(),
+                allow_holes: self.measurement.protocol.holes == Holes::Skip,
+                trivial: self.measurement.baseline.map(absolute),
                 engine: format!("{} {}", estimator.engine(), self.precision.name()),
                 set: self.set.map(str::to_owned),
                 focal_correction: self.measurement.focal_correction,

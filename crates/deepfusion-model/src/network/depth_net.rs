@@ -289,7 +289,7 @@ impl DepthNetConfig {
     }
 
     /// # Errors
-    /// [`NetworkError::Config`] for a network that cannot be built, or a depth range that is none.
+    /// [`NetworkError::Config`] for a network that cannot be built, or a depth range that cannot be one.
     pub fn validate(&self) -> Result<(), NetworkError> {
         self.encoder.validate()?;
         self.hce.as_ref().map_or(Ok(()), HceConfig::validate)?;

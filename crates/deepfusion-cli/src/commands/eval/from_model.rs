@@ -43,7 +43,7 @@ pub(super) fn outcome(args: &EvalArgs) -> Result<EvaluationOutcome> {
     let mut measured = measure(args, &mut inputs)?;
     measure_intervals(args, &mut inputs, &mut measured)?;
     write_points(args, &measured.evaluated)?;
-    let request = request(args, &measured);
+    let request = request(args, &inputs.options, &measured);
     let saved = keep(&request, &inputs, &measured.evaluated)?;
     let reliability = calibrate_confidence(args, &mut inputs, &mut measured)?;
     let without_truth = (reliability.as_deref(), verdict.as_ref());
@@ -191,12 +191,16 @@ fn keep(
 }
 
 /// How a network was measured, as its evaluation keeps it.
-fn request<'a>(args: &'a EvalArgs, measured: &Measurement<'a>) -> EvaluationRequest<'a> {
+fn request<'a>(
+    args: &'a EvalArgs,
+    options: &OpenOptions,
+    measured: &Measurement<'a>,
+) -> EvaluationRequest<'a> {
     EvaluationRequest {
         data: &args.data,
         split: args.split.as_deref(),
         measurement: measured.request.clone(),
-        camera: args.camera,
+        options: options.clone(),
         precision: args.engine.precision,
         set: args.engine.set.as_deref(),
         program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),

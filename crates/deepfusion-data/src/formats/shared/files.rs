@@ -33,7 +33,7 @@ pub(crate) fn by_either_name<T>(
     Ok(Vec::new())
 }
 
-/// The PNG and JPEG files of a folder, hidden ones left out; none where there is no such folder.
+/// The PNG and JPEG files of a folder, hidden ones left out. A folder that is not there is an error.
 pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {

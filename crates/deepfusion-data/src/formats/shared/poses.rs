@@ -14,7 +14,7 @@ pub(crate) fn is_rotation(matrix: &Matrix3<f64>) -> bool {
         && matrix.determinant() > 0.0
 }
 
-/// A motion from the upper three rows of its matrix, row by row, in metres; `None` where its rotation is none.
+/// A motion from the upper three rows of its matrix, row by row, in metres; `None` where its matrix is no rotation.
 pub(crate) fn motion_of_rows(numbers: &[f64]) -> Option<Se3> {
     let at = |row: usize, column: usize| numbers.get(4 * row + column).copied().unwrap_or(f64::NAN);
     let rotation = Matrix3::from_fn(at);

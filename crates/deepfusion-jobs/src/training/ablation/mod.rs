@@ -52,7 +52,7 @@ impl Plan {
     /// The plan of a table that was begun.
     ///
     /// # Errors
-    /// A file that is not there, or is none.
+    /// A file that is not there, or cannot be one.
     pub fn read(out: &Path) -> Result<Self> {
         let path = out.join(PLAN);
         let text = std::fs::read_to_string(&path).map_err(|e| DataError::file(&path, e))?;

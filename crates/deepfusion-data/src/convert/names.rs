@@ -1,0 +1,74 @@
+//! What frames are called in array files and as pictures.
+
+use crate::{Dataset, FrameImage};
+use std::collections::{BTreeMap, HashSet};
+use std::fs;
+use std::path::PathBuf;
+
+/// The names under which the selected frames of `datasets` appear in array files, a list for each data
+/// set: `0000000005`, or `<drive>/0000000005` where there are several drives, with the camera's folder
+/// between where there are both cameras.
+///
+/// Of drives of one name the later ones have a number, in the order of their paths: `<drive>-2/0000000005`. A drive that is given twice
+/// has the same names twice.
+#[must_use]
+pub fn ground_truth_names(datasets: &[Dataset]) -> Vec<Vec<String>> {
+    let drives = drive_names(datasets);
+    let cameras: HashSet<_> = datasets.iter().map(Dataset::camera).collect();
+    let names = datasets.iter().map(|dataset| {
+        let mut before = String::new();
+        if drives.len() > 1 {
+            before += &format!("{}/", drives[&Drive::of(dataset)]);
+        }
+        if cameras.len() > 1 {
+            before += &format!("image_0{}/", dataset.camera().number());
+        }
+        let name = |frame: &usize| format!("{before}{:010}", dataset.frames()[*frame].number);
+        dataset.selected().iter().map(name).collect::<Vec<_>>()
+    });
+    names.collect()
+}
+
+/// What tells drives apart. The two cameras of one are the same.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Drive<'a> {
+    /// Its folder, or the file that its images are in.
+    path: PathBuf,
+    split_name: &'a str,
+}
+
+impl<'a> Drive<'a> {
+    fn of(dataset: &'a Dataset) -> Self {
+        let path = match dataset.frames().first().map(|frame| &frame.image) {
+            // A folder may hold several.
+            Some(FrameImage::Within { file, .. }) => file.as_path(),
+            _ => dataset.folder(),
+        };
+        Self {
+            path: fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()),
+            split_name: dataset.split_name(),
+        }
+    }
+}
+
+/// The drives' names, of which no two are the same, not even to a file system for which `A` is `a`.
+fn drive_names(datasets: &[Dataset]) -> BTreeMap<Drive<'_>, String> {
+    let drives = datasets.iter().map(|d| (Drive::of(d), d.name()));
+    let drives: BTreeMap<_, _> = drives.collect();
+    let mut taken = HashSet::new();
+    let names = drives.into_iter();
+    names
+        .map(|(drive, name)| (drive, unique(name, &mut taken)))
+        .collect()
+}
+
+/// This name, with a number where it is among those taken, in small letters: `a`, `a-2`.
+fn unique(name: &str, taken: &mut HashSet<String>) -> String {
+    let mut candidate = name.to_owned();
+    let mut number = 1;
+    while !taken.insert(candidate.to_lowercase()) {
+        number += 1;
+        candidate = format!("{name}-{number}");
+    }
+    candidate
+}
