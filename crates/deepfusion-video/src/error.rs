@@ -56,6 +56,14 @@ pub enum Error {
         /// The format's name.
         format: String,
     },
+    /// Frames that could not be decoded when the first of them was asked for: they are not decoded anew for each.
+    #[error("{said}")]
+    NotDecoded {
+        /// What was wrong then.
+        said: String,
+        /// What to do about it.
+        hint: Option<String>,
+    },
     /// A live source gives no frame for longer than is waited for.
     #[error("{address}: ffmpeg gave no frame for {} s{}{}", waited.as_secs_f64(), after(*frames), quoted(said))]
     Silent {
@@ -89,6 +97,7 @@ impl Hint for Error {
             Self::Picture { .. } => "PNG and JPEG are read",
             Self::Program { problem, .. } => return problem.hint(),
             Self::Packet { problem, .. } => return problem.hint(),
+            Self::NotDecoded { hint, .. } => return hint.clone(),
             Self::Codec { .. } => {
                 "h264, h265 (hevc), vp9 and av1 are read: encode the stream as one of them, or record images"
             }
