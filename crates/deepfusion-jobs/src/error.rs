@@ -148,6 +148,12 @@ pub enum Error {
         /// The shard.
         shard: Shard,
     },
+    /// A folder that another process writes into.
+    #[error("{}: another run is at work there", folder.display())]
+    FolderBusy {
+        /// The output folder.
+        folder: PathBuf,
+    },
     /// What is kept beside a network cannot be read.
     #[error("{}", path.display())]
     Kept {

@@ -187,6 +187,17 @@ impl Lock {
         }
         Ok(Self { _file: file })
     }
+
+    /// Takes the lock of all that is done in a folder, for work that has no shards: it is that of the only shard.
+    ///
+    /// # Errors
+    /// [`Error::FolderBusy`] where another process has it; a folder that cannot be written to.
+    pub fn take_whole(folder: &Path) -> Result<Self> {
+        Self::take(folder, Shard::WHOLE).map_err(|error| match error {
+            Error::Busy { folder, .. } => Error::FolderBusy { folder },
+            other => other,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -206,7 +217,11 @@ mod tests {
         second.try_lock().unwrap();
         let third = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
         assert!(third.to_string().contains("at work"), "{third}");
+        // Work without shards waits for it, too.
+        let whole = Lock::take_whole(folder.path()).unwrap_err();
+        assert!(matches!(whole, Error::FolderBusy { .. }), "{whole}");
         drop(second);
-        Lock::take(folder.path(), Shard::WHOLE).unwrap();
+        drop(Lock::take(folder.path(), Shard::WHOLE).unwrap());
+        Lock::take_whole(folder.path()).unwrap();
     }
 }

@@ -39,6 +39,7 @@ impl Hint for Error {
                 Some("start every shard with the same inputs and options, or choose another folder".into())
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
+            Self::FolderBusy { .. } => Some("wait for it, or choose another folder".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
             Self::SawReal { .. } => Some(
                 "pack it without saying that it saw simulated images alone".into(),
