@@ -270,6 +270,10 @@ fn what_cannot_be_opened_is_an_error() {
             format!("perceive --model run {image} --speed 0 --out a"),
             "--speed",
         ),
+        (
+            "perceive --model run camera:0?sise=640x480 --out a".to_owned(),
+            "no setting `sise`",
+        ),
     ];
     for (args, part) in &cases {
         refused(&run(at, args), &[part]);

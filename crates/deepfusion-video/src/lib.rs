@@ -20,7 +20,7 @@ pub use frames::VideoFrames;
 pub use live::{Address, LiveFrame, LiveSource, NextFrame};
 pub use packets::{Codec, PacketFrames, PacketStream};
 pub use problem::{
-    AnswerProblem, LiveFrameProblem, LiveProblem, PacketProblem, ProgramProblem, ProgramTask,
-    SourceKind,
+    AnswerProblem, CameraModeProblem, LiveFrameProblem, LiveProblem, PacketProblem, ProgramProblem,
+    ProgramTask, SourceKind,
 };
 pub use write::{VideoPicture, can_write_video, shown_for, write_video};

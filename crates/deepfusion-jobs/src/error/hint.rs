@@ -1,12 +1,15 @@
 use deepfusion_hint::{Hint, system_hint};
 
-use super::Error;
+use super::{Error, NoMean, UnfitCamera};
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoImages { .. } => Some(
                 "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
+            ),
+            Self::Camera(UnfitCamera::OtherSize { .. }) => Some(
+                "give the calibration of images of this size; a camera of this machine gives images of another with ?size=1920x1080 behind its name".into(),
             ),
             Self::Camera(_) => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
