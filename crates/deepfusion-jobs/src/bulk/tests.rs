@@ -10,6 +10,7 @@ use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::*;
 use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs};
+use crate::scene::MotionTracker;
 use crate::{Error, Input, Result, TargetFinder, TargetSettings};
 
 const CAMERA: [f64; 4] = [56.0, 56.0, 47.0, 31.0];
@@ -173,6 +174,22 @@ fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
         };
         assert!(error.to_string().contains("another calibration"), "{error}");
     }
+}
+
+#[test]
+fn each_recording_begins_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let drives = ["monday", "tuesday"].map(|day| {
+        let drive = folder.path().join(day);
+        std::fs::create_dir(&drive).unwrap();
+        frames(&drive, 60.0)
+    });
+    let mut motions = MotionTracker::default();
+    let inputs = drives.iter().flatten();
+    let begins: Vec<bool> = inputs
+        .map(|input| motions.next(input).begins_recording)
+        .collect();
+    assert_eq!(begins, [true, false, true, false]);
 }
 
 /// Neither a job nor a frame keeps a picture of layers that nothing shows.
