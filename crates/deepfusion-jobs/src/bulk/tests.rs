@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, SystemTime};
 
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, save_png};
 use deepfusion_motion::ScaleMonitorConfig;
@@ -174,6 +175,46 @@ fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
         };
         assert!(error.to_string().contains("another calibration"), "{error}");
     }
+}
+
+/// A run that shares the same images among another number of shards is writing them.
+#[test]
+fn what_another_run_is_writing_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (model, estimator) = network();
+    let out = folder_for_outputs(at);
+    let job = DepthJob::new(
+        settings(None),
+        &out,
+        outputs(),
+        &model,
+        &estimator,
+        None,
+        &|_| (),
+    );
+    let job = job.unwrap();
+    let all = inputs(at, &["a", "b"]);
+    let mine: Vec<&Input> = all.iter().collect();
+    let begin = || {
+        let bulk = job.bulk(Shard::WHOLE, false, false);
+        bulk.begin(&all, &mine, false).unwrap();
+    };
+    let partial = |name: &str, age_s: u64| {
+        let path = out.join(name);
+        let file = std::fs::File::create(&path).unwrap();
+        let written = SystemTime::now() - Duration::from_secs(age_s);
+        file.set_modified(written).unwrap();
+        path
+    };
+    let new = partial(".a_depth.npy.17-00ab.partial", 0);
+    let old = partial(".b_depth.npy.17-00ac.partial", 7200);
+    let lock = Lock::take(&out, Shard { index: 1, count: 2 }).unwrap();
+    begin();
+    assert!(new.exists() && !old.exists());
+    drop(lock);
+    begin();
+    assert!(!new.exists());
 }
 
 #[test]
