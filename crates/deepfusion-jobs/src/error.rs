@@ -88,6 +88,12 @@ pub enum Error {
         /// How many frames are evaluated.
         expected: usize,
     },
+    /// An image whose path is no text, as JSON needs it.
+    #[error("{}: its path is not UTF-8, and the JSON beside its outputs has to name it", path.display())]
+    NotText {
+        /// The image.
+        path: PathBuf,
+    },
     /// Something that would be overwritten.
     #[error("{}: already exists", path.display())]
     Exists {

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use deepfusion_records::MadeWith;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use sha2::{Digest, Sha256};
 
 use super::Shard;
@@ -30,6 +30,7 @@ pub struct Manifest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// The input.
+    #[serde(serialize_with = "as_text")]
     pub image: PathBuf,
     /// What its outputs' names begin with.
     pub name: String,
@@ -38,6 +39,11 @@ pub struct Entry {
     /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
+}
+
+/// A path as text: of one that is none, the image fails, and the manifest is to say so.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
 }
 
 /// How far an image is.

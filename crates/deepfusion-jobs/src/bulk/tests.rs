@@ -5,6 +5,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, save_png};
+#[cfg(target_os = "linux")]
+use deepfusion_hint::Hint;
 use deepfusion_motion::ScaleMonitorConfig;
 use deepfusion_perception::PerceptionConfig;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
@@ -70,17 +72,18 @@ fn folder_for_outputs(folder: &Path) -> PathBuf {
 
 /// Depth of images of a folder, and what was warned of.
 fn depth_of(folder: &Path, names: &[&str]) -> (Summary<Error>, Vec<ImageWarning>) {
+    depth_of_all(folder, &inputs(folder, names))
+}
+
+fn depth_of_all(folder: &Path, all: &[Input]) -> (Summary<Error>, Vec<ImageWarning>) {
     let (model, mut estimator) = network();
     let given = Mutex::new(Vec::new());
     let warn = |warning: ImageWarning| given.lock().unwrap().push(warning);
     let out = folder_for_outputs(folder);
     let settings = settings(None);
     let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, None, &warn).unwrap();
-    let all = inputs(folder, names);
     let mine: Vec<&Input> = all.iter().collect();
-    let begun = job
-        .bulk(Shard::WHOLE, false, false)
-        .begin(&all, &mine, true);
+    let begun = job.bulk(Shard::WHOLE, false, false).begin(all, &mine, true);
     let StartedJob {
         manifest,
         sidecars,
@@ -115,6 +118,28 @@ fn depth_is_made_once_and_warned_of_once() {
     assert_eq!((again.done, again.sidecars.len()), (2, 2));
     assert!(warned.is_empty(), "{warned:?}");
     assert_eq!(made_at(), before);
+}
+
+/// Names of files are bytes there, and JSON is text.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_image_whose_name_is_no_text_fails_alone() {
+    use std::os::unix::ffi::OsStrExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut all = inputs(at, &["a", "b"]);
+    let path = at.join(std::ffi::OsStr::from_bytes(b"b\xff.png"));
+    std::fs::rename(at.join("b.png"), &path).unwrap();
+    all[1].path = path;
+    let (summary, _) = depth_of_all(at, &all);
+    assert_eq!((summary.done, summary.total), (1, 2));
+    assert!(summary.stopped_by.is_none());
+    summary.manifest.unwrap();
+    let [(1, error @ Error::NotText { .. })] = summary.failures.as_slice() else {
+        panic!("{:?}", summary.failures);
+    };
+    assert!(error.hint().unwrap().contains("rename it"), "{error}");
 }
 
 /// Frames of a folder of images whose camera has this focal length.

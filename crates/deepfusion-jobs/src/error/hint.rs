@@ -27,6 +27,7 @@ impl Hint for Error {
             Self::StackLength { .. } => Some(
                 "give an .npz whose arrays have the frames' names, or an array for each frame, in the order of the split's lines".into(),
             ),
+            Self::NotText { .. } => Some("rename it, or the folder that it is in".into()),
             Self::Exists { .. } | Self::Stale { .. } => {
                 Some("allow overwriting, or choose another folder".into())
             }
