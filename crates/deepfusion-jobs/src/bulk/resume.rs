@@ -35,6 +35,12 @@ pub struct BulkJob<'a> {
     pub videos: bool,
 }
 
+/// An image that is done.
+struct Done {
+    /// Where sidecars are asked for: of a hundred thousand images they take much memory.
+    sidecar: Option<Box<Sidecar>>,
+}
+
 /// A job that has begun.
 pub struct StartedJob {
     /// What there is to do and what is done, written into the folder.
@@ -64,11 +70,14 @@ impl BulkJob<'_> {
         let mut todo = Vec::new();
         let mut sidecars = vec![None; if keep_sidecars { mine.len() } else { 0 }];
         // Whatever is there is read, to see that it still is what was written.
-        let found: Vec<Result<Option<Sidecar>>> = mine
+        let done = |sidecar| Done {
+            sidecar: keep_sidecars.then(|| Box::new(sidecar)),
+        };
+        let found: Vec<Result<Option<Done>>> = mine
             .par_iter()
             .map(|input| {
                 let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
-                self.finished(input, known)
+                self.finished(input, known).map(|found| found.map(done))
             })
             .collect();
         let mut found = found.into_iter().collect::<Result<Vec<_>>>()?;
@@ -78,10 +87,10 @@ impl BulkJob<'_> {
         for (i, found) in found.into_iter().enumerate() {
             match found {
                 None => todo.push(i),
-                Some(sidecar) => {
+                Some(Done { sidecar }) => {
                     manifest.images[i].state = State::Done;
-                    if let Some(place) = sidecars.get_mut(i) {
-                        *place = Some(sidecar);
+                    if let (Some(place), Some(sidecar)) = (sidecars.get_mut(i), sidecar) {
+                        *place = Some(*sidecar);
                     }
                 }
             }
@@ -203,7 +212,7 @@ fn is_abandoned(file: &Path) -> bool {
 }
 
 /// Takes what is done of a recording for not done where some of it is not: a scale that is watched is followed from the recording's first frame on.
-fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Sidecar>]) {
+fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Done>]) {
     let recording = |input: &Input| {
         input
             .frame
