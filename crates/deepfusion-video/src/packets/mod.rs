@@ -76,7 +76,7 @@ impl PacketFrames {
         E: From<Error> + Hint,
         P: Iterator<Item = std::result::Result<Vec<u8>, E>>,
     {
-        self.decoded.once(|| {
+        self.decoded.once::<E>(|| {
             let PacketStream { file, name, .. } = &self.stream;
             let origin =
                 Origin::of(file, self.stream.count, Some(name.clone()))?.kept_in(&self.cache, file);
