@@ -17,6 +17,7 @@ use deepfusion_rosbag::msg::{
     CompressedImage, CompressedVideo, FfmpegPacket, Header, OldFfmpegPacket,
 };
 use deepfusion_rosbag::{Bag, BagWriter, RosMessage, Selection, WriterOptions};
+use deepfusion_video::frames_folder;
 
 const FRAMES: usize = 24;
 /// Packets from one key frame to the next.
@@ -365,7 +366,8 @@ fn the_command_takes_a_stream_as_it_takes_pictures() {
         at,
         "train --data drive.bag --preset tiny --size 64x64 --batch 2 --steps 2 --init none --out run",
     );
-    let cache = at.join("scratch/drive.bag.camera.image_rect.ffmpeg.frames");
+    let name = "drive.bag.camera.image_rect.ffmpeg";
+    let cache = frames_folder(&at.join("scratch"), &bag, name);
     assert_eq!(fs::read_dir(&cache).unwrap().count(), FRAMES + 1);
     drive.came_back(&bag, 0);
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::support::streams::{brightness, piped, serve, stream, stream_of, with_path};
-use crate::support::{Run, is_lock, run};
+use crate::support::{Run, fails, is_lock, run};
 use serde_json::Value;
 
 const CAMERA: &str = "--intrinsics 186,186,157,44";
@@ -270,6 +270,10 @@ fn what_cannot_be_opened_is_an_error() {
             format!("perceive --model run {image} --speed 0 --out a"),
             "--speed",
         ),
+        (
+            "perceive --model run camera:0?sise=640x480 --out a".to_owned(),
+            "no setting `sise`",
+        ),
     ];
     for (args, part) in &cases {
         refused(&run(at, args), &[part]);
@@ -298,6 +302,35 @@ fn what_cannot_be_opened_is_an_error() {
     refused(&noise, &["standard input", "Invalid data"]);
     let nothing = piped(at, "predict --model run - --out d", Vec::new());
     refused(&nothing, &["standard input", "gave no frame"]);
+}
+
+/// Frames and targets of a run that is at work are not another's to replace, not even where replacing is asked for.
+#[test]
+fn a_folder_in_which_a_run_is_at_work_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let out = at.join("seen");
+    std::fs::create_dir(&out).unwrap();
+    let written = ["live-0000000000.json", "targets.jsonl.partial"];
+    for file in written {
+        std::fs::write(out.join(file), "{}\n").unwrap();
+    }
+    image::RgbImage::new(320, 96)
+        .save(at.join("a.png"))
+        .unwrap();
+    let lock = std::fs::File::create(out.join(".predict-1-of-1.lock")).unwrap();
+    lock.lock().unwrap();
+    for command in [
+        "predict udp://127.0.0.1:1",
+        "perceive udp://127.0.0.1:1",
+        "perceive a.png",
+    ] {
+        let args = format!("{command} --model tiny {CAMERA} --overwrite --out seen");
+        fails(at, &args, &["at work there", "choose another folder"]);
+    }
+    for file in written {
+        assert_eq!(std::fs::read(out.join(file)).unwrap(), b"{}\n", "{file}");
+    }
 }
 
 /// Before ffmpeg 5.1 an option had another name.

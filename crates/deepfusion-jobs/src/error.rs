@@ -90,6 +90,12 @@ pub enum Error {
         /// How many frames are evaluated.
         expected: usize,
     },
+    /// An image whose path is no text, as JSON needs it.
+    #[error("{}: its path is not UTF-8, and the JSON beside its outputs has to name it", path.display())]
+    NotText {
+        /// The image.
+        path: PathBuf,
+    },
     /// Something that would be overwritten.
     #[error("{}: already exists", path.display())]
     Exists {
@@ -149,6 +155,12 @@ pub enum Error {
         folder: PathBuf,
         /// The shard.
         shard: Shard,
+    },
+    /// A folder that another process writes into.
+    #[error("{}: another run is at work there", folder.display())]
+    FolderBusy {
+        /// The output folder.
+        folder: PathBuf,
     },
     /// What is kept beside a network cannot be read.
     #[error("{}", path.display())]

@@ -116,7 +116,7 @@ impl<'a> TargetFinder<'a> {
         } = started;
         let mut prediction = self.estimator.infer(&prepared)?;
         let camera = loaded.camera.ok_or(Error::NoCamera)?;
-        self.watch.see_through(&camera);
+        self.watch.see_through(&camera, &motion);
         if let Some(factor) = self.watch.correction() {
             prediction.scale_depth(factor);
         }

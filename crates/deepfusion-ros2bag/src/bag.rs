@@ -40,6 +40,8 @@ pub fn is_ros2_bag(path: &Path) -> bool {
 pub struct Ros2Bag {
     path: PathBuf,
     files: Vec<Box<dyn Storage>>,
+    /// Of every file's channels, in their order.
+    connections: Vec<Connection>,
     /// Files that `metadata.yaml` names but that do not exist.
     missing: Vec<PathBuf>,
 }
@@ -94,6 +96,7 @@ impl Ros2Bag {
             }),
             _ => Ok(Self {
                 path: path.to_owned(),
+                connections: connections_of(&files),
                 files,
                 missing,
             }),
@@ -106,7 +109,7 @@ impl Ros2Bag {
 
     /// Every file's connections, one for each topic and publisher.
     pub fn connections(&self) -> impl Iterator<Item = &Connection> {
-        self.channels().map(|channel| &channel.connection)
+        self.connections.iter()
     }
 
     /// Number of messages in the bag.
@@ -114,6 +117,11 @@ impl Ros2Bag {
     pub fn message_count(&self) -> u64 {
         self.connections().map(|c| c.count).sum()
     }
+}
+
+fn connections_of(files: &[Box<dyn Storage>]) -> Vec<Connection> {
+    let channels = files.iter().flat_map(|file| file.channels());
+    channels.map(|channel| channel.connection.clone()).collect()
 }
 
 fn open_file(path: &Path) -> Result<Box<dyn Storage>> {
@@ -163,8 +171,7 @@ impl MessageSource for Ros2Bag {
     }
 
     fn messages(&self, selection: Selection) -> Result<MessageIter<'_>> {
-        let connections: Vec<Connection> = self.connections().cloned().collect();
-        let mut wanted = selection.wanted(&connections, &self.path)?.into_iter();
+        let mut wanted = selection.wanted(&self.connections, &self.path)?.into_iter();
         let mut waiting = Vec::new();
         for file in &self.files {
             let wanted: Vec<bool> = wanted.by_ref().take(file.channels().len()).collect();

@@ -18,6 +18,9 @@ pub(crate) struct Origin {
     /// Width and height of the frames where they are not as the file has them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     size: Option<(u32, u32)>,
+    /// The file, where its frames are not kept beside it: others of its name may be kept there. Those beside it may be moved with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
 }
 
 const ORIGIN: &str = "origin.json";
@@ -35,6 +38,7 @@ impl Origin {
             frames,
             stream,
             size: None,
+            file: None,
         };
         if place.is_dir() {
             for entry in std::fs::read_dir(place).map_err(failed)? {
@@ -54,6 +58,22 @@ impl Origin {
     /// The same with frames of another size than the file has.
     pub(crate) fn with_size(self, size: Option<(u32, u32)>) -> Self {
         Self { size, ..self }
+    }
+
+    /// The same of frames that are kept in `cache`.
+    pub(crate) fn kept_in(self, cache: &Path, file: &Path) -> Self {
+        let elsewhere = cache
+            .parent()
+            .is_some_and(|folder| !is_beside(file, folder));
+        Self {
+            file: elsewhere.then(|| real(file).to_string_lossy().into_owned()),
+            ..self
+        }
+    }
+
+    /// Whether both say which file they are of, and it is not the same.
+    fn is_of_another_file(&self, other: &Self) -> bool {
+        self.file.is_some() && other.file.is_some() && self.file != other.file
     }
 
     fn add(&mut self, file: &Path) -> Result<()> {
@@ -80,6 +100,42 @@ impl Origin {
     }
 }
 
+/// Where the frames of a video, or of a stream in a recording, are kept in `folder`: as `<name>.frames` beside their `file`, and elsewhere as
+/// `<name>-<hash>.frames`, by the hash of the file's path, as recordings of one name may share a folder.
+#[must_use]
+pub fn frames_folder(folder: &Path, file: &Path, name: &str) -> PathBuf {
+    if is_beside(file, folder) {
+        return folder.join(format!("{name}.frames"));
+    }
+    let hash = fnv_1a(real(file).as_os_str().as_encoded_bytes());
+    folder.join(format!("{name}-{hash:016x}.frames"))
+}
+
+/// The hash FNV-1a of 64 bits: the same on every machine and in every version.
+fn fnv_1a(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3)
+    })
+}
+
+/// Whether a folder is the one that a file lies in, however both are named.
+fn is_beside(file: &Path, folder: &Path) -> bool {
+    let own = file.parent().unwrap_or(Path::new("."));
+    own == folder || real(own) == real(folder)
+}
+
+/// A path without links; of what is not there, as it is.
+fn real(path: &Path) -> PathBuf {
+    // The folder of a bare name.
+    let path = if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
+    };
+    let real = path.canonicalize().or_else(|_| std::path::absolute(path));
+    real.unwrap_or_else(|_| path.to_owned())
+}
+
 /// The file of a frame, counted from 0.
 pub(crate) fn frame_path(cache: &Path, index: u64) -> PathBuf {
     cache.join(format!("{index:010}.jpg"))
@@ -101,10 +157,16 @@ pub(crate) fn keep<E: From<Error>>(
     let real = cache.canonicalize();
     let cache = real.as_deref().unwrap_or(cache);
     // What cannot be replaced in the end is said before hours of decoding.
-    let is_in_the_way = Origin::read(cache).is_none()
-        && std::fs::read_dir(cache).is_ok_and(|mut files| files.next().is_some());
-    if is_in_the_way {
-        let why = "it holds other files, or a part of the frames: delete it";
+    let in_the_way = match Origin::read(cache) {
+        Some(before) if before.is_of_another_file(origin) => {
+            Some("it holds the frames of another file: delete it")
+        }
+        Some(_) => None,
+        None => std::fs::read_dir(cache)
+            .is_ok_and(|mut files| files.next().is_some())
+            .then_some("it holds other files, or a part of the frames: delete it"),
+    };
+    if let Some(why) = in_the_way {
         let why = std::io::Error::new(std::io::ErrorKind::AlreadyExists, why);
         return Err(Error::file(cache, why).into());
     }
@@ -171,6 +233,63 @@ mod tests {
         let kept = std::fs::read_to_string(frame_path(&cache, 0)).unwrap();
         assert_eq!(kept, "second");
         assert_eq!(names(&cache), ["drive.mp4.frames"]);
+    }
+
+    /// Two drives whose cameras' files have one name, and one place for the frames of both.
+    #[test]
+    fn videos_of_one_name_share_no_frames() {
+        let root = tempfile::tempdir().unwrap();
+        let scratch = root.path().join("scratch");
+        let kept = ["monday", "tuesday"].map(|day| {
+            let folder = root.path().join(day);
+            std::fs::create_dir(&folder).unwrap();
+            let video = folder.join("front.mp4");
+            std::fs::write(&video, "x").unwrap();
+            let cache = frames_folder(&scratch, &video, "front.mp4");
+            let origin = Origin::of(&video, 1, None).unwrap().kept_in(&cache, &video);
+            keep(&cache, &origin, frame(day)).unwrap();
+            (day, video, cache, origin)
+        });
+        for (day, video, cache, origin) in &kept {
+            let never = |_: &Path| -> Result<()> { panic!("they are there") };
+            keep(cache, origin, never).unwrap();
+            let text = std::fs::read_to_string(frame_path(cache, 0)).unwrap();
+            assert_eq!(text, *day);
+            // Neither the folder's being there nor another name of the file changes its place.
+            let other_name = root.path().join("monday/..").join(day).join("front.mp4");
+            let again = frames_folder(&scratch, &other_name, "front.mp4");
+            assert_eq!(again, *cache);
+            // Beside it, it needs nobody's name but its own, and may be moved with it.
+            let own = video.parent().unwrap();
+            let beside = frames_folder(own, video, "front.mp4");
+            assert_eq!(beside, own.join("front.mp4.frames"));
+            let moved = Origin::of(video, 1, None).unwrap();
+            assert_eq!(moved.file, None);
+            assert_eq!(moved.kept_in(&beside, video).file, None);
+        }
+        // What says that it is another's is not replaced.
+        let [(.., cache, _), (.., other)] = &kept;
+        let refused = keep(cache, other, frame("another")).unwrap_err();
+        assert!(refused.to_string().contains("another file"), "{refused}");
+    }
+
+    /// The values of the algorithm's own page.
+    #[test]
+    fn the_hash_is_fnv_1a() {
+        assert_eq!(fnv_1a(b""), 0xCBF2_9CE4_8422_2325);
+        assert_eq!(fnv_1a(b"a"), 0xAF63_DC4C_8601_EC8C);
+        assert_eq!(fnv_1a(b"foobar"), 0x8594_4171_F739_67E8);
+    }
+
+    #[test]
+    fn frames_of_before_stay_valid_beside_their_video() {
+        let folder = tempfile::tempdir().unwrap();
+        let (_, origin) = video(folder.path(), 3);
+        let text = serde_json::to_string(&origin).unwrap();
+        let keys = ["bytes", "modified_ns", "frames"];
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value.as_object().unwrap().len(), keys.len(), "{text}");
+        assert!(keys.iter().all(|key| value.get(key).is_some()), "{text}");
     }
 
     #[cfg(unix)]

@@ -1,4 +1,4 @@
-use crate::problem::{PacketProblem, ProgramProblem, quoted};
+use crate::problem::{CameraModeProblem, PacketProblem, ProgramProblem, quoted};
 use deepfusion_hint::{Hint, count_of, system_hint};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -56,6 +56,23 @@ pub enum Error {
         /// The format's name.
         format: String,
     },
+    /// Frames that could not be decoded when the first of them was asked for: they are not decoded anew for each.
+    #[error("{said}")]
+    NotDecoded {
+        /// What was wrong then.
+        said: String,
+        /// What to do about it.
+        hint: Option<String>,
+    },
+    /// What a camera is to give is not understood.
+    #[error("{address}: {problem}")]
+    CameraMode {
+        /// The camera, with what is asked of it.
+        address: String,
+        /// Why not.
+        #[source]
+        problem: CameraModeProblem,
+    },
     /// A live source gives no frame for longer than is waited for.
     #[error("{address}: ffmpeg gave no frame for {} s{}{}", waited.as_secs_f64(), after(*frames), quoted(said))]
     Silent {
@@ -89,8 +106,12 @@ impl Hint for Error {
             Self::Picture { .. } => "PNG and JPEG are read",
             Self::Program { problem, .. } => return problem.hint(),
             Self::Packet { problem, .. } => return problem.hint(),
+            Self::NotDecoded { hint, .. } => return hint.clone(),
             Self::Codec { .. } => {
                 "h264, h265 (hevc), vp9 and av1 are read: encode the stream as one of them, or record images"
+            }
+            Self::CameraMode { .. } => {
+                "any of size=1920x1080, fps=30 and format=mjpeg may stand behind the camera's `?`, with & between them"
             }
             Self::Silent { .. } => "is the source sending? A longer timeout waits for it",
         };

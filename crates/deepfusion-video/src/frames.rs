@@ -1,17 +1,17 @@
 //! A video's frames as files.
 //!
 //! Training reads frames in random order, which a video cannot give: every jump decodes from the last
-//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller names, as
-//! JPEGs of ffmpeg's best quality but one; the folder can be deleted at any time. It is filled under another name and
-//! renamed when it is whole.
+//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller names
+//! ([`frames_folder`]), as JPEGs of ffmpeg's best quality but one; the folder can be deleted at any time. It is filled under
+//! another name and renamed when it is whole.
 
-use crate::cache::{Origin, frame_path, keep};
+use crate::cache::{Origin, frame_path, frames_folder, keep};
+use crate::decoded::Decoded;
 use crate::probe::{Probed, probe};
 use crate::program::{Printed, in_either_words, outcome};
 use crate::{Error, ProgramProblem, ProgramTask, Result};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 /// A video's frames: counted when it is opened, decoded when the first of them is asked for.
 #[derive(Debug)]
@@ -19,18 +19,18 @@ pub struct VideoFrames {
     file: PathBuf,
     cache: PathBuf,
     probed: Probed,
-    /// Whether the cache is complete; held while it is made.
-    decoded: Mutex<bool>,
+    decoded: Decoded,
 }
 
 impl VideoFrames {
-    /// Counts the frames of a video with ffprobe. Its frames will be kept in `<video>.frames` in `folder`.
+    /// Counts the frames of a video with ffprobe. Its frames will be kept in `folder`, under the name that
+    /// [`frames_folder`] gives.
     ///
     /// # Errors
     /// [`Error::Program`].
     pub fn open(file: &Path, folder: &Path) -> Result<Self> {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let cache = folder.join(format!("{name}.frames"));
+        let cache = frames_folder(folder, file, &name);
         // The programs run in other folders.
         let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
         let file = absolute(file)?;
@@ -38,7 +38,7 @@ impl VideoFrames {
             probed: probe(&file)?,
             cache: absolute(&cache)?,
             file,
-            decoded: Mutex::new(false),
+            decoded: Decoded::default(),
         })
     }
 
@@ -76,20 +76,22 @@ impl VideoFrames {
     /// The JPEG of a frame, counted from 0; the first call decodes the whole video, unless that was done before.
     ///
     /// # Errors
-    /// [`Error::Program`] where the video cannot be decoded, [`Error::File`] where its frames cannot be kept.
+    /// [`Error::Program`] where the video cannot be decoded, [`Error::File`] where its frames cannot be kept; [`Error::NotDecoded`] in the same
+    /// words for every frame that is asked for after that.
     pub fn frame(&self, index: u64) -> Result<PathBuf> {
-        // A thread that failed while decoding left nothing behind.
-        let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
-        if !*decoded {
-            let frames = self.probed.frames;
-            let size = (!self.probed.square).then_some(self.probed.size);
-            let origin = Origin::of(&self.file, frames, None)?.with_size(size);
-            keep(&self.cache, &origin, |part| {
-                decode(&self.file, part, &self.probed)
-            })?;
-            *decoded = true;
-        }
+        self.decoded.once(|| self.decode_all())?;
         Ok(frame_path(&self.cache, index))
+    }
+
+    fn decode_all(&self) -> Result<()> {
+        let frames = self.probed.frames;
+        let size = (!self.probed.square).then_some(self.probed.size);
+        let origin = Origin::of(&self.file, frames, None)?
+            .with_size(size)
+            .kept_in(&self.cache, &self.file);
+        keep(&self.cache, &origin, |part| {
+            decode(&self.file, part, &self.probed)
+        })
     }
 }
 

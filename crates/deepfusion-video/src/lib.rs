@@ -4,6 +4,7 @@
 //! newest frame of a camera or stream. Without ffmpeg each says so, and what to do; nothing is linked.
 
 mod cache;
+mod decoded;
 mod error;
 mod frames;
 mod live;
@@ -13,12 +14,13 @@ mod problem;
 mod program;
 mod write;
 
+pub use cache::frames_folder;
 pub use error::{Error, Result};
 pub use frames::VideoFrames;
 pub use live::{Address, LiveFrame, LiveSource, NextFrame};
 pub use packets::{Codec, PacketFrames, PacketStream};
 pub use problem::{
-    AnswerProblem, LiveFrameProblem, LiveProblem, PacketProblem, ProgramProblem, ProgramTask,
-    SourceKind,
+    AnswerProblem, CameraModeProblem, LiveFrameProblem, LiveProblem, PacketProblem, ProgramProblem,
+    ProgramTask, SourceKind,
 };
 pub use write::{VideoPicture, can_write_video, shown_for, write_video};

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 
+use deepfusion_jobs::bulk::CameraSource;
 use deepfusion_jobs::live::{Feed, LiveEnd, LiveLimits};
 use deepfusion_video::Address;
 
@@ -11,30 +12,39 @@ use crate::failure::Result;
 use crate::interrupt;
 
 /// The live source among the arguments, if they name one; it is then alone, and options of live sources are for it.
-pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, CliError> {
+pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>> {
     let mut found = inputs.iter().filter_map(|input| Address::parse(input));
     match (found.next(), args.given()) {
         (Some(address), _) if inputs.len() > 1 => Err(CliError::LiveAlone {
             address: address.to_string(),
-        }),
-        (Some(address), _) if address.is_stdin() && std::io::stdin().is_terminal() => {
-            Err(CliError::Terminal)
         }
-        (Some(address), _) => Ok(Some(address)),
-        (None, Some(option)) => Err(CliError::OnlyLive { option }),
+        .into()),
+        (Some(address), _) if address.is_stdin() && std::io::stdin().is_terminal() => {
+            Err(CliError::Terminal.into())
+        }
+        (Some(address), _) => {
+            address.check()?;
+            Ok(Some(address))
+        }
+        (None, Some(option)) => Err(CliError::OnlyLive { option }.into()),
         (None, None) => Ok(None),
     }
 }
 
-/// Begins to read a source, until Ctrl-C or what the options say.
-pub(super) fn open(address: &Address, args: &LiveArgs) -> Result<Feed> {
+/// Begins to read a source, until Ctrl-C or what the options say. A camera is asked for images of its calibration's size, unless its address asks
+/// for others: a driver's own choice is often the smallest.
+pub(super) fn open(address: &Address, camera: &CameraSource, args: &LiveArgs) -> Result<Feed> {
+    let address = match camera.image_size() {
+        Some(size) => address.clone().or_of_size(size),
+        None => address.clone(),
+    };
     let until = LiveLimits {
         frames: args.frames,
         duration_s: args.duration,
         timeout_s: args.timeout_s(),
         stop: interrupt::asked,
     };
-    Ok(Feed::open(address, &until)?)
+    Ok(Feed::open(&address, &until)?)
 }
 
 /// Warns where a source's end may be a loss.

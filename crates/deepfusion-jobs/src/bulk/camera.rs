@@ -84,6 +84,16 @@ impl CameraSource {
         ))
     }
 
+    /// Width and height of the images that it was measured with, where its file says them.
+    #[must_use]
+    pub fn image_size(&self) -> Option<(u32, u32)> {
+        match self {
+            Self::File(k) => Some((k.width, k.height)),
+            Self::Lens(file) => file.image_size(),
+            _ => None,
+        }
+    }
+
     /// What it is to an image that says nothing itself.
     #[must_use]
     pub fn from(&self) -> CameraFrom {
@@ -225,6 +235,15 @@ pub struct LensFile {
 }
 
 impl LensFile {
+    /// The size of its images, where it says one.
+    fn image_size(&self) -> Option<(u32, u32)> {
+        // A file that says none is read with any; what is wrong with it is said when the first image is there.
+        const ANY: (u32, u32) = (1920, 1080);
+        let calibration = CameraCalibration::read(&self.path, ANY).ok()?;
+        let k = &calibration.intrinsics;
+        calibration.size_in_file.then_some((k.width, k.height))
+    }
+
     fn lens_for(&self, size: (u32, u32)) -> Result<&Lens> {
         let other_size = |made_for| {
             Error::Camera(UnfitCamera::OtherSize {
@@ -305,6 +324,22 @@ mod tests {
         assert!((half.fx - 0.5 * k.fx).abs() < 1e-9 && (half.fy - 0.5 * k.fy).abs() < 1e-9);
         let upright = with_the_view_of(&k, 1024, 1280);
         assert!((upright.fy - k.fx).abs() < 1e-9 && (upright.fx - k.fy).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_calibration_may_say_the_size_of_its_images() {
+        let folder = tempfile::tempdir().unwrap();
+        let size_of = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            CameraSource::of_file(&path).unwrap().image_size()
+        };
+        let yaml = "image_width: 1280\nimage_height: 720\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
+                    data: [900.0, 0.0, 640.0, 0.0, 900.0, 360.0, 0.0, 0.0, 1.0]\n";
+        assert_eq!(size_of("camera.yaml", yaml), Some((1280, 720)));
+        assert_eq!(size_of("intrinsics.txt", "900 900 640 360\n"), None);
+        assert_eq!(size_of("broken.yaml", "?"), None);
+        assert_eq!(CameraSource::Hfov(90.0).image_size(), None);
     }
 
     #[test]

@@ -44,8 +44,12 @@ impl ImageLoader {
     /// Reads an image of a file or a recording.
     ///
     /// # Errors
-    /// A file that cannot be read; [`Error::CameraOf`] for a camera that cannot be its own.
+    /// [`Error::NotText`]; a file that cannot be read; [`Error::CameraOf`] for a camera that cannot be its own.
     pub fn load(&self, input: &Input) -> Result<(LoadedImage, PreparedImage)> {
+        if input.path.to_str().is_none() {
+            let path = input.path.clone();
+            return Err(Error::NotText { path });
+        }
         // Before it is read: a change in between is then noticed by the next run.
         let mark = FileMark::of(&input.path).map_err(|e| DataError::file(&input.path, e))?;
         let taken = match &input.frame {

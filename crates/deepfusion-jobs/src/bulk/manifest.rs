@@ -1,11 +1,10 @@
 //! What a shard has to do and has done, in the output folder: `predict-I-of-N.manifest.json`.
 
 use std::collections::HashSet;
-use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use deepfusion_records::MadeWith;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use sha2::{Digest, Sha256};
 
 use super::Shard;
@@ -31,6 +30,7 @@ pub struct Manifest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// The input.
+    #[serde(serialize_with = "as_text")]
     pub image: PathBuf,
     /// What its outputs' names begin with.
     pub name: String,
@@ -39,6 +39,11 @@ pub struct Entry {
     /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
+}
+
+/// A path as text: of one that is none, the image fails, and the manifest is to say so.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
 }
 
 /// How far an image is.
@@ -151,62 +156,5 @@ impl Manifest {
         entries
             .map(|e| (e.image.as_path(), e.name.as_str()))
             .collect()
-    }
-}
-
-/// Held while a shard is worked on, so that nobody else does. The system frees it with the process, however that ends; its
-/// empty file stays: who removed it could take it from under another run that has it open and is about to hold it.
-#[derive(Debug)]
-pub struct Lock {
-    _file: File,
-}
-
-impl Lock {
-    /// Takes the lock of a shard.
-    ///
-    /// # Errors
-    /// [`Error::Busy`] where another process has it; a folder that cannot be written to.
-    pub fn take(folder: &Path, shard: Shard) -> Result<Self> {
-        let Shard { index, count } = shard;
-        let path = folder.join(format!(".predict-{index}-of-{count}.lock"));
-        let file = File::create(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                let folder = folder.to_owned();
-                return Err(Error::Busy { folder, shard });
-            }
-            // Some network file systems have no locks; two runs of one shard then write the same files twice,
-            // each whole.
-            Err(TryLockError::Error(error)) => {
-                tracing::warn!(
-                    "{}: cannot be locked ({error}): start each shard once",
-                    path.display()
-                );
-            }
-        }
-        Ok(Self { _file: file })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A run that opened the file while another held it, and gets it after that: a third one must see it held.
-    #[test]
-    fn a_lock_that_was_waited_for_is_seen_by_others() {
-        let folder = tempfile::tempdir().unwrap();
-        let first = Lock::take(folder.path(), Shard::WHOLE).unwrap();
-        let busy = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
-        assert!(busy.to_string().contains("at work on shard 1/1"), "{busy}");
-        let file = folder.path().join(".predict-1-of-1.lock");
-        let second = File::open(&file).unwrap();
-        drop(first);
-        second.try_lock().unwrap();
-        let third = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
-        assert!(third.to_string().contains("at work"), "{third}");
-        drop(second);
-        Lock::take(folder.path(), Shard::WHOLE).unwrap();
     }
 }

@@ -9,8 +9,10 @@ use deepfusion_records::Sidecar;
 use super::manifest::{Manifest, State};
 use crate::{Error, Result};
 
-/// How often the manifest is written while images are done. After a kill the sidecars tell what it does not.
+/// How long after one writing of the manifest the next is due, at least. After a kill the sidecars tell what it does not.
 const WRITE_EVERY: Duration = Duration::from_secs(5);
+/// How many times as long as the last writing took: that of a hundred thousand images takes a while, and a slow disk has other things to write.
+const TIMES_AS_LONG: u32 = 20;
 
 /// Sees how many images are done or failed, and how many there are.
 type Watcher<'a> = Box<dyn FnMut(usize, usize) + Send + 'a>;
@@ -31,7 +33,8 @@ struct Shared<'a, E> {
     /// What ended the run: no later image would fare better.
     stop: Option<E>,
     done: usize,
-    written: Instant,
+    /// When the manifest is to be written next; `None` while a thread does.
+    due: Option<Instant>,
     watcher: Watcher<'a>,
 }
 
@@ -68,7 +71,7 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
             sidecars,
             failures: Vec::new(),
             stop: None,
-            written: Instant::now(),
+            due: Some(Instant::now() + WRITE_EVERY),
             watcher: Box::new(watcher),
         };
         Self {
@@ -92,7 +95,7 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         if let Some(place) = state.sidecars.get_mut(image) {
             *place = Some(sidecar);
         }
-        self.report(&mut state);
+        self.report(state);
     }
 
     /// An image cannot be predicted; the others can. The manifest keeps why.
@@ -103,7 +106,7 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         entry.state = State::Failed;
         entry.error = Some(why);
         state.failures.push((image, error));
-        self.report(&mut state);
+        self.report(state);
     }
 
     /// Outputs cannot be written: the run ends.
@@ -135,23 +138,48 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         }
     }
 
-    fn report(&self, state: &mut Shared<'a, E>) {
+    /// Says how far it is, and now and then writes the manifest, as it was: while the disk takes its time, others may go on.
+    fn report(&self, mut state: MutexGuard<'_, Shared<'a, E>>) {
         let (done, total) = (
             state.done + state.failures.len(),
             state.manifest.images.len(),
         );
         (state.watcher)(done, total);
-        if state.written.elapsed() < WRITE_EVERY {
+        if state.due.is_none_or(|due| Instant::now() < due) {
             return;
         }
-        if let Err(error) = state.manifest.write(self.folder) {
+        state.due = None;
+        let manifest = state.manifest.clone();
+        drop(state);
+        let begun = Instant::now();
+        let written = manifest.write(self.folder);
+        let pause = pause_after(begun.elapsed());
+        let mut state = self.lock();
+        state.due = Instant::now().checked_add(pause);
+        if let Err(error) = written {
             state.stop.get_or_insert(error.into());
         }
-        state.written = Instant::now();
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared<'a, E>> {
         // Whoever panicked while holding it changed single fields only.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// How long nothing is written after a writing that took so long.
+fn pause_after(writing: Duration) -> Duration {
+    WRITE_EVERY.max(writing.saturating_mul(TIMES_AS_LONG))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_takes_long_to_write_is_written_less_often() {
+        let pause = |ms| pause_after(Duration::from_millis(ms));
+        assert_eq!(pause(3), WRITE_EVERY);
+        assert_eq!(pause(2000), Duration::from_secs(40));
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use deepfusion_fs::Partial;
 use deepfusion_records::{FileMark, MadeWith, Sidecar, same_number};
@@ -11,8 +12,11 @@ use serde::de::IgnoredAny;
 
 use super::manifest::{Manifest, State};
 use super::sidecars::{is_complete, sidecar_path};
-use super::{CameraFrom, Shard, video};
+use super::{CameraFrom, Lock, Shard, video};
 use crate::{Error, Input, Result, StaleReason};
+
+/// For how long a file is not written to that nobody writes any more: outputs take seconds.
+const ABANDONED: Duration = Duration::from_secs(3600);
 
 /// What is made of images, and where.
 #[derive(Debug, Clone)]
@@ -29,6 +33,12 @@ pub struct BulkJob<'a> {
     pub shard: Shard,
     /// Whether videos are made of the pictures in the end.
     pub videos: bool,
+}
+
+/// An image that is done.
+struct Done {
+    /// Where sidecars are asked for: of a hundred thousand images they take much memory.
+    sidecar: Option<Box<Sidecar>>,
 }
 
 /// A job that has begun.
@@ -60,11 +70,14 @@ impl BulkJob<'_> {
         let mut todo = Vec::new();
         let mut sidecars = vec![None; if keep_sidecars { mine.len() } else { 0 }];
         // Whatever is there is read, to see that it still is what was written.
-        let found: Vec<Result<Option<Sidecar>>> = mine
+        let done = |sidecar| Done {
+            sidecar: keep_sidecars.then(|| Box::new(sidecar)),
+        };
+        let found: Vec<Result<Option<Done>>> = mine
             .par_iter()
             .map(|input| {
                 let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
-                self.finished(input, known)
+                self.finished(input, known).map(|found| found.map(done))
             })
             .collect();
         let mut found = found.into_iter().collect::<Result<Vec<_>>>()?;
@@ -74,10 +87,10 @@ impl BulkJob<'_> {
         for (i, found) in found.into_iter().enumerate() {
             match found {
                 None => todo.push(i),
-                Some(sidecar) => {
+                Some(Done { sidecar }) => {
                     manifest.images[i].state = State::Done;
-                    if let Some(place) = sidecars.get_mut(i) {
-                        *place = Some(sidecar);
+                    if let (Some(place), Some(sidecar)) = (sidecars.get_mut(i), sidecar) {
+                        *place = Some(*sidecar);
                     }
                 }
             }
@@ -155,7 +168,8 @@ impl BulkJob<'_> {
         Ok(())
     }
 
-    /// Removes the half-written files that a killed run of this shard left.
+    /// Removes the half-written files that a killed run left of these images. A run that shares the images among another number of shards may be
+    /// writing of the same ones: while one is at work, only files that nobody has touched for long go.
     fn remove_partial_files(&self, mine: &[&Input]) -> Result<()> {
         let out = self.folder;
         let files_of = |input: &&Input| {
@@ -168,18 +182,37 @@ impl BulkJob<'_> {
         };
         let files: HashSet<String> = mine.iter().flat_map(files_of).collect();
         let failed = |e| deepfusion_data::Error::file(out, e);
+        let mut partial = Vec::new();
         for entry in std::fs::read_dir(out).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
             if Partial::target_of(&path).is_some_and(|file| files.contains(file)) {
-                std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+                partial.push(path);
+            }
+        }
+        if !partial.is_empty() && Lock::is_held_by_others(out, self.shard.count) {
+            partial.retain(|path| is_abandoned(path));
+        }
+        for path in partial {
+            match std::fs::remove_file(&path) {
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(deepfusion_data::Error::file(&path, e).into());
+                }
+                _ => {}
             }
         }
         Ok(())
     }
 }
 
+/// Whether nobody has written to a file for so long that nobody will.
+fn is_abandoned(file: &Path) -> bool {
+    let written = std::fs::metadata(file).and_then(|about| about.modified());
+    let age = written.ok().and_then(|written| written.elapsed().ok());
+    age.is_some_and(|age| age > ABANDONED)
+}
+
 /// Takes what is done of a recording for not done where some of it is not: a scale that is watched is followed from the recording's first frame on.
-fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Sidecar>]) {
+fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Done>]) {
     let recording = |input: &Input| {
         input
             .frame

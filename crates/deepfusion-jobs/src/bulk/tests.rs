@@ -2,14 +2,18 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, SystemTime};
 
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, save_png};
+#[cfg(target_os = "linux")]
+use deepfusion_hint::Hint;
 use deepfusion_motion::ScaleMonitorConfig;
 use deepfusion_perception::PerceptionConfig;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::*;
 use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs};
+use crate::scene::MotionTracker;
 use crate::{Error, Input, Result, TargetFinder, TargetSettings};
 
 const CAMERA: [f64; 4] = [56.0, 56.0, 47.0, 31.0];
@@ -68,17 +72,18 @@ fn folder_for_outputs(folder: &Path) -> PathBuf {
 
 /// Depth of images of a folder, and what was warned of.
 fn depth_of(folder: &Path, names: &[&str]) -> (Summary<Error>, Vec<ImageWarning>) {
+    depth_of_all(folder, &inputs(folder, names))
+}
+
+fn depth_of_all(folder: &Path, all: &[Input]) -> (Summary<Error>, Vec<ImageWarning>) {
     let (model, mut estimator) = network();
     let given = Mutex::new(Vec::new());
     let warn = |warning: ImageWarning| given.lock().unwrap().push(warning);
     let out = folder_for_outputs(folder);
     let settings = settings(None);
     let job = DepthJob::new(settings, &out, outputs(), &model, &estimator, None, &warn).unwrap();
-    let all = inputs(folder, names);
     let mine: Vec<&Input> = all.iter().collect();
-    let begun = job
-        .bulk(Shard::WHOLE, false, false)
-        .begin(&all, &mine, true);
+    let begun = job.bulk(Shard::WHOLE, false, false).begin(all, &mine, true);
     let StartedJob {
         manifest,
         sidecars,
@@ -113,6 +118,28 @@ fn depth_is_made_once_and_warned_of_once() {
     assert_eq!((again.done, again.sidecars.len()), (2, 2));
     assert!(warned.is_empty(), "{warned:?}");
     assert_eq!(made_at(), before);
+}
+
+/// Names of files are bytes there, and JSON is text.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_image_whose_name_is_no_text_fails_alone() {
+    use std::os::unix::ffi::OsStrExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut all = inputs(at, &["a", "b"]);
+    let path = at.join(std::ffi::OsStr::from_bytes(b"b\xff.png"));
+    std::fs::rename(at.join("b.png"), &path).unwrap();
+    all[1].path = path;
+    let (summary, _) = depth_of_all(at, &all);
+    assert_eq!((summary.done, summary.total), (1, 2));
+    assert!(summary.stopped_by.is_none());
+    summary.manifest.unwrap();
+    let [(1, error @ Error::NotText { .. })] = summary.failures.as_slice() else {
+        panic!("{:?}", summary.failures);
+    };
+    assert!(error.hint().unwrap().contains("rename it"), "{error}");
 }
 
 /// Frames of a folder of images whose camera has this focal length.
@@ -173,6 +200,62 @@ fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
         };
         assert!(error.to_string().contains("another calibration"), "{error}");
     }
+}
+
+/// A run that shares the same images among another number of shards is writing them.
+#[test]
+fn what_another_run_is_writing_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (model, estimator) = network();
+    let out = folder_for_outputs(at);
+    let job = DepthJob::new(
+        settings(None),
+        &out,
+        outputs(),
+        &model,
+        &estimator,
+        None,
+        &|_| (),
+    );
+    let job = job.unwrap();
+    let all = inputs(at, &["a", "b"]);
+    let mine: Vec<&Input> = all.iter().collect();
+    let begin = || {
+        let bulk = job.bulk(Shard::WHOLE, false, false);
+        bulk.begin(&all, &mine, false).unwrap();
+    };
+    let partial = |name: &str, age_s: u64| {
+        let path = out.join(name);
+        let file = std::fs::File::create(&path).unwrap();
+        let written = SystemTime::now() - Duration::from_secs(age_s);
+        file.set_modified(written).unwrap();
+        path
+    };
+    let new = partial(".a_depth.npy.17-00ab.partial", 0);
+    let old = partial(".b_depth.npy.17-00ac.partial", 7200);
+    let lock = Lock::take(&out, Shard { index: 1, count: 2 }).unwrap();
+    begin();
+    assert!(new.exists() && !old.exists());
+    drop(lock);
+    begin();
+    assert!(!new.exists());
+}
+
+#[test]
+fn each_recording_begins_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let drives = ["monday", "tuesday"].map(|day| {
+        let drive = folder.path().join(day);
+        std::fs::create_dir(&drive).unwrap();
+        frames(&drive, 60.0)
+    });
+    let mut motions = MotionTracker::default();
+    let inputs = drives.iter().flatten();
+    let begins: Vec<bool> = inputs
+        .map(|input| motions.next(input).begins_recording)
+        .collect();
+    assert_eq!(begins, [true, false, true, false]);
 }
 
 /// Neither a job nor a frame keeps a picture of layers that nothing shows.

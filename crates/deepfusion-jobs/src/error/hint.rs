@@ -1,12 +1,15 @@
 use deepfusion_hint::{Hint, system_hint};
 
-use super::Error;
+use super::{Error, NoMean, UnfitCamera};
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoImages { .. } => Some(
                 "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
+            ),
+            Self::Camera(UnfitCamera::OtherSize { .. }) => Some(
+                "give the calibration of images of this size; a camera of this machine gives images of another with ?size=1920x1080 behind its name".into(),
             ),
             Self::Camera(_) => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
@@ -30,6 +33,7 @@ impl Hint for Error {
             Self::StackLength { .. } => Some(
                 "give an .npz whose arrays have the frames' names, or an array for each frame, in the order of the split's lines".into(),
             ),
+            Self::NotText { .. } => Some("rename it, or the folder that it is in".into()),
             Self::Exists { .. } | Self::Stale { .. } => {
                 Some("allow overwriting, or choose another folder".into())
             }
@@ -45,6 +49,7 @@ impl Hint for Error {
                 Some("start every shard with the same inputs and options, or choose another folder".into())
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
+            Self::FolderBusy { .. } => Some("wait for it, or choose another folder".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
             Self::SawReal { .. } => Some(
                 "pack it without saying that it saw simulated images alone".into(),

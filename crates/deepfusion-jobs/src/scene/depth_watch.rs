@@ -43,7 +43,7 @@ impl DepthWatch {
     ) -> Option<ScaleRecord> {
         let motion = self.motions.next(input);
         if let Some(camera) = &camera {
-            self.watch.see_through(camera);
+            self.watch.see_through(camera, &motion);
         }
         if let Some(factor) = self.watch.correction() {
             prediction.scale_depth(factor);

@@ -25,6 +25,8 @@ pub struct Motion {
     pub last_from_this: Option<Se3>,
     /// Whether the frame goes on from the last one, so that what was followed there still means something.
     pub goes_on: bool,
+    /// Whether the last frame was of another recording, or there was none: what was learned of that is not this one's.
+    pub begins_recording: bool,
     /// Which way is down in the camera, where its mount is known.
     pub down_in_cam: Option<Vector3<f64>>,
     /// Which way is straight ahead of the vehicle in the camera, where its mount is known.
@@ -55,6 +57,8 @@ pub fn motion_known(dataset: &Dataset) -> bool {
 #[derive(Debug, Default)]
 pub struct MotionTracker {
     last: Option<(Arc<Dataset>, usize, Se3)>,
+    /// That of the last frame.
+    recording: Option<Arc<Dataset>>,
 }
 
 impl MotionTracker {
@@ -70,6 +74,8 @@ impl MotionTracker {
     /// As [`Self::next`], of a recording's frame.
     pub fn of(&mut self, dataset: &Arc<Dataset>, index: usize) -> Motion {
         let frame = &dataset.frames()[index];
+        let before = self.recording.replace(Arc::clone(dataset));
+        let begins_recording = before.is_none_or(|before| !Arc::ptr_eq(&before, dataset));
         let step = self.last.take().and_then(|(before, last, world_from_cam)| {
             let same = Arc::ptr_eq(&before, dataset) && index > last;
             let motion = same.then(|| dataset.camera_motion(last, index))??;
@@ -98,6 +104,7 @@ impl MotionTracker {
             last_from_this: step.map(|(_, motion, _)| motion),
             seconds: step.map(|(.., dt)| dt),
             goes_on: step.is_some(),
+            begins_recording,
             down_in_cam: dataset
                 .cam_from_vehicle()
                 .map(|cam| -cam.rotate(&Vector3::z())),

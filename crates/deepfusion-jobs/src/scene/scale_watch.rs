@@ -80,14 +80,12 @@ impl ScaleWatch {
         }
     }
 
-    /// Begins anew where another camera begins: nothing that was learned of the last one holds for it. To be said before the
-    /// [correction](Self::correction) of its first frame is asked for.
-    pub fn see_through(&mut self, camera: &Intrinsics) {
-        if self
-            .camera
-            .replace(*camera)
-            .is_some_and(|before| before != *camera)
-        {
+    /// Begins anew where another camera or recording begins: nothing that was learned of the last one holds for it, and a run that goes on from a
+    /// recording's beginning gives what one gives that was never stopped. To be said before the [correction](Self::correction) of its first frame
+    /// is asked for.
+    pub fn see_through(&mut self, camera: &Intrinsics, motion: &Motion) {
+        let before = self.camera.replace(*camera);
+        if motion.begins_recording || before.is_some_and(|before| before != *camera) {
             self.monitor = ScaleMonitor::new(self.config.clone());
             self.correction = self.correct.then(ScaleCorrection::default);
             self.last = None;
@@ -116,7 +114,7 @@ impl ScaleWatch {
         }
         // A frame that stands for itself moves by nothing that is known.
         motion.stamp?;
-        self.see_through(camera);
+        self.see_through(camera, motion);
         let width = WIDTH.min(camera.width);
         let height = (width * camera.height).div_ceil(camera.width).max(1);
         let later = Arc::new(RoadTexture::from(&grey_image(image, width, height)));
@@ -156,5 +154,38 @@ impl ScaleWatch {
         {
             self.first_drift = Some(ratio);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_learned_of_a_recording_is_not_the_next_ones() {
+        let mut watch = ScaleWatch::new(ScaleMonitorConfig::default(), true);
+        let camera = Intrinsics::centred(60.0, (96, 64));
+        let first = Motion {
+            begins_recording: true,
+            ..Motion::default()
+        };
+        watch.see_through(&camera, &first);
+        let drift = ScaleReading {
+            ratio: Some(1.2),
+            ci95: None,
+            height_m: None,
+            depth_ratio: None,
+            state: ScaleState::Drift,
+        };
+        watch.note_drift(&drift);
+        watch.correction.as_mut().unwrap().follow(&drift);
+        let learned = watch.correction().unwrap();
+        assert!(learned > 1.0, "{learned}");
+        // Not even a gap in it takes it away.
+        watch.see_through(&camera, &Motion::default());
+        assert_eq!(watch.correction(), Some(learned));
+        watch.see_through(&camera, &first);
+        assert_eq!(watch.correction(), Some(1.0));
+        assert!(!watch.drifted);
     }
 }

@@ -40,8 +40,7 @@ impl<'a> Messages<'a> {
         });
         let mut waiting: Vec<&ChunkInfo> = chunks.collect();
         waiting.sort_by_key(|info| (info.first, info.from));
-        let loose = index.loose.iter();
-        let loose = loose.filter(|e| is_wanted(&e.channel) && selection.contains(e.time));
+        let loose = within(&index.loose, selection).filter(|e| is_wanted(&e.channel));
         let loose: Vec<Entry> = loose.cloned().collect();
         let mut messages = Self {
             file,
@@ -107,6 +106,13 @@ impl<'a> Messages<'a> {
         let problem = StorageProblem::Chunk { at, problem };
         self.errors.push_back(problem.of(&self.file.path));
     }
+}
+
+/// Those of messages in time order that lie in a selection's times. One image of many is asked for at a time: the others are not looked at.
+fn within<'a>(ordered: &'a [Entry], selection: &Selection) -> impl Iterator<Item = &'a Entry> {
+    let from = ordered.partition_point(|entry| entry.time < selection.start());
+    let rest = ordered[from..].iter();
+    rest.take_while(move |entry| selection.contains(entry.time))
 }
 
 impl<'a> Iterator for Messages<'a> {
@@ -191,3 +197,38 @@ impl PartialEq for OpenChunk<'_> {
 }
 
 impl Eq for OpenChunk<'_> {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_messages_of_a_time_are_those_that_it_contains() {
+        let entry = |(place, ns): (usize, u64)| Entry {
+            time: Time::from_nanos(ns),
+            channel: 0,
+            range: place..place + 1,
+        };
+        let times = [1, 2, 2, 3, 5, 5, 8].into_iter().enumerate();
+        let ordered: Vec<Entry> = times.map(entry).collect();
+        for (from, until) in [
+            (0, 9),
+            (2, 3),
+            (2, 2),
+            (3, 5),
+            (4, 5),
+            (5, 6),
+            (8, 9),
+            (9, 20),
+        ] {
+            let selection = Selection::all()
+                .from(Time::from_nanos(from))
+                .until(Time::from_nanos(until));
+            let found = within(&ordered, &selection).map(|e| e.range.start);
+            let contained = ordered.iter().filter(|e| selection.contains(e.time));
+            let expected: Vec<usize> = contained.map(|e| e.range.start).collect();
+            assert_eq!(found.collect::<Vec<_>>(), expected, "{from} to {until}");
+        }
+        assert_eq!(within(&ordered, &Selection::all()).count(), ordered.len());
+    }
+}

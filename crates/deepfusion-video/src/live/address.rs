@@ -1,5 +1,6 @@
 //! What names a live source, and how it is passed to ffmpeg.
 
+use super::camera_mode::CameraMode;
 use crate::{Error, LiveProblem, Result, SourceKind};
 use std::fmt;
 use std::path::PathBuf;
@@ -9,13 +10,16 @@ use std::path::PathBuf;
 pub struct Address {
     text: String,
     kind: SourceKind,
+    /// Width and height that a camera is asked for where its text asks for none.
+    size: Option<(u32, u32)>,
 }
 
 /// What stands before a camera's number or name.
 const CAMERA: &str = "camera:";
 
 impl Address {
-    /// `camera:0`, `/dev/video0`, `-`, or anything with a scheme (`rtsp://…`); `None` is for files.
+    /// `camera:0`, `/dev/video0`, `-`, or anything with a scheme (`rtsp://…`); `None` is for files. Behind a camera's name may stand what it is to
+    /// give, any part of `?size=1920x1080&fps=30&format=mjpeg`; [`Self::check`] says whether that is understood.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let kind = if text == "-" {
@@ -28,7 +32,41 @@ impl Address {
             return None;
         };
         let text = text.to_owned();
-        Some(Self { text, kind })
+        Some(Self {
+            text,
+            kind,
+            size: None,
+        })
+    }
+
+    /// The same, where it is a camera asked for images of this width and height, unless it is asked for others already.
+    #[must_use]
+    pub fn or_of_size(self, size: (u32, u32)) -> Self {
+        let size = Some(size);
+        Self { size, ..self }
+    }
+
+    /// That it is understood what a camera is to give, before it is opened.
+    ///
+    /// # Errors
+    /// [`Error::CameraMode`].
+    pub fn check(&self) -> Result<()> {
+        if self.is_camera() {
+            self.camera()?;
+        }
+        Ok(())
+    }
+
+    /// A camera's number or name, and what it is to give.
+    fn camera(&self) -> Result<(&str, CameraMode)> {
+        let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
+        let (name, asked) = name.split_once('?').unwrap_or((name, ""));
+        let mut mode = CameraMode::parse(asked).map_err(|problem| Error::CameraMode {
+            address: self.to_string(),
+            problem,
+        })?;
+        mode.size = mode.size.or(self.size);
+        Ok((name, mode))
     }
 
     /// Whether it is standard input.
@@ -75,9 +113,11 @@ impl Address {
     /// ffmpeg's arguments up to and with `-i`, on this system (as [`std::env::consts::OS`] names it).
     ///
     /// # Errors
-    /// [`Error::Program`] where a camera is not named as this system does.
+    /// [`Error::Program`] where a camera is not named as this system does, [`Error::CameraMode`].
     pub(super) fn input(&self, system: &str) -> Result<Vec<String>> {
-        let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
+        let words = |words: &[&str]| -> Vec<String> {
+            words.iter().map(|word| (*word).to_owned()).collect()
+        };
         Ok(match self.kind {
             SourceKind::Stdin => words(&["-i", "pipe:0"]),
             // Over UDP a camera's pictures tear where the network loses a packet.
@@ -86,28 +126,20 @@ impl Address {
             }
             SourceKind::Stream => words(&["-i", &self.text]),
             SourceKind::Camera => {
-                let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
+                let (name, mode) = self.camera()?;
                 let number = name.parse::<u32>().is_ok();
-                match system {
-                    "linux" if number => words(&["-f", "v4l2", "-i", &format!("/dev/video{name}")]),
-                    "linux" => words(&["-f", "v4l2", "-i", name]),
-                    // Its default of 29.97 frames a second is one that cameras do not have.
-                    "macos" => words(&[
-                        "-f",
-                        "avfoundation",
-                        "-framerate",
-                        "30",
-                        "-i",
-                        &format!("{name}:none"),
-                    ]),
-                    "windows" if !number => words(&["-f", "dshow", "-i", &format!("video={name}")]),
-                    "windows" => {
-                        return Err(self.error(LiveProblem::CameraNumber));
-                    }
-                    _ => {
-                        return Err(self.error(LiveProblem::NoCameras));
-                    }
-                }
+                let (device, input) = match system {
+                    "linux" if number => ("v4l2", format!("/dev/video{name}")),
+                    "linux" => ("v4l2", name.to_owned()),
+                    "macos" => ("avfoundation", format!("{name}:none")),
+                    "windows" if !number => ("dshow", format!("video={name}")),
+                    "windows" => return Err(self.error(LiveProblem::CameraNumber)),
+                    _ => return Err(self.error(LiveProblem::NoCameras)),
+                };
+                let mut arguments = words(&["-f", device]);
+                arguments.extend(mode.options(device));
+                arguments.extend(words(&["-i", &input]));
+                arguments
             }
         })
     }
@@ -194,6 +226,35 @@ mod tests {
         assert!(by_number.unwrap_err().hint().unwrap().contains("dshow"));
         assert_eq!(input("-", "windows"), "-i pipe:0");
         assert_eq!(input("udp://@:5000", "linux"), "-i udp://@:5000");
+    }
+
+    #[test]
+    fn a_camera_is_asked_for_what_stands_behind_its_name() {
+        let full = "-f v4l2 -input_format mjpeg -framerate 30 -video_size 1920x1080 -i /dev/video0";
+        for name in ["camera:0", "/dev/video0"] {
+            let asked = format!("{name}?size=1920x1080&fps=30&format=mjpeg");
+            assert_eq!(input(&asked, "linux"), full);
+        }
+        // A calibration's size is asked for where none is, and of cameras alone.
+        let sized = |text: &str| {
+            let address = Address::parse(text).unwrap().or_of_size((640, 480));
+            address.input("linux").unwrap().join(" ")
+        };
+        let of_size = |size: &str| format!("-f v4l2 -video_size {size} -i /dev/video0");
+        assert_eq!(sized("camera:0"), of_size("640x480"));
+        assert_eq!(sized("camera:0?size=320x240"), of_size("320x240"));
+        assert_eq!(sized("udp://@:5000?size=1"), "-i udp://@:5000?size=1");
+        let wrong = Address::parse("camera:0?sise=1x1").unwrap();
+        let error = wrong.check().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "camera:0?sise=1x1: a camera has no setting `sise`"
+        );
+        assert!(error.hint().unwrap().contains("size="), "{error:?}");
+        assert!(wrong.input("linux").is_err());
+        for right in ["camera:0?fps=5", "udp://@:5000?sise=1", "-"] {
+            Address::parse(right).unwrap().check().unwrap();
+        }
     }
 
     #[test]

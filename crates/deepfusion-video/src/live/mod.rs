@@ -5,6 +5,7 @@
 //! taken is counted. Nothing here grows with time.
 
 mod address;
+mod camera_mode;
 mod ffmpeg;
 mod ppm;
 mod slot;

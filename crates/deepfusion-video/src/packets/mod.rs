@@ -13,10 +13,11 @@ mod nal;
 pub use codec::Codec;
 
 use crate::cache::{Origin, frame_path, keep};
+use crate::decoded::Decoded;
 use crate::{Error, PacketProblem, Result};
 use batch::Batch;
+use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 /// Packets that are decoded together, at least: from there on a key frame begins the next.
 const TOGETHER: usize = 250;
@@ -41,12 +42,11 @@ pub struct PacketStream {
 pub struct PacketFrames {
     stream: PacketStream,
     cache: PathBuf,
-    /// Whether the cache is complete; held while it is made.
-    decoded: Mutex<bool>,
+    decoded: Decoded,
 }
 
 impl PacketFrames {
-    /// A stream whose frames will be kept in the folder `cache`.
+    /// A stream whose frames will be kept in the folder `cache`, such as [`frames_folder`](crate::frames_folder) names.
     ///
     /// # Errors
     /// [`Error::File`] where the working folder is gone.
@@ -56,7 +56,7 @@ impl PacketFrames {
         Ok(Self {
             stream,
             cache,
-            decoded: Mutex::new(false),
+            decoded: Decoded::default(),
         })
     }
 
@@ -65,24 +65,23 @@ impl PacketFrames {
     ///
     /// # Errors
     /// Those of `packets`; [`Error::Packet`] for one that is damaged, does not follow the one before it, or is a B-frame;
-    /// [`Error::Program`] without ffmpeg; [`Error::File`] where frames cannot be kept.
+    /// [`Error::Program`] without ffmpeg; [`Error::File`] where frames cannot be kept; [`Error::NotDecoded`] in the same words for every
+    /// frame that is asked for after that.
     pub fn frame<E, P>(
         &self,
         index: u64,
         packets: impl FnOnce() -> std::result::Result<P, E>,
     ) -> std::result::Result<PathBuf, E>
     where
-        E: From<Error>,
+        E: From<Error> + Hint,
         P: Iterator<Item = std::result::Result<Vec<u8>, E>>,
     {
-        // A thread that failed while decoding left nothing behind.
-        let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
-        if !*decoded {
+        self.decoded.once::<E>(|| {
             let PacketStream { file, name, .. } = &self.stream;
-            let origin = Origin::of(file, self.stream.count, Some(name.clone()))?;
-            keep(&self.cache, &origin, |part| self.decode(part, packets()?))?;
-            *decoded = true;
-        }
+            let origin =
+                Origin::of(file, self.stream.count, Some(name.clone()))?.kept_in(&self.cache, file);
+            keep(&self.cache, &origin, |part| self.decode(part, packets()?))
+        })?;
         Ok(frame_path(&self.cache, index))
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_hint::count_of;
 use deepfusion_instances::InstanceModel;
-use deepfusion_jobs::bulk::{self, DepthJob, TargetSummary, WrittenTargets};
+use deepfusion_jobs::bulk::{self, DepthJob, Lock, TargetSummary, WrittenTargets};
 use deepfusion_jobs::outputs::require_unwritten;
 use deepfusion_jobs::{Input, TargetFinder, TargetSettings, perception_settings};
 use deepfusion_perception::PerceptionConfig;
@@ -54,6 +54,8 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     };
     let finder = TargetFinder::open(&model, &mut estimator, settings)?;
     output::make_folder(out)?;
+    // Before anything there is replaced: it may be what another run is writing.
+    let _lock = Lock::take_whole(out)?;
     if source.is_some() {
         deepfusion_jobs::live::make_room(out, prediction.overwrite)?;
     }

@@ -30,10 +30,12 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     if args.cloud() && matches!(job.loader.camera, CameraSource::Unknown) {
         return Err(Error::NoCamera.into());
     }
+    output::make_folder(out)?;
+    // Before room is made: the frames there may be those of a run that is at work.
+    let _lock = Lock::take_whole(out)?;
     live::make_room(out, prediction.overwrite)?;
-    let _lock = Lock::take(out, args.shard)?;
     interrupt::catch("stopping after the frames at work");
-    let mut feed = open(address, &prediction.live)?;
+    let mut feed = open(address, &job.loader.camera, &prediction.live)?;
     let written = |sidecar: &Sidecar| -> Result<()> {
         if args.json {
             output::print(&(serde_json::to_string(sidecar)? + "\n"))

@@ -9,7 +9,7 @@ use super::index::Index;
 use super::packet::{VideoTopic, packet};
 use crate::{Result, decode_rgb, load_rgb};
 use deepfusion_rosbag::{MessageSource, Selection};
-use deepfusion_video::{PacketFrames, PacketStream};
+use deepfusion_video::{PacketFrames, PacketStream, frames_folder};
 use image::RgbImage;
 use std::path::{Path, PathBuf};
 
@@ -80,13 +80,13 @@ impl BagVideo {
     }
 }
 
-/// Where frames are kept: `<bag>.<topic>.frames`, beside the bag or where the file beside it says.
+/// Where frames are kept: `<bag>.<topic>.frames`, beside the bag or, with a hash of its path, where the file beside it says.
 fn cache(bag: &Path, topic: &str, config: &BagConfig) -> PathBuf {
     let beside = bag.parent().unwrap_or(Path::new("."));
     let folder = config.cache.as_ref();
     let folder = folder.map_or(beside.to_owned(), |c| config.folder().join(c));
-    let bag = bag.file_name().unwrap_or_default().to_string_lossy();
+    let name = bag.file_name().unwrap_or_default().to_string_lossy();
     // No topic has a dot in its name.
     let topic = topic.trim_matches('/').replace('/', ".");
-    folder.join(format!("{bag}.{topic}.frames"))
+    frames_folder(&folder, bag, &format!("{name}.{topic}"))
 }

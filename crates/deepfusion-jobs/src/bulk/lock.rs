@@ -1,0 +1,145 @@
+//! That only one run at a time works on a shard, or on a whole folder.
+
+use std::fs::{File, TryLockError};
+use std::path::Path;
+use std::time::Duration;
+
+use super::Shard;
+use crate::{Error, Result};
+
+/// What the name of a lock's file is made of: `.predict-I-of-N.lock`.
+const BEGIN: &str = ".predict-";
+/// Between a shard and the number of shards.
+const OF: &str = "-of-";
+/// At the end.
+const END: &str = ".lock";
+
+/// How often a lock is tried that is held, and how long is waited in between.
+const TRIES: usize = 3;
+/// See [`TRIES`].
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Held while a shard is worked on, so that nobody else does. The system frees it with the process, however that ends; its
+/// empty file stays: who removed it could take it from under another run that has it open and is about to hold it.
+#[derive(Debug)]
+pub struct Lock {
+    _file: File,
+}
+
+impl Lock {
+    /// Takes the lock of a shard.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] where another process has it; a folder that cannot be written to.
+    pub fn take(folder: &Path, shard: Shard) -> Result<Self> {
+        let Shard { index, count } = shard;
+        let path = folder.join(format!("{BEGIN}{index}{OF}{count}{END}"));
+        let file = File::create(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+        let mut tries = 1;
+        let taken = loop {
+            match file.try_lock() {
+                // One that only looks whether it is held lets go at once.
+                Err(TryLockError::WouldBlock) if tries < TRIES => {
+                    tries += 1;
+                    std::thread::sleep(PAUSE);
+                }
+                taken => break taken,
+            }
+        };
+        match taken {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                let folder = folder.to_owned();
+                return Err(Error::Busy { folder, shard });
+            }
+            // Some network file systems have no locks; two runs of one shard then write the same files twice,
+            // each whole.
+            Err(TryLockError::Error(error)) => {
+                tracing::warn!(
+                    "{}: cannot be locked ({error}): start each shard once",
+                    path.display()
+                );
+            }
+        }
+        Ok(Self { _file: file })
+    }
+
+    /// Takes the lock of all that is done in a folder, for work that has no shards: it is that of the only shard.
+    ///
+    /// # Errors
+    /// [`Error::FolderBusy`] where another process has it; a folder that cannot be written to.
+    pub fn take_whole(folder: &Path) -> Result<Self> {
+        Self::take(folder, Shard::WHOLE).map_err(|error| match error {
+            Error::Busy { folder, .. } => Error::FolderBusy { folder },
+            other => other,
+        })
+    }
+
+    /// Whether a run is at work in the folder that shares the images among another number of shards than `count`: it may be writing of any of
+    /// them. True, too, where nobody can tell.
+    pub(super) fn is_held_by_others(folder: &Path, count: usize) -> bool {
+        let Ok(entries) = std::fs::read_dir(folder) else {
+            return true;
+        };
+        entries.flatten().any(|entry| {
+            let name = entry.file_name();
+            let others = name.to_str().and_then(shards_of_lock);
+            others.is_some_and(|others| others != count) && is_held(&entry.path())
+        })
+    }
+}
+
+/// Of how many shards one has this lock.
+fn shards_of_lock(name: &str) -> Option<usize> {
+    let shard = name.strip_prefix(BEGIN)?.strip_suffix(END)?;
+    let (index, count) = shard.split_once(OF)?;
+    index.parse::<usize>().ok()?;
+    count.parse().ok()
+}
+
+fn is_held(lock: &Path) -> bool {
+    File::open(lock).is_ok_and(|file| file.try_lock_shared().is_err())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run that opened the file while another held it, and gets it after that: a third one must see it held.
+    #[test]
+    fn a_lock_that_was_waited_for_is_seen_by_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = Lock::take(folder.path(), Shard::WHOLE).unwrap();
+        let busy = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
+        assert!(busy.to_string().contains("at work on shard 1/1"), "{busy}");
+        let file = folder.path().join(".predict-1-of-1.lock");
+        let second = File::open(&file).unwrap();
+        drop(first);
+        second.try_lock().unwrap();
+        let third = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
+        assert!(third.to_string().contains("at work"), "{third}");
+        // Work without shards waits for it, too.
+        let whole = Lock::take_whole(folder.path()).unwrap_err();
+        assert!(matches!(whole, Error::FolderBusy { .. }), "{whole}");
+        drop(second);
+        drop(Lock::take(folder.path(), Shard::WHOLE).unwrap());
+        Lock::take_whole(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn runs_with_other_shards_are_seen_at_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let held = |count| Lock::is_held_by_others(at, count);
+        std::fs::write(at.join(".predict-a-of-3.lock"), "").unwrap();
+        assert!(!held(1));
+        let second = Shard { index: 2, count: 2 };
+        let lock = Lock::take(at, second).unwrap();
+        assert!(held(1) && held(3));
+        // Its siblings have images of their own.
+        assert!(!held(2));
+        drop(lock);
+        assert!(!held(1), "the file stays, and nobody holds it");
+        assert!(Lock::is_held_by_others(&at.join("none"), 1));
+    }
+}

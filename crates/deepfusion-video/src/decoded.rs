@@ -1,0 +1,100 @@
+//! Whether frames are decoded: found out once, by whoever asks first.
+
+use crate::Error;
+use deepfusion_hint::Hint;
+use std::sync::{Mutex, PoisonError};
+
+/// Whether all frames are kept in their folder, or why they cannot be; `None` until the first is asked for. Locked while they are made.
+#[derive(Debug, Default)]
+pub(crate) struct Decoded(Mutex<Option<Result<(), Refusal>>>);
+
+/// Why frames could not be decoded, in the words of the error that said so first.
+#[derive(Debug, Clone)]
+struct Refusal {
+    said: String,
+    hint: Option<String>,
+}
+
+impl Decoded {
+    /// Has the frames made by the first call alone. What failed then is said again by all others: a video that is damaged, or larger than the
+    /// disk, is not decoded anew for each of its frames.
+    ///
+    /// # Errors
+    /// Those of `make`; [`Error::NotDecoded`] in their words where it failed before.
+    pub(crate) fn once<E: From<Error> + Hint>(
+        &self,
+        make: impl FnOnce() -> Result<(), E>,
+    ) -> Result<(), E> {
+        // A thread that panicked while decoding left nothing behind.
+        let mut outcome = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*outcome {
+            Some(Ok(())) => return Ok(()),
+            Some(Err(refusal)) => return Err(refusal.again().into()),
+            None => {}
+        }
+        let made = make();
+        *outcome = Some(match &made {
+            Ok(()) => Ok(()),
+            Err(error) => Err(Refusal::of(error)),
+        });
+        made
+    }
+}
+
+impl Refusal {
+    fn of(error: &impl Hint) -> Self {
+        let mut said = error.to_string();
+        let mut cause = error.source();
+        while let Some(error) = cause {
+            let text = error.to_string();
+            // Many messages already hold their cause's.
+            if !said.contains(&text) {
+                said += &format!(": {text}");
+            }
+            cause = error.source();
+        }
+        let hint = error.hint();
+        Self { said, hint }
+    }
+
+    fn again(&self) -> Error {
+        let Self { said, hint } = self.clone();
+        Error::NotDecoded { said, hint }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::ErrorKind;
+    use std::path::Path;
+
+    #[test]
+    fn what_failed_once_is_not_tried_again() {
+        let decoded = Decoded::default();
+        let full = || Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
+        let first = decoded.once(|| Err(full())).unwrap_err();
+        assert!(matches!(first, Error::File { .. }));
+        for _ in 0..2 {
+            let again = decoded.once(|| -> Result<(), Error> { panic!("a second time") });
+            let again = again.unwrap_err();
+            assert!(matches!(again, Error::NotDecoded { .. }));
+            assert_eq!(again.to_string(), full().to_string());
+            assert_eq!(again.hint(), full().hint());
+        }
+    }
+
+    #[test]
+    fn what_is_decoded_is_decoded_once() {
+        let decoded = Decoded::default();
+        let mut times = 0;
+        for _ in 0..3 {
+            let made = decoded.once(|| -> Result<(), Error> {
+                times += 1;
+                Ok(())
+            });
+            made.unwrap();
+        }
+        assert_eq!(times, 1);
+    }
+}
