@@ -148,6 +148,45 @@ fn scale_ratio(model: &Model, config: &TrainConfig, set: SampleSet) -> f64 {
     measured / predicted
 }
 
+/// One network for two lenses says the metres of one of them, and depth by the other is brought to it: else the same pixels would have to be near
+/// by the one and far by the other.
+#[test]
+fn cameras_of_one_set_are_brought_to_one_focal_length() {
+    let both = both();
+    let with = |drives: &[PathBuf; 2], name: &str| {
+        let mut config = config(&both.drives);
+        config.data.sets.clear();
+        let samples = samples(&config, drives);
+        let folder = RunFolder::create(&both._folder.path().join(name)).unwrap();
+        Trainer::create(config, folder, samples, &Device::flex(), Ok).unwrap()
+    };
+    let [road, zoomed] = &both.drives;
+    let alike = with(&[road.clone(), road.clone()], "alike");
+    assert_eq!(alike.config().canonical_focal_px, None);
+    let differ = with(&[road.clone(), zoomed.clone()], "differ");
+    let first = Dataset::open(road, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    let fy = first.intrinsics(0).resized(96, 64).fy;
+    assert_eq!(differ.config().canonical_focal_px, Some(fy));
+    // Whoever predicts with the run, or goes on from it, reads it; the settings are as they were given.
+    let (folder, _) = RunFolder::open(differ.folder()).unwrap();
+    assert_eq!(folder.read_config().unwrap().canonical_focal_px, Some(fy));
+    assert_eq!(folder.read_settings().unwrap().canonical_focal_px, None);
+    let focal = |dataset: &Dataset| {
+        let camera = dataset.intrinsics(0);
+        differ
+            .config()
+            .sample_factors(0, &camera, differ.config().size)
+            .focal
+    };
+    let second = Dataset::open(zoomed, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    assert!((focal(&first) - 1.0).abs() < 1e-9);
+    assert!((focal(&second) - 2.0).abs() < 1e-6);
+}
+
 /// The factors come from the data, set by set, and reach every sample of a batch with its own camera.
 #[test]
 fn every_sample_brings_its_own_camera_range_and_unit() {
