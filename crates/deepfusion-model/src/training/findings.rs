@@ -171,11 +171,9 @@ impl TrainFindings {
             }
         }
         let found = Self {
-            metres_per_unit: None,
             camera,
-            learned_camera: None,
             sets,
-            averaged: Vec::new(),
+            ..Self::default()
         };
         Ok((found != Self::default()).then_some(found))
     }
@@ -252,6 +250,7 @@ mod tests {
         TrainFindings {
             metres_per_unit: Some(0.8),
             camera: Some(camera(230.4)),
+            canonical_focal_px: Some(230.4),
             learned_camera: Some(LearnedCamera {
                 focal_px: [230.4, 230.4],
                 sigma_px: Some([3.0, 4.0]),
@@ -308,6 +307,7 @@ mod tests {
     fn what_is_open_is_filled_in_and_what_is_set_stays() {
         let complete = findings().complete(config());
         assert_eq!(complete.pose_net.metres_per_unit, 0.8);
+        assert_eq!(complete.canonical_focal_px, Some(230.4));
         let units = complete.data.sets.iter().map(|set| set.metres_per_unit);
         assert_eq!(units.collect::<Vec<_>>(), [1.1, 0.25]);
         let fx = |set| findings().camera_of(&complete, set).map(|k| k.fx);
