@@ -488,3 +488,8 @@ impl From<Error> for deepfusion_runtime::EngineProblem {
         }
     }
 }
+
+#[cfg(feature = "train")]
+fn because(why: Option<deepfusion_eval::verdict::NoCertificate>) -> String {
+    why.map_or_else(String::new, |why| format!(": {why}"))
+}

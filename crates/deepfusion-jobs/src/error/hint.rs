@@ -190,8 +190,3 @@ impl Hint for Error {
         }
     }
 }
-
-#[cfg(feature = "train")]
-fn because(why: Option<deepfusion_eval::verdict::NoCertificate>) -> String {
-    why.map_or_else(String::new, |why| format!(": {why}"))
-}
