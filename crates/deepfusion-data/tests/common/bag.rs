@@ -188,6 +188,26 @@ impl TinyBag {
         })
     }
 
+    /// A satellite receiver's velocity, to the east (x) and to the north (y): of a constant speed, m/s, on courses from the east to the left
+    /// in radians, by the message's number.
+    pub(crate) fn course_twist(
+        &mut self,
+        topic: &str,
+        speed_mps: f64,
+        course: impl Fn(u32) -> f64,
+    ) -> &mut Self {
+        let count = std::cell::Cell::new(0_u32);
+        self.stream(topic, |header| {
+            let mut twist = TwistStamped {
+                header,
+                ..TwistStamped::default()
+            };
+            let (sin, cos) = course(count.replace(count.get() + 1)).sin_cos();
+            (twist.twist.linear.x, twist.twist.linear.y) = (speed_mps * cos, speed_mps * sin);
+            twist
+        })
+    }
+
     /// A twist with rates about all three axes, rad/s.
     pub(crate) fn tumbling_twist(
         &mut self,

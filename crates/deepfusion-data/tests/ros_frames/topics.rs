@@ -2,6 +2,7 @@
 
 use super::common::{Drive, open, open_with, refusal, says};
 use crate::common::bag::{CAMERA, TinyBag};
+use crate::common::text_of;
 use deepfusion_data::Error;
 
 #[test]
@@ -113,4 +114,27 @@ fn a_topic_is_named_by_a_caller() {
     deepfusion_data::save_png(&picture, &folder.path().join("0.png")).unwrap();
     let text = refusal(open_with(folder.path(), &["image=/twist"]));
     says(&text, &["image=/twist", "has no topics"]);
+}
+
+/// `nmea_navsat_driver` and ublox write east and north where a vehicle writes ahead and to the left.
+#[test]
+fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
+    let opened = |course: fn(u32) -> f64| {
+        Drive::bare(CAMERA, |bag| {
+            bag.images("/image").course_twist("/vel", 8.0, course);
+        })
+        .opened()
+    };
+    // To the north-west: as a speed ahead it would be negative.
+    let receiver = opened(|_| 2.4);
+    let speed = receiver.frames()[12].speed_mps.unwrap();
+    assert!((speed - 8.0).abs() < 1e-6, "{speed}");
+    assert!(!receiver.yaw_known());
+    says(&text_of(receiver.warnings()), &["/vel", "world's axes"]);
+    // A vehicle that slips in bends.
+    let vehicle = opened(|i| if i % 5 == 0 { 0.35 } else { 0.05 });
+    let speed = vehicle.frames()[12].speed_mps.unwrap();
+    assert!(speed < 7.995, "{speed}");
+    let said = text_of(vehicle.warnings());
+    assert!(!said.contains("world's axes"), "{said}");
 }

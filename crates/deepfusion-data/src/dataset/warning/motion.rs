@@ -131,6 +131,14 @@ pub enum MotionWarning {
         /// The median of their standard deviations, m/s.
         sigma_mps: f64,
     },
+    /// A topic's velocities are along other axes than the vehicle's.
+    #[error(
+        "{topic}: its velocities are in the world's axes: their length is taken as the speed, and always as forward"
+    )]
+    WorldAxes {
+        /// The topic.
+        topic: String,
+    },
     /// Values that a signal has by its description never: the bus's way to say that it has none.
     #[error("{key}: {} beyond the signal's range left out", count_of(*frames, "value"))]
     BeyondRange {
@@ -224,6 +232,10 @@ mod tests {
                     sigma_mps: 0.123,
                 },
                 "/gnss/fix: speeds are those of its positions, smoothed, sure to 0.12 m/s in the middle",
+            ),
+            (
+                MotionWarning::WorldAxes { topic: topic() },
+                "/gnss/fix: its velocities are in the world's axes: their length is taken as the speed, and always as forward",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

@@ -5,13 +5,14 @@ use super::config::BagConfig;
 use super::fixes::Fixes;
 use super::frames::Frames;
 use super::packet::{VideoTopic, packet};
+use super::readings::{Reading, reading, steering};
 use super::topics::{Role, Topics};
-use crate::{ConfigProblem, DataWarning, Error, ImageProblem, Result};
+use super::world_axes::are_world_axes;
+use crate::{DataWarning, Error, ImageProblem, MotionWarning, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
-    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, NavSatFix, Odometry,
-    OldTFMessage, TFMessage, Twist, TwistStamped, TwistWithCovarianceStamped,
+    CameraInfo, Float32, Float64, Frame, Imu, NavSatFix, Odometry, OldTFMessage, TFMessage,
 };
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
@@ -51,6 +52,8 @@ pub(super) struct Index {
     pub(super) camera_info: Option<CameraInfo>,
     /// Of a message each; of satellite positions what [`Fixes::speeds`] makes of them.
     pub(super) speed_mps: Vec<(i64, f64)>,
+    /// Of a twist each: the velocity across that of `speed_mps`.
+    across_mps: Vec<f64>,
     /// Satellite positions, where they are the speed's source.
     pub(super) fixes: Fixes,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
@@ -116,6 +119,7 @@ impl Index {
             let most = config.vehicle.max_gap_s;
             index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
         }
+        index.take_lengths(topics);
         let beyond = can.keep_measured(&mut index.speed_mps, &mut index.steering_rad);
         // The one place where the vehicle's speeds are scaled, whichever message held them.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
@@ -140,6 +144,23 @@ impl Index {
         index.dynamic.sort_by_key(|p| p.stamp_ns);
         index.truth.sort_by_key(|p| p.0);
         Ok(index)
+    }
+
+    /// Of velocities along the world's axes their length is the speed. Which way the vehicle's front looked they do not say.
+    fn take_lengths(&mut self, topics: &Topics) {
+        let across = std::mem::take(&mut self.across_mps);
+        let ahead = self.speed_mps.iter().map(|(_, ahead)| *ahead);
+        if across.len() != self.speed_mps.len()
+            || !are_world_axes(ahead.zip(across.iter().copied()))
+        {
+            return;
+        }
+        for ((_, speed), across) in self.speed_mps.iter_mut().zip(across) {
+            *speed = speed.hypot(across);
+        }
+        let topic = topics.of(Role::Speed).unwrap_or_default().to_owned();
+        self.computed
+            .push(MotionWarning::WorldAxes { topic }.into());
     }
 
     fn add(
@@ -208,6 +229,7 @@ impl Index {
                 Role::Speed => {
                     let Reading {
                         speed_mps,
+                        across_mps,
                         rates,
                         frame,
                     } = reading(message, config)?;
@@ -215,6 +237,7 @@ impl Index {
                         self.speed_frame = frame.filter(|f| !f.is_empty());
                     }
                     self.speed_mps.push((at_ns, speed_mps));
+                    self.across_mps.extend(across_mps);
                     if let Some([roll, pitch, yaw]) = rates {
                         self.yaw_rate.push((at_ns, yaw));
                         self.tilt_rates.push((at_ns, [roll, pitch]));
@@ -244,85 +267,6 @@ impl Index {
         }
         Ok(())
     }
-}
-
-/// What a message about the speed says.
-struct Reading {
-    speed_mps: f64,
-    /// Roll, pitch and yaw rate, in rad/s.
-    rates: Option<[f64; 3]>,
-    /// The frame that has this speed.
-    frame: Option<String>,
-}
-
-/// The vehicle's forward speed by whatever message holds it.
-fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
-    if message.is::<TwistStamped>() {
-        let twist: TwistStamped = message.decode()?;
-        return Ok(Reading {
-            speed_mps: twist.twist.linear.x,
-            rates: Some(rates(&twist.twist)),
-            frame: Some(twist.header.frame_id),
-        });
-    }
-    if message.is::<TwistWithCovarianceStamped>() {
-        let twist: TwistWithCovarianceStamped = message.decode()?;
-        return Ok(Reading {
-            speed_mps: twist.twist.twist.linear.x,
-            rates: Some(rates(&twist.twist.twist)),
-            frame: Some(twist.header.frame_id),
-        });
-    }
-    if message.is::<AckermannDriveStamped>() {
-        let drive: AckermannDriveStamped = message.decode()?;
-        return Ok(Reading {
-            speed_mps: f64::from(drive.drive.speed),
-            rates: None,
-            frame: Some(drive.header.frame_id),
-        });
-    }
-    if message.is::<Odometry>() {
-        let odometry: Odometry = message.decode()?;
-        let twist = odometry.twist.twist;
-        return Ok(Reading {
-            speed_mps: twist.linear.x,
-            rates: Some(rates(&twist)),
-            frame: Some(odometry.child_frame_id),
-        });
-    }
-    let value = number(message)?;
-    let unit = config.vehicle.speed_unit.ok_or_else(|| {
-        config.wrong(ConfigProblem::NoSpeedUnit {
-            topic: message.topic().to_owned(),
-        })
-    })?;
-    Ok(Reading {
-        speed_mps: value * unit.metres_per_second(),
-        rates: None,
-        frame: None,
-    })
-}
-
-fn rates(twist: &Twist) -> [f64; 3] {
-    [twist.angular.x, twist.angular.y, twist.angular.z]
-}
-
-/// The steering angle in radians, by whatever message holds it.
-fn steering(message: &Message<'_>) -> Result<f64> {
-    if message.is::<AckermannDriveStamped>() {
-        let drive: AckermannDriveStamped = message.decode()?;
-        return Ok(f64::from(drive.drive.steering_angle));
-    }
-    number(message)
-}
-
-/// A bare number.
-fn number(message: &Message<'_>) -> Result<f64> {
-    Ok(if message.is::<Float32>() {
-        f64::from(message.decode::<Float32>()?.data)
-    } else {
-        message.decode::<Float64>()?.data
-    })
 }
 
 /// When a message was measured, in nanoseconds: the stamp of its header; the time of recording where it has no header, or
