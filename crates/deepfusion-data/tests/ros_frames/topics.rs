@@ -138,3 +138,48 @@ fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
     let said = text_of(vehicle.warnings());
     assert!(!said.contains("world's axes"), "{said}");
 }
+
+/// ROS 2's controllers publish what they are asked for with a stamp, too.
+#[test]
+fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
+    let sidecar = format!("{CAMERA}[vehicle]\nwheelbase_m = 2.5\n");
+    let drive = |fill: fn(&mut TinyBag)| {
+        Drive::bare(&sidecar, |bag| {
+            bag.images("/image").twist("/controller/cmd_vel", 3.0);
+            bag.ackermann("/ackermann_cmd", 3.0, 0.3);
+            fill(bag);
+        })
+    };
+    let speed = |drive: &Drive| drive.opened().frames()[12].speed_mps.unwrap();
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.05, "{found}");
+    let measured = drive(|bag| {
+        bag.odometry("/odom", 7.0).ackermann("/report", 9.0, 0.0);
+    });
+    near(speed(&measured), 7.0);
+    let opened = measured.opened();
+    let said = text_of(opened.warnings());
+    assert!(!said.contains("command"), "{said}");
+    let turn = opened.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
+    assert!(turn.abs() < 1e-6, "{turn}");
+    // Positions are weak, and measured.
+    near(
+        speed(&drive(|bag| {
+            bag.fixes("/fix", 12.0);
+        })),
+        12.0,
+    );
+    let alone = drive(|_| {});
+    near(speed(&alone), 3.0);
+    let opened = alone.opened();
+    says(
+        &text_of(opened.warnings()),
+        &[
+            "/controller/cmd_vel: by its name a command, taken for the measured speed",
+            "/ackermann_cmd: by its name a command, taken for the measured steering",
+        ],
+    );
+    // Whoever names it knows.
+    let named = ["speed=/controller/cmd_vel", "steering=/ackermann_cmd"];
+    let named = open_with(&alone.bag, &named).unwrap();
+    assert!(!text_of(named.warnings()).contains("command"));
+}

@@ -1,5 +1,6 @@
 //! What is unsure about how the vehicle moved.
 
+use crate::TopicRole;
 use deepfusion_hint::count_of;
 use deepfusion_logs::LogNote;
 use deepfusion_motion::can::CanId;
@@ -139,6 +140,16 @@ pub enum MotionWarning {
         /// The topic.
         topic: String,
     },
+    /// What the vehicle was asked for stands for what it did.
+    #[error(
+        "{topic}: by its name a command, taken for the measured {role} as nothing else is there; another source is better"
+    )]
+    Commanded {
+        /// The topic.
+        topic: String,
+        /// What it is taken for.
+        role: TopicRole,
+    },
     /// Values that a signal has by its description never: the bus's way to say that it has none.
     #[error("{key}: {} beyond the signal's range left out", count_of(*frames, "value"))]
     BeyondRange {
@@ -232,6 +243,13 @@ mod tests {
                     sigma_mps: 0.123,
                 },
                 "/gnss/fix: speeds are those of its positions, smoothed, sure to 0.12 m/s in the middle",
+            ),
+            (
+                MotionWarning::Commanded {
+                    topic: "/cmd_vel".into(),
+                    role: TopicRole::Speed,
+                },
+                "/cmd_vel: by its name a command, taken for the measured speed as nothing else is there; another source is better",
             ),
             (
                 MotionWarning::WorldAxes { topic: topic() },

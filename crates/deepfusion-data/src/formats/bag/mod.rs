@@ -10,6 +10,7 @@
 mod camera;
 mod can;
 mod can_config;
+mod commands;
 mod config;
 mod doppler;
 mod dynamic;

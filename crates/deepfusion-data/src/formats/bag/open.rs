@@ -68,7 +68,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let clock = Clock::from_image(&first, &config, options);
     let damage = damage_of(bag.as_ref(), &index);
     let mut warnings = damage.clone();
-    warnings.extend(oddities_of(&index));
+    warnings.extend(oddities_of(&topics, &index));
 
     let video = BagVideo::of(path, &index, &config)?;
     let picture = match &video {
