@@ -248,6 +248,27 @@ impl TinyBag {
         })
     }
 
+    /// An inertial unit that says by a covariance of −1 that it has no angular rates, whatever stands there.
+    pub(crate) fn accelerometer(&mut self, topic: &str) -> &mut Self {
+        self.stream(topic, |header| {
+            let mut no_rates = [0.0; 9];
+            no_rates[0] = -1.0;
+            let up = |z| Vector3 {
+                z,
+                ..Vector3::default()
+            };
+            Imu {
+                header,
+                orientation: Quaternion::default(),
+                orientation_covariance: [0.0; 9],
+                angular_velocity: up(0.3),
+                angular_velocity_covariance: no_rates,
+                linear_acceleration: up(9.81),
+                linear_acceleration_covariance: [0.0; 9],
+            }
+        })
+    }
+
     /// From here on no header says when its message was measured.
     pub(crate) fn without_stamps(&mut self) -> &mut Self {
         self.2 = false;

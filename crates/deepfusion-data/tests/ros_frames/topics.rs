@@ -3,7 +3,7 @@
 use super::common::{Drive, open, open_with, refusal, says};
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::text_of;
-use deepfusion_data::Error;
+use deepfusion_data::{Dataset, Error, OpenOptions, write_bag_config};
 
 #[test]
 fn the_speeds_messages_are_read_and_positions_come_last() {
@@ -182,4 +182,88 @@ fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
     let named = ["speed=/controller/cmd_vel", "steering=/ackermann_cmd"];
     let named = open_with(&alone.bag, &named).unwrap();
     assert!(!text_of(named.warnings()).contains("command"));
+}
+
+#[test]
+fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
+    let level = |fill: fn(&mut TinyBag)| {
+        Drive::bare(CAMERA, |bag| {
+            bag.images("/image")
+                .turning_twist("/twist", |_| (10.0, 0.2));
+            fill(bag);
+        })
+    };
+    // What a filter leaves of the accelerations once gravity is out.
+    let filtered = level(|bag| {
+        bag.imu_along_z("/imu/data", 0.2, 0.02);
+    });
+    let text = filtered.refusal();
+    says(
+        &text,
+        &["removed already", "[topics] imu = \"none\"", "drive.toml"],
+    );
+    assert!(matches!(
+        open(&filtered.bag),
+        Err(Error::InertialUnit { .. })
+    ));
+    let turn = |dataset: &Dataset| {
+        let motion = dataset.track().unwrap().motion(0.2, 0.7);
+        motion.unwrap().yaw_rad
+    };
+    // By its own yaw rate then, which the caller's word or the file's brings back.
+    let left_out = open_with(&filtered.bag, &["imu=none"]).unwrap();
+    assert!(left_out.yaw_known() && (turn(&left_out) - 0.1).abs() < 1e-6);
+    let sidecar = format!("{CAMERA}[topics]\nimu = \"none\"\n");
+    std::fs::write(filtered.bag.with_extension("toml"), sidecar).unwrap();
+    assert!((turn(&filtered.opened()) - 0.1).abs() < 1e-6);
+
+    // RealSense's two: neither is a unit by itself.
+    let apart = level(|bag| {
+        bag.imu_along_z("/camera/gyro/sample", 0.2, 0.0)
+            .accelerometer("/camera/accel/sample");
+    });
+    says(
+        &apart.refusal(),
+        &[
+            "2 topics could be the imu",
+            "or imu = \"none\" to read none",
+        ],
+    );
+    let named = open_with(&apart.bag, &["imu=/camera/accel/sample"]).unwrap();
+    assert!((turn(&named) - 0.1).abs() < 1e-6);
+    says(
+        &text_of(named.warnings()),
+        &["/camera/accel/sample: not read, as it has no angular rates"],
+    );
+    // What stands for no rate may be zeros, too.
+    let still = Drive::bare(CAMERA, |bag| {
+        bag.images("/image").twist("/twist", 10.0);
+        bag.imu_along_z("/imu", 0.0, 9.81);
+    })
+    .opened();
+    assert!(!still.yaw_known());
+    says(&text_of(still.warnings()), &["/imu: not read"]);
+    // There is nothing without images.
+    let text = refusal(open_with(&apart.bag, &["imu=none", "image=none"]));
+    says(&text, &["has no topic none", "topics.image"]);
+}
+
+#[test]
+fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
+    let can = "[can]\nspeed_unit = \"km/h\"\n\
+        speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
+    let drive = Drive::bare(&format!("{CAMERA}{can}"), |bag| {
+        bag.images("/image").twist("/twist", 5.0);
+        bag.imu("/imu/a", 0.2).imu("/imu/b", 0.2);
+    });
+    let options = OpenOptions {
+        topics: vec!["imu=none".parse().unwrap(), "speed=none".parse().unwrap()],
+        ..OpenOptions::default()
+    };
+    write_bag_config(&drive.bag, &options, true).unwrap();
+    let text = std::fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
+    says(&text, &["imu = \"none\"", "speed = \"none\""]);
+    let opened = drive.opened();
+    assert_eq!(opened.frames()[12].speed_mps, None);
+    assert!(opened.track().is_none());
 }

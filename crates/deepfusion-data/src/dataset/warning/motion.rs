@@ -150,6 +150,14 @@ pub enum MotionWarning {
         /// What it is taken for.
         role: TopicRole,
     },
+    /// The messages of an inertial unit say no angular rates.
+    #[error(
+        "{topic}: not read, as it has no angular rates: they are 0 throughout, or said not to be there"
+    )]
+    NoRates {
+        /// The topic.
+        topic: String,
+    },
     /// Values that a signal has by its description never: the bus's way to say that it has none.
     #[error("{key}: {} beyond the signal's range left out", count_of(*frames, "value"))]
     BeyondRange {
@@ -250,6 +258,12 @@ mod tests {
                     role: TopicRole::Speed,
                 },
                 "/cmd_vel: by its name a command, taken for the measured speed as nothing else is there; another source is better",
+            ),
+            (
+                MotionWarning::NoRates {
+                    topic: "/camera/accel/sample".into(),
+                },
+                "/camera/accel/sample: not read, as it has no angular rates: they are 0 throughout, or said not to be there",
             ),
             (
                 MotionWarning::WorldAxes { topic: topic() },

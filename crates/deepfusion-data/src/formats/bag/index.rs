@@ -120,6 +120,7 @@ impl Index {
             index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
         }
         index.take_lengths(topics);
+        index.leave_out_rateless(topics);
         let beyond = can.keep_measured(&mut index.speed_mps, &mut index.steering_rad);
         // The one place where the vehicle's speeds are scaled, whichever message held them.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
@@ -163,6 +164,23 @@ impl Index {
             .push(MotionWarning::WorldAxes { topic }.into());
     }
 
+    /// An inertial unit that measures no rates is none here: its zeros are no straight drive. Some drivers publish a gyroscope and an
+    /// accelerometer as a topic each, others fill in the accelerations alone.
+    fn leave_out_rateless(&mut self, topics: &Topics) {
+        let Some(topic) = topics.of(Role::Imu) else {
+            return;
+        };
+        let none = Vector3::<f64>::zeros();
+        let measures = |(_, sample): &(i64, ImuSample)| sample.angular_rate_radps != none;
+        if self.imu.iter().any(measures) {
+            return;
+        }
+        self.imu.clear();
+        self.imu_frame = None;
+        let topic = topic.to_owned();
+        self.computed.push(MotionWarning::NoRates { topic }.into());
+    }
+
     fn add(
         &mut self,
         bag: &dyn MessageSource,
@@ -204,6 +222,10 @@ impl Index {
                 Role::CameraInfo => {}
                 Role::Imu => {
                     let imu: Imu = message.decode()?;
+                    // By the message's definition: there are no angular rates.
+                    if imu.angular_velocity_covariance[0] == -1.0 {
+                        continue;
+                    }
                     let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
                     let sample = ImuSample {
                         time_s: 0.0,

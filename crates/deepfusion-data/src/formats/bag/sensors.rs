@@ -20,7 +20,7 @@ pub(super) struct Motion {
 /// The vehicle's motion by all its sensors, on the vehicle's clock counted from `origin_ns`; `None` without a speed.
 ///
 /// # Errors
-/// [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
+/// [`Error::InertialUnit`], [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
 pub(super) fn motion(
     bag: &Path,
     index: &Index,
@@ -76,14 +76,32 @@ pub(super) fn motion(
         },
         fusion: config.fusion,
     };
-    let track = FusedTrack::new(&sensors, &motion).map_err(|source| Error::Motion {
-        path: bag.to_owned(),
-        source,
-    })?;
+    let track = FusedTrack::new(&sensors, &motion).map_err(|e| refusal(bag, config, e))?;
     Ok(Some(Motion {
         yaw_known: track.knows_yaw(),
         track: track.into(),
     }))
+}
+
+/// Why sensors make no motion: an inertial unit that is at fault alone can be left out.
+fn refusal(bag: &Path, config: &BagConfig, source: deepfusion_motion::Error) -> Error {
+    use deepfusion_motion::Error as Reason;
+    let path = bag.to_owned();
+    let of_unit = matches!(
+        source,
+        Reason::NotGravity { .. }
+            | Reason::NotUp { .. }
+            | Reason::TooFewSamples { stream: "imu", .. }
+    );
+    if of_unit {
+        Error::InertialUnit {
+            path,
+            source: Box::new(source),
+            config: config.path.clone(),
+        }
+    } else {
+        Error::Motion { path, source }
+    }
 }
 
 /// A vehicle that says its yaw rate itself, and has no other sensor for it.

@@ -2,7 +2,7 @@
 
 use super::commands::is_command;
 use super::config::BagConfig;
-use crate::{DataWarning, Error, MotionWarning, Result, TopicProblem, TopicRole};
+use crate::{DataWarning, Error, MotionWarning, NamedTopic, Result, TopicProblem, TopicRole};
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, CompressedImage, Float32, Float64, Frame, Image, Imu,
     NavSatFix, Odometry, OldTFMessage, PointCloud2, TFMessage, TwistStamped,
@@ -201,7 +201,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The topic that the file names, or the only one of these types.
+    /// The topic that the file names, or the only one of these types; none where it names none.
     fn one(
         &self,
         role: TopicRole,
@@ -209,6 +209,9 @@ impl Search<'_> {
         types: &[&str],
         fits: impl Fn(&TopicInfo) -> bool,
     ) -> Result<Option<String>> {
+        if role.is_optional() && named.as_deref() == Some(NamedTopic::NONE) {
+            return Ok(None);
+        }
         if let Some(name) = named {
             let Some(topic) = self.all.iter().find(|t| t.name == *name) else {
                 return Err(self.error(TopicProblem::NoTopic {
