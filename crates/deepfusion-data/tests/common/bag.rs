@@ -275,6 +275,39 @@ impl TinyBag {
         self
     }
 
+    /// An odometry without a twist: on a circle to the left from the world's x on, at a speed (m/s) and a yaw rate (rad/s), with its
+    /// attitude turned by so much (radians) from the way it goes.
+    pub(crate) fn poses(
+        &mut self,
+        topic: &str,
+        speed_mps: f64,
+        yaw_rate: f64,
+        turned_rad: f64,
+    ) -> &mut Self {
+        let count = std::cell::Cell::new(0_u32);
+        self.stream(topic, |header| {
+            let time_s = 0.04 * f64::from(count.replace(count.get() + 1));
+            let (angle, radius) = (yaw_rate * time_s, speed_mps / yaw_rate);
+            let (z, w) = (0.5 * (angle + turned_rad)).sin_cos();
+            let mut pose = Pose::default();
+            pose.position.x = radius * angle.sin();
+            pose.position.y = radius * (1.0 - angle.cos());
+            (pose.orientation.z, pose.orientation.w) = (z, w);
+            Odometry {
+                header,
+                child_frame_id: "body".into(),
+                pose: PoseWithCovariance {
+                    pose,
+                    covariance: [0.0; 36],
+                },
+                twist: TwistWithCovariance {
+                    twist: Twist::default(),
+                    covariance: [0.0; 36],
+                },
+            }
+        })
+    }
+
     pub(crate) fn odometry(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
         self.stream(topic, |header| {
             let twist = Twist {

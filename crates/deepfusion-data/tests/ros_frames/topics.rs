@@ -267,3 +267,40 @@ fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
     assert_eq!(opened.frames()[12].speed_mps, None);
     assert!(opened.track().is_none());
 }
+
+/// FAST-LIO and others leave the twist of their odometry at 0.
+#[test]
+fn an_odometry_without_a_twist_moves_as_its_poses_do() {
+    let drive = |turned_rad: f64, scale: &str| {
+        Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
+            bag.images("/image")
+                .poses("/Odometry", 10.0, 0.4, turned_rad);
+        })
+        .opened()
+    };
+    let dataset = drive(0.0, "");
+    let speed = dataset.frames()[12].speed_mps.unwrap();
+    assert!((speed - 10.0).abs() < 0.01, "{speed}");
+    let turn = dataset.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
+    assert!(
+        dataset.yaw_known() && (turn - 0.2).abs() < 1e-3,
+        "{turn} rad"
+    );
+    says(
+        &text_of(dataset.warnings()),
+        &["/Odometry: its messages have no twist: speed and turns"],
+    );
+    let scaled = drive(0.0, "vehicle = { speed_scale = 0.5 }\n");
+    let speed = scaled.frames()[12].speed_mps.unwrap();
+    assert!((speed - 5.0).abs() < 0.01, "{speed}");
+    // A body whose x looks to the side.
+    let sideways = drive(1.5, "");
+    assert_eq!(sideways.frames()[12].speed_mps, None);
+    says(&text_of(sideways.warnings()), &["/Odometry: no speed"]);
+    // One that stands is believed.
+    let standing = Drive::bare(CAMERA, |bag| {
+        bag.images("/image").odometry("/odom", 0.0);
+    })
+    .opened();
+    assert_eq!(standing.frames()[12].speed_mps, Some(0.0));
+}

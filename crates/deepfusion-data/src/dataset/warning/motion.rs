@@ -150,6 +150,20 @@ pub enum MotionWarning {
         /// What it is taken for.
         role: TopicRole,
     },
+    /// The messages of an odometry have no twist: its poses say how the vehicle moves.
+    #[error("{topic}: its messages have no twist: speed and turns are those of its poses")]
+    OfPoses {
+        /// The topic.
+        topic: String,
+    },
+    /// The messages of an odometry have no twist, and its poses are of a body with other axes than the vehicle's.
+    #[error(
+        "{topic}: no speed, as its messages have no twist, and its poses' x does not point along the way"
+    )]
+    PosesOfOtherAxes {
+        /// The topic.
+        topic: String,
+    },
     /// The messages of an inertial unit say no angular rates.
     #[error(
         "{topic}: not read, as it has no angular rates: they are 0 throughout, or said not to be there"
@@ -258,6 +272,18 @@ mod tests {
                     role: TopicRole::Speed,
                 },
                 "/cmd_vel: by its name a command, taken for the measured speed as nothing else is there; another source is better",
+            ),
+            (
+                MotionWarning::OfPoses {
+                    topic: "/Odometry".into(),
+                },
+                "/Odometry: its messages have no twist: speed and turns are those of its poses",
+            ),
+            (
+                MotionWarning::PosesOfOtherAxes {
+                    topic: "/vins".into(),
+                },
+                "/vins: no speed, as its messages have no twist, and its poses' x does not point along the way",
             ),
             (
                 MotionWarning::NoRates {

@@ -4,10 +4,12 @@ use super::can::Can;
 use super::config::BagConfig;
 use super::fixes::Fixes;
 use super::frames::Frames;
+use super::odometry_poses::{PoseMotion, motion_of};
 use super::packet::{VideoTopic, packet};
 use super::readings::{Reading, reading, steering};
 use super::topics::{Role, Topics};
 use super::world_axes::are_world_axes;
+use crate::logs::samples::Samples;
 use crate::{DataWarning, Error, ImageProblem, MotionWarning, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
@@ -17,6 +19,7 @@ use deepfusion_rosbag::msg::{
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A message that is read again when it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,12 +57,16 @@ pub(super) struct Index {
     pub(super) speed_mps: Vec<(i64, f64)>,
     /// Of a twist each: the velocity across that of `speed_mps`.
     across_mps: Vec<f64>,
+    /// Of an odometry's messages, each without a twist: `world_from_body`.
+    poses: Vec<(i64, Se3)>,
     /// Satellite positions, where they are the speed's source.
     pub(super) fixes: Fixes,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
     pub(super) yaw_rate: Vec<(i64, f64)>,
     /// Roll and pitch rate, in rad/s, where a twist gives all three.
     pub(super) tilt_rates: Vec<(i64, [f64; 2])>,
+    /// Roll and pitch, in radians, where the speeds are those of poses.
+    pub(super) tilts_rad: Vec<(i64, [f64; 2])>,
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
     /// `world_from_vehicle`, exact.
@@ -84,10 +91,10 @@ pub(super) struct Index {
 }
 
 impl Index {
-    /// Whether the messages that hold the speed ever say a turn: publishers that know none write zeros, or NaN.
+    /// Whether the messages that hold the speed ever say a turn: publishers that know none write zeros, or NaN. Poses always say it.
     pub(super) fn says_turns(&self) -> bool {
         let turns = |rate: f64| rate.is_finite() && rate != 0.0;
-        self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
+        !self.tilts_rad.is_empty() || self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
     }
 
     /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. What cannot be read is
@@ -119,6 +126,7 @@ impl Index {
             let most = config.vehicle.max_gap_s;
             index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
         }
+        index.take_poses(bag.path(), topics);
         index.take_lengths(topics);
         index.leave_out_rateless(topics);
         let beyond = can.keep_measured(&mut index.speed_mps, &mut index.steering_rad);
@@ -145,6 +153,33 @@ impl Index {
         index.dynamic.sort_by_key(|p| p.stamp_ns);
         index.truth.sort_by_key(|p| p.0);
         Ok(index)
+    }
+
+    /// An odometry of which every message leaves its twist at 0 says by its poses how the vehicle moves. Where these are of a body with
+    /// other axes nothing is known of the speed: the zeros would be a vehicle that stands.
+    fn take_poses(&mut self, bag: &Path, topics: &Topics) {
+        let poses = std::mem::take(&mut self.poses);
+        if poses.is_empty() || poses.len() != self.speed_mps.len() {
+            return;
+        }
+        let topic = topics.of(Role::Speed).unwrap_or_default().to_owned();
+        let warning = match motion_of(bag, poses) {
+            PoseMotion::Standing => return,
+            PoseMotion::OtherAxes => {
+                self.speed_mps.clear();
+                self.yaw_rate.clear();
+                MotionWarning::PosesOfOtherAxes { topic }
+            }
+            PoseMotion::Moving(log) => {
+                self.speed_mps = pairs(log.speeds_mps);
+                self.yaw_rate = log.yaw_rates_radps.map(pairs).unwrap_or_default();
+                self.tilts_rad = log.tilts_rad;
+                MotionWarning::OfPoses { topic }
+            }
+        };
+        self.tilt_rates.clear();
+        self.across_mps.clear();
+        self.computed.push(warning.into());
     }
 
     /// Of velocities along the world's axes their length is the speed. Which way the vehicle's front looked they do not say.
@@ -254,12 +289,14 @@ impl Index {
                         across_mps,
                         rates,
                         frame,
+                        pose,
                     } = reading(message, config)?;
                     if self.speed_frame.is_none() {
                         self.speed_frame = frame.filter(|f| !f.is_empty());
                     }
                     self.speed_mps.push((at_ns, speed_mps));
                     self.across_mps.extend(across_mps);
+                    self.poses.extend(pose.map(|pose| (at_ns, pose)));
                     if let Some([roll, pitch, yaw]) = rates {
                         self.yaw_rate.push((at_ns, yaw));
                         self.tilt_rates.push((at_ns, [roll, pitch]));
@@ -289,6 +326,11 @@ impl Index {
         }
         Ok(())
     }
+}
+
+/// Values with their times.
+fn pairs(samples: Samples) -> Vec<(i64, f64)> {
+    samples.ns.into_iter().zip(samples.values).collect()
 }
 
 /// When a message was measured, in nanoseconds: the stamp of its header; the time of recording where it has no header, or

@@ -20,6 +20,7 @@ mod image;
 mod index;
 mod inspect;
 mod mounts;
+mod odometry_poses;
 mod open;
 mod packet;
 mod profile;

@@ -1,7 +1,9 @@
 //! What a message says of the vehicle's speed or its steering, whichever type it has.
 
 use super::config::BagConfig;
+use super::odometry_poses::pose_without_twist;
 use crate::{ConfigProblem, Result};
+use deepfusion_geometry::Se3;
 use deepfusion_rosbag::Message;
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, Float32, Float64, Odometry, Twist, TwistStamped,
@@ -17,6 +19,8 @@ pub(super) struct Reading {
     pub(super) rates: Option<[f64; 3]>,
     /// The frame that has this speed.
     pub(super) frame: Option<String>,
+    /// `world_from_body`, of an odometry that leaves its twist at 0.
+    pub(super) pose: Option<Se3>,
 }
 
 impl Reading {
@@ -27,6 +31,7 @@ impl Reading {
             across_mps: Some(twist.linear.y),
             rates: Some([turn.x, turn.y, turn.z]),
             frame: Some(frame),
+            pose: None,
         }
     }
 }
@@ -51,12 +56,16 @@ pub(super) fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Readi
             across_mps: None,
             rates: None,
             frame: Some(drive.header.frame_id),
+            pose: None,
         });
     }
     if message.is::<Odometry>() {
         let odometry: Odometry = message.decode()?;
-        let frame = odometry.child_frame_id;
-        return Ok(Reading::of_twist(&odometry.twist.twist, frame));
+        let pose = pose_without_twist(&odometry);
+        return Ok(Reading {
+            pose,
+            ..Reading::of_twist(&odometry.twist.twist, odometry.child_frame_id)
+        });
     }
     let value = number(message)?;
     let unit = config.vehicle.speed_unit.ok_or_else(|| {
@@ -69,6 +78,7 @@ pub(super) fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Readi
         across_mps: None,
         rates: None,
         frame: None,
+        pose: None,
     })
 }
 

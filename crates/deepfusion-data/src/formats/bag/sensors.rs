@@ -124,6 +124,12 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
         let turns: Vec<_> = turns.map(|(t, _, yaw_rate)| (*t, *yaw_rate)).collect();
         track = VehicleTrack::new(&speeds).with_yaw_rate(&turns, VehicleTrack::MAX_GAP_S);
     }
+    if !index.tilts_rad.is_empty() {
+        let at_s = |ns: i64| (ns - origin_ns) as f64 * 1e-9;
+        let tilts = index.tilts_rad.iter();
+        let tilts = tilts.map(|(ns, [roll, pitch])| (at_s(*ns), *roll, *pitch));
+        track = track.with_tilt(&tilts.collect::<Vec<_>>());
+    }
     if index.tilt_rates.iter().any(|(_, rates)| *rates != [0.0; 2]) {
         track = track.with_tilt_rates(&tilt_rates(index, origin_ns), VehicleTrack::MAX_GAP_S);
     }
