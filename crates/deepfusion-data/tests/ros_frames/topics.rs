@@ -304,3 +304,31 @@ fn an_odometry_without_a_twist_moves_as_its_poses_do() {
     .opened();
     assert_eq!(standing.frames()[12].speed_mps, Some(0.0));
 }
+
+/// As a GPX file's beside a video: what is unsure counts less in training.
+#[test]
+fn speeds_of_positions_say_how_sure_they_are() {
+    let opened = |scale: &str, positions: bool| {
+        Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
+            bag.images("/image");
+            if positions {
+                bag.fixes("/fix", 12.0);
+            } else {
+                bag.twist("/twist", 12.0);
+            }
+        })
+        .opened()
+    };
+    let sigma_m = |dataset: &Dataset| {
+        let ego = dataset.ego().unwrap();
+        let motion = ego.between(dataset.frames(), 12, 13).unwrap();
+        motion.distance_sigma_m
+    };
+    let dataset = opened("", true);
+    let found = sigma_m(&dataset).unwrap();
+    assert!(found > 0.004, "a tenth of a m/s over 40 ms: {found} m");
+    assert!(dataset.receiver().course_rate_radps.is_some());
+    let scaled = sigma_m(&opened("vehicle = { speed_scale = 0.5 }\n", true)).unwrap();
+    assert!((scaled - 0.5 * found).abs() < 1e-9, "{scaled} of {found}");
+    assert_eq!(sigma_m(&opened("", false)), None);
+}

@@ -61,6 +61,10 @@ pub(super) struct Index {
     poses: Vec<(i64, Se3)>,
     /// Satellite positions, where they are the speed's source.
     pub(super) fixes: Fixes,
+    /// How sure the speeds of positions are.
+    pub(super) sigmas_mps: Option<Samples>,
+    /// How the course of positions turned.
+    pub(super) course_rates_radps: Option<Samples>,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
     pub(super) yaw_rate: Vec<(i64, f64)>,
     /// Roll and pitch rate, in rad/s, where a twist gives all three.
@@ -124,7 +128,10 @@ impl Index {
         if !index.fixes.is_empty() {
             let topic = topics.of(Role::Speed).unwrap_or_default();
             let most = config.vehicle.max_gap_s;
-            index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
+            let found = index.fixes.speeds(topic, most, &mut index.computed);
+            index.speed_mps = found.speeds_mps;
+            index.sigmas_mps = found.sigmas_mps;
+            index.course_rates_radps = found.course_rates_radps;
         }
         index.take_poses(bag.path(), topics);
         index.take_lengths(topics);
@@ -133,6 +140,9 @@ impl Index {
         // The one place where the vehicle's speeds are scaled, whichever message held them.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
         index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
+        if let Some(sigmas) = &mut index.sigmas_mps {
+            sigmas.values.iter_mut().for_each(|v| *v *= scale);
+        }
         index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
         index.silent.extend(beyond);
         if let Some(video) = &mut index.video {
