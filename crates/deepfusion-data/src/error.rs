@@ -325,6 +325,16 @@ pub enum Error {
         /// Why not.
         source: deepfusion_motion::Error,
     },
+    /// A bag's inertial unit cannot be read as it is mounted, or not at all.
+    #[error("{}: {source}", path.display())]
+    InertialUnit {
+        /// The bag.
+        path: PathBuf,
+        /// Why not.
+        source: Box<deepfusion_motion::Error>,
+        /// The file beside the bag, which may leave the unit out.
+        config: PathBuf,
+    },
     /// Something is there already where something is to be written.
     #[error("{}: already exists", path.display())]
     Exists {

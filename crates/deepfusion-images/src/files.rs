@@ -34,8 +34,11 @@ pub fn decode(path: &Path) -> Result<DynamicImage> {
     decode_bytes(&bytes, path)
 }
 
-/// The same of a file's bytes.
-pub(crate) fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
+/// The same of a file's bytes; `path` is for errors alone.
+///
+/// # Errors
+/// As [`load_rgb`].
+pub fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     if jpeg::is_jpeg(bytes) && !jpeg::has_end(bytes) {
         return Err(truncated(path));
     }

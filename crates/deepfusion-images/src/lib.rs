@@ -16,7 +16,7 @@ mod resize;
 pub use depth_png::{read_depth_png, write_depth_png};
 pub use error::{Error, ImageProblem, Result};
 pub use exif_camera::{ExifCamera, exif_block_camera, exif_camera};
-pub use files::{decode, decode_rgb, image_size, load_rgb, save_png};
+pub use files::{decode, decode_bytes, decode_rgb, image_size, load_rgb, save_png};
 pub use image::RgbImage;
 pub use photo::{Photo, load_photo};
 pub use resize::{resize_rgb, to_chw, to_network_input};

@@ -150,7 +150,7 @@ impl Hint for Error {
                 "the accelerations look like multiples of g: multiply them by 9.80665"
             }
             Self::NotGravity { norm, .. } if *norm < 0.8 => {
-                "gravity seems to have been removed already: give the raw accelerations"
+                "gravity seems to have been removed already: give the raw accelerations, or leave the unit out"
             }
             Self::NotGravity { .. } => "give accelerations in m/s², gravity included",
             Self::NotUp { angle_deg, .. } if *angle_deg > 135.0 => {

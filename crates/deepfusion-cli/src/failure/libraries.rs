@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::{CalibrationSource, DatasetKind};
+use deepfusion_data::{CalibrationSource, DatasetKind, NamedTopic, TopicRole};
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 use deepfusion_runtime::EngineProblem;
@@ -212,7 +212,18 @@ impl Reportable for deepfusion_data::Error {
             Self::Topic {
                 choice: Some(topic),
                 ..
+            } if topic.role.is_optional() => or(&format!(
+                "--topic {topic} (--topic {}={} reads none)",
+                topic.role,
+                NamedTopic::NONE
+            )),
+            Self::Topic {
+                choice: Some(topic),
+                ..
             } => or(&format!("--topic {topic}")),
+            Self::InertialUnit { .. } => {
+                or(&format!("--topic {}={}", TopicRole::Imu, NamedTopic::NONE))
+            }
             Self::NoSegmentVideo { .. } => hint
                 .map(|hint| format!("{hint}; `deepfusion data inspect` reports its other streams")),
             Self::NoTopics { .. } => Some("leave --topic out, or give bags alone".into()),

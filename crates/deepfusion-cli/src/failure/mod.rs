@@ -220,6 +220,19 @@ mod tests {
     }
 
     #[test]
+    fn a_bag_is_read_without_a_unit_of_no_use_by_an_option() {
+        let (found, norm) = ([0.0; 3], 0.0);
+        let error = deepfusion_data::Error::InertialUnit {
+            path: "drive.bag".into(),
+            source: Box::new(deepfusion_motion::Error::NotGravity { found, norm }),
+            config: "drive.toml".into(),
+        };
+        let hint = Failure::from(error).hint().unwrap();
+        assert!(hint.contains("--topic imu=none"), "{hint}");
+        assert!(hint.contains("(in drive.toml)"), "{hint}");
+    }
+
+    #[test]
     fn causes_follow_the_failure_and_are_not_said_twice() {
         let system = std::io::Error::from(ErrorKind::NotFound);
         let said = system.to_string();

@@ -56,6 +56,13 @@ impl TopicRole {
             Self::Truth => "truth",
         }
     }
+
+    /// Whether a bag is read without it, too: then [`NamedTopic::NONE`] may stand for its topic. There are no frames without images, and CAN
+    /// frames are read only where signals of theirs are asked for.
+    #[must_use]
+    pub fn is_optional(self) -> bool {
+        !matches!(self, Self::Image | Self::Can)
+    }
 }
 
 impl fmt::Display for TopicRole {
@@ -64,13 +71,18 @@ impl fmt::Display for TopicRole {
     }
 }
 
-/// A topic and what it is read for, written `speed=/gps/fix`.
+/// A topic and what it is read for, written `speed=/gps/fix`; `imu=none` where a bag has such topics, and none is to be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedTopic {
     /// What for.
     pub role: TopicRole,
-    /// The topic's whole name.
+    /// The topic's whole name, or [`Self::NONE`].
     pub topic: String,
+}
+
+impl NamedTopic {
+    /// In place of a topic's name: none is read for the role, which must be an [optional](TopicRole::is_optional) one.
+    pub const NONE: &'static str = "none";
 }
 
 impl fmt::Display for NamedTopic {

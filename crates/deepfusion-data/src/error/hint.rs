@@ -1,7 +1,7 @@
 //! What to do about each error.
 
 use super::{Error, FoundInstead};
-use crate::{DatasetKind, ImageProblem};
+use crate::{DatasetKind, ImageProblem, NamedTopic};
 use deepfusion_fs::Unfinished;
 use deepfusion_hint::{Hint, system_hint};
 use std::io::ErrorKind;
@@ -35,6 +35,13 @@ impl Hint for Error {
             Self::Video(error) => return error.hint(),
             Self::Log(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
+            Self::InertialUnit { source, config, .. } => {
+                let hint = source.hint().map_or_else(String::new, |hint| hint + "; ");
+                let (none, config) = (NamedTopic::NONE, config.display());
+                return Some(format!(
+                    "{hint}the bag is read without the unit by [topics] imu = \"{none}\" (in {config})"
+                ));
+            }
             Self::NotABag { .. } => {
                 "only bags have such a file; folders and videos have dataset.toml: docs/reference/dataset-toml.md"
             }

@@ -100,11 +100,16 @@ impl TopicProblem {
                 role,
                 topics,
                 config,
-            } => format!(
-                "name it: [topics] {role} = \"{}\" (in {})",
-                topics.first().map_or("", String::as_str),
-                config.display()
-            ),
+            } => {
+                let first = topics.first().map_or("", String::as_str);
+                let none = if role.is_optional() {
+                    format!(", or {role} = \"{}\" to read none", NamedTopic::NONE)
+                } else {
+                    String::new()
+                };
+                let config = config.display();
+                format!("name it: [topics] {role} = \"{first}\"{none} (in {config})")
+            }
             Self::AndSignal { role, .. } => {
                 format!("keep one of them: delete topics.{role} or can.{role}")
             }

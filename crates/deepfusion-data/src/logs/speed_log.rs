@@ -150,17 +150,8 @@ impl SpeedLog {
 
     /// What a receiver's track says beside the speeds, on the frames' clock.
     pub(crate) fn receiver(&self, origin_ns: i64) -> Receiver {
-        let signal = |samples: &Samples, gap_s: f64| {
-            let pairs = samples.ns.iter().zip(&samples.values);
-            let pairs = pairs.map(|(ns, value)| (seconds(*ns, origin_ns), *value));
-            Signal::with_max_gap(pairs, gap_s)
-        };
         let course = self.course_rates_radps.as_ref();
-        let sigma = self.sigmas_mps.as_ref();
-        Receiver {
-            course_rate_radps: course.map(|samples| signal(samples, COURSE_GAP_S)),
-            speed_sigma_mps: sigma.map(|samples| signal(samples, SIGMA_GAP_S)),
-        }
+        receiver(course, self.sigmas_mps.as_ref(), origin_ns)
     }
 
     /// The car's motion on the frames' clock, and whether its turns are known.
@@ -204,6 +195,23 @@ impl SpeedLog {
         let tilts = self.tilts_rad.iter();
         let tilts = tilts.map(|(ns, [roll, pitch])| (seconds(*ns, origin_ns), *roll, *pitch));
         track.with_tilt(&tilts.collect::<Vec<_>>())
+    }
+}
+
+/// What a receiver's track says beside the speeds, on the frames' clock: turns of its course (rad/s), and how sure the speeds are (m/s).
+pub(crate) fn receiver(
+    course_rates_radps: Option<&Samples>,
+    sigmas_mps: Option<&Samples>,
+    origin_ns: i64,
+) -> Receiver {
+    let signal = |samples: &Samples, gap_s: f64| {
+        let pairs = samples.ns.iter().zip(&samples.values);
+        let pairs = pairs.map(|(ns, value)| (seconds(*ns, origin_ns), *value));
+        Signal::with_max_gap(pairs, gap_s)
+    };
+    Receiver {
+        course_rate_radps: course_rates_radps.map(|samples| signal(samples, COURSE_GAP_S)),
+        speed_sigma_mps: sigmas_mps.map(|samples| signal(samples, SIGMA_GAP_S)),
     }
 }
 

@@ -188,6 +188,26 @@ impl TinyBag {
         })
     }
 
+    /// A satellite receiver's velocity, to the east (x) and to the north (y): of a constant speed, m/s, on courses from the east to the left
+    /// in radians, by the message's number.
+    pub(crate) fn course_twist(
+        &mut self,
+        topic: &str,
+        speed_mps: f64,
+        course: impl Fn(u32) -> f64,
+    ) -> &mut Self {
+        let count = std::cell::Cell::new(0_u32);
+        self.stream(topic, |header| {
+            let mut twist = TwistStamped {
+                header,
+                ..TwistStamped::default()
+            };
+            let (sin, cos) = course(count.replace(count.get() + 1)).sin_cos();
+            (twist.twist.linear.x, twist.twist.linear.y) = (speed_mps * cos, speed_mps * sin);
+            twist
+        })
+    }
+
     /// A twist with rates about all three axes, rad/s.
     pub(crate) fn tumbling_twist(
         &mut self,
@@ -228,10 +248,64 @@ impl TinyBag {
         })
     }
 
+    /// An inertial unit that says by a covariance of −1 that it has no angular rates, whatever stands there.
+    pub(crate) fn accelerometer(&mut self, topic: &str) -> &mut Self {
+        self.stream(topic, |header| {
+            let mut no_rates = [0.0; 9];
+            no_rates[0] = -1.0;
+            let up = |z| Vector3 {
+                z,
+                ..Vector3::default()
+            };
+            Imu {
+                header,
+                orientation: Quaternion::default(),
+                orientation_covariance: [0.0; 9],
+                angular_velocity: up(0.3),
+                angular_velocity_covariance: no_rates,
+                linear_acceleration: up(9.81),
+                linear_acceleration_covariance: [0.0; 9],
+            }
+        })
+    }
+
     /// From here on no header says when its message was measured.
     pub(crate) fn without_stamps(&mut self) -> &mut Self {
         self.2 = false;
         self
+    }
+
+    /// An odometry without a twist: on a circle to the left from the world's x on, at a speed (m/s) and a yaw rate (rad/s), with its
+    /// attitude turned by so much (radians) from the way it goes.
+    pub(crate) fn poses(
+        &mut self,
+        topic: &str,
+        speed_mps: f64,
+        yaw_rate: f64,
+        turned_rad: f64,
+    ) -> &mut Self {
+        let count = std::cell::Cell::new(0_u32);
+        self.stream(topic, |header| {
+            let time_s = 0.04 * f64::from(count.replace(count.get() + 1));
+            let (angle, radius) = (yaw_rate * time_s, speed_mps / yaw_rate);
+            let (z, w) = (0.5 * (angle + turned_rad)).sin_cos();
+            let mut pose = Pose::default();
+            pose.position.x = radius * angle.sin();
+            pose.position.y = radius * (1.0 - angle.cos());
+            (pose.orientation.z, pose.orientation.w) = (z, w);
+            Odometry {
+                header,
+                child_frame_id: "body".into(),
+                pose: PoseWithCovariance {
+                    pose,
+                    covariance: [0.0; 36],
+                },
+                twist: TwistWithCovariance {
+                    twist: Twist::default(),
+                    covariance: [0.0; 36],
+                },
+            }
+        })
     }
 
     pub(crate) fn odometry(&mut self, topic: &str, speed_mps: f64) -> &mut Self {

@@ -2,7 +2,8 @@
 
 use super::common::{Drive, open, open_with, refusal, says};
 use crate::common::bag::{CAMERA, TinyBag};
-use deepfusion_data::Error;
+use crate::common::text_of;
+use deepfusion_data::{Dataset, Error, OpenOptions, write_bag_config};
 
 #[test]
 fn the_speeds_messages_are_read_and_positions_come_last() {
@@ -113,4 +114,221 @@ fn a_topic_is_named_by_a_caller() {
     deepfusion_data::save_png(&picture, &folder.path().join("0.png")).unwrap();
     let text = refusal(open_with(folder.path(), &["image=/twist"]));
     says(&text, &["image=/twist", "has no topics"]);
+}
+
+/// `nmea_navsat_driver` and ublox write east and north where a vehicle writes ahead and to the left.
+#[test]
+fn a_receiver_s_velocity_to_east_and_north_is_no_speed_ahead() {
+    let opened = |course: fn(u32) -> f64| {
+        Drive::bare(CAMERA, |bag| {
+            bag.images("/image").course_twist("/vel", 8.0, course);
+        })
+        .opened()
+    };
+    // To the north-west: as a speed ahead it would be negative.
+    let receiver = opened(|_| 2.4);
+    let speed = receiver.frames()[12].speed_mps.unwrap();
+    assert!((speed - 8.0).abs() < 1e-6, "{speed}");
+    assert!(!receiver.yaw_known());
+    says(&text_of(receiver.warnings()), &["/vel", "world's axes"]);
+    // A vehicle that slips in bends.
+    let vehicle = opened(|i| if i % 5 == 0 { 0.35 } else { 0.05 });
+    let speed = vehicle.frames()[12].speed_mps.unwrap();
+    assert!(speed < 7.995, "{speed}");
+    let said = text_of(vehicle.warnings());
+    assert!(!said.contains("world's axes"), "{said}");
+}
+
+/// ROS 2's controllers publish what they are asked for with a stamp, too.
+#[test]
+fn a_command_is_taken_for_a_measurement_only_where_there_is_none() {
+    let sidecar = format!("{CAMERA}[vehicle]\nwheelbase_m = 2.5\n");
+    let drive = |fill: fn(&mut TinyBag)| {
+        Drive::bare(&sidecar, |bag| {
+            bag.images("/image").twist("/controller/cmd_vel", 3.0);
+            bag.ackermann("/ackermann_cmd", 3.0, 0.3);
+            fill(bag);
+        })
+    };
+    let speed = |drive: &Drive| drive.opened().frames()[12].speed_mps.unwrap();
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 0.05, "{found}");
+    let measured = drive(|bag| {
+        bag.odometry("/odom", 7.0).ackermann("/report", 9.0, 0.0);
+    });
+    near(speed(&measured), 7.0);
+    let opened = measured.opened();
+    let said = text_of(opened.warnings());
+    assert!(!said.contains("command"), "{said}");
+    let turn = opened.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
+    assert!(turn.abs() < 1e-6, "{turn}");
+    // Positions are weak, and measured.
+    near(
+        speed(&drive(|bag| {
+            bag.fixes("/fix", 12.0);
+        })),
+        12.0,
+    );
+    let alone = drive(|_| {});
+    near(speed(&alone), 3.0);
+    let opened = alone.opened();
+    says(
+        &text_of(opened.warnings()),
+        &[
+            "/controller/cmd_vel: by its name a command, taken for the measured speed",
+            "/ackermann_cmd: by its name a command, taken for the measured steering",
+        ],
+    );
+    // Whoever names it knows.
+    let named = ["speed=/controller/cmd_vel", "steering=/ackermann_cmd"];
+    let named = open_with(&alone.bag, &named).unwrap();
+    assert!(!text_of(named.warnings()).contains("command"));
+}
+
+#[test]
+fn an_inertial_unit_that_is_of_no_use_can_be_left_out() {
+    let level = |fill: fn(&mut TinyBag)| {
+        Drive::bare(CAMERA, |bag| {
+            bag.images("/image")
+                .turning_twist("/twist", |_| (10.0, 0.2));
+            fill(bag);
+        })
+    };
+    // What a filter leaves of the accelerations once gravity is out.
+    let filtered = level(|bag| {
+        bag.imu_along_z("/imu/data", 0.2, 0.02);
+    });
+    let text = filtered.refusal();
+    says(
+        &text,
+        &["removed already", "[topics] imu = \"none\"", "drive.toml"],
+    );
+    assert!(matches!(
+        open(&filtered.bag),
+        Err(Error::InertialUnit { .. })
+    ));
+    let turn = |dataset: &Dataset| {
+        let motion = dataset.track().unwrap().motion(0.2, 0.7);
+        motion.unwrap().yaw_rad
+    };
+    // By its own yaw rate then, which the caller's word or the file's brings back.
+    let left_out = open_with(&filtered.bag, &["imu=none"]).unwrap();
+    assert!(left_out.yaw_known() && (turn(&left_out) - 0.1).abs() < 1e-6);
+    let sidecar = format!("{CAMERA}[topics]\nimu = \"none\"\n");
+    std::fs::write(filtered.bag.with_extension("toml"), sidecar).unwrap();
+    assert!((turn(&filtered.opened()) - 0.1).abs() < 1e-6);
+
+    // RealSense's two: neither is a unit by itself.
+    let apart = level(|bag| {
+        bag.imu_along_z("/camera/gyro/sample", 0.2, 0.0)
+            .accelerometer("/camera/accel/sample");
+    });
+    says(
+        &apart.refusal(),
+        &[
+            "2 topics could be the imu",
+            "or imu = \"none\" to read none",
+        ],
+    );
+    let named = open_with(&apart.bag, &["imu=/camera/accel/sample"]).unwrap();
+    assert!((turn(&named) - 0.1).abs() < 1e-6);
+    says(
+        &text_of(named.warnings()),
+        &["/camera/accel/sample: not read, as it has no angular rates"],
+    );
+    // What stands for no rate may be zeros, too.
+    let still = Drive::bare(CAMERA, |bag| {
+        bag.images("/image").twist("/twist", 10.0);
+        bag.imu_along_z("/imu", 0.0, 9.81);
+    })
+    .opened();
+    assert!(!still.yaw_known());
+    says(&text_of(still.warnings()), &["/imu: not read"]);
+    // There is nothing without images.
+    let text = refusal(open_with(&apart.bag, &["imu=none", "image=none"]));
+    says(&text, &["has no topic none", "topics.image"]);
+}
+
+#[test]
+fn what_is_not_to_be_read_stays_so_in_the_file_that_is_written() {
+    let can = "[can]\nspeed_unit = \"km/h\"\n\
+        speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
+    let drive = Drive::bare(&format!("{CAMERA}{can}"), |bag| {
+        bag.images("/image").twist("/twist", 5.0);
+        bag.imu("/imu/a", 0.2).imu("/imu/b", 0.2);
+    });
+    let options = OpenOptions {
+        topics: vec!["imu=none".parse().unwrap(), "speed=none".parse().unwrap()],
+        ..OpenOptions::default()
+    };
+    write_bag_config(&drive.bag, &options, true).unwrap();
+    let text = std::fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
+    says(&text, &["imu = \"none\"", "speed = \"none\""]);
+    let opened = drive.opened();
+    assert_eq!(opened.frames()[12].speed_mps, None);
+    assert!(opened.track().is_none());
+}
+
+/// FAST-LIO and others leave the twist of their odometry at 0.
+#[test]
+fn an_odometry_without_a_twist_moves_as_its_poses_do() {
+    let drive = |turned_rad: f64, scale: &str| {
+        Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
+            bag.images("/image")
+                .poses("/Odometry", 10.0, 0.4, turned_rad);
+        })
+        .opened()
+    };
+    let dataset = drive(0.0, "");
+    let speed = dataset.frames()[12].speed_mps.unwrap();
+    assert!((speed - 10.0).abs() < 0.01, "{speed}");
+    let turn = dataset.track().unwrap().motion(0.2, 0.7).unwrap().yaw_rad;
+    assert!(
+        dataset.yaw_known() && (turn - 0.2).abs() < 1e-3,
+        "{turn} rad"
+    );
+    says(
+        &text_of(dataset.warnings()),
+        &["/Odometry: its messages have no twist: speed and turns"],
+    );
+    let scaled = drive(0.0, "vehicle = { speed_scale = 0.5 }\n");
+    let speed = scaled.frames()[12].speed_mps.unwrap();
+    assert!((speed - 5.0).abs() < 0.01, "{speed}");
+    // A body whose x looks to the side.
+    let sideways = drive(1.5, "");
+    assert_eq!(sideways.frames()[12].speed_mps, None);
+    says(&text_of(sideways.warnings()), &["/Odometry: no speed"]);
+    // One that stands is believed.
+    let standing = Drive::bare(CAMERA, |bag| {
+        bag.images("/image").odometry("/odom", 0.0);
+    })
+    .opened();
+    assert_eq!(standing.frames()[12].speed_mps, Some(0.0));
+}
+
+/// As a GPX file's beside a video: what is unsure counts less in training.
+#[test]
+fn speeds_of_positions_say_how_sure_they_are() {
+    let opened = |scale: &str, positions: bool| {
+        Drive::bare(&format!("{CAMERA}{scale}"), |bag| {
+            bag.images("/image");
+            if positions {
+                bag.fixes("/fix", 12.0);
+            } else {
+                bag.twist("/twist", 12.0);
+            }
+        })
+        .opened()
+    };
+    let sigma_m = |dataset: &Dataset| {
+        let ego = dataset.ego().unwrap();
+        let motion = ego.between(dataset.frames(), 12, 13).unwrap();
+        motion.distance_sigma_m
+    };
+    let dataset = opened("", true);
+    let found = sigma_m(&dataset).unwrap();
+    assert!(found > 0.004, "a tenth of a m/s over 40 ms: {found} m");
+    assert!(dataset.receiver().course_rate_radps.is_some());
+    let scaled = sigma_m(&opened("vehicle = { speed_scale = 0.5 }\n", true)).unwrap();
+    assert!((scaled - 0.5 * found).abs() < 1e-9, "{scaled} of {found}");
+    assert_eq!(sigma_m(&opened("", false)), None);
 }

@@ -1,5 +1,6 @@
 //! What is unsure about how the vehicle moved.
 
+use crate::TopicRole;
 use deepfusion_hint::count_of;
 use deepfusion_logs::LogNote;
 use deepfusion_motion::can::CanId;
@@ -131,6 +132,46 @@ pub enum MotionWarning {
         /// The median of their standard deviations, m/s.
         sigma_mps: f64,
     },
+    /// A topic's velocities are along other axes than the vehicle's.
+    #[error(
+        "{topic}: its velocities are in the world's axes: their length is taken as the speed, and always as forward"
+    )]
+    WorldAxes {
+        /// The topic.
+        topic: String,
+    },
+    /// What the vehicle was asked for stands for what it did.
+    #[error(
+        "{topic}: by its name a command, taken for the measured {role} as nothing else is there; another source is better"
+    )]
+    Commanded {
+        /// The topic.
+        topic: String,
+        /// What it is taken for.
+        role: TopicRole,
+    },
+    /// The messages of an odometry have no twist: its poses say how the vehicle moves.
+    #[error("{topic}: its messages have no twist: speed and turns are those of its poses")]
+    OfPoses {
+        /// The topic.
+        topic: String,
+    },
+    /// The messages of an odometry have no twist, and its poses are of a body with other axes than the vehicle's.
+    #[error(
+        "{topic}: no speed, as its messages have no twist, and its poses' x does not point along the way"
+    )]
+    PosesOfOtherAxes {
+        /// The topic.
+        topic: String,
+    },
+    /// The messages of an inertial unit say no angular rates.
+    #[error(
+        "{topic}: not read, as it has no angular rates: they are 0 throughout, or said not to be there"
+    )]
+    NoRates {
+        /// The topic.
+        topic: String,
+    },
     /// Values that a signal has by its description never: the bus's way to say that it has none.
     #[error("{key}: {} beyond the signal's range left out", count_of(*frames, "value"))]
     BeyondRange {
@@ -224,6 +265,35 @@ mod tests {
                     sigma_mps: 0.123,
                 },
                 "/gnss/fix: speeds are those of its positions, smoothed, sure to 0.12 m/s in the middle",
+            ),
+            (
+                MotionWarning::Commanded {
+                    topic: "/cmd_vel".into(),
+                    role: TopicRole::Speed,
+                },
+                "/cmd_vel: by its name a command, taken for the measured speed as nothing else is there; another source is better",
+            ),
+            (
+                MotionWarning::OfPoses {
+                    topic: "/Odometry".into(),
+                },
+                "/Odometry: its messages have no twist: speed and turns are those of its poses",
+            ),
+            (
+                MotionWarning::PosesOfOtherAxes {
+                    topic: "/vins".into(),
+                },
+                "/vins: no speed, as its messages have no twist, and its poses' x does not point along the way",
+            ),
+            (
+                MotionWarning::NoRates {
+                    topic: "/camera/accel/sample".into(),
+                },
+                "/camera/accel/sample: not read, as it has no angular rates: they are 0 throughout, or said not to be there",
+            ),
+            (
+                MotionWarning::WorldAxes { topic: topic() },
+                "/gnss/fix: its velocities are in the world's axes: their length is taken as the speed, and always as forward",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

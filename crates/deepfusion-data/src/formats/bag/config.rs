@@ -80,7 +80,7 @@ pub(super) struct FrameNames {
     pub(super) imu: Option<String>,
 }
 
-/// Topics by name.
+/// Topics by name; [`NamedTopic::NONE`] for none.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct TopicNames {
@@ -93,6 +93,29 @@ pub(super) struct TopicNames {
     pub(super) steering: Option<String>,
     pub(super) can: Option<String>,
     pub(super) truth: Option<String>,
+}
+
+impl TopicNames {
+    /// The name for a role.
+    fn of(&self, role: TopicRole) -> Option<&str> {
+        let name = match role {
+            TopicRole::Image => &self.image,
+            TopicRole::CameraInfo => &self.camera_info,
+            TopicRole::Lidar => &self.lidar,
+            TopicRole::Dynamic => &self.dynamic,
+            TopicRole::Imu => &self.imu,
+            TopicRole::Speed => &self.speed,
+            TopicRole::Steering => &self.steering,
+            TopicRole::Can => &self.can,
+            TopicRole::Truth => &self.truth,
+        };
+        name.as_deref()
+    }
+
+    /// Whether nothing is to be read for a role.
+    pub(super) fn is_none(&self, role: TopicRole) -> bool {
+        role.is_optional() && self.of(role) == Some(NamedTopic::NONE)
+    }
 }
 
 /// A camera by four numbers and its image's size.

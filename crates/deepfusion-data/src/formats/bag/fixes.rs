@@ -2,7 +2,7 @@
 
 use crate::logs::samples::Samples;
 use crate::{DataWarning, MotionWarning};
-use deepfusion_motion::{Fix, speeds_of_fixes};
+use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
 use deepfusion_rosbag::msg::NavSatFix;
 
 /// A receiver that has no position says so by a status below this.
@@ -15,6 +15,17 @@ pub(super) struct Fixes {
     places: Vec<(i64, [f64; 2])>,
     /// Messages of a receiver that had no position.
     without: usize,
+}
+
+/// What positions say of how the vehicle moved. Times are nanoseconds.
+#[derive(Debug, Default)]
+pub(super) struct SpeedsOfFixes {
+    /// Over ground, with those between that a slow receiver leaves out.
+    pub(super) speeds_mps: Vec<(i64, f64)>,
+    /// Standard deviations of the speeds at the positions.
+    pub(super) sigmas_mps: Option<Samples>,
+    /// How the course turned, positive to the left, where the vehicle moved.
+    pub(super) course_rates_radps: Option<Samples>,
 }
 
 impl Fixes {
@@ -38,14 +49,14 @@ impl Fixes {
         self.places.iter().map(|(ns, _)| *ns)
     }
 
-    /// Speeds over ground in m/s, of all positions together, with those between that a slow receiver leaves out: gaps of up to
-    /// `max_gap_s` are bridged, or of a few seconds. How that was done goes to the warnings.
+    /// Speeds of all positions together: gaps of up to `max_gap_s` are bridged, or of a few seconds. How that was done goes to the
+    /// warnings.
     pub(super) fn speeds(
         &mut self,
         topic: &str,
         max_gap_s: Option<f64>,
         warnings: &mut Vec<DataWarning>,
-    ) -> Vec<(i64, f64)> {
+    ) -> SpeedsOfFixes {
         self.places.sort_by_key(|(ns, _)| *ns);
         if self.without > 0 {
             let left_out = MotionWarning::NoPosition {
@@ -56,7 +67,7 @@ impl Fixes {
             warnings.push(left_out.into());
         }
         let Some(&(origin_ns, _)) = self.places.first() else {
-            return Vec::new();
+            return SpeedsOfFixes::default();
         };
         let fixes = self.places.iter().map(|(ns, [north, east])| Fix {
             time_s: (ns - origin_ns) as f64 * 1e-9,
@@ -73,7 +84,7 @@ impl Fixes {
                 positions: self.places.len(),
             };
             warnings.push(too_few.into());
-            return Vec::new();
+            return SpeedsOfFixes::default();
         };
         let of_positions = MotionWarning::OfPositions {
             topic: topic.to_owned(),
@@ -81,13 +92,24 @@ impl Fixes {
         };
         warnings.push(of_positions.into());
         let ns = |s: f64| origin_ns + (s * 1e9).round() as i64;
-        let samples = Samples {
+        let at_fixes = |values: Vec<f64>| Samples {
             ns: smoothed.iter().map(|s| ns(s.time_s)).collect(),
-            values: smoothed.iter().map(|s| s.speed_mps).collect(),
+            values,
         };
+        let samples = at_fixes(smoothed.iter().map(|s| s.speed_mps).collect());
+        let sigmas = at_fixes(smoothed.iter().map(|s| s.sigma_mps).collect());
+        let rates = course_rates(&smoothed);
+        let course_rates_radps = (!rates.is_empty()).then(|| Samples {
+            ns: rates.iter().map(|(time_s, _)| ns(*time_s)).collect(),
+            values: rates.iter().map(|(_, rate)| *rate).collect(),
+        });
         let setting = "vehicle.max_gap_s in the file beside the bag";
         let bridged = samples.bridged(max_gap_s, Some((warnings, topic, setting)));
-        bridged.ns.into_iter().zip(bridged.values).collect()
+        SpeedsOfFixes {
+            speeds_mps: bridged.ns.into_iter().zip(bridged.values).collect(),
+            sigmas_mps: Some(sigmas),
+            course_rates_radps,
+        }
     }
 }
 
@@ -122,7 +144,14 @@ mod tests {
             fixes.add(second * 1_000_000_000, &fix(metres, status));
         }
         let mut warnings = Vec::new();
-        let speeds = fixes.speeds("/fix", None, &mut warnings);
+        let found = fixes.speeds("/fix", None, &mut warnings);
+        // Those of the positions alone, which are 18.
+        let sigmas = found.sigmas_mps.unwrap();
+        assert_eq!(sigmas.ns.len(), 18);
+        assert!(sigmas.values.iter().all(|sigma| (0.1..3.0).contains(sigma)));
+        let turns = found.course_rates_radps.unwrap();
+        assert!(turns.values.iter().all(|rate| rate.abs() < 1e-6));
+        let speeds = found.speeds_mps;
         assert!(
             speeds.iter().all(|(_, v)| (v - 10.0).abs() < 0.05),
             "{speeds:?}"
@@ -140,14 +169,15 @@ mod tests {
             assert!(warnings.contains(said), "{said}: {warnings}");
         }
         // Not across more than is allowed.
-        let speeds = fixes.speeds("/fix", Some(2.0), &mut Vec::new());
+        let speeds = fixes.speeds("/fix", Some(2.0), &mut Vec::new()).speeds_mps;
         let steps = speeds.windows(2).map(|w| w[1].0 - w[0].0);
         assert_eq!(steps.max(), Some(3_000_000_000));
         // One position alone is no speed, and none at all is none.
         let mut lone = Fixes::default();
         lone.add(0, &fix(0.0, 0));
         let mut warnings = Vec::new();
-        assert!(lone.speeds("/fix", None, &mut warnings).is_empty());
+        let found = lone.speeds("/fix", None, &mut warnings);
+        assert!(found.speeds_mps.is_empty() && found.sigmas_mps.is_none());
         let said = warnings[0].to_string();
         assert!(said.contains("at least two"), "{said}");
     }

@@ -1,10 +1,12 @@
 //! An image message as pixels.
 
 use super::index::MessageRef;
-use crate::{Error, ImageProblem, Result, decode_rgb};
-use deepfusion_rosbag::msg::{CompressedImage, Image, RosMessage};
+use crate::{Error, ImageProblem, Result};
+use deepfusion_images::decode_bytes;
+use deepfusion_rosbag::msg::{CompressedImage, Encoding, Image, RosMessage};
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
+use std::borrow::Cow;
 
 /// The message of a topic recorded at a place's time.
 ///
@@ -41,10 +43,41 @@ pub(super) fn message<'bag>(
 /// [`Error::Bag`] for an encoding that is no picture, or sizes that contradict each other; [`Error::Image`].
 pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<RgbImage> {
     if message.is::<CompressedImage<'_>>() {
-        let image: CompressedImage<'_> = message.decode()?;
-        return Ok(decode_rgb(&image.data, bag.path())?);
+        let compressed: CompressedImage<'_> = message.decode()?;
+        let picture = decode_bytes(&compressed.data, bag.path())?;
+        return match (mosaic(&compressed.format), picture) {
+            (Some(encoding), DynamicImage::ImageLuma8(grey)) => {
+                let (width, height) = grey.dimensions();
+                let image = Image {
+                    header: compressed.header,
+                    height,
+                    width,
+                    encoding,
+                    is_bigendian: 0,
+                    step: width,
+                    data: Cow::Owned(grey.into_raw()),
+                };
+                rgb(bag, message, &image)
+            }
+            (_, picture) => Ok(picture.into_rgb8()),
+        };
     }
     let image: Image<'_> = message.decode()?;
+    rgb(bag, message, &image)
+}
+
+/// The Bayer pattern of a picture that was compressed as its sensor took it, a colour a pixel, by the message's format: ROS 1 writes
+/// `bayer_rggb8; jpeg compressed ` of it, and with `bgr8` behind where colours were made first.
+fn mosaic(format: &str) -> Option<String> {
+    let (encoding, rest) = format.split_once(';')?;
+    let (_, compressed_as) = rest.split_once("compressed")?;
+    let encoding = encoding.trim();
+    let is_bayer = matches!(Encoding::from_name(encoding), Some(Encoding::Bayer8(_)));
+    (is_bayer && compressed_as.trim().is_empty()).then(|| encoding.to_owned())
+}
+
+/// The pixels of an image that `message` holds.
+fn rgb(bag: &dyn MessageSource, message: &Message<'_>, image: &Image<'_>) -> Result<RgbImage> {
     // As a message of the bag's, whose hint says what is read: an image file's would say PNG and JPEG.
     let pixels = image
         .to_rgb8()
@@ -70,15 +103,25 @@ mod tests {
     use deepfusion_hint::Hint;
     use deepfusion_rosbag::msg::Header;
     use deepfusion_rosbag::{Bag, BagWriter, WriterOptions};
-    use std::borrow::Cow;
+    use std::io::Cursor;
 
-    /// The picture of a bag with one image of 2 × 2 pixels.
-    fn picture(encoding: &str) -> Result<RgbImage> {
+    /// The picture of a bag with one message.
+    fn decoded<'m, M: RosMessage<'m>>(image: &M) -> Result<RgbImage> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("one.bag");
         let mut writer = BagWriter::create(&path, WriterOptions::default()).unwrap();
-        let connection = writer.add_connection::<Image<'_>>("/camera").unwrap();
-        let image = Image {
+        let connection = writer.add_connection::<M>("/camera").unwrap();
+        let time = Time::from_nanos(1);
+        writer.write(connection, time, image).unwrap();
+        writer.finish().unwrap();
+        let bag = Bag::open(&path).unwrap();
+        let mut messages = bag.messages_on_demand(Selection::all()).unwrap();
+        decode(&bag, &messages.next().unwrap().unwrap())
+    }
+
+    /// The picture of one image of 2 × 2 pixels.
+    fn picture(encoding: &str) -> Result<RgbImage> {
+        decoded(&Image {
             header: Header::default(),
             height: 2,
             width: 2,
@@ -86,13 +129,42 @@ mod tests {
             is_bigendian: 0,
             step: 8,
             data: Cow::Owned(vec![128; 16]),
+        })
+    }
+
+    /// A mosaic of one colour, as a grey picture of 4 × 4 pixels.
+    fn of_format(format: &str) -> RgbImage {
+        let filter = [[200, 90], [90, 7]];
+        let grey = image::GrayImage::from_fn(4, 4, |x, y| {
+            image::Luma([filter[y as usize % 2][x as usize % 2]])
+        });
+        let mut file = Vec::new();
+        grey.write_to(&mut Cursor::new(&mut file), image::ImageFormat::Png)
+            .unwrap();
+        let compressed = CompressedImage {
+            header: Header::default(),
+            format: format.to_owned(),
+            data: Cow::Owned(file),
         };
-        let time = Time::from_nanos(1);
-        writer.write(connection, time, &image).unwrap();
-        writer.finish().unwrap();
-        let bag = Bag::open(&path).unwrap();
-        let mut messages = bag.messages_on_demand(Selection::all()).unwrap();
-        decode(&bag, &messages.next().unwrap().unwrap())
+        decoded(&compressed).unwrap()
+    }
+
+    #[test]
+    fn a_mosaic_that_was_compressed_as_it_is_has_colours() {
+        let colour = [200_u8, 90, 7].repeat(16);
+        assert_eq!(of_format("bayer_rggb8; jpeg compressed ").as_raw(), &colour);
+        assert_eq!(of_format("bayer_rggb8; png compressed").as_raw(), &colour);
+        // Grey pictures, whatever the camera had before.
+        for format in [
+            "jpeg",
+            "mono8; jpeg compressed ",
+            "bayer_rggb8; jpeg compressed mono8",
+            "bayer_rggb16; png compressed ",
+            "bayer_rggb8",
+        ] {
+            let grey = of_format(format);
+            assert_eq!(grey.get_pixel(0, 0).0, [200; 3], "{format}");
+        }
     }
 
     #[test]

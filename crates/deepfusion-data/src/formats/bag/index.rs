@@ -4,18 +4,22 @@ use super::can::Can;
 use super::config::BagConfig;
 use super::fixes::Fixes;
 use super::frames::Frames;
+use super::odometry_poses::{PoseMotion, motion_of};
 use super::packet::{VideoTopic, packet};
+use super::readings::{Reading, reading, steering};
 use super::topics::{Role, Topics};
-use crate::{ConfigProblem, DataWarning, Error, ImageProblem, Result};
+use super::world_axes::are_world_axes;
+use crate::logs::samples::Samples;
+use crate::{DataWarning, Error, ImageProblem, MotionWarning, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
-    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, NavSatFix, Odometry,
-    OldTFMessage, TFMessage, Twist, TwistStamped, TwistWithCovarianceStamped,
+    CameraInfo, Float32, Float64, Frame, Imu, NavSatFix, Odometry, OldTFMessage, TFMessage,
 };
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A message that is read again when it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,12 +55,22 @@ pub(super) struct Index {
     pub(super) camera_info: Option<CameraInfo>,
     /// Of a message each; of satellite positions what [`Fixes::speeds`] makes of them.
     pub(super) speed_mps: Vec<(i64, f64)>,
+    /// Of a twist each: the velocity across that of `speed_mps`.
+    across_mps: Vec<f64>,
+    /// Of an odometry's messages, each without a twist: `world_from_body`.
+    poses: Vec<(i64, Se3)>,
     /// Satellite positions, where they are the speed's source.
     pub(super) fixes: Fixes,
+    /// How sure the speeds of positions are.
+    pub(super) sigmas_mps: Option<Samples>,
+    /// How the course of positions turned.
+    pub(super) course_rates_radps: Option<Samples>,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
     pub(super) yaw_rate: Vec<(i64, f64)>,
     /// Roll and pitch rate, in rad/s, where a twist gives all three.
     pub(super) tilt_rates: Vec<(i64, [f64; 2])>,
+    /// Roll and pitch, in radians, where the speeds are those of poses.
+    pub(super) tilts_rad: Vec<(i64, [f64; 2])>,
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
     /// `world_from_vehicle`, exact.
@@ -81,10 +95,10 @@ pub(super) struct Index {
 }
 
 impl Index {
-    /// Whether the messages that hold the speed ever say a turn: publishers that know none write zeros, or NaN.
+    /// Whether the messages that hold the speed ever say a turn: publishers that know none write zeros, or NaN. Poses always say it.
     pub(super) fn says_turns(&self) -> bool {
         let turns = |rate: f64| rate.is_finite() && rate != 0.0;
-        self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
+        !self.tilts_rad.is_empty() || self.yaw_rate.iter().any(|(_, rate)| turns(*rate))
     }
 
     /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. What cannot be read is
@@ -114,12 +128,21 @@ impl Index {
         if !index.fixes.is_empty() {
             let topic = topics.of(Role::Speed).unwrap_or_default();
             let most = config.vehicle.max_gap_s;
-            index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
+            let found = index.fixes.speeds(topic, most, &mut index.computed);
+            index.speed_mps = found.speeds_mps;
+            index.sigmas_mps = found.sigmas_mps;
+            index.course_rates_radps = found.course_rates_radps;
         }
+        index.take_poses(bag.path(), topics);
+        index.take_lengths(topics);
+        index.leave_out_rateless(topics);
         let beyond = can.keep_measured(&mut index.speed_mps, &mut index.steering_rad);
         // The one place where the vehicle's speeds are scaled, whichever message held them.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
         index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
+        if let Some(sigmas) = &mut index.sigmas_mps {
+            sigmas.values.iter_mut().for_each(|v| *v *= scale);
+        }
         index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
         index.silent.extend(beyond);
         if let Some(video) = &mut index.video {
@@ -140,6 +163,67 @@ impl Index {
         index.dynamic.sort_by_key(|p| p.stamp_ns);
         index.truth.sort_by_key(|p| p.0);
         Ok(index)
+    }
+
+    /// An odometry of which every message leaves its twist at 0 says by its poses how the vehicle moves. Where these are of a body with
+    /// other axes nothing is known of the speed: the zeros would be a vehicle that stands.
+    fn take_poses(&mut self, bag: &Path, topics: &Topics) {
+        let poses = std::mem::take(&mut self.poses);
+        if poses.is_empty() || poses.len() != self.speed_mps.len() {
+            return;
+        }
+        let topic = topics.of(Role::Speed).unwrap_or_default().to_owned();
+        let warning = match motion_of(bag, poses) {
+            PoseMotion::Standing => return,
+            PoseMotion::OtherAxes => {
+                self.speed_mps.clear();
+                self.yaw_rate.clear();
+                MotionWarning::PosesOfOtherAxes { topic }
+            }
+            PoseMotion::Moving(log) => {
+                self.speed_mps = pairs(log.speeds_mps);
+                self.yaw_rate = log.yaw_rates_radps.map(pairs).unwrap_or_default();
+                self.tilts_rad = log.tilts_rad;
+                MotionWarning::OfPoses { topic }
+            }
+        };
+        self.tilt_rates.clear();
+        self.across_mps.clear();
+        self.computed.push(warning.into());
+    }
+
+    /// Of velocities along the world's axes their length is the speed. Which way the vehicle's front looked they do not say.
+    fn take_lengths(&mut self, topics: &Topics) {
+        let across = std::mem::take(&mut self.across_mps);
+        let ahead = self.speed_mps.iter().map(|(_, ahead)| *ahead);
+        if across.len() != self.speed_mps.len()
+            || !are_world_axes(ahead.zip(across.iter().copied()))
+        {
+            return;
+        }
+        for ((_, speed), across) in self.speed_mps.iter_mut().zip(across) {
+            *speed = speed.hypot(across);
+        }
+        let topic = topics.of(Role::Speed).unwrap_or_default().to_owned();
+        self.computed
+            .push(MotionWarning::WorldAxes { topic }.into());
+    }
+
+    /// An inertial unit that measures no rates is none here: its zeros are no straight drive. Some drivers publish a gyroscope and an
+    /// accelerometer as a topic each, others fill in the accelerations alone.
+    fn leave_out_rateless(&mut self, topics: &Topics) {
+        let Some(topic) = topics.of(Role::Imu) else {
+            return;
+        };
+        let none = Vector3::<f64>::zeros();
+        let measures = |(_, sample): &(i64, ImuSample)| sample.angular_rate_radps != none;
+        if self.imu.iter().any(measures) {
+            return;
+        }
+        self.imu.clear();
+        self.imu_frame = None;
+        let topic = topic.to_owned();
+        self.computed.push(MotionWarning::NoRates { topic }.into());
     }
 
     fn add(
@@ -183,6 +267,10 @@ impl Index {
                 Role::CameraInfo => {}
                 Role::Imu => {
                     let imu: Imu = message.decode()?;
+                    // By the message's definition: there are no angular rates.
+                    if imu.angular_velocity_covariance[0] == -1.0 {
+                        continue;
+                    }
                     let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
                     let sample = ImuSample {
                         time_s: 0.0,
@@ -208,13 +296,17 @@ impl Index {
                 Role::Speed => {
                     let Reading {
                         speed_mps,
+                        across_mps,
                         rates,
                         frame,
+                        pose,
                     } = reading(message, config)?;
                     if self.speed_frame.is_none() {
                         self.speed_frame = frame.filter(|f| !f.is_empty());
                     }
                     self.speed_mps.push((at_ns, speed_mps));
+                    self.across_mps.extend(across_mps);
+                    self.poses.extend(pose.map(|pose| (at_ns, pose)));
                     if let Some([roll, pitch, yaw]) = rates {
                         self.yaw_rate.push((at_ns, yaw));
                         self.tilt_rates.push((at_ns, [roll, pitch]));
@@ -246,83 +338,9 @@ impl Index {
     }
 }
 
-/// What a message about the speed says.
-struct Reading {
-    speed_mps: f64,
-    /// Roll, pitch and yaw rate, in rad/s.
-    rates: Option<[f64; 3]>,
-    /// The frame that has this speed.
-    frame: Option<String>,
-}
-
-/// The vehicle's forward speed by whatever message holds it.
-fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
-    if message.is::<TwistStamped>() {
-        let twist: TwistStamped = message.decode()?;
-        return Ok(Reading {
-            speed_mps: twist.twist.linear.x,
-            rates: Some(rates(&twist.twist)),
-            frame: Some(twist.header.frame_id),
-        });
-    }
-    if message.is::<TwistWithCovarianceStamped>() {
-        let twist: TwistWithCovarianceStamped = message.decode()?;
-        return Ok(Reading {
-            speed_mps: twist.twist.twist.linear.x,
-            rates: Some(rates(&twist.twist.twist)),
-            frame: Some(twist.header.frame_id),
-        });
-    }
-    if message.is::<AckermannDriveStamped>() {
-        let drive: AckermannDriveStamped = message.decode()?;
-        return Ok(Reading {
-            speed_mps: f64::from(drive.drive.speed),
-            rates: None,
-            frame: Some(drive.header.frame_id),
-        });
-    }
-    if message.is::<Odometry>() {
-        let odometry: Odometry = message.decode()?;
-        let twist = odometry.twist.twist;
-        return Ok(Reading {
-            speed_mps: twist.linear.x,
-            rates: Some(rates(&twist)),
-            frame: Some(odometry.child_frame_id),
-        });
-    }
-    let value = number(message)?;
-    let unit = config.vehicle.speed_unit.ok_or_else(|| {
-        config.wrong(ConfigProblem::NoSpeedUnit {
-            topic: message.topic().to_owned(),
-        })
-    })?;
-    Ok(Reading {
-        speed_mps: value * unit.metres_per_second(),
-        rates: None,
-        frame: None,
-    })
-}
-
-fn rates(twist: &Twist) -> [f64; 3] {
-    [twist.angular.x, twist.angular.y, twist.angular.z]
-}
-
-/// The steering angle in radians, by whatever message holds it.
-fn steering(message: &Message<'_>) -> Result<f64> {
-    if message.is::<AckermannDriveStamped>() {
-        let drive: AckermannDriveStamped = message.decode()?;
-        return Ok(f64::from(drive.drive.steering_angle));
-    }
-    number(message)
-}
-
-/// A bare number.
-fn number(message: &Message<'_>) -> Result<f64> {
-    Ok(if message.is::<Float32>() {
-        f64::from(message.decode::<Float32>()?.data)
-    } else {
-        message.decode::<Float64>()?.data
-    })
+/// Values with their times.
+fn pairs(samples: Samples) -> Vec<(i64, f64)> {
+    samples.ns.into_iter().zip(samples.values).collect()
 }
 
 /// When a message was measured, in nanoseconds: the stamp of its header; the time of recording where it has no header, or

@@ -27,7 +27,7 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
     }
     let index = Index::read(bag.as_ref(), &topics, &config)?;
     let mut warnings = damage_of(bag.as_ref(), &index);
-    warnings.extend(oddities_of(&index));
+    warnings.extend(oddities_of(&topics, &index));
     // Of the mounts only the inertial unit's counts here; what is wrong with the others ends an opening, and no look at it.
     let mounts = Mounts::find(path, &config, &index, &mut Vec::new()).ok();
     let imu = mounts.and_then(|mounts| mounts.vehicle_from_imu);

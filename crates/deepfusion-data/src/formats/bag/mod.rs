@@ -2,14 +2,15 @@
 //!
 //! The way of a bag: `source` → `topics` → `sensors` and `index` → `open`. `source` is its reader, whatever is a
 //! [`deepfusion_rosbag::MessageSource`]. `topics` says which is which, by message type; `sensors` makes speed, steering and IMU a motion;
-//! `index` says when images and scans were taken. `open` puts these together with the `camera` to a `recording` (a [`crate::Recording`]).
-//! That reads an `image`, of a `video` stream a frame, or of its `scans` a `scan`, when it is asked for, with the points that its `dynamic`
-//! topic lists. Where the sensors are its `frames` say, as `mounts`. What a bag cannot say stands in a file beside it: `config`, which
+//! `index` says when images and scans were taken, and by its messages' `readings` what the vehicle said. `open` puts these together with
+//! the `camera` to a `recording` (a [`crate::Recording`]). That reads an `image`, of a `video` stream a frame, or of its `scans` a `scan`,
+//! when it is asked for, with the points that its `dynamic` topic lists. Where the sensors are its `frames` say, as `mounts`. What a bag cannot say stands in a file beside it: `config`, which
 //! `write_config` writes.
 
 mod camera;
 mod can;
 mod can_config;
+mod commands;
 mod config;
 mod doppler;
 mod dynamic;
@@ -19,9 +20,11 @@ mod image;
 mod index;
 mod inspect;
 mod mounts;
+mod odometry_poses;
 mod open;
 mod packet;
 mod profile;
+mod readings;
 mod recording;
 mod scan;
 mod scans;
@@ -30,6 +33,7 @@ mod source;
 mod streams;
 mod topics;
 mod video;
+mod world_axes;
 mod write_config;
 
 pub(crate) use config::says_simulated;

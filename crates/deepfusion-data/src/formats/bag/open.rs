@@ -13,6 +13,7 @@ use super::video::BagVideo;
 use super::{camera, image, sensors, source};
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::logs::frame_times::numbers_by_time;
+use crate::logs::speed_log::receiver;
 use crate::{
     Camera, CameraWarning, DataWarning, Dataset, DatasetParts, Error, Frame, FrameImage,
     IncompleteWarning, MotionModel, MountWarning, NoFramesReason, OpenOptions, Result,
@@ -68,7 +69,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let clock = Clock::from_image(&first, &config, options);
     let damage = damage_of(bag.as_ref(), &index);
     let mut warnings = damage.clone();
-    warnings.extend(oddities_of(&index));
+    warnings.extend(oddities_of(&topics, &index));
 
     let video = BagVideo::of(path, &index, &config)?;
     let picture = match &video {
@@ -131,6 +132,11 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         }
         _ => None,
     };
+    let receiver = receiver(
+        index.course_rates_radps.as_ref(),
+        index.sigmas_mps.as_ref(),
+        clock.origin_ns,
+    );
     let recording = BagRecording {
         streams: streams(bag.as_ref(), &topics, &index)?,
         folder: if path.is_dir() {
@@ -153,6 +159,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     };
     let dataset = Dataset::new(parts, Arc::new(recording));
     Ok(dataset
+        .with_receiver(receiver)
         .with_camera_assumed(assumed)
         .with_mount_assumed(mount_assumed)
         .with_simulated(simulated))

@@ -20,7 +20,7 @@ pub(super) struct Motion {
 /// The vehicle's motion by all its sensors, on the vehicle's clock counted from `origin_ns`; `None` without a speed.
 ///
 /// # Errors
-/// [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
+/// [`Error::InertialUnit`], [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
 pub(super) fn motion(
     bag: &Path,
     index: &Index,
@@ -76,14 +76,32 @@ pub(super) fn motion(
         },
         fusion: config.fusion,
     };
-    let track = FusedTrack::new(&sensors, &motion).map_err(|source| Error::Motion {
-        path: bag.to_owned(),
-        source,
-    })?;
+    let track = FusedTrack::new(&sensors, &motion).map_err(|e| refusal(bag, config, e))?;
     Ok(Some(Motion {
         yaw_known: track.knows_yaw(),
         track: track.into(),
     }))
+}
+
+/// Why sensors make no motion: an inertial unit that is at fault alone can be left out.
+fn refusal(bag: &Path, config: &BagConfig, source: deepfusion_motion::Error) -> Error {
+    use deepfusion_motion::Error as Reason;
+    let path = bag.to_owned();
+    let of_unit = matches!(
+        source,
+        Reason::NotGravity { .. }
+            | Reason::NotUp { .. }
+            | Reason::TooFewSamples { stream: "imu", .. }
+    );
+    if of_unit {
+        Error::InertialUnit {
+            path,
+            source: Box::new(source),
+            config: config.path.clone(),
+        }
+    } else {
+        Error::Motion { path, source }
+    }
 }
 
 /// A vehicle that says its yaw rate itself, and has no other sensor for it.
@@ -105,6 +123,12 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
             .filter(|(_, _, yaw_rate)| yaw_rate.is_finite());
         let turns: Vec<_> = turns.map(|(t, _, yaw_rate)| (*t, *yaw_rate)).collect();
         track = VehicleTrack::new(&speeds).with_yaw_rate(&turns, VehicleTrack::MAX_GAP_S);
+    }
+    if !index.tilts_rad.is_empty() {
+        let at_s = |ns: i64| (ns - origin_ns) as f64 * 1e-9;
+        let tilts = index.tilts_rad.iter();
+        let tilts = tilts.map(|(ns, [roll, pitch])| (at_s(*ns), *roll, *pitch));
+        track = track.with_tilt(&tilts.collect::<Vec<_>>());
     }
     if index.tilt_rates.iter().any(|(_, rates)| *rates != [0.0; 2]) {
         track = track.with_tilt_rates(&tilt_rates(index, origin_ns), VehicleTrack::MAX_GAP_S);

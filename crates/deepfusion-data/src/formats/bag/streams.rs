@@ -60,9 +60,10 @@ pub(super) fn damage_of(bag: &dyn MessageSource, index: &Index) -> Vec<DataWarni
 }
 
 /// What is odd about a bag that can be read.
-pub(super) fn oddities_of(index: &Index) -> Vec<DataWarning> {
+pub(super) fn oddities_of(topics: &Topics, index: &Index) -> Vec<DataWarning> {
     let late = index.video.as_ref().and_then(VideoTopic::warning);
     let mut warnings: Vec<DataWarning> = late.into_iter().map(DataWarning::from).collect();
+    warnings.extend(topics.warnings.iter().cloned());
     warnings.extend(index.silent.iter().cloned());
     warnings.extend(index.computed.iter().cloned());
     warnings.extend(index.unstamped.iter().map(|(topic, messages)| {

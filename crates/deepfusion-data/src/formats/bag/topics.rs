@@ -1,7 +1,8 @@
 //! Which topic is which: by message type, unless the file beside the bag names it.
 
+use super::commands::is_command;
 use super::config::BagConfig;
-use crate::{Error, Result, TopicProblem, TopicRole};
+use crate::{DataWarning, Error, MotionWarning, NamedTopic, Result, TopicProblem, TopicRole};
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, CompressedImage, Float32, Float64, Frame, Image, Imu,
     NavSatFix, Odometry, OldTFMessage, PointCloud2, TFMessage, TwistStamped,
@@ -50,6 +51,8 @@ pub(super) struct Topics {
     pub(super) found: Vec<(Role, String)>,
     /// Whether there are those that only a simulator can write.
     pub(super) simulated: bool,
+    /// What was taken for want of something better.
+    pub(super) warnings: Vec<DataWarning>,
 }
 
 /// Exact data of a simulated drive: never taken for a sensor.
@@ -133,9 +136,11 @@ impl Topics {
                 add(Role::Frames, Some(topic.name.clone()));
             }
         }
+        let warnings = commands(&found, config);
         Ok(Self {
             found,
             simulated: are_simulated(&all),
+            warnings,
         })
     }
 
@@ -159,6 +164,23 @@ fn are_simulated(all: &[TopicInfo]) -> bool {
         && has(&|t| t.name == EXACT_DEPTH)
 }
 
+/// A warning for each command that stands for what was measured, as nothing better is there; none for one that is named.
+fn commands(found: &[(Role, String)], config: &BagConfig) -> Vec<DataWarning> {
+    let names = &config.topics;
+    let steers = config.vehicle.wheelbase_m.is_some();
+    let taken = found.iter().filter_map(|(role, topic)| {
+        let role = match role {
+            Role::Speed if names.speed.is_none() => TopicRole::Speed,
+            // Without a wheelbase no steering angle is used.
+            Role::Steering if names.steering.is_none() && steers => TopicRole::Steering,
+            _ => return None,
+        };
+        let topic = topic.clone();
+        is_command(&topic).then(|| DataWarning::from(MotionWarning::Commanded { topic, role }))
+    });
+    taken.collect()
+}
+
 fn is_depth(name: &str) -> bool {
     name.to_lowercase().contains("depth")
 }
@@ -179,7 +201,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The topic that the file names, or the only one of these types.
+    /// The topic that the file names, or the only one of these types; none where it names none.
     fn one(
         &self,
         role: TopicRole,
@@ -187,6 +209,9 @@ impl Search<'_> {
         types: &[&str],
         fits: impl Fn(&TopicInfo) -> bool,
     ) -> Result<Option<String>> {
+        if role.is_optional() && named.as_deref() == Some(NamedTopic::NONE) {
+            return Ok(None);
+        }
         if let Some(name) = named {
             let Some(topic) = self.all.iter().find(|t| t.name == *name) else {
                 return Err(self.error(TopicProblem::NoTopic {
@@ -253,11 +278,23 @@ impl Search<'_> {
     /// The steering angle: a message that says so by its type. A bare number must be named.
     fn steering(&self, named: &Option<String>) -> Result<Option<String>> {
         let any = [AckermannDriveStamped::TYPE, Float32::TYPE, Float64::TYPE];
-        let types = match named {
-            Some(_) => &any[..],
-            None => &any[..1],
-        };
-        self.one(TopicRole::Steering, named, types, |_| true)
+        if named.is_some() {
+            return self.one(TopicRole::Steering, named, &any, |_| true);
+        }
+        self.measured(TopicRole::Steering, &any[..1])
+    }
+
+    /// The topic of the first of these types that there is; of a name that says a command only where no other is there.
+    fn measured(&self, role: TopicRole, types: &[&str]) -> Result<Option<String>> {
+        for commanded in [false, true] {
+            for kind in types {
+                let fits = |t: &TopicInfo| is_command(&t.name) == commanded;
+                if let Some(topic) = self.one(role, &None, &[*kind], fits)? {
+                    return Ok(Some(topic));
+                }
+            }
+        }
+        Ok(None)
     }
 
     /// The vehicle's speed: a twist, else an odometry, else steering messages with a speed, else satellite positions to compute
@@ -275,18 +312,14 @@ impl Search<'_> {
         if named.is_some() {
             return self.one(TopicRole::Speed, named, &any, |_| true);
         }
-        for kind in [
+        let kinds = [
             TwistStamped::TYPE,
             TwistWithCovarianceStamped::TYPE,
             Odometry::TYPE,
             AckermannDriveStamped::TYPE,
             NavSatFix::TYPE,
-        ] {
-            if let Some(topic) = self.one(TopicRole::Speed, &None, &[kind], |_| true)? {
-                return Ok(Some(topic));
-            }
-        }
-        Ok(None)
+        ];
+        self.measured(TopicRole::Speed, &kinds)
     }
 
     /// The cloud of dynamic points: of several in the bag the one in the LiDAR's namespace. Without a LiDAR it is of no use.

@@ -1,13 +1,13 @@
 //! The file beside a bag, written of what was found in the bag: a beginning to correct and to complete.
 
-use super::config::BagConfig;
+use super::config::{BagConfig, TopicNames};
 use super::index::Index;
 use super::mounts::Mounts;
 use super::open::open_bag;
 use super::source;
 use super::topics::{Role, Topics};
 use crate::formats::layout::Layout;
-use crate::{ConfigProblem, Error, Mount, OpenOptions, Result};
+use crate::{ConfigProblem, Error, Mount, NamedTopic, OpenOptions, Result, TopicRole};
 use deepfusion_hint::count_of;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -81,7 +81,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
         own.remove(key);
     }
     if let Some(can) = own.get_mut("can").and_then(Value::as_table_mut) {
-        remove_named_signals(can, &topics);
+        remove_named_signals(can, &topics, &config.topics);
     }
     let given = options.calibration.as_ref();
     let given = given.filter(|_| options.intrinsics.is_none() && options.hfov_deg.is_none());
@@ -118,7 +118,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
     if own.values().any(|value| !is_table(value)) {
         text.push('\n');
     }
-    text += &topics_text(&topics, &bag.topics()?);
+    text += &topics_text(&topics, &config.topics, &bag.topics()?);
     if !own.contains_key("camera") && !own.contains_key("calibration") {
         text += match &index.camera_info {
             Some(info) if info.k[0] > 0.0 => "\n# The camera is as CameraInfo has it.\n",
@@ -148,16 +148,21 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
 }
 
 /// Takes the signals out of `[can]` that a named topic stands for now: both would contradict each other.
-fn remove_named_signals(can: &mut Table, topics: &Topics) {
-    for (role, key) in [(Role::Speed, "speed"), (Role::Steering, "steering")] {
-        if topics.of(role).is_some() {
-            can.remove(key);
+fn remove_named_signals(can: &mut Table, topics: &Topics, names: &TopicNames) {
+    for role in [Role::Speed, Role::Steering] {
+        let Some(key) = role.key() else { continue };
+        if topics.of(role).is_some() || names.is_none(key) {
+            can.remove(key.name());
         }
     }
 }
 
-/// `[topics]`: which was found for what.
-fn topics_text(topics: &Topics, all: &[deepfusion_rosbag::TopicInfo]) -> String {
+/// `[topics]`: which was found for what, and for what none is to be read.
+fn topics_text(
+    topics: &Topics,
+    names: &TopicNames,
+    all: &[deepfusion_rosbag::TopicInfo],
+) -> String {
     let mut text = String::from("\n[topics]\n");
     for (role, name) in &topics.found {
         let Some(key) = role.key() else { continue };
@@ -167,6 +172,12 @@ fn topics_text(topics: &Topics, all: &[deepfusion_rosbag::TopicInfo]) -> String 
         });
         let name = Value::String(name.clone());
         let _ = writeln!(text, "{key} = {name}{about}");
+    }
+    for role in TopicRole::ALL
+        .into_iter()
+        .filter(|role| names.is_none(*role))
+    {
+        let _ = writeln!(text, "{role} = \"{}\"", NamedTopic::NONE);
     }
     text
 }

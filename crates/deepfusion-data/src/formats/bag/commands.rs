@@ -1,0 +1,43 @@
+//! Which topics say what a vehicle was asked for, not what it did: ROS 2's controllers publish both with messages of one type.
+
+/// Words in the names of such topics.
+const WORDS: [&str; 7] = [
+    "cmd", "command", "commands", "setpoint", "target", "teleop", "joy",
+];
+/// What other words may run into.
+const PARTS: [&str; 2] = ["cmd_vel", "nav_vel"];
+
+/// Whether a topic's name says that it is what the vehicle was asked for.
+pub(super) fn is_command(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let mut words = name.split(['/', '_']);
+    words.any(|word| WORDS.contains(&word)) || PARTS.iter().any(|part| name.contains(part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_command;
+
+    #[test]
+    fn a_command_is_known_by_the_words_of_its_name() {
+        for name in [
+            "/diff_drive_controller/cmd_vel",
+            "/ackermann_cmd",
+            "/nav_vel_stamped",
+            "/base/cmd_velocity",
+            "/Teleop/drive",
+            "/steering/setpoint",
+            "/joy_stick/twist",
+        ] {
+            assert!(is_command(name), "{name}");
+        }
+        for name in [
+            "/vehicle/steering",
+            "/vehicle/twist",
+            "/enjoy/speed",
+            "/drive",
+        ] {
+            assert!(!is_command(name), "{name}");
+        }
+    }
+}

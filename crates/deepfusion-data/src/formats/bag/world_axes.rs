@@ -1,0 +1,45 @@
+//! Velocities in the world's axes: a satellite receiver's, to the east and to the north, in a message that the vehicle's own has, too.
+
+/// Slower than this a direction says little, m/s.
+const LEAST_MPS: f64 = 2.0;
+/// Velocity across over velocity: 17° off the vehicle's x, which its rear axle does not do, nor a place ahead of it but in tight bends.
+const ACROSS: f64 = 0.3;
+
+/// Whether velocities (x, y; m/s) are along other axes than the vehicle's: of those that are fast enough, a quarter points far from x. Of
+/// all headings two thirds are, but streets may run east and west for most of a drive.
+pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bool {
+    let across = velocities.filter_map(|(x, y)| {
+        let speed = x.hypot(y);
+        (speed > LEAST_MPS).then(|| y.abs() / speed)
+    });
+    let mut across: Vec<f64> = across.collect();
+    across.sort_by(f64::total_cmp);
+    let quarter = across.get(3 * across.len() / 4);
+    quarter.is_some_and(|across| *across > ACROSS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive around a block at 10 m/s, to the north, the west, the south and the east; and one mostly to the east.
+    #[test]
+    fn a_course_is_not_taken_for_the_vehicle_s_axes() {
+        let to = |course: f64| (10.0 * course.cos(), 10.0 * course.sin());
+        let block = (0..100).map(|i| to(f64::from(i / 25 + 1) * std::f64::consts::FRAC_PI_2));
+        assert!(are_world_axes(block));
+        let mostly_east = (0..100).map(|i| to(if i % 10 < 3 { 1.5 } else { 0.05 }));
+        assert!(are_world_axes(mostly_east));
+    }
+
+    #[test]
+    fn a_vehicle_goes_along_its_own_axes() {
+        // Bends at a place 1.5 m ahead of the axle, reversing, and what is too slow to have a direction.
+        let bend = |i: i32| (8.0, 1.5 * 0.4 * f64::from(i % 3 - 1));
+        assert!(!are_world_axes((0..99).map(bend)));
+        assert!(!are_world_axes((0..99).map(|_| (-5.0, 0.1))));
+        assert!(!are_world_axes((0..99).map(|_| (0.1, 1.9))));
+        assert!(!are_world_axes((0..99).map(|_| (5.0, f64::NAN))));
+        assert!(!are_world_axes(std::iter::empty()));
+    }
+}
