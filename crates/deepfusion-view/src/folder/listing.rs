@@ -13,6 +13,9 @@ use super::summary::Summary;
 
 /// Files that are written in place change without the folder noticing; so the folder is listed again after this time in any case.
 const RELIST_AFTER: Duration = Duration::from_secs(5);
+/// A folder that changes all the time, as while it is written to, is listed for one part in so many: a hundred thousand frames take seconds, and
+/// every other answer waits for them.
+const LISTED_SHARE: u32 = 10;
 /// How long an answer may be held up by reading small files; the rest is read for the next one.
 const READING_TIME: Duration = Duration::from_millis(150);
 
@@ -24,8 +27,26 @@ pub(super) struct Listing {
     places: HashMap<String, usize>,
     /// Counts the changes, from 1.
     version: u64,
-    /// When the folder was listed, and the time of change that it had.
-    listed: Option<(Instant, SystemTime)>,
+    listed: Option<Listed>,
+}
+
+/// How the folder was listed last.
+#[derive(Debug, Clone, Copy)]
+struct Listed {
+    /// When it was done.
+    done: Instant,
+    took: Duration,
+    /// The time of change that the folder had.
+    changed: SystemTime,
+}
+
+impl Listed {
+    /// Whether the list still stands for a folder with this time of change.
+    fn stands(self, changed: SystemTime) -> bool {
+        let age = self.done.elapsed();
+        let unchanged = self.changed == changed && age < RELIST_AFTER;
+        unchanged || age < LISTED_SHARE * self.took
+    }
 }
 
 impl Listing {
@@ -65,12 +86,10 @@ impl Listing {
         let changed = std::fs::metadata(&self.folder)?
             .modified()
             .unwrap_or(SystemTime::UNIX_EPOCH);
-        if let Some((when, at_change)) = self.listed
-            && at_change == changed
-            && when.elapsed() < RELIST_AFTER
-        {
+        if self.listed.is_some_and(|listed| listed.stands(changed)) {
             return Ok(());
         }
+        let begun = Instant::now();
         let mut found: HashMap<String, Entry> = HashMap::new();
         for file in std::fs::read_dir(&self.folder)? {
             let file = file?;
@@ -93,7 +112,11 @@ impl Listing {
             }
         }
         self.replace(found);
-        self.listed = Some((Instant::now(), changed));
+        self.listed = Some(Listed {
+            done: Instant::now(),
+            took: begun.elapsed(),
+            changed,
+        });
         Ok(())
     }
 
@@ -171,5 +194,29 @@ impl Listing {
                 "latency_ms": column(|s| json!(s.latency_ms)),
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_that_took_long_stands_for_longer() {
+        let done = Instant::now();
+        let changed = SystemTime::UNIX_EPOCH;
+        let later = changed + Duration::from_secs(1);
+        let quick = Listed {
+            done,
+            took: Duration::ZERO,
+            changed,
+        };
+        assert!(quick.stands(changed));
+        assert!(!quick.stands(later));
+        let slow = Listed {
+            took: Duration::from_secs(60),
+            ..quick
+        };
+        assert!(slow.stands(later));
     }
 }
