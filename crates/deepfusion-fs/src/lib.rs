@@ -1,10 +1,11 @@
-//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut.
+//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut. And the order of names with numbers in them.
 
 mod content;
 mod in_the_way;
 mod machine;
 mod made_folders;
 mod names;
+mod order;
 mod partial;
 mod partial_folder;
 mod sync;
@@ -12,6 +13,7 @@ mod sync;
 pub use content::Content;
 pub use in_the_way::{InTheWay, Unfinished, in_the_way};
 pub use names::{moved_path, unused};
+pub use order::natural_order;
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
 pub use partial_folder::PartialFolder;
 pub use sync::{publish, publish_folder, sync_files, sync_folder};

@@ -13,6 +13,7 @@ use deepfusion_calibrate::{
     View, calibrate, find_board, pick, sharpness,
 };
 use deepfusion_data::{Lens, OpenOptions, load_photo, load_rgb};
+use deepfusion_fs::natural_order;
 use deepfusion_geometry::Distortion;
 use deepfusion_video::VideoFrames;
 use image::GrayImage;
@@ -97,7 +98,7 @@ pub fn find_views(
     Ok(seen)
 }
 
-/// The pictures of a folder in the order of their names.
+/// The pictures of a folder in the natural order of their names.
 fn images_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| deepfusion_data::Error::file(folder, e))?;
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
@@ -107,7 +108,7 @@ fn images_of(folder: &Path) -> Result<Vec<PathBuf>> {
             input: folder.display().to_string(),
         });
     }
-    images.sort();
+    images.sort_by(|a, b| natural_order(a, b));
     Ok(images)
 }
 

@@ -5,6 +5,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
+use deepfusion_fs::natural_order;
 
 use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
@@ -34,7 +35,7 @@ const RECORDINGS: [&str; 10] = [
     "bag", "mcap", "db3", "mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm",
 ];
 
-/// The images that files, folders, patterns and recordings mean: in the order of their paths, each once, then the frames of
+/// The images that files, folders, patterns and recordings mean: in the natural order of their paths, each once, then the frames of
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
 /// apart agree on both.
 ///
@@ -181,7 +182,7 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 /// Sorts the paths, drops those given twice, and names each after its file, numbered where two files share a name.
 fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     let mut paths: Vec<PathBuf> = paths.iter().map(|p| without_dots(p)).collect();
-    paths.sort();
+    paths.sort_by(|a, b| natural_order(a, b));
     let mut seen = HashSet::new();
     paths.retain(|p| seen.insert(std::path::absolute(p).unwrap_or_else(|_| p.clone())));
     let mut used = UniqueNames::default();
@@ -224,6 +225,12 @@ mod tests {
             names(&["a/0.png", "b/0.png", "c/0-2.png", "d/A.png", "e/a.png"]),
             ["0", "0-2", "0-2-2", "A", "a-2"]
         );
+    }
+
+    #[test]
+    fn numbers_in_names_count_by_their_values() {
+        let given = ["a/frame_10.png", "a/frame_1.png", "a/frame_2.png"];
+        assert_eq!(names(&given), ["frame_1", "frame_2", "frame_10"]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::{
     ColumnsProblem, DataWarning, Error, ExpectedCell, IncompleteWarning, Result, TableProblem,
     TimeStampProblem, TimesWarning,
 };
+use deepfusion_fs::natural_order;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -102,12 +103,12 @@ fn have_numbers(images: &[PathBuf]) -> bool {
     images.iter().all(|path| number(path).is_some())
 }
 
-/// By number where all names are numbers, by name otherwise.
+/// By number where all names are numbers; otherwise by name, the numbers in it by their values.
 fn in_order(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
     if have_numbers(&images) {
         images.sort_by_cached_key(|path| (number(path), path.clone()))
     } else {
-        images.sort()
+        images.sort_by(|a, b| natural_order(a, b))
     }
     images
 }

@@ -1,6 +1,7 @@
 //! What is in a folder.
 
 use crate::{Error, Result};
+use deepfusion_fs::natural_order;
 use std::path::{Path, PathBuf};
 
 /// A folder's name.
@@ -21,7 +22,7 @@ pub(crate) fn both_names(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(given.into_iter().chain([real]).collect())
 }
 
-/// The PNG and JPEG files of a folder, hidden ones left out; none where there is no such folder.
+/// The PNG and JPEG files of a folder in their natural order, hidden ones left out; none where there is no such folder.
 pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
@@ -33,7 +34,7 @@ pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
             images.push(path);
         }
     }
-    images.sort();
+    images.sort_by(|a, b| natural_order(a, b));
     Ok(images)
 }
 
