@@ -6,7 +6,7 @@
 //!
 //! | Log | Read by |
 //! |---|---|
-//! | GPX, NMEA | Doppler speed where every fix has one, else positions, smoothed |
+//! | GPX, NMEA | Doppler speed where most fixes have one, else positions, smoothed |
 //! | Tables (`.csv`, `.tsv`, `.txt`): Torque, Sensor Logger, phyphox, any other | names and units of the columns |
 //! | Car Scanner (one value a row) | the rows of the vehicle's speed |
 //! | Google's GnssLogger | its `Fix` rows |
