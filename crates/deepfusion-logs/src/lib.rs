@@ -42,7 +42,7 @@ mod turns;
 mod units;
 mod wide_table;
 
-pub use dates::time_on_clock;
+pub use dates::{parse_date, time_on_clock};
 pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, NoGps, Result};
 pub use gopro_lens::GoproLens;

@@ -105,6 +105,19 @@ fn lists_and_tables_are_read() {
 }
 
 #[test]
+fn dates_with_a_zone_are_read() {
+    let start = 1_714_557_600_123 * MS;
+    let expected = [(0, Some(start)), (1, Some(start + 100 * MS))];
+    let list = "2024-05-01T10:00:00.123Z\n2024-05-01T12:00:00.223+02:00\n";
+    let table =
+        "timestamp,file\n2024-05-01T10:00:00.123Z,a.png\n2024-05-01T12:00:00.223+02:00,b.png\n";
+    for (file, text) in [("timestamps.txt", list), ("frames.csv", table)] {
+        let found = timed(&["a", "b"], &[(file, text)]).unwrap();
+        assert_eq!(found, expected, "{file}");
+    }
+}
+
+#[test]
 fn what_is_wrong_is_named() {
     for (file, text, problem) in [
         ("timestamps.txt", "0.5\n", "1 time, but there are 2 images"),
