@@ -197,6 +197,10 @@ impl FolderConfig {
             let key = "vehicle_from_imu";
             return Err(config.error(ConfigProblem::NotFinite { key }));
         }
+        let mount = config.mount.unwrap_or_default();
+        if let Some((key, bad)) = mount.numbers().into_iter().find(|(_, x)| !x.is_finite()) {
+            return Err(config.bad(key, bad, ExpectedValue::AsNamed));
+        }
         if let Some(bad) = config.start_s.filter(|v| v.is_nan() || v.abs() > 9e9) {
             return Err(config.bad("start_s", bad, ExpectedValue::Time));
         }
@@ -307,6 +311,18 @@ impl FolderConfig {
 }
 
 impl Mount {
+    /// Its numbers by their keys.
+    fn numbers(&self) -> [(&'static str, f64); 6] {
+        [
+            ("mount.forward_m", self.forward_m),
+            ("mount.left_m", self.left_m),
+            ("mount.up_m", self.up_m),
+            ("mount.yaw_deg", self.yaw_deg),
+            ("mount.pitch_deg", self.pitch_deg),
+            ("mount.roll_deg", self.roll_deg),
+        ]
+    }
+
     fn cam_from_vehicle(&self) -> Se3 {
         // The camera's axes in the vehicle's: x is right (-y), y is down (-z), z is ahead (x).
         let ahead = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -376,6 +392,8 @@ mod tests {
             ("fps = 'fast'", "fps"),
             ("intrinsics = [1, 2, 3]", "intrinsics"),
             ("start_s = nan", "start_s is NaN"),
+            ("[mount]\nyaw_deg = nan", "mount.yaw_deg is NaN"),
+            ("[mount]\nup_m = inf", "mount.up_m is inf"),
         ] {
             let error = read(text).unwrap_err().to_string();
             assert!(
