@@ -4,6 +4,7 @@
 //! newest frame of a camera or stream. Without ffmpeg each says so, and what to do; nothing is linked.
 
 mod cache;
+mod endings;
 mod error;
 mod frames;
 mod live;
@@ -13,6 +14,7 @@ mod problem;
 mod program;
 mod write;
 
+pub use endings::{VIDEO_ENDINGS, is_video};
 pub use error::{Error, Result};
 pub use frames::VideoFrames;
 pub use live::{Address, LiveFrame, LiveSource, NextFrame};

@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use deepfusion_fs::natural_order;
+use deepfusion_images::is_image;
 use std::path::{Path, PathBuf};
 
 /// A folder's name.
@@ -27,10 +28,8 @@ pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
         let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-        let known = ["png", "jpg", "jpeg"].contains(&extension.to_ascii_lowercase().as_str());
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
-        if known && !name.starts_with('.') && path.is_file() {
+        if is_image(&path) && !name.starts_with('.') && path.is_file() {
             images.push(path);
         }
     }
