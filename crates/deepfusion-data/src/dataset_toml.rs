@@ -175,10 +175,11 @@ impl FolderConfig {
     /// [`Error::Config`], [`Error::File`].
     pub(crate) fn read(folder: &Path) -> Result<Self> {
         let own = Self::read_alone(folder)?;
-        match folder.parent().map(Self::read_for_folders).transpose()? {
-            Some(Some(above)) => Ok(own.completed(above)),
-            _ => Ok(own),
-        }
+        let above = folder.parent().map(Self::read_for_folders);
+        Ok(match above.transpose()?.flatten() {
+            Some(above) => own.completed(above),
+            None => own,
+        })
     }
 
     /// The settings of a folder for the folders in it. A file that has no such key may be another program's, or of a recording: it is not looked at.

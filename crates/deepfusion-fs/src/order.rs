@@ -49,11 +49,11 @@ fn of_names(mut a: &[u8], mut b: &[u8]) -> Ordering {
         if order.is_ne() {
             return order;
         }
-        match (a.get(used.0..), b.get(used.1..)) {
-            (Some(after_a), Some(after_b)) => (a, b) = (after_a, after_b),
+        let (Some(after_a), Some(after_b)) = (a.get(used.0..), b.get(used.1..)) else {
             // Both have ended.
-            _ => return Ordering::Equal,
-        }
+            return Ordering::Equal;
+        };
+        (a, b) = (after_a, after_b);
     }
 }
 

@@ -449,7 +449,7 @@ mod tests {
         let text = "(1436509052.2) can0 123#01\n(1.5) can0 124#02\n(1.6) can0 123#03\n";
         let trace = of_text(Path::new("a.log"), text, CanId::Standard(0x124)).unwrap();
         let data: Vec<&[u8]> = trace.frames.iter().map(|f| &f.data[..]).collect();
-        assert_eq!(data, [&[2][..]]);
+        assert_eq!(data, [&[2_u8][..]]);
         assert_eq!((trace.all, trace.clock), (3, Clock::Date));
     }
 
