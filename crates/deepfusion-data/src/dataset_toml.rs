@@ -67,9 +67,15 @@ pub(crate) struct FolderConfig {
     /// The camera's clock.
     #[serde(default)]
     pub(crate) clock: Clock,
+    /// Whether what is said here is said of the recordings in the folders here, too, where their own files say nothing.
+    #[serde(default)]
+    pub(crate) for_folders: bool,
     /// Where the file is.
     #[serde(skip)]
     pub(crate) path: PathBuf,
+    /// The one in the folder above, where that is for the folders there.
+    #[serde(skip)]
+    pub(crate) above: Option<Box<FolderConfig>>,
 }
 
 /// The camera's place on the vehicle: x forward, y left, z up from where the speed is measured (the rear
@@ -163,11 +169,61 @@ pub(crate) fn read_or_default<T: serde::de::DeserializeOwned>(path: &Path) -> Re
 impl FolderConfig {
     pub(crate) const NAME: &str = "dataset.toml";
 
-    /// Reads `dataset.toml` in a folder; without one, nothing is said.
+    /// Reads `dataset.toml` in a folder, and the one in the folder above where that is for the folders there; without one, nothing is said.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
     pub(crate) fn read(folder: &Path) -> Result<Self> {
+        let own = Self::read_alone(folder)?;
+        let above = folder.parent().map(Self::read_for_folders);
+        Ok(match above.transpose()?.flatten() {
+            Some(above) => own.completed(above),
+            None => own,
+        })
+    }
+
+    /// The settings of a folder for the folders in it. A file that has no such key may be another program's, or of a recording: it is not looked at.
+    fn read_for_folders(folder: &Path) -> Result<Option<Self>> {
+        let text = std::fs::read_to_string(folder.join(Self::NAME));
+        if !text.is_ok_and(|text| text.contains("for_folders")) {
+            return Ok(None);
+        }
+        let config = Self::read_alone(folder)?;
+        Ok(Some(config).filter(|config| config.for_folders))
+    }
+
+    /// With what the file above says of everything that is not said here, but for what is a single recording's: its files, its clocks, whether
+    /// it is simulated. The camera is looked for above by `find_camera`, as a calibration here goes before it.
+    fn completed(self, above: Self) -> Self {
+        let text = |own: Option<String>, above: &Option<String>| own.or_else(|| above.clone());
+        let own_vehicle = self.vehicle != Vehicle::default();
+        Self {
+            time_column: text(self.time_column, &above.time_column),
+            speed_column: text(self.speed_column, &above.speed_column),
+            time_unit: text(self.time_unit, &above.time_unit),
+            speed_unit: text(self.speed_unit, &above.speed_unit),
+            yaw_rate_unit: text(self.yaw_rate_unit, &above.yaw_rate_unit),
+            max_gap_s: self.max_gap_s.or(above.max_gap_s),
+            fps: self.fps.or(above.fps),
+            depth_unit_m: self.depth_unit_m.or(above.depth_unit_m),
+            depth_invalid: self.depth_invalid.or(above.depth_invalid),
+            mount: self.mount.or(above.mount),
+            vehicle_from_imu: self.vehicle_from_imu.or(above.vehicle_from_imu),
+            vehicle: if own_vehicle {
+                self.vehicle
+            } else {
+                above.vehicle
+            },
+            above: Some(Box::new(above)),
+            ..self
+        }
+    }
+
+    /// Reads the file of a folder alone.
+    ///
+    /// # Errors
+    /// [`Error::Config`], [`Error::File`].
+    fn read_alone(folder: &Path) -> Result<Self> {
         let path = folder.join(Self::NAME);
         let mut config: Self = read_or_default(&path)?;
         config.path = path;
@@ -196,6 +252,10 @@ impl FolderConfig {
         if !numbers.all(|x| x.is_finite()) {
             let key = "vehicle_from_imu";
             return Err(config.error(ConfigProblem::NotFinite { key }));
+        }
+        let mount = config.mount.unwrap_or_default();
+        if let Some((key, bad)) = mount.numbers().into_iter().find(|(_, x)| !x.is_finite()) {
+            return Err(config.bad(key, bad, ExpectedValue::AsNamed));
         }
         if let Some(bad) = config.start_s.filter(|v| v.is_nan() || v.abs() > 9e9) {
             return Err(config.bad("start_s", bad, ExpectedValue::Time));
@@ -307,6 +367,18 @@ impl FolderConfig {
 }
 
 impl Mount {
+    /// Its numbers by their keys.
+    fn numbers(&self) -> [(&'static str, f64); 6] {
+        [
+            ("mount.forward_m", self.forward_m),
+            ("mount.left_m", self.left_m),
+            ("mount.up_m", self.up_m),
+            ("mount.yaw_deg", self.yaw_deg),
+            ("mount.pitch_deg", self.pitch_deg),
+            ("mount.roll_deg", self.roll_deg),
+        ]
+    }
+
     fn cam_from_vehicle(&self) -> Se3 {
         // The camera's axes in the vehicle's: x is right (-y), y is down (-z), z is ahead (x).
         let ahead = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -322,74 +394,5 @@ impl Mount {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> Result<FolderConfig> {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join(FolderConfig::NAME), text).unwrap();
-        FolderConfig::read(folder.path())
-    }
-
-    #[test]
-    fn a_mounted_camera_sees_ahead() {
-        let config = read("[mount]\nforward_m = 1.5\nup_m = 1.2\n").unwrap();
-        // A stone 10 m before the axle and 1 m to its left lies 8.5 m ahead, to the left, 1.2 m below.
-        let seen = config
-            .cam_from_vehicle()
-            .transform(&Vector3::new(10.0, 1.0, 0.0));
-        assert!(
-            (seen - Vector3::new(-1.0, 1.2, 8.5)).norm() < 1e-12,
-            "{seen}"
-        );
-    }
-
-    #[test]
-    fn angles_turn_the_way_they_say() {
-        let ahead = |text: &str| {
-            let config = read(&format!("[mount]\n{text} = 10\n")).unwrap();
-            config
-                .cam_from_vehicle()
-                .transform(&Vector3::new(10.0, 0.0, 0.0))
-        };
-        // What is ahead of the car appears to the right of a camera that looks left, above one that looks
-        // down, and stays put under roll.
-        assert!(ahead("yaw_deg").x > 1.0);
-        assert!(ahead("pitch_deg").y < -1.0);
-        assert!((ahead("roll_deg") - Vector3::new(0.0, 0.0, 10.0)).norm() < 1e-12);
-        // Rolled to the right, what is to the right moves up in the image.
-        let config = read("[mount]\nroll_deg = 10\n").unwrap();
-        assert!(
-            config
-                .cam_from_vehicle()
-                .transform(&Vector3::new(10.0, -5.0, 0.0))
-                .y
-                < 0.0
-        );
-    }
-
-    #[test]
-    fn mistakes_are_named() {
-        for (text, problem) in [
-            ("fsp = 10", "unknown field `fsp`"),
-            ("fps = 0", "fps is 0, it must be above 0"),
-            ("fps = 'fast'", "fps"),
-            ("intrinsics = [1, 2, 3]", "intrinsics"),
-            ("start_s = nan", "start_s is NaN"),
-        ] {
-            let error = read(text).unwrap_err().to_string();
-            assert!(
-                error.contains("dataset.toml") && error.contains(problem),
-                "{error}"
-            );
-        }
-        let config = read("speed = 'gone.csv'").unwrap();
-        let error = config.find(Path::new("."), "speed", config.speed.as_ref(), &[]);
-        assert!(
-            error
-                .unwrap_err()
-                .to_string()
-                .contains("speed: there is no")
-        );
-    }
-}
+#[path = "dataset_toml_tests.rs"]
+mod tests;

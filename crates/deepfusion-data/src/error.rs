@@ -565,7 +565,7 @@ const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/
   comma2k19 segment  processed_log/CAN/speed/t or global_pose/frame_times
   ROS bag            a file .bag, .mcap or .db3, or a folder with metadata.yaml, given or here
   RGB-D folder       frame-000000.color.png or .jpg with .depth.png, here or in folders seq-01, …
-  video              a file .mp4, .mkv, .mov, .avi or .hevc, given or the only one here
+  video              a file .mp4, .mkv, .mov, .avi, .hevc, .m4v or .webm, given or the only one here
   image folder       .png or .jpg files here, in images/, or where dataset.toml says";
 
 impl From<deepfusion_images::Error> for Error {
@@ -658,6 +658,16 @@ mod tests {
         out.write_all(b"x").unwrap();
         let error = Error::file(Path::new("depth.npz"), out.flush().unwrap_err());
         assert!(error.hint().unwrap().contains("full"), "{error}");
+    }
+
+    #[test]
+    fn every_ending_of_a_video_is_named() {
+        for ending in deepfusion_video::VIDEO_ENDINGS {
+            let named = LOOKED_FOR
+                .split([' ', ','])
+                .any(|word| word == format!(".{ending}"));
+            assert!(named, "{ending}");
+        }
     }
 
     #[test]

@@ -107,6 +107,23 @@ fn a_field_of_view_is_a_camera() {
     assert_eq!(open(folder, &both).unwrap().intrinsics(0).fx, 70.0);
 }
 
+/// Settings for all folders of a fleet; a calibration of the drive's own goes before them.
+#[test]
+fn the_camera_may_stand_once_for_many_recordings() {
+    let fleet = tempfile::tempdir().unwrap();
+    let drive = fleet.path().join("drive");
+    photographs(&drive, &[vec![], vec![]]);
+    let above = "for_folders = true\nintrinsics = [70, 70, 30, 20]\n";
+    fs::write(fleet.path().join("dataset.toml"), above).unwrap();
+    let focal = || {
+        let dataset = open(&drive, &OpenOptions::default()).unwrap();
+        dataset.intrinsics(0).fx
+    };
+    assert_eq!(focal(), 70.0);
+    fs::write(drive.join("intrinsics.txt"), "40 40 32 24\n").unwrap();
+    assert_eq!(focal(), 40.0);
+}
+
 #[test]
 fn angles_that_are_none_are_refused() {
     let root = tempfile::tempdir().unwrap();

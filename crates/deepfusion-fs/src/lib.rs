@@ -1,4 +1,4 @@
-//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut.
+//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut. And the order of names with numbers in them.
 
 mod content;
 mod folder_lock;
@@ -6,6 +6,7 @@ mod in_the_way;
 mod machine;
 mod made_folders;
 mod names;
+mod order;
 mod partial;
 mod partial_folder;
 mod sync;
@@ -14,6 +15,7 @@ pub use content::Content;
 pub use folder_lock::FolderLock;
 pub use in_the_way::{InTheWay, Unfinished, in_the_way};
 pub use names::{absolute, create_unused, moved_path, unused};
+pub use order::natural_order;
 pub use partial::{Partial, publish_all, write, write_aside, write_atomically, write_unsynced};
 pub use partial_folder::PartialFolder;
 pub use sync::{publish, publish_folder, sync_files, sync_folder};

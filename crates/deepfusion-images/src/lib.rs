@@ -5,6 +5,7 @@
 //! gives the network's numbers, [`read_depth_png`] and [`write_depth_png`] read and write depth as KITTI does.
 
 mod depth_png;
+mod endings;
 mod error;
 mod exif_camera;
 mod files;
@@ -14,6 +15,7 @@ mod photo;
 mod resize;
 
 pub use depth_png::{read_depth_png, write_depth_png};
+pub use endings::{IMAGE_ENDINGS, is_image};
 pub use error::{Error, ImageProblem, Result};
 pub use exif_camera::{ExifCamera, exif_block_camera, exif_camera};
 pub use files::{decode, decode_bytes, decode_rgb, image_size, load_rgb, save_png};

@@ -13,8 +13,10 @@ use deepfusion_calibrate::{
     View, calibrate, find_board, pick, sharpness,
 };
 use deepfusion_data::{Lens, OpenOptions, load_photo, load_rgb};
+use deepfusion_fs::natural_order;
 use deepfusion_geometry::Distortion;
-use deepfusion_video::VideoFrames;
+use deepfusion_images::is_image;
+use deepfusion_video::{VideoFrames, is_video};
 use image::GrayImage;
 use image::imageops::grayscale;
 use rayon::prelude::*;
@@ -25,9 +27,6 @@ pub use self::warning::BoardWarning;
 use self::warning::turned;
 use crate::{Error, Result, find_inputs};
 
-/// Endings of pictures and videos.
-const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
-const VIDEOS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
 /// A video is looked at in so many parts, of each the sharpest of so many frames.
 const PARTS: usize = 200;
 const FRAMES_OF_A_PART: usize = 4;
@@ -82,7 +81,7 @@ pub fn find_views(
         let path = PathBuf::from(input);
         if path.is_dir() {
             files.extend(images_of(&path)?);
-        } else if path.exists() && has_ending(&path, &VIDEOS) {
+        } else if path.exists() && is_video(&path) {
             videos.push(path);
         } else {
             let found = find_inputs(std::slice::from_ref(input), &OpenOptions::default(), |_| ())?;
@@ -97,23 +96,18 @@ pub fn find_views(
     Ok(seen)
 }
 
-/// The pictures of a folder in the order of their names.
+/// The pictures of a folder in the natural order of their names.
 fn images_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| deepfusion_data::Error::file(folder, e))?;
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut images: Vec<_> = paths.filter(|p| has_ending(p, &IMAGES)).collect();
+    let mut images: Vec<_> = paths.filter(|p| is_image(p)).collect();
     if images.is_empty() {
         return Err(Error::NoImages {
             input: folder.display().to_string(),
         });
     }
-    images.sort();
+    images.sort_by(|a, b| natural_order(a, b));
     Ok(images)
-}
-
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    let ending = path.extension().and_then(|e| e.to_str());
-    ending.is_some_and(|e| endings.contains(&e.to_ascii_lowercase().as_str()))
 }
 
 impl BoardViews {

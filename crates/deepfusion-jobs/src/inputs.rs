@@ -5,13 +5,12 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
-use deepfusion_fs::absolute;
+use deepfusion_fs::{absolute, natural_order};
+use deepfusion_images::is_image;
+use deepfusion_video::is_video;
 
 use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
-
-/// The endings of images.
-const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
 
 /// An image, and what its outputs are called.
 #[derive(Debug, Clone)]
@@ -30,12 +29,10 @@ impl PartialEq for Input {
     }
 }
 
-/// Endings of files that hold many images.
-const RECORDINGS: [&str; 10] = [
-    "bag", "mcap", "db3", "mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm",
-];
+/// Endings of ROS bags.
+const BAGS: [&str; 3] = ["bag", "mcap", "db3"];
 
-/// The images that files, folders, patterns and recordings mean: in the order of their paths, each once, then the frames of
+/// The images that files, folders, patterns and recordings mean: in the natural order of their paths, each once, then the frames of
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
 /// apart agree on both.
 ///
@@ -65,7 +62,7 @@ pub fn find_inputs(
             } else {
                 found.extend(images);
             }
-        } else if path.exists() && has_ending(&path, &RECORDINGS) {
+        } else if path.exists() && (is_bag(&path) || is_video(&path)) {
             recordings.extend(open(&path, argument, options)?);
         } else if path.exists() || !argument.contains(['*', '?', '[']) {
             // One of several files that is not there is an error of whoever opens it.
@@ -169,20 +166,16 @@ fn images_among(paths: impl Iterator<Item = PathBuf>, argument: &str) -> Result<
     Ok(images)
 }
 
-fn is_image(path: &Path) -> bool {
-    has_ending(path, &IMAGES)
-}
-
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
+fn is_bag(path: &Path) -> bool {
     path.extension()
         .and_then(|e| e.to_str())
-        .is_some_and(|e| endings.contains(&e.to_ascii_lowercase().as_str()))
+        .is_some_and(|e| BAGS.contains(&e.to_ascii_lowercase().as_str()))
 }
 
 /// Sorts the paths, drops those given twice, and names each after its file, numbered where two files share a name.
 fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     let mut paths: Vec<PathBuf> = paths.iter().map(|p| without_dots(p)).collect();
-    paths.sort();
+    paths.sort_by(|a, b| natural_order(a, b));
     let mut seen = HashSet::new();
     paths.retain(|p| seen.insert(absolute(p)));
     let mut used = UniqueNames::default();
@@ -225,6 +218,12 @@ mod tests {
             names(&["a/0.png", "b/0.png", "c/0-2.png", "d/A.png", "e/a.png"]),
             ["0", "0-2", "0-2-2", "A", "a-2"]
         );
+    }
+
+    #[test]
+    fn numbers_in_names_count_by_their_values() {
+        let given = ["a/frame_10.png", "a/frame_1.png", "a/frame_2.png"];
+        assert_eq!(names(&given), ["frame_1", "frame_2", "frame_10"]);
     }
 
     #[test]

@@ -143,10 +143,7 @@ struct Trace {
 /// The frames of one identifier.
 fn trace(path: &Path, id: CanId) -> Result<Trace> {
     if !is_blf(path)? {
-        let (mut frames, clock) = frames(path, &text_of(path)?)?;
-        let all = frames.len();
-        frames.retain(|frame| frame.id == id);
-        return Ok(Trace { frames, all, clock });
+        return of_text(path, &text_of(path)?, id);
     }
     let (mut frames, mut all) = (Vec::new(), 0);
     let start_ns = blf::read(path, |frame| {
@@ -186,14 +183,15 @@ pub(crate) fn is_blf(path: &Path) -> Result<bool> {
     Ok(first == blf::MARK)
 }
 
-fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
+/// The frames of one identifier of a text; others are counted and not kept, as a trace of hours has hundreds of millions.
+fn of_text(path: &Path, text: &str, id: CanId) -> Result<Trace> {
     let is_asc = text.lines().take(200).any(|l| {
         let l = l.trim().to_ascii_lowercase();
         l.starts_with("base hex")
             || l.starts_with("base dec")
             || l.starts_with("begin triggerblock")
     });
-    let mut frames = Vec::new();
+    let (mut frames, mut all, mut first_ns) = (Vec::new(), 0, None);
     let mut header = AscHeader::default();
     for (index, line) in text.lines().enumerate() {
         let parsed = if is_asc {
@@ -210,16 +208,24 @@ fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
         };
         match parsed {
             None => {}
-            Some(Ok(frame)) => frames.push(frame),
+            Some(Ok(frame)) => {
+                all += 1;
+                first_ns.get_or_insert(frame.ns);
+                if frame.id == id {
+                    frames.push(frame);
+                }
+            }
             Some(Err(problem)) => {
                 return Err(BadLine::new(index as u64 + 1, "frame", problem).of(path));
             }
         }
     }
-    let is_date = frames
-        .first()
-        .is_some_and(|f| f.ns > 946_000_000_000_000_000);
-    Ok((frames, if is_date { Clock::Date } else { Clock::Free }))
+    let is_date = first_ns.is_some_and(|ns| ns > 946_000_000_000_000_000);
+    Ok(Trace {
+        frames,
+        all,
+        clock: if is_date { Clock::Date } else { Clock::Free },
+    })
 }
 
 /// SocketCAN's bit of an identifier that marks a report of an error (`CAN_ERR_FLAG` of linux/can.h).
@@ -430,10 +436,21 @@ mod tests {
         for (times, expected) in [("absolute", [10, 30]), ("relative", [10, 60])] {
             let text =
                 format!("date Mon Nov 2 10:00:00 2026\nbase hex  timestamps {times}\n{lines}");
-            let (frames, _) = super::frames(Path::new("a.asc"), &text).unwrap();
-            let ms: Vec<i64> = frames.iter().map(|f| f.ns / 1_000_000).collect();
+            let id = CanId::Standard(0x1A0);
+            let trace = of_text(Path::new("a.asc"), &text, id).unwrap();
+            let ms: Vec<i64> = trace.frames.iter().map(|f| f.ns / 1_000_000).collect();
             assert_eq!(ms, expected, "{times}");
         }
+    }
+
+    /// Other identifiers' frames are counted, and the first of all says the clock; none of them is kept.
+    #[test]
+    fn frames_of_one_identifier_are_kept() {
+        let text = "(1436509052.2) can0 123#01\n(1.5) can0 124#02\n(1.6) can0 123#03\n";
+        let trace = of_text(Path::new("a.log"), text, CanId::Standard(0x124)).unwrap();
+        let data: Vec<&[u8]> = trace.frames.iter().map(|f| &f.data[..]).collect();
+        assert_eq!(data, [&[2_u8][..]]);
+        assert_eq!((trace.all, trace.clock), (3, Clock::Date));
     }
 
     #[test]

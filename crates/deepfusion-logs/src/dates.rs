@@ -44,7 +44,7 @@ pub(crate) fn unit_ns(name: &str) -> Option<i64> {
 pub(crate) fn style_of(words: &[&str], unit: Option<&str>) -> Option<TimeStyle> {
     let first = *words.first()?;
     if first.parse::<f64>().is_err() {
-        return match (date(first), time_of_day(first)) {
+        return match (parse_date(first), time_of_day(first)) {
             (Some(_), _) => Some(TimeStyle::Date),
             (None, Some(_)) => Some(TimeStyle::TimeOfDay),
             (None, None) => None,
@@ -73,7 +73,7 @@ pub(crate) fn style_of(words: &[&str], unit: Option<&str>) -> Option<TimeStyle> 
 pub(crate) fn nanoseconds(word: &str, style: TimeStyle, after: Option<i64>) -> Option<i64> {
     match style {
         TimeStyle::Number(unit_ns) => number_ns(word, unit_ns),
-        TimeStyle::Date => date(word).map(|(ns, _)| ns),
+        TimeStyle::Date => parse_date(word).map(|(ns, _)| ns),
         TimeStyle::TimeOfDay => {
             let ns = time_of_day(word)?;
             let Some(after) = after else { return Some(ns) };
@@ -90,7 +90,7 @@ pub(crate) fn nanoseconds(word: &str, style: TimeStyle, after: Option<i64>) -> O
 pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
     match style {
         TimeStyle::TimeOfDay => Clock::TimeOfDay,
-        TimeStyle::Date if date(word).is_some_and(|(_, zoned)| zoned) => Clock::Date,
+        TimeStyle::Date if parse_date(word).is_some_and(|(_, zoned)| zoned) => Clock::Date,
         TimeStyle::Date => Clock::LocalDate,
         TimeStyle::Number(unit_ns) => {
             let seconds = word.parse::<f64>().unwrap_or(0.0) * unit_ns as f64 * 1e-9;
@@ -116,7 +116,7 @@ pub fn time_on_clock(word: &str, clock: Clock, span_ns: (i64, i64), zone_s: i64)
         Clock::LocalDate => ns.saturating_sub(zone_s.saturating_mul(1_000_000_000)),
         _ => ns,
     };
-    match (date(word), clock) {
+    match (parse_date(word), clock) {
         (Some((ns, true)), Clock::Date | Clock::LocalDate) => Some(ns),
         (Some((ns, false)), Clock::Date | Clock::LocalDate) => Some(of_local(ns)),
         (Some((ns, _)), Clock::TimeOfDay) => Some(nearest_day(ns, span_ns)),
@@ -165,8 +165,10 @@ fn number_ns(word: &str, unit_ns: i64) -> Option<i64> {
     Some(if negative { -value } else { value })
 }
 
-/// A date in nanoseconds since 1970, and whether it says its zone.
-pub(crate) fn date(word: &str) -> Option<(i64, bool)> {
+/// A date with a time of day as recorders write it (ISO 8601, or a form of some apps'): in nanoseconds since 1970, and whether it says its
+/// zone. Without one it is taken for UTC.
+#[must_use]
+pub fn parse_date(word: &str) -> Option<(i64, bool)> {
     let word = word.trim();
     let ns = |stamp: jiff::Timestamp| i64::try_from(stamp.as_nanosecond()).ok();
     if let Ok(stamp) = word.parse::<jiff::Timestamp>() {
@@ -219,10 +221,10 @@ mod tests {
             ("22.09.2019 12:00:01", noon + SECOND, false),
             ("2019/09/22 12:00:00", noon, false),
         ] {
-            assert_eq!(date(word), Some((ns, zoned)), "{word}");
+            assert_eq!(parse_date(word), Some((ns, zoned)), "{word}");
         }
         for word in ["", "2019-09-22", "tomorrow", "12.5", "31-Feb-2019 10:00:00"] {
-            assert_eq!(date(word), None, "{word}");
+            assert_eq!(parse_date(word), None, "{word}");
         }
     }
 
@@ -348,7 +350,7 @@ mod tests {
     proptest! {
         #[test]
         fn garbage_never_panics(text in ".{0,40}", after in any::<i64>()) {
-            let _ = date(&text);
+            let _ = parse_date(&text);
             let _ = style_of(&[&text, &text], None);
             for style in [TimeStyle::Number(SECOND), TimeStyle::Date, TimeStyle::TimeOfDay] {
                 let _ = nanoseconds(&text, style, Some(after / 4));

@@ -1,10 +1,10 @@
 //! A phone's export folder: a table for each sensor, as Sensor Logger and phyphox write them.
 
 use crate::error::{Error, Result};
-use crate::log::{Clock, DriveLog, Format, ReadOptions};
+use crate::log::{DriveLog, Format, ReadOptions};
 use crate::note::{LogNote, TurnsNote};
 use crate::problem::SpeedProblem;
-use crate::rows::text_of;
+use crate::rows::{Backwards, text_of};
 use crate::table::Table;
 use crate::turns::{Heading, Sensor, yaw_rates};
 use crate::wide_table::{self, Times};
@@ -44,22 +44,15 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
     };
     let mut log = wide_table::read(&location, options)?;
     log.format = Format::ExportFolder;
-    let file = location
-        .path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
     if let Some(first) = log.notes.first_mut() {
-        let note = Box::new(first.clone());
-        *first = LogNote::OfFile { file, note };
+        *first = of_file(&location, first.clone());
     }
     let (Some(gyroscope), Some(gravity)) = (table(&GYROSCOPES)?, table(&GRAVITIES)?) else {
         log.notes.push(TurnsNote::NoGyroscope.into());
         return Ok(log);
     };
-    let rates = axes(&gyroscope, options, log.clock)?;
-    let accelerations = axes(&gravity, options, log.clock)?;
+    let rates = axes(&gyroscope, options, &mut log)?;
+    let accelerations = axes(&gravity, options, &mut log)?;
     let heading = headings(&location, options)?;
     let (turns, note) = yaw_rates(&rates, &accelerations, &heading);
     log.yaw_rates = turns;
@@ -67,9 +60,18 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
     Ok(log)
 }
 
+/// What is said of one of the folder's tables.
+fn of_file(table: &Table, note: LogNote) -> LogNote {
+    let name = table.path.file_name().unwrap_or_default();
+    LogNote::OfFile {
+        file: name.to_string_lossy().into_owned(),
+        note: Box::new(note),
+    }
+}
+
 /// The three axes of a sensor over time, in the units of the file: rad/s, m/s². Their times are in the column that was asked for where there is
-/// such, and on the positions' clock.
-fn axes(table: &Table, options: &ReadOptions, clock: Clock) -> Result<Vec<Sensor>> {
+/// such, and on the positions' clock: that of `log`, which has a note where rows are left out.
+fn axes(table: &Table, options: &ReadOptions, log: &mut DriveLog) -> Result<Vec<Sensor>> {
     let asked = options.time.clone();
     let times = Times::of(
         table,
@@ -78,7 +80,7 @@ fn axes(table: &Table, options: &ReadOptions, clock: Clock) -> Result<Vec<Sensor
             ..options.clone()
         },
     )?;
-    if times.clock != clock {
+    if times.clock != log.clock {
         let path = table.path.clone();
         return Err(Error::OtherClock { path });
     }
@@ -100,6 +102,7 @@ fn axes(table: &Table, options: &ReadOptions, clock: Clock) -> Result<Vec<Sensor
         .is_some_and(|u| u.contains('°') || u.contains("deg"));
     let factor = if degrees { 1_f64.to_radians() } else { 1.0 };
     let (mut all, mut last) = (Vec::with_capacity(table.len()), None);
+    let (mut back, mut used) = (Backwards::default(), 0);
     for row in 0..table.len() {
         let values = (
             table.number(row, x)?,
@@ -109,7 +112,10 @@ fn axes(table: &Table, options: &ReadOptions, clock: Clock) -> Result<Vec<Sensor
         let (Some(x), Some(y), Some(z)) = values else {
             continue;
         };
-        let ns = times.ns(table, row, last)?;
+        let Some(ns) = times.ns(table, row, last, &mut back)? else {
+            continue;
+        };
+        used += 1;
         if last == Some(ns) {
             continue;
         }
@@ -119,6 +125,9 @@ fn axes(table: &Table, options: &ReadOptions, clock: Clock) -> Result<Vec<Sensor
             value: Vector3::new(x, y, z) * factor,
         });
     }
+    let of_back = back.note(used)?;
+    let of_back = of_back.map(|note| of_file(table, note.into()));
+    log.notes.extend(of_back);
     Ok(all)
 }
 
@@ -133,12 +142,16 @@ fn headings(table: &Table, options: &ReadOptions) -> Result<Vec<Heading>> {
     };
     let times = Times::of(table, options)?;
     let (mut all, mut last) = (Vec::new(), None);
+    let (mut back, mut used) = (Backwards::default(), 0);
     for row in 0..table.len() {
         let (Some(degrees), Some(speed)) = (table.number(row, bearing)?, table.number(row, speed)?)
         else {
             continue;
         };
-        let ns = times.ns(table, row, last)?;
+        let Some(ns) = times.ns(table, row, last, &mut back)? else {
+            continue;
+        };
+        used += 1;
         last = Some(ns);
         // Below a brisk walk the course of a receiver is noise.
         if speed > 3.0 && degrees >= 0.0 {
@@ -148,5 +161,7 @@ fn headings(table: &Table, options: &ReadOptions) -> Result<Vec<Heading>> {
             });
         }
     }
+    // The speeds of these rows have a note of their own.
+    back.note(used)?;
     Ok(all)
 }

@@ -5,7 +5,7 @@ use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::note::{FixesNote, LogNote};
 use crate::numbers::{Cell, cell};
 use crate::problem::{LineField, SpeedProblem, TableProblem};
-use crate::rows::{enough, left_out};
+use crate::rows::{Backwards, enough, left_out};
 use crate::table::short;
 use std::path::Path;
 
@@ -57,6 +57,7 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
     };
     let satellites = fixes().any(|(_, row)| is_satellite(&row));
     let (mut speeds, mut rows, mut absent, mut repeated) = (Vec::<Speed>::new(), 0, 0, 0);
+    let mut back = Backwards::default();
     for (line, row) in fixes() {
         if satellites && !is_satellite(&row) {
             continue;
@@ -81,9 +82,12 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
         let ns = (ms * 1e6).round() as i64;
         match speeds.last() {
             Some(last) if ns < last.ns => {
-                let back_s = (last.ns - ns) as f64 * 1e-9;
-                let problem = TableProblem::FixBackwards { back_s };
-                return Err(BadLine::new(line, "Fix, UnixTimeMillis", problem).of(path));
+                back.leave_out(|| {
+                    let back_s = (last.ns - ns) as f64 * 1e-9;
+                    let problem = TableProblem::FixBackwards { back_s };
+                    BadLine::new(line, "Fix, UnixTimeMillis", problem).of(path)
+                });
+                continue;
             }
             Some(last) if ns == last.ns => {
                 repeated += 1;
@@ -102,6 +106,7 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
         of_satellites: satellites,
     })];
     left_out(&mut notes, rows, absent, repeated);
+    notes.extend(back.note(speeds.len() + repeated)?.map(LogNote::from));
     enough(path, &speeds)?;
     Ok(DriveLog {
         format: Format::GnssLogger,

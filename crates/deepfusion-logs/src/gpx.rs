@@ -57,7 +57,7 @@ fn fixes(bytes: &[u8]) -> std::result::Result<Vec<TimedFix>, BadLine> {
                 } else if let Some(point) = &mut point {
                     match name.as_ref() {
                         b"time" => point.ns = Some(date(text.trim(), point.line)?),
-                        b"speed" => point.fix.speed_mps = Some(speed(text.trim(), point.line)?),
+                        b"speed" => point.fix.speed_mps = speed(text.trim(), point.line)?,
                         _ => {}
                     }
                 }
@@ -113,11 +113,13 @@ fn date(word: &str, line: u64) -> std::result::Result<i64, BadLine> {
     i64::try_from(stamp.as_nanosecond()).map_err(|_| bad(GpxProblem::TooLate { text: text() }))
 }
 
-fn speed(word: &str, line: u64) -> std::result::Result<f64, BadLine> {
+/// A speed in m/s; a negative one, as iOS writes it, is not known.
+fn speed(word: &str, line: u64) -> std::result::Result<Option<f64>, BadLine> {
     let value: Option<f64> = word.parse().ok();
-    let value = value.filter(|v| v.is_finite() && (0.0..200.0).contains(v));
-    value.ok_or_else(|| {
+    let value = value.filter(|v| v.is_finite() && *v < 200.0);
+    let value = value.ok_or_else(|| {
         let text = word.to_owned();
         BadLine::new(line, "speed", GpxProblem::Speed { text })
-    })
+    })?;
+    Ok((value >= 0.0).then_some(value))
 }

@@ -6,7 +6,7 @@
 //!
 //! | Log | Read by |
 //! |---|---|
-//! | GPX, NMEA | Doppler speed where every fix has one, else positions, smoothed |
+//! | GPX, NMEA | Doppler speed where most fixes have one, else positions, smoothed |
 //! | Tables (`.csv`, `.tsv`, `.txt`): Torque, Sensor Logger, phyphox, any other | names and units of the columns |
 //! | Car Scanner (one value a row) | the rows of the vehicle's speed |
 //! | Google's GnssLogger | its `Fix` rows |
@@ -42,7 +42,7 @@ mod turns;
 mod units;
 mod wide_table;
 
-pub use dates::time_on_clock;
+pub use dates::{parse_date, time_on_clock};
 pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, NoGps, Result};
 pub use gopro_lens::GoproLens;

@@ -38,6 +38,36 @@ pub(crate) fn left_out(notes: &mut Vec<LogNote>, rows: usize, absent: usize, rep
     }
 }
 
+/// A log may have one row in so many that goes back in time.
+const ONE_BACK_IN: usize = 100;
+
+/// Rows that go back in time and are left out.
+#[derive(Default)]
+pub(crate) struct Backwards {
+    count: usize,
+    first: Option<Error>,
+}
+
+impl Backwards {
+    /// Leaves a row out; `error` is what is wrong with it.
+    pub(crate) fn leave_out(&mut self, error: impl FnOnce() -> Error) {
+        self.count += 1;
+        self.first.get_or_insert_with(error);
+    }
+
+    /// What is said of them beside so many rows that are used.
+    ///
+    /// # Errors
+    /// That of the first, where more than one row in a hundred goes back: such a log is in no order.
+    pub(crate) fn note(self, used: usize) -> Result<Option<TableNote>> {
+        let (back, rows) = (self.count, self.count + used);
+        match self.first {
+            Some(error) if back * ONE_BACK_IN > rows => Err(error),
+            first => Ok(first.map(|_| TableNote::Backwards { back, rows })),
+        }
+    }
+}
+
 /// An error where there are not two speeds.
 pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
     match speeds.len() {

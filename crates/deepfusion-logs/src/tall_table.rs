@@ -5,7 +5,7 @@ use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{DriveLog, Format, ReadOptions, Speed};
 use crate::note::{LogNote, TableNote};
 use crate::problem::SpeedProblem;
-use crate::rows::{enough, left_out};
+use crate::rows::{Backwards, enough, left_out};
 use crate::table::Table;
 use crate::units::SpeedUnit;
 use crate::wide_table::Times;
@@ -39,6 +39,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     })];
     let (mut speeds, mut last, mut of_speed, mut absent, mut repeated) =
         (Vec::<Speed>::new(), None, 0, 0, 0);
+    let mut back = Backwards::default();
     for row in 0..table.len() {
         if table.word(row, quantity) != name {
             continue;
@@ -48,7 +49,9 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
             absent += 1;
             continue;
         };
-        let ns = times.ns(table, row, last)?;
+        let Some(ns) = times.ns(table, row, last, &mut back)? else {
+            continue;
+        };
         if last == Some(ns) {
             repeated += 1;
             continue;
@@ -61,6 +64,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         });
     }
     left_out(&mut notes, of_speed, absent, repeated);
+    notes.extend(back.note(speeds.len() + repeated)?.map(LogNote::from));
     enough(&table.path, &speeds)?;
     Ok(DriveLog {
         format: Format::TallTable,

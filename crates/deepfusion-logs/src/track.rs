@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
 use crate::note::FixesNote;
 use crate::problem::SpeedProblem;
-use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
+use deepfusion_motion::{Fix, FixSpeedSource, course_rates, speeds_of_fixes};
 use std::path::Path;
 
 /// A fix and its time in nanoseconds; the fix's own time is not set.
@@ -13,7 +13,7 @@ pub(crate) struct TimedFix {
     pub(crate) fix: Fix,
 }
 
-/// The speeds of fixes with dates: as the receiver measured them where every fix has one, else from the smoothed positions.
+/// The speeds of fixes with dates: as the receiver measured them where most fixes have one, else from the smoothed positions.
 ///
 /// # Errors
 /// [`Error::NoSpeed`] where fewer than two fixes have a neighbour.
@@ -31,7 +31,9 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
             problem: SpeedProblem::TooFewFixes { fixes: fixes.len() },
         });
     }
-    let measured = fixes.iter().all(|f| f.speed_mps.is_some());
+    let of = |source: FixSpeedSource| smoothed.iter().filter(move |s| s.source == source);
+    let measured = of(FixSpeedSource::Positions).next().is_none();
+    let standing = of(FixSpeedSource::Standing).count();
     let mut notes = Vec::new();
     if smoothed.len() < fixes.len() {
         let (lost, fixes) = (fixes.len() - smoothed.len(), fixes.len());
@@ -45,6 +47,10 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
         sigma_mps,
     };
     notes.push(of_speeds.into());
+    if standing > 0 {
+        let fixes = fixes.len();
+        notes.push(FixesNote::Standing { standing, fixes }.into());
+    }
     let time = |s: f64| origin.saturating_add((s * 1e9).round() as i64);
     let course_rates = course_rates(&smoothed);
     let course_rates = course_rates.iter().map(|(time_s, radps)| YawRate {

@@ -6,7 +6,7 @@ use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
 use crate::note::{LogNote, TableNote};
 use crate::problem::{SpeedProblem, TableProblem};
-use crate::rows::{enough, left_out};
+use crate::rows::{Backwards, enough, left_out};
 use crate::table::{Table, short};
 use crate::track::{self, TimedFix};
 use crate::units::SpeedUnit;
@@ -62,8 +62,14 @@ impl<'a> Times<'a> {
         })
     }
 
-    /// The time of a row, which may not be before `after`.
-    pub(crate) fn ns(&self, table: &Table, row: usize, after: Option<i64>) -> Result<i64> {
+    /// The time of a row; `None`, and one more of `back`, where it is before `after`.
+    pub(crate) fn ns(
+        &self,
+        table: &Table,
+        row: usize,
+        after: Option<i64>,
+        back: &mut Backwards,
+    ) -> Result<Option<i64>> {
         let word = table.plain_word(row, self.column);
         let ns = nanoseconds(&word, self.style, after).ok_or_else(|| {
             let text = short(&word);
@@ -71,13 +77,16 @@ impl<'a> Times<'a> {
         })?;
         match after {
             Some(after) if ns < after => {
-                let problem = TableProblem::Backwards {
-                    text: short(&word),
-                    back_s: after.saturating_sub(ns) as f64 * 1e-9,
-                };
-                Err(table.bad(row, self.column, problem))
+                back.leave_out(|| {
+                    let problem = TableProblem::Backwards {
+                        text: short(&word),
+                        back_s: after.saturating_sub(ns) as f64 * 1e-9,
+                    };
+                    table.bad(row, self.column, problem)
+                });
+                Ok(None)
             }
-            _ => Ok(ns),
+            _ => Ok(Some(ns)),
         }
     }
 }
@@ -118,6 +127,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     let accuracy = table.named(&ACCURACY);
     let of_accuracy = accuracy.and_then(Column::speed_unit).unwrap_or(unit);
     let (mut speeds, mut last, mut absent, mut repeated) = (Vec::<Speed>::new(), None, 0, 0);
+    let mut back = Backwards::default();
     for row in 0..table.len() {
         let value = table.number(row, column)?;
         // A phone without a fix writes -1.
@@ -130,7 +140,9 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
             absent += 1;
             continue;
         }
-        let ns = times.ns(table, row, last)?;
+        let Some(ns) = times.ns(table, row, last, &mut back)? else {
+            continue;
+        };
         if last == Some(ns) {
             repeated += 1;
             continue;
@@ -147,6 +159,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         });
     }
     left_out(&mut notes, table.len(), absent, repeated);
+    notes.extend(back.note(speeds.len() + repeated)?.map(LogNote::from));
     enough(&table.path, &speeds)?;
     Ok(DriveLog {
         format: Format::Table,
@@ -188,6 +201,7 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<V
         return Ok(Vec::new());
     };
     let mut found: Vec<YawRate> = Vec::new();
+    let (mut back, mut used) = (Backwards::default(), 0);
     for row in 0..table.len() {
         let Some(value) = table.number(row, column)? else {
             continue;
@@ -196,12 +210,19 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<V
             continue;
         }
         let last = found.last().map(|turn| turn.ns);
-        let ns = times.ns(table, row, last)?;
+        let Some(ns) = times.ns(table, row, last, &mut back)? else {
+            continue;
+        };
+        used += 1;
         if last != Some(ns) {
             let radps = value * radps;
             found.push(YawRate { ns, radps });
         }
     }
+    // Of rows that have a speed, too, it is said already.
+    let of_back = back.note(used)?.map(LogNote::from);
+    let unsaid = of_back.filter(|note| !notes.contains(note));
+    notes.extend(unsaid);
     if !found.is_empty() {
         notes.push(TableNote::YawRate { column: header() }.into());
     }
@@ -245,6 +266,7 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
         return Err(table.lacks(ColumnProblem::NoSpeed));
     };
     let (mut fixes, mut last, mut beyond) = (Vec::new(), None, Vec::new());
+    let mut back = Backwards::default();
     for row in 0..table.len() {
         let place = (table.number(row, latitude)?, table.number(row, longitude)?);
         let (Some(latitude_deg), Some(longitude_deg)) = place else {
@@ -259,7 +281,9 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
             beyond.push((row, latitude_deg, longitude_deg));
             continue;
         }
-        let ns = times.ns(table, row, last)?;
+        let Some(ns) = times.ns(table, row, last, &mut back)? else {
+            continue;
+        };
         last = Some(ns);
         let fix = Fix {
             time_s: 0.0,
@@ -276,6 +300,7 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
         };
         return Err(table.bad(row, latitude, problem));
     }
+    notes.extend(back.note(fixes.len())?.map(LogNote::from));
     if !beyond.is_empty() {
         let (beyond, rows) = (beyond.len(), table.len());
         notes.push(TableNote::NoDegrees { beyond, rows }.into());

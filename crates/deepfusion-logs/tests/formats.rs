@@ -1,8 +1,8 @@
 //! One log of each kind, of one drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
 
 use deepfusion_logs::{
-    Clock, DriveLog, Format, GoproLens, ReadOptions, SpeedUnit, TableNote, TurnSign, TurnsNote,
-    read,
+    Clock, DriveLog, Format, GoproLens, LogNote, ReadOptions, SpeedUnit, TableNote, TurnSign,
+    TurnsNote, read,
 };
 use std::path::{Path, PathBuf};
 
@@ -59,6 +59,31 @@ fn a_track_without_speeds_is_smoothed() {
         assert!(error < 1.5 * sigma, "{i}: {error}, sigma {sigma}");
         assert!(error < 0.6 || !(2..11).contains(&i), "{i}: {error}");
     }
+}
+
+/// A clock that steps back for a row: the row is left out and counted; a table in no order is refused by the first such row.
+#[test]
+fn a_row_that_goes_back_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("trip.csv");
+    let read_with = |back: &[i32]| {
+        let row = |i: i32| {
+            let late = if back.contains(&i) { 5 } else { 0 };
+            format!("{},{i},0.1\n", f64::from(i - late) / 10.0)
+        };
+        let rows: String = (0..200).map(row).collect();
+        std::fs::write(&file, format!("time_s,speed_mps,yaw_rate_radps\n{rows}")).unwrap();
+        read(&file, &ReadOptions::default())
+    };
+    let log = read_with(&[50]).unwrap();
+    assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
+    assert!(log.speeds.iter().all(|speed| speed.mps != 50.0));
+    let said = LogNote::from(TableNote::Backwards { back: 1, rows: 200 });
+    let times = log.notes.iter().filter(|note| **note == said);
+    assert_eq!(times.count(), 1, "{:?}", log.notes);
+    let error = read_with(&[50, 60, 70]).unwrap_err().to_string();
+    assert!(error.contains("trip.csv:52: "), "{error}");
+    assert!(error.contains("0.4 s before the row above"), "{error}");
 }
 
 #[test]

@@ -61,6 +61,23 @@ fn a_speed_in_an_extension_counts() {
     assert_eq!(speeds, [0.5, 1.5, 2.5, 3.5, 4.5]);
 }
 
+/// iOS writes -1 where it does not know the speed, OsmAnd none where it is 0.
+#[test]
+fn a_point_without_a_speed_leaves_the_others_theirs() {
+    for unknown in ["<speed>-1</speed>", ""] {
+        let speed = |i: usize| {
+            let own = format!("<speed>{i}.5</speed>");
+            if i == 0 { unknown.to_owned() } else { own }
+        };
+        let log = read("a.gpx", &track(5, 0.0, speed)).unwrap();
+        let speeds: Vec<f64> = log.speeds.iter().map(|s| s.mps).collect();
+        assert_eq!(speeds, [0.0, 1.5, 2.5, 3.5, 4.5], "{unknown}");
+        let said: Vec<String> = log.notes.iter().map(ToString::to_string).collect();
+        assert!(said[0].contains("as the receiver measured"), "{said:?}");
+        assert!(said[1].ends_with("1 of 5 fixes"), "{said:?}");
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_track_is_named_by_line() {
     let good = track(5, 1e-4, |_| String::new());
@@ -78,8 +95,8 @@ fn what_is_wrong_with_a_track_is_named_by_line() {
             "a.gpx:4: time: '2026-05-01Tnoon'",
         ),
         (
-            good.replacen("</ele>", "</ele><speed>-7</speed>", 2),
-            "a.gpx:3: speed: '-7' is no speed",
+            good.replacen("</ele>", "</ele><speed>fast</speed>", 2),
+            "a.gpx:3: speed: 'fast' is no speed",
         ),
         (good[..good.len() - 100].to_owned(), "a.gpx:"),
         ("<html></html>".to_owned(), "it is no GPX file"),

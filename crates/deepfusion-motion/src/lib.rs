@@ -70,7 +70,7 @@ pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,
 };
 pub use motion_model::MotionModel;
-pub use positions::{COURSE_MPS, Fix, FixSpeed, course_rates, speeds_of_fixes};
+pub use positions::{COURSE_MPS, Fix, FixSpeed, FixSpeedSource, course_rates, speeds_of_fixes};
 pub use road_height::{
     GreyImage, GroundPair, RoadCosts, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
 };

@@ -17,6 +17,8 @@ const SPEED_SIGMA_MPS: f64 = 0.15;
 const ACCELERATION_DENSITY: f64 = 1.5;
 /// Degrees of freedom of Student's t: small is robust.
 const FREEDOM: f64 = 4.0;
+/// Below this speed by the smoothed positions, in m/s, a fix without a speed stands: some apps write only speeds above 0.
+const STANDING_MPS: f64 = 1.0;
 /// Number of rounds of reweighting.
 const ROUNDS: usize = 5;
 /// Longest time between two fixes from which a turn is taken, in seconds.
@@ -53,6 +55,19 @@ pub struct FixSpeed {
     /// Where it was going, in radians from east to the left, by the smoothed positions; `None` below [`COURSE_MPS`], where
     /// positions do not say it.
     pub course_rad: Option<f64>,
+    /// Who says the speed.
+    pub source: FixSpeedSource,
+}
+
+/// Who says the speed at a fix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FixSpeedSource {
+    /// The receiver.
+    Receiver,
+    /// Nobody, among others whose speeds the receiver says: by its positions it stands.
+    Standing,
+    /// The smoothed positions.
+    Positions,
 }
 
 /// Least speed at which positions show a course, m/s: their smoothed velocity is sure to some tenths.
@@ -74,6 +89,9 @@ pub fn course_rates(speeds: &[FixSpeed]) -> Vec<(f64, f64)> {
 
 /// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out, but one that leapt ahead is left out
 /// itself where the next is back in time; a fix more than ten seconds from both neighbours has none.
+///
+/// The receiver's own speeds count where at least half of the fixes of a part without gaps have one, not counting those that stand and have
+/// none: there a fix without one has the speed 0 where its positions stand, and is left out where they move.
 #[must_use]
 pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
     let mut kept: Vec<Fix> = Vec::with_capacity(fixes.len());
@@ -109,7 +127,6 @@ fn leapt(fixes: &[Fix], next: &Fix) -> bool {
 
 /// The speeds of a track without gaps.
 fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
-    let measured = fixes.iter().all(|fix| fix.speed_mps.is_some());
     let places = metres(fixes);
     let mut weights = vec![1.0; fixes.len()];
     let mut tracks = [Vec::new(), Vec::new()];
@@ -126,7 +143,7 @@ fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
     }
     let [east, north] = &tracks;
     let all = fixes.iter().zip(east.iter().zip(north));
-    all.map(|(fix, (east, north))| {
+    let of_positions = all.map(|(fix, (east, north))| {
         let (x, y) = (east.state[1], north.state[1]);
         let (var_x, var_y) = (east.covariance[(1, 1)], north.covariance[(1, 1)]);
         let speed = x.hypot(y);
@@ -136,21 +153,39 @@ fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
         } else {
             var_x.max(var_y)
         };
-        let course_rad = (speed >= COURSE_MPS).then(|| y.atan2(x));
-        match fix.speed_mps.filter(|_| measured) {
-            Some(measured) => FixSpeed {
-                time_s: fix.time_s,
-                speed_mps: measured.max(0.0),
-                sigma_mps: SPEED_SIGMA_MPS,
-                course_rad,
-            },
-            None => FixSpeed {
-                time_s: fix.time_s,
-                speed_mps: speed,
-                sigma_mps: variance.sqrt(),
-                course_rad,
-            },
+        FixSpeed {
+            time_s: fix.time_s,
+            speed_mps: speed,
+            sigma_mps: variance.sqrt(),
+            course_rad: (speed >= COURSE_MPS).then(|| y.atan2(x)),
+            source: FixSpeedSource::Positions,
         }
+    });
+    of_receiver(fixes, of_positions.collect())
+}
+
+/// The receiver's own speeds in place of those of the positions, where it says enough of them.
+fn of_receiver(fixes: &[Fix], of_positions: Vec<FixSpeed>) -> Vec<FixSpeed> {
+    let stands = |by_positions: &FixSpeed| by_positions.speed_mps < STANDING_MPS;
+    let measured = fixes.iter().filter(|fix| fix.speed_mps.is_some()).count();
+    let both = fixes.iter().zip(&of_positions);
+    let unsaid = both.filter(|(fix, of)| fix.speed_mps.is_none() && !stands(of));
+    if measured == 0 || unsaid.count() > measured {
+        return of_positions;
+    }
+    let both = fixes.iter().zip(of_positions);
+    both.filter_map(|(fix, of_positions)| match fix.speed_mps {
+        Some(measured) => Some(FixSpeed {
+            speed_mps: measured.max(0.0),
+            sigma_mps: SPEED_SIGMA_MPS,
+            source: FixSpeedSource::Receiver,
+            ..of_positions
+        }),
+        None => stands(&of_positions).then_some(FixSpeed {
+            speed_mps: 0.0,
+            source: FixSpeedSource::Standing,
+            ..of_positions
+        }),
     })
     .collect()
 }
@@ -237,150 +272,5 @@ fn advanced(from: &Estimate, dt: f64) -> Estimate {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A pseudo-random number between -1 and 1.
-    fn noise(i: usize) -> f64 {
-        let x = (i as f64 * 12.9898).sin() * 43_758.545_3;
-        2.0 * (x - x.floor()) - 1.0
-    }
-
-    /// A drive at 49° north that speeds up from 5 to 15 m/s, brakes and turns; `jitter` metres to either side.
-    fn drive(jitter: f64) -> (Vec<Fix>, Vec<f64>) {
-        let (mut x, mut y, mut heading) = (0.0_f64, 0.0_f64, 0.6_f64);
-        let (mut fixes, mut speeds) = (Vec::new(), Vec::new());
-        let (sin, cos) = 49_f64.to_radians().sin_cos();
-        let w = 1.0 - ECCENTRICITY_2 * sin * sin;
-        for tenth in 0..1200 {
-            let t = f64::from(tenth) / 10.0;
-            let speed = 10.0 + 5.0 * (t / 15.0).sin();
-            if tenth % 10 == 0 {
-                let (east, north) = (
-                    x + jitter * noise(tenth as usize),
-                    y + jitter * noise(7919 + tenth as usize),
-                );
-                fixes.push(Fix {
-                    time_s: t,
-                    latitude_deg: 49.0
-                        + (north * w.powf(1.5) / (EQUATOR_M * (1.0 - ECCENTRICITY_2))).to_degrees(),
-                    longitude_deg: 8.4 + (east * w.sqrt() / (EQUATOR_M * cos)).to_degrees(),
-                    speed_mps: None,
-                });
-                speeds.push(speed);
-            }
-            (x, y) = (
-                x + 0.1 * speed * heading.cos(),
-                y + 0.1 * speed * heading.sin(),
-            );
-            heading += 0.1 * 0.15 * (t / 9.0).sin();
-        }
-        (fixes, speeds)
-    }
-
-    /// Root mean square of the errors, and the ratio of the distances.
-    fn errors(found: &[FixSpeed], truth: &[f64]) -> (f64, f64) {
-        let squares = found
-            .iter()
-            .zip(truth)
-            .map(|(f, t)| (f.speed_mps - t).powi(2));
-        let ratio = found.iter().map(|f| f.speed_mps).sum::<f64>() / truth.iter().sum::<f64>();
-        ((squares.sum::<f64>() / truth.len() as f64).sqrt(), ratio)
-    }
-
-    #[test]
-    fn a_track_gives_its_turns() {
-        for (jitter, most) in [(0.0, 0.02), (1.0, 0.06)] {
-            let (fixes, _) = drive(jitter);
-            let rates = course_rates(&speeds_of_fixes(&fixes));
-            assert_eq!(rates.len(), fixes.len() - 1);
-            let squares = rates
-                .iter()
-                .map(|(t, rate)| (rate - 0.15 * (t / 9.0).sin()).powi(2));
-            let rms = (squares.sum::<f64>() / rates.len() as f64).sqrt();
-            // The turns themselves have 0.1 rad/s.
-            assert!(rms < most, "{jitter}: {rms}");
-        }
-    }
-
-    #[test]
-    fn a_track_gives_its_speeds() {
-        for (jitter, rms, bias) in [(0.0, 0.2, 2e-3), (1.0, 0.5, 6e-3)] {
-            let (fixes, truth) = drive(jitter);
-            let found = speeds_of_fixes(&fixes);
-            assert_eq!(found.len(), truth.len());
-            let (error, ratio) = errors(&found, &truth);
-            assert!(error < rms, "{jitter}: {error}");
-            assert!((ratio - 1.0).abs() < bias, "{jitter}: {ratio}");
-            // At least two thirds lie within its own standard deviation.
-            let within = found
-                .iter()
-                .zip(&truth)
-                .filter(|(f, t)| (f.speed_mps - **t).abs() < f.sigma_mps);
-            assert!(within.count() * 3 > 2 * truth.len(), "{jitter}");
-        }
-    }
-
-    #[test]
-    fn a_time_far_ahead_does_not_take_the_rest_away() {
-        let (mut fixes, _) = drive(0.3);
-        for glitch in [0, 7] {
-            let (own, all) = (fixes[glitch].time_s, fixes.len());
-            fixes[glitch].time_s = own + 86_400.0;
-            assert_eq!(speeds_of_fixes(&fixes).len(), all - 1, "fix {glitch}");
-            fixes[glitch].time_s = own;
-        }
-    }
-
-    #[test]
-    fn leaps_do_not_become_speed() {
-        let (mut fixes, truth) = drive(0.3);
-        for i in [17, 40, 41, 90] {
-            fixes[i].latitude_deg += 4e-4;
-        }
-        let (error, ratio) = errors(&speeds_of_fixes(&fixes), &truth);
-        assert!(error < 0.7 && (ratio - 1.0).abs() < 0.01, "{error} {ratio}");
-        // What neighbours say is tens of m/s.
-        let naive = 4e-4_f64.to_radians() * EQUATOR_M;
-        assert!(naive > 40.0);
-    }
-
-    #[test]
-    fn a_receivers_own_speed_counts_and_gaps_part_the_track() {
-        let fix = |time_s: f64, speed: f64| Fix {
-            time_s,
-            latitude_deg: 49.0,
-            longitude_deg: 179.999_99,
-            speed_mps: Some(speed),
-        };
-        let fixes = [
-            fix(0.0, 3.0),
-            fix(1.0, 4.0),
-            fix(1.0, 9.0),
-            fix(30.0, 5.0),
-            fix(f64::NAN, 5.0),
-        ];
-        let found = speeds_of_fixes(&fixes);
-        let speeds: Vec<f64> = found.iter().map(|f| f.speed_mps).collect();
-        assert_eq!(
-            speeds,
-            [3.0, 4.0],
-            "twice a time, a lone fix, and one without a time"
-        );
-        assert!(speeds_of_fixes(&[]).is_empty());
-        let over = |longitude_deg: f64, time_s: f64| Fix {
-            longitude_deg,
-            speed_mps: None,
-            ..fix(time_s, 0.0)
-        };
-        let found = speeds_of_fixes(&[
-            over(179.9999, 0.0),
-            over(-179.9999, 1.0),
-            over(-179.9997, 2.0),
-        ]);
-        assert!(
-            found.iter().all(|f| (10.0..20.0).contains(&f.speed_mps)),
-            "{found:?}"
-        );
-    }
-}
+#[path = "positions_tests.rs"]
+mod tests;

@@ -5,6 +5,7 @@
 
 mod cache;
 mod decoded;
+mod endings;
 mod error;
 mod frames;
 mod live;
@@ -15,6 +16,7 @@ mod program;
 mod write;
 
 pub use cache::frames_folder;
+pub use endings::{VIDEO_ENDINGS, is_video};
 pub use error::{Error, Result};
 pub use frames::VideoFrames;
 pub use live::{Address, LiveFrame, LiveSource, NextFrame};

@@ -47,7 +47,7 @@ pub(crate) enum Pictures<'a> {
     Video(&'a Path, Option<&'a GoproLens>),
 }
 
-/// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside them or in the folder above. Else
+/// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside them, or given or in a file in the folder above. Else
 /// what the `pictures` say themselves, and where nothing says it the one that is to be assumed; both become one of the `warnings`.
 ///
 /// # Errors
@@ -68,16 +68,17 @@ pub(crate) fn find_camera(
     if let Some(file) = &options.calibration {
         return CameraCalibration::read(file, size);
     }
-    if let Some(given) = config.intrinsics {
-        return CameraCalibration::given(given, size, config.path.as_path().into());
-    }
-    if let Some(hfov_deg) = config.hfov_deg {
-        let given = numbers_of_hfov(hfov_deg, size);
-        let given = CameraCalibration::given(given, size, config.path.as_path().into())?;
-        return Ok(given.for_any_size(true));
+    if let Some(given) = in_numbers(config, size)? {
+        return Ok(given);
     }
     let named = config.calibration.as_ref();
     let mut file = config.find(folder, "calibration", named, &NAMES)?;
+    if file.is_none()
+        && let Some(above) = &config.above
+        && let Some(given) = in_numbers(above, size)?
+    {
+        return Ok(given);
+    }
     if file.is_none()
         && let Some(above) = folder.parent()
     {
@@ -110,6 +111,19 @@ pub(crate) fn find_camera(
             layout,
         }),
     }
+}
+
+/// The camera that a `dataset.toml` says in numbers.
+fn in_numbers(config: &FolderConfig, size: (u32, u32)) -> Result<Option<CameraCalibration>> {
+    let by = CalibrationSource::from(config.path.as_path());
+    if let Some(given) = config.intrinsics {
+        return CameraCalibration::given(given, size, by).map(Some);
+    }
+    let Some(hfov_deg) = config.hfov_deg else {
+        return Ok(None);
+    };
+    let given = CameraCalibration::given(numbers_of_hfov(hfov_deg, size), size, by)?;
+    Ok(Some(given.for_any_size(true)))
 }
 
 /// How many images of a recording are asked whether the camera stayed as it was.

@@ -89,6 +89,11 @@ impl Dataset {
                             continue 'targets;
                         }
                     };
+                    // No larger step makes a distance of what is no number.
+                    if !motion.distance_m.is_finite() {
+                        no_motion += 1;
+                        continue 'targets;
+                    }
                     // A pair that is too slow is dropped below, so nobody waits for a car that stands.
                     if motion.distance_m >= least_m || motion.speed_mps < min_speed_mps {
                         break Source {

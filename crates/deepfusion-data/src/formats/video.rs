@@ -12,18 +12,9 @@ use crate::{
 };
 use deepfusion_geometry::Distortion;
 use deepfusion_logs::{GoproLens, may_hold_log};
-use deepfusion_video::VideoFrames;
+use deepfusion_video::{VideoFrames, is_video};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Endings of the files that are taken for videos.
-const ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
-
-/// Whether a file is named like a video.
-pub(crate) fn is_video(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    ENDINGS.contains(&extension.to_ascii_lowercase().as_str())
-}
 
 /// The video of a folder.
 #[derive(Debug)]

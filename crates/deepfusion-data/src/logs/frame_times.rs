@@ -9,6 +9,8 @@ use crate::{
     ColumnsProblem, DataWarning, Error, ExpectedCell, IncompleteWarning, Result, TableProblem,
     TimeStampProblem, TimesWarning,
 };
+use deepfusion_fs::natural_order;
+use deepfusion_logs::parse_date;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -102,12 +104,12 @@ fn have_numbers(images: &[PathBuf]) -> bool {
     images.iter().all(|path| number(path).is_some())
 }
 
-/// By number where all names are numbers, by name otherwise.
+/// By number where all names are numbers; otherwise by name, the numbers in it by their values.
 fn in_order(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
     if have_numbers(&images) {
         images.sort_by_cached_key(|path| (number(path), path.clone()))
     } else {
-        images.sort()
+        images.sort_by(|a, b| natural_order(a, b))
     }
     images
 }
@@ -217,7 +219,7 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
         });
     }
     let number = |text: &str| text.trim().parse::<f64>().ok();
-    // Numbers, or dates as KITTI has them: the first line tells.
+    // Numbers, or dates as KITTI has them or in other forms: the first line tells.
     let dates = lines.first().is_some_and(|(_, l)| number(l).is_none());
     let numbers: Vec<f64> = lines.iter().map_while(|(_, l)| number(l)).collect();
     let unit = match &config.time_unit {
@@ -234,7 +236,8 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
     let mut times = Vec::with_capacity(lines.len());
     for (line, text) in &lines {
         let ns = if dates {
-            date_time::parse(text).ok()
+            let other = || parse_date(text).map(|(ns, _)| ns);
+            date_time::parse(text).ok().or_else(other)
         } else {
             // A line that is not a number has kept the unit from being known: it is the one to be named.
             number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text))

@@ -66,6 +66,26 @@ fn a_rate_counts_frames_whose_names_are_dates() {
     assert_eq!(times, [0, 50 * MS]);
 }
 
+/// As `ffmpeg frame_%d.png` writes them.
+#[test]
+fn numbers_in_names_need_no_zeros() {
+    let names: Vec<String> = (1..=12).map(|i| format!("frame_{i}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let config = FolderConfig {
+        fps: Some(10.0),
+        ..FolderConfig::default()
+    };
+    let (folder, mut warnings) = (tempfile::tempdir().unwrap(), Vec::new());
+    let mut given = images(&names);
+    given.sort();
+    let found = timed_images(folder.path(), given, &config, &mut warnings).unwrap();
+    let paths: Vec<PathBuf> = found.iter().map(|image| image.path.clone()).collect();
+    assert_eq!(paths, images(&names));
+    let times: Vec<i64> = found.iter().map(|image| image.ns.unwrap()).collect();
+    let expected: Vec<i64> = (0..12).map(|i| i * 100 * MS).collect();
+    assert_eq!(times, expected);
+}
+
 #[test]
 fn a_break_of_years_takes_a_bounded_number_of_numbers() {
     let numbers = numbers_by_time(&[0, 100 * MS, 200 * MS, 1 << 60, (1 << 60) + 100 * MS]);
@@ -82,6 +102,19 @@ fn lists_and_tables_are_read() {
     let table = "time_ms,file\n10,images/b.png\n20,a.png\n";
     let found = timed(&["a", "b", "c"], &[("frames.csv", table)]).unwrap();
     assert_eq!(found, [(0, Some(10 * MS)), (1, Some(20 * MS))]);
+}
+
+#[test]
+fn dates_with_a_zone_are_read() {
+    let start = 1_714_557_600_123 * MS;
+    let expected = [(0, Some(start)), (1, Some(start + 100 * MS))];
+    let list = "2024-05-01T10:00:00.123Z\n2024-05-01T12:00:00.223+02:00\n";
+    let table =
+        "timestamp,file\n2024-05-01T10:00:00.123Z,a.png\n2024-05-01T12:00:00.223+02:00,b.png\n";
+    for (file, text) in [("timestamps.txt", list), ("frames.csv", table)] {
+        let found = timed(&["a", "b"], &[(file, text)]).unwrap();
+        assert_eq!(found, expected, "{file}");
+    }
 }
 
 #[test]

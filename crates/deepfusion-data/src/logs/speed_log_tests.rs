@@ -53,6 +53,27 @@ fn units_come_from_the_header_or_the_config() {
 }
 
 #[test]
+fn times_may_be_dates() {
+    let (start, tenth) = (1_714_557_600_123_000_000, 100_000_000);
+    for (zone, warned) in [("Z", false), ("", true)] {
+        let table = format!(
+            "timestamp,speed_mps\n2024-05-01T10:00:00.123{zone},3\n2024-05-01 10:00:00.223{zone},4\n"
+        );
+        let log = read(&[("speed.csv", &table)]).unwrap();
+        assert_eq!(log.speeds_mps.ns, [start, start + tenth], "{zone}");
+        let said = text_of(&log).contains("taken for UTC");
+        assert_eq!(said, warned, "{zone}");
+    }
+    // Of one column all say their zone, or none.
+    let mixed = "timestamp,speed_mps\n2024-05-01T10:00:00Z,3\n2024-05-01T10:00:01,4\n";
+    let error = refusal(&[("speed.csv", mixed)]).to_string();
+    assert!(error.contains(":3: column timestamp: "), "{error}");
+    let seconds = "timestamp,speed_mps\n2024-05-01T10:00:00Z,3\n1714557601,4\n";
+    let error = refusal(&[("speed.csv", seconds)]).to_string();
+    assert!(error.contains("'1714557601' is not a time"), "{error}");
+}
+
+#[test]
 fn a_unit_is_never_guessed() {
     let error = refusal(&[("speed.csv", "time_s,speed\n0,36\n")]);
     assert!(

@@ -1,22 +1,48 @@
 //! The column of times of a table.
 
 use super::clock::{TimeUnit, seconds};
-use super::table::Table;
+use super::table::{Column, Table};
 use crate::dataset_toml::FolderConfig;
 use crate::{ColumnsProblem, DataWarning, ExpectedCell, Result, TableProblem, TimesWarning};
+use deepfusion_logs::parse_date;
 
 pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
-/// The table's times in nanoseconds, which must rise; equal ones are warned of once.
-pub(crate) fn times(
+/// How a column's times are written.
+enum TimeStyle {
+    Numbers(TimeUnit),
+    /// All with their zone, or all without.
+    Dates {
+        zoned: bool,
+    },
+}
+
+impl TimeStyle {
+    fn nanoseconds(&self, word: &str) -> Option<i64> {
+        match self {
+            Self::Numbers(unit) => unit.nanoseconds(word),
+            Self::Dates { zoned } => {
+                let (ns, says_zone) = parse_date(word)?;
+                (says_zone == *zoned).then_some(ns)
+            }
+        }
+    }
+}
+
+/// How the times of a column are written: dates where the first is one, of which those without a zone are warned of, else numbers.
+fn style_of(
     table: &Table,
+    column: &Column,
     config: &FolderConfig,
     warnings: &mut Vec<DataWarning>,
     name: &str,
-) -> Result<Vec<i64>> {
-    let column = table.require(&TIMES, "time_s,speed_mps")?;
-    if table.len() == 0 {
-        return Err(table.lacks(ColumnsProblem::NoRows));
+) -> Result<TimeStyle> {
+    if let Some((_, zoned)) = table.words(column).next().and_then(parse_date) {
+        if !zoned {
+            let log = name.to_owned();
+            warnings.push(TimesWarning::NoZone { log }.into());
+        }
+        return Ok(TimeStyle::Dates { zoned });
     }
     let unit = match (&column.unit, &config.time_unit) {
         (Some(unit), _) | (None, Some(unit)) => TimeUnit::named(unit),
@@ -33,15 +59,29 @@ pub(crate) fn times(
             unit
         }
     };
-    let Some(unit) = unit else {
-        return Err(table.lacks(ColumnsProblem::NoTimeUnit {
+    unit.map(TimeStyle::Numbers).ok_or_else(|| {
+        table.lacks(ColumnsProblem::NoTimeUnit {
             column: column.header.clone(),
-        }));
-    };
+        })
+    })
+}
+
+/// The table's times in nanoseconds, which must rise; equal ones are warned of once.
+pub(crate) fn times(
+    table: &Table,
+    config: &FolderConfig,
+    warnings: &mut Vec<DataWarning>,
+    name: &str,
+) -> Result<Vec<i64>> {
+    let column = table.require(&TIMES, "time_s,speed_mps")?;
+    if table.len() == 0 {
+        return Err(table.lacks(ColumnsProblem::NoRows));
+    }
+    let style = style_of(table, column, config, warnings, name)?;
     let mut all: Vec<i64> = Vec::with_capacity(table.len());
     let mut repeated = Vec::new();
     for (row, word) in table.words(column).enumerate() {
-        let ns = unit.nanoseconds(word);
+        let ns = style.nanoseconds(word);
         let not_a_time = || TableProblem::not(ExpectedCell::Time, word);
         let ns = ns.ok_or_else(|| table.bad(row, column, not_a_time()))?;
         match all.last() {

@@ -12,19 +12,30 @@ pub enum FixesNote {
         if *measured { "as the receiver measured them" } else { "from its positions, smoothed" }
     )]
     Speeds {
-        /// Whether every fix has one; else they follow from the positions.
+        /// Whether enough fixes have one everywhere; else they follow from the positions, at least in parts.
         measured: bool,
         /// The median of their standard deviations, m/s.
         sigma_mps: f64,
     },
-    /// Fixes without a neighbour in time.
+    /// Fixes without a neighbour in time, and moving ones without a speed among those that have one.
     #[error(
-        "left out, as they stand alone or go back in time: {lost} of {}",
+        "left out, as they stand alone, go back in time or lack the speed that others have: {lost} of {}",
         count_of(*fixes, "fix")
     )]
     Alone {
         /// How many.
         lost: usize,
+        /// How many fixes there are.
+        fixes: usize,
+    },
+    /// Fixes without a speed among those that have one, whose positions stand.
+    #[error(
+        "taken to stand, as they have no speed and their positions do: {standing} of {}",
+        count_of(*fixes, "fix")
+    )]
+    Standing {
+        /// How many.
+        standing: usize,
         /// How many fixes there are.
         fixes: usize,
     },
@@ -61,7 +72,14 @@ mod tests {
             ),
             (
                 FixesNote::Alone { lost: 1, fixes: 12 },
-                "left out, as they stand alone or go back in time: 1 of 12 fixes",
+                "left out, as they stand alone, go back in time or lack the speed that others have: 1 of 12 fixes",
+            ),
+            (
+                FixesNote::Standing {
+                    standing: 2,
+                    fixes: 12,
+                },
+                "taken to stand, as they have no speed and their positions do: 2 of 12 fixes",
             ),
             (
                 fix_rows(true),

@@ -67,6 +67,18 @@ pub enum TableNote {
         /// Of so many that could have a speed.
         rows: usize,
     },
+    /// Rows that go back in time.
+    #[error(
+        "{back} of {} {} left out",
+        count_of(*rows, "row"),
+        if *back == 1 { "goes back in time and is" } else { "go back in time and are" }
+    )]
+    Backwards {
+        /// How many.
+        back: usize,
+        /// Of so many that could be used.
+        rows: usize,
+    },
     /// Rows whose latitude or longitude is none.
     #[error(
         "left out, as their degrees are none: {beyond} of {}",
@@ -198,6 +210,14 @@ mod tests {
                     rows: 1,
                 },
                 "1 of 1 row repeats the time of the row above and is left out",
+            ),
+            (
+                TableNote::Backwards { back: 1, rows: 200 },
+                "1 of 200 rows goes back in time and is left out",
+            ),
+            (
+                TableNote::Backwards { back: 2, rows: 200 },
+                "2 of 200 rows go back in time and are left out",
             ),
             (
                 TableNote::NoDegrees { beyond: 1, rows: 1 },

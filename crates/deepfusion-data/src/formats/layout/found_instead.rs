@@ -2,6 +2,8 @@
 
 use crate::formats::shared::files::folders;
 use crate::{Error, FileKind, FoundInstead, Result};
+use deepfusion_images::is_image;
+use deepfusion_video::is_video;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -54,12 +56,16 @@ pub(super) fn folder(folder: &Path) -> Result<FoundInstead> {
 
 /// The kind of a file, by its ending.
 fn kind_of(path: &Path) -> Option<FileKind> {
+    if is_image(path) {
+        return Some(FileKind::Images);
+    }
+    if is_video(path) {
+        return Some(FileKind::Videos);
+    }
     let extension = path.extension()?.to_str()?;
     Some(match extension.to_ascii_lowercase().as_str() {
-        "png" | "jpg" | "jpeg" => FileKind::Images,
         "mcap" | "db3" => FileKind::Ros2Bags,
         "bag" => FileKind::RosBags,
-        "mp4" | "mkv" | "avi" | "mov" | "hevc" => FileKind::Videos,
         "zip" | "tar" | "gz" | "tgz" => FileKind::Archives,
         "bin" => FileKind::Bin,
         _ => return None,

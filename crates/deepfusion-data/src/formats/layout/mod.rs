@@ -12,6 +12,7 @@ use crate::{
     Result,
 };
 use deepfusion_rosbag::MessageSource;
+use deepfusion_video::is_video;
 use neighbours::{NeighbourSearch, unread};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -141,7 +142,7 @@ impl Layout {
             return Ok(Some(Self::Bags(vec![given])));
         }
         if !real.is_dir() {
-            return if video::is_video(&real) {
+            return if is_video(&real) {
                 Ok(Some(Self::Video(real)))
             } else {
                 Err(unknown(found_instead::file(&real)))

@@ -1,7 +1,8 @@
 //! What lies in the folder of a recording, looks like another one, and is not read with it.
 
 use crate::dataset_toml::FolderConfig;
-use crate::formats::{comma, video};
+use crate::formats::comma;
+use deepfusion_video::is_video;
 use std::path::{Path, PathBuf};
 
 /// Endings of bags.
@@ -77,7 +78,7 @@ fn holds_a_recording(folder: &Path) -> bool {
 /// Whether a file is named like a video that is no output.
 fn is_source_video(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
-    video::is_video(path) && !name.ends_with(OUTPUT_VIDEO.as_bytes())
+    is_video(path) && !name.ends_with(OUTPUT_VIDEO.as_bytes())
 }
 
 fn is_bag(path: &Path) -> bool {

@@ -2,6 +2,8 @@
 
 pub(crate) use crate::names::name_of;
 use crate::{Error, Result};
+use deepfusion_fs::natural_order;
+use deepfusion_images::is_image;
 use std::path::{Path, PathBuf};
 
 /// The names of a path: as it was given, and with its links resolved, where that is another. Layouts that are recognised by the folders above
@@ -33,19 +35,17 @@ pub(crate) fn by_either_name<T>(
     Ok(Vec::new())
 }
 
-/// The PNG and JPEG files of a folder, hidden ones left out. A folder that is not there is an error.
+/// The PNG and JPEG files of a folder in their natural order, hidden ones left out. A folder that is not there is an error.
 pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
         let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-        let known = ["png", "jpg", "jpeg"].contains(&extension.to_ascii_lowercase().as_str());
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
-        if known && !name.starts_with('.') && path.is_file() {
+        if is_image(&path) && !name.starts_with('.') && path.is_file() {
             images.push(path);
         }
     }
-    images.sort();
+    images.sort_by(|a, b| natural_order(a, b));
     Ok(images)
 }
 

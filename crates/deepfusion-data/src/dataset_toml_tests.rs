@@ -1,0 +1,115 @@
+use super::*;
+
+fn read(text: &str) -> Result<FolderConfig> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join(FolderConfig::NAME), text).unwrap();
+    FolderConfig::read(folder.path())
+}
+
+#[test]
+fn a_mounted_camera_sees_ahead() {
+    let config = read("[mount]\nforward_m = 1.5\nup_m = 1.2\n").unwrap();
+    // A stone 10 m before the axle and 1 m to its left lies 8.5 m ahead, to the left, 1.2 m below.
+    let seen = config
+        .cam_from_vehicle()
+        .transform(&Vector3::new(10.0, 1.0, 0.0));
+    assert!(
+        (seen - Vector3::new(-1.0, 1.2, 8.5)).norm() < 1e-12,
+        "{seen}"
+    );
+}
+
+#[test]
+fn angles_turn_the_way_they_say() {
+    let ahead = |text: &str| {
+        let config = read(&format!("[mount]\n{text} = 10\n")).unwrap();
+        config
+            .cam_from_vehicle()
+            .transform(&Vector3::new(10.0, 0.0, 0.0))
+    };
+    // What is ahead of the car appears to the right of a camera that looks left, above one that looks
+    // down, and stays put under roll.
+    assert!(ahead("yaw_deg").x > 1.0);
+    assert!(ahead("pitch_deg").y < -1.0);
+    assert!((ahead("roll_deg") - Vector3::new(0.0, 0.0, 10.0)).norm() < 1e-12);
+    // Rolled to the right, what is to the right moves up in the image.
+    let config = read("[mount]\nroll_deg = 10\n").unwrap();
+    assert!(
+        config
+            .cam_from_vehicle()
+            .transform(&Vector3::new(10.0, -5.0, 0.0))
+            .y
+            < 0.0
+    );
+}
+
+#[test]
+fn mistakes_are_named() {
+    for (text, problem) in [
+        ("fsp = 10", "unknown field `fsp`"),
+        ("fps = 0", "fps is 0, it must be above 0"),
+        ("fps = 'fast'", "fps"),
+        ("intrinsics = [1, 2, 3]", "intrinsics"),
+        ("start_s = nan", "start_s is NaN"),
+        ("[mount]\nyaw_deg = nan", "mount.yaw_deg is NaN"),
+        ("[mount]\nup_m = inf", "mount.up_m is inf"),
+    ] {
+        let error = read(text).unwrap_err().to_string();
+        assert!(
+            error.contains("dataset.toml") && error.contains(problem),
+            "{error}"
+        );
+    }
+    let config = read("speed = 'gone.csv'").unwrap();
+    let error = config.find(Path::new("."), "speed", config.speed.as_ref(), &[]);
+    assert!(
+        error
+            .unwrap_err()
+            .to_string()
+            .contains("speed: there is no")
+    );
+}
+
+/// Reads the file of a drive in a folder that has one, too.
+fn read_below(above: &str, own: &str) -> Result<FolderConfig> {
+    let fleet = tempfile::tempdir().unwrap();
+    let drive = fleet.path().join("drive");
+    std::fs::create_dir(&drive).unwrap();
+    std::fs::write(fleet.path().join(FolderConfig::NAME), above).unwrap();
+    std::fs::write(drive.join(FolderConfig::NAME), own).unwrap();
+    FolderConfig::read(&drive)
+}
+
+#[test]
+fn the_file_above_completes_what_is_not_said() {
+    let above = "for_folders = true\nfps = 20\nspeed_unit = 'km/h'\nstart_s = 5\nspeed = 'all.csv'\nhfov_deg = 69\n\
+                 [mount]\nup_m = 1.2\n[vehicle]\nspeed_scale = 0.98\n";
+    let config = read_below(above, "fps = 25\n").unwrap();
+    assert_eq!(config.fps, Some(25.0), "its own goes before it");
+    assert_eq!(config.speed_unit.as_deref(), Some("km/h"));
+    assert_eq!(config.mount.map(|mount| mount.up_m), Some(1.2));
+    assert_eq!(config.speed_scale(), 0.98);
+    let of_one = (config.start_s, config.speed, config.hfov_deg);
+    assert_eq!(of_one, (None, None, None), "a recording's own");
+    assert_eq!(config.above.unwrap().hfov_deg, Some(69.0));
+    // A table counts as a whole.
+    let config = read_below(above, "[mount]\nleft_m = 0.5\n").unwrap();
+    assert_eq!(config.mount.map(|mount| mount.up_m), Some(0.0));
+}
+
+#[test]
+fn a_file_above_that_is_a_recordings_says_nothing() {
+    for above in ["fps = 20\n", "yaw_known = false\n", "= no TOML\n"] {
+        let config = read_below(above, "").unwrap();
+        assert_eq!(
+            (config.fps, config.above.is_some()),
+            (None, false),
+            "{above}"
+        );
+    }
+    // One that is for the folders is named where it is wrong.
+    let error = read_below("for_folders = true\nfps = 0\n", "").unwrap_err();
+    let error = error.to_string();
+    assert!(!error.contains("drive/dataset.toml"), "{error}");
+    assert!(error.contains("dataset.toml: fps is 0"), "{error}");
+}

@@ -1,0 +1,180 @@
+//! The order of names with numbers in them.
+
+use std::cmp::Ordering;
+use std::path::{Component, Path};
+
+/// The order in which a person puts paths: folder by folder as paths are ordered, but the numbers in names by their values, so that
+/// `frame_2.png` is before `frame_10.png`. Digits behind a decimal point are a fraction: `0.15` is before `0.2`. Names whose numbers have as
+/// many digits are in the order of their bytes, as are those that differ in leading zeros alone.
+#[must_use]
+pub fn natural_order(a: &Path, b: &Path) -> Ordering {
+    let (mut rest_a, mut rest_b) = (a.components(), b.components());
+    loop {
+        let order = match (rest_a.next(), rest_b.next()) {
+            // `a//b` and `a/b` are one path; what else is left differs in leading zeros.
+            (None, None) => return a.cmp(b),
+            (None, Some(_)) => Ordering::Less,
+            (Some(_), None) => Ordering::Greater,
+            (Some(Component::Normal(a)), Some(Component::Normal(b))) => {
+                of_names(a.as_encoded_bytes(), b.as_encoded_bytes())
+            }
+            (Some(a), Some(b)) => a.cmp(&b),
+        };
+        if order.is_ne() {
+            return order;
+        }
+    }
+}
+
+/// Two names, byte by byte, their numbers as numbers; equal where they differ in leading zeros alone.
+fn of_names(mut a: &[u8], mut b: &[u8]) -> Ordering {
+    // What both had last before the place: a number, or a point behind one.
+    let (mut number, mut point) = (false, false);
+    loop {
+        let (digits_a, digits_b) = (digits(a), digits(b));
+        let (order, used) = if digits_a.is_empty() || digits_b.is_empty() {
+            let order = a.first().cmp(&b.first());
+            (point, number) = (number && a.first() == Some(&b'.'), false);
+            (order, (1, 1))
+        } else {
+            let order = if point {
+                digits_a.cmp(digits_b)
+            } else {
+                of_numbers(digits_a, digits_b)
+            };
+            // A fraction has no point of its own.
+            (number, point) = (!point, false);
+            (order, (digits_a.len(), digits_b.len()))
+        };
+        if order.is_ne() {
+            return order;
+        }
+        let (Some(after_a), Some(after_b)) = (a.get(used.0..), b.get(used.1..)) else {
+            // Both have ended.
+            return Ordering::Equal;
+        };
+        (a, b) = (after_a, after_b);
+    }
+}
+
+/// The digits that a name begins with.
+fn digits(name: &[u8]) -> &[u8] {
+    let count = name.iter().take_while(|b| b.is_ascii_digit()).count();
+    &name[..count]
+}
+
+/// Two written whole numbers of any length.
+fn of_numbers(a: &[u8], b: &[u8]) -> Ordering {
+    let (a, b) = (without_zeros(a), without_zeros(b));
+    a.len().cmp(&b.len()).then_with(|| a.cmp(b))
+}
+
+fn without_zeros(digits: &[u8]) -> &[u8] {
+    let zeros = digits.iter().take_while(|b| **b == b'0').count();
+    &digits[zeros..]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    fn sorted(paths: &[&str]) -> Vec<PathBuf> {
+        let mut paths: Vec<PathBuf> = paths.iter().map(PathBuf::from).collect();
+        paths.sort_by(|a, b| natural_order(a, b));
+        paths
+    }
+
+    #[test]
+    fn numbers_count_by_their_values() {
+        for right in [
+            &[
+                "frame_1.png",
+                "frame_2.png",
+                "frame_10.png",
+                "frame_100.png",
+            ][..],
+            &["frame_9999.png", "frame_10000.png"],
+            &["cam0_9.png", "cam0_10.png", "cam1_1.png"],
+            &["drive2/9.png", "drive2/10.png", "drive10/1.png"],
+            // Longer than any integer.
+            &[
+                "99999999999999999999999.png",
+                "100000000000000000000000.png",
+            ],
+            // Of one value, as bytes.
+            &["02.png", "2.png", "3.png"],
+            &["a.png", "a1.png", "a1b.png", "aa.png"],
+        ] {
+            let mut wrong = right.to_vec();
+            wrong.reverse();
+            let right: Vec<PathBuf> = right.iter().map(PathBuf::from).collect();
+            assert_eq!(sorted(&wrong), right);
+        }
+    }
+
+    #[test]
+    fn digits_behind_a_point_are_a_fraction() {
+        let names = [
+            "1305031102.1753.png",
+            "1305031102.2.png",
+            "1305031102.25.png",
+            "1305031103.png",
+        ];
+        let mut wrong = names;
+        wrong.reverse();
+        assert_eq!(sorted(&wrong), names.map(PathBuf::from));
+        // A point behind letters is none of a number.
+        let names = ["frame.9.png", "frame.10.png"];
+        assert_eq!(
+            sorted(&["frame.10.png", "frame.9.png"]),
+            names.map(PathBuf::from)
+        );
+    }
+
+    #[test]
+    fn numbers_of_one_length_keep_the_order_of_paths() {
+        let names = [
+            "image_02/data/0000000010.png",
+            "image_02/data/0000000002.jpg",
+            "image_02/0000000002.png",
+            "b-01_x.png",
+            "b_01-x.png",
+            "b/01.png",
+            "b01/01.png",
+            "B_02.png",
+            "/b/07.png",
+            "../b/07.png",
+            "1403636579763555584.png",
+            "1403636579813555456.png",
+            "1305031102.175304.png",
+            "",
+        ];
+        let mut right: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+        right.sort();
+        assert_eq!(sorted(&names), right);
+    }
+
+    /// No order is a circle, whatever the names.
+    #[test]
+    fn the_order_is_total() {
+        let parts = ["", "0", "1", "01", "10", ".", "a", "-", "/"];
+        let mut paths = Vec::new();
+        for a in parts {
+            for b in parts {
+                for c in parts {
+                    paths.push(PathBuf::from(format!("{a}{b}{c}")));
+                }
+            }
+        }
+        let mut sorted = paths.clone();
+        sorted.sort_by(|a, b| natural_order(a, b));
+        for (i, a) in sorted.iter().enumerate() {
+            for b in &sorted[i..] {
+                assert!(natural_order(a, b).is_le(), "{a:?} {b:?}");
+                assert_eq!(natural_order(b, a), natural_order(a, b).reverse());
+                assert_eq!(natural_order(a, b).is_eq(), a == b, "{a:?} {b:?}");
+            }
+        }
+    }
+}
