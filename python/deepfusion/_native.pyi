@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "Dataset",
     "DeepFusionError",
+    "Evaluation",
     "Frame",
     "Model",
     "Perception",
@@ -20,7 +21,6 @@ __all__ = [
     "command",
     "devices",
     "doctor",
-    "evaluate",
     "load",
     "networks",
     "simulate",
@@ -166,7 +166,6 @@ def load(model: Any, precision: str, data_set: str | None, device: str) -> Model
 def networks() -> list[str]: ...
 def devices() -> list[str]: ...
 def check_device(device: str) -> None: ...
-def evaluate(pairs: Any, kind: str, crop: str, cap: float, min_depth: float) -> str: ...
 def simulate(
     out: Any,
     frames: int,
@@ -199,3 +198,20 @@ class Perception:
         speed_mps: float | None,
         yaw_rate_radps: float,
     ) -> str: ...
+
+@final
+class Evaluation:
+    def __new__(
+        cls,
+        kind: str,
+        crop: str,
+        cap: float,
+        min_depth: float,
+        allow_holes: bool,
+        gt_depth: str,
+        scale: float | None,
+        points: int,
+        points_seed: int,
+    ) -> Evaluation: ...
+    def add(self, name: str, prediction: Prediction | NDArray[np.float64], truth: NDArray[np.float64]) -> None: ...
+    def report(self) -> str: ...

@@ -29,7 +29,7 @@ mod _native {
     #[pymodule_export]
     use super::error::DeepFusionError;
     #[pymodule_export]
-    use super::measure::{doctor, evaluate, simulate};
+    use super::measure::{Evaluation, doctor, simulate};
     #[pymodule_export]
     use super::model::{Model, Prediction, load, networks};
     #[pymodule_export]

@@ -390,7 +390,7 @@ pub(crate) struct Prediction {
 }
 
 /// An array of H x W.
-type Plane = Py<PyArray2<f32>>;
+pub(crate) type Plane = Py<PyArray2<f32>>;
 
 impl Prediction {
     pub(crate) fn new(
@@ -419,6 +419,12 @@ impl Prediction {
         Some((depth, sigma))
     }
 
+    /// Whether the network saw the whole image.
+    pub(crate) fn saw_all(&self) -> bool {
+        let [width, height] = self.prediction.image_size;
+        self.prediction.window == [0, 0, width, height]
+    }
+
     /// With its depth made already.
     pub(crate) fn with_depth(self) -> Self {
         let made = Mutex::new(Some(self.prediction.depth()));
@@ -430,7 +436,7 @@ impl Prediction {
 impl Prediction {
     /// H x W metres at the image's size; 0 outside of what the network looked at. One array, made once.
     #[getter]
-    fn depth(&self, py: Python<'_>) -> PyResult<Plane> {
+    pub(crate) fn depth(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.depth.get_or_try_init(py, || {
             let made = self
                 .made
@@ -464,7 +470,7 @@ impl Prediction {
 
     /// 1/m, at the network's size. One array, made once.
     #[getter]
-    fn disparity(&self, py: Python<'_>) -> PyResult<Plane> {
+    pub(crate) fn disparity(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.disparity.get_or_try_init(py, || {
             let p = &self.prediction;
             image_array(py, p.height, p.width, p.disparity.clone())

@@ -206,6 +206,43 @@ def test_the_metrics_are_the_fields():
     assert inverse["unscaled"]["abs_rel"] == pytest.approx(report["unscaled"]["abs_rel"], rel=1e-6)
 
 
+def test_what_predicts_nothing_somewhere_can_be_left_out():
+    """`Prediction.depth` is 0 outside of what the network looked at."""
+    truth = np.full((4, 6), 10.0)
+    predicted = np.full((4, 6), 11.0)
+    predicted[:2] = 0
+    with pytest.raises(deepfusion.DeepFusionError, match="12 of 24") as refused:
+        deepfusion.evaluate([predicted], [truth])
+    assert "allow_holes=True" in refused.value.hint
+    report = deepfusion.evaluate([predicted], [truth], allow_holes=True, gt_depth="annotated", scale=0.5, points=4)
+    assert report["unscaled"]["abs_rel"] == pytest.approx(0.1) and report["missing_rate"] > 0
+    assert report["protocol"]["gt"] == "annotated"
+    assert report["fixed_scaled"]["factor"] == 0.5 and report["points"] is not None
+    with pytest.raises(ValueError, match="gt_depth"):
+        deepfusion.evaluate([predicted], [truth], gt_depth="lidar")
+    with pytest.raises(ValueError, match="1 x 4 x 6"):
+        deepfusion.evaluate([predicted[None]], [truth])
+
+
+def test_predictions_are_measured_as_they_come(drive, model):
+    recording = deepfusion.Dataset(drive)
+    camera = recording[0].intrinsics
+    truths = [frame.ground_truth() for frame in recording]
+    assert [truth is None for truth in truths] == [False, True, False]
+    images = [frame.image for frame in recording]
+    scans = [0, 2]
+    for kind in ("depth", "disparity"):
+        arrays = [getattr(model.predict(images[i], camera, stretch=True), kind) for i in scans]
+        expected = deepfusion.evaluate(arrays, [truths[i] for i in scans], kind=kind)
+        seen = model.predict_many(images, camera, stretch=True)
+        assert deepfusion.evaluate(seen, (truth for truth in truths), kind=kind) == expected
+    with pytest.raises(ValueError, match="only 2"):
+        deepfusion.evaluate(model.predict_many(images[:2], camera, stretch=True), truths)
+    with pytest.raises(deepfusion.DeepFusionError, match="no image has") as refused:
+        deepfusion.evaluate(images[:1], [None])
+    assert "no frame has ground truth" in refused.value.hint
+
+
 def test_errors_say_what_to_do(drive, model, tmp_path):
     assert deepfusion.DeepFusionError("somebody's own").hint is None
     with pytest.raises(deepfusion.DeepFusionError) as caught:
