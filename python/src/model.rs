@@ -13,8 +13,11 @@ use deepfusion::jobs::engine::EngineSettings;
 use deepfusion::jobs::evaluation::augmentation;
 use deepfusion::jobs::intervals::sigma;
 use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
-use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{
+    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -294,9 +297,7 @@ impl Source {
         } else if image.hasattr("convert")? {
             // PIL's way, which others have as well.
             exif = exif_of_file(image)?;
-            let image = upright(image)?;
-            let rgb = image.call_method1("convert", ("RGB",))?;
-            numpy.call_method1("asarray", (rgb,))?
+            of_pil(&upright(image)?)?
         } else {
             numpy.call_method1("asarray", (image,))?
         };
@@ -352,6 +353,34 @@ fn upright<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     }
     py.import("PIL.ImageOps")?
         .call_method1("exif_transpose", (image,))
+}
+
+/// The pixels of a PIL image, H x W x 3. Its own conversion cuts 16-bit grey off at 255: here it becomes 8 bits as that of a file does.
+fn of_pil<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = image.py();
+    let numpy = py.import("numpy")?;
+    // What only looks like PIL's need not have one.
+    let mode = image.getattr("mode").ok();
+    let mode: Option<String> = mode.and_then(|mode| mode.extract().ok());
+    match mode.as_deref() {
+        Some(mode) if mode.starts_with("I;16") => {
+            let grey = numpy.call_method1("asarray", (image, "uint16"))?;
+            let grey: PyReadonlyArray2<'_, u16> = grey.extract()?;
+            let grey = grey.as_array();
+            let size = (grey.nrows(), grey.ncols(), 3);
+            let eight_bits = |value: u16| ((u32::from(value) + 128) / 257) as u8;
+            let rgb =
+                Array3::from_shape_fn(size, |(row, column, _)| eight_bits(grey[(row, column)]));
+            Ok(rgb.into_pyarray(py).into_any())
+        }
+        Some(mode @ ("I" | "F")) => Err(PyTypeError::new_err(format!(
+            "image: a PIL image of mode {mode:?} has no fixed range: give one of 8 bits, or an array of uint8"
+        ))),
+        _ => {
+            let rgb = image.call_method1("convert", ("RGB",))?;
+            numpy.call_method1("asarray", (rgb,))
+        }
+    }
 }
 
 fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {

@@ -170,6 +170,21 @@ def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
     assert not np.array_equal(mirrored, expected)
 
 
+def test_sixteen_bits_are_eight_as_in_a_file(drive, model, tmp_path):
+    """PIL's own conversion would make nearly all of it white."""
+    frame = deepfusion.Dataset(drive)[0]
+    grey = frame.image.mean(axis=2) * 257
+    file = tmp_path / "grey.png"
+    Image.fromarray(grey.astype(np.uint16)).save(file)
+    with Image.open(file) as opened:
+        if not opened.mode.startswith("I;16"):
+            pytest.skip("this Pillow reads 16 bits as 32")
+        assert np.array_equal(model.predict(opened, frame.intrinsics).depth, model.predict(file, frame.intrinsics).depth)
+    for values in [grey.astype(np.int32), grey.astype(np.float32)]:
+        with pytest.raises(TypeError, match="no fixed range"):
+            model.predict(Image.fromarray(values), frame.intrinsics)
+
+
 def test_a_recording(drive):
     recording = deepfusion.Dataset(drive)
     assert len(recording) == 3 and recording.layout == "KITTI raw"
