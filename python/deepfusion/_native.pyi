@@ -137,6 +137,10 @@ class Frame:
     def speed_mps(self) -> float | None:
         """The vehicle's."""
     @property
+    def yaw_rate_radps(self) -> float | None:
+        """How fast the vehicle turned since the frame before, radians a second, positive to the left; None where that is not known, and of the
+        first frame."""
+    @property
     def intrinsics(self) -> _Intrinsics:
         """fx, fy, cx, cy in pixels of `image`."""
     def ground_truth(self, kind: str = "z") -> NDArray[np.float32] | None:
@@ -158,6 +162,10 @@ class Dataset:
     @property
     def layout(self) -> str:
         """Such as "KITTI raw"."""
+    @property
+    def camera_yaw_rad(self) -> float | None:
+        """By how much the camera looks to the left of the way straight ahead, radians; 0 where nothing says its mount, None for one that
+        looks to the side or back (more than 60 degrees)."""
     def motion(self, source: int, target: int) -> NDArray[np.float64] | None:
         """4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
         the vehicle's motion is not known."""
@@ -197,6 +205,7 @@ class Perception:
         world_from_cam: NDArray[np.float64] | None,
         speed_mps: float | None,
         yaw_rate_radps: float,
+        camera_yaw_rad: float | None,
     ) -> str: ...
 
 @final

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use deepfusion::data::{self, Cameras, GtKind, OpenOptions};
+use deepfusion::jobs::scene::{Motion, motion_known, yaw_rate};
+use nalgebra::Vector3;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -64,6 +66,18 @@ impl Dataset {
             dataset: Arc::clone(&self.inner),
             index: *found,
         })
+    }
+
+    /// By how much the camera looks to the left of the way straight ahead, radians; 0 where nothing says its mount, None for one that
+    /// looks to the side or back (more than 60 degrees).
+    #[getter]
+    fn camera_yaw_rad(&self) -> Option<f64> {
+        let mount = self.inner.cam_from_vehicle();
+        let mounted = Motion {
+            ahead_in_cam: mount.map(|cam_from_vehicle| cam_from_vehicle.rotate(&Vector3::x())),
+            ..Motion::default()
+        };
+        mounted.camera_yaw()
     }
 
     fn __iter__(&self) -> Frames {
@@ -180,6 +194,21 @@ impl Frame {
     #[getter]
     fn speed_mps(&self) -> Option<f64> {
         self.facts().speed_mps
+    }
+
+    /// How fast the vehicle turned since the frame before, radians a second, positive to the left; None where that is not known, and of the
+    /// first frame.
+    #[getter]
+    fn yaw_rate_radps(&self) -> Option<f64> {
+        let (dataset, index) = (&self.dataset, self.index);
+        let place = dataset.selected().iter().position(|i| *i == index)?;
+        let last = *dataset.selected().get(place.checked_sub(1)?)?;
+        if !motion_known(dataset) {
+            return None;
+        }
+        let last_from_this = dataset.camera_motion(last, index)?;
+        let seconds = self.facts().time_s? - dataset.frames()[last].time_s?;
+        Some(yaw_rate(&last_from_this, seconds))
     }
 
     /// fx, fy, cx, cy in pixels of `image`.

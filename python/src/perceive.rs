@@ -66,7 +66,7 @@ impl Perception {
             .reset();
     }
 
-    #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps))]
+    #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps, camera_yaw_rad))]
     #[expect(clippy::too_many_arguments, reason = "by name in Python")]
     fn detect(
         &self,
@@ -78,6 +78,7 @@ impl Perception {
         world_from_cam: Option<PyReadonlyArray2<'_, f64>>,
         speed_mps: Option<f64>,
         yaw_rate_radps: f64,
+        camera_yaw_rad: Option<f64>,
     ) -> PyResult<String> {
         let depth = depth_map(&depth);
         let sigma = sigma.map(|sigma| depth_map(&sigma));
@@ -108,11 +109,22 @@ impl Perception {
             scale_bounds(&mut found.targets, [small.width, small.height], whole);
             Ok::<_, deepfusion::perception::Error>(found)
         });
-        to_json(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
+        let found = found.map_err(raise)?;
+        let collision = speed_mps.and_then(|speed| {
+            let vehicle = VehicleShape {
+                camera_yaw_rad: camera_yaw_rad.filter(|yaw| yaw.cos() > LOOKS_ASIDE)?,
+                ..VehicleShape::default()
+            };
+            time_to_collision(&found.targets, speed, yaw_rate_radps, &vehicle)
+        });
+        to_json(&found, collision)
     }
 }
 
-fn to_json(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyResult<String> {
+/// Cosine of the angle from which on a camera does not look ahead, so that nothing is said of what the vehicle meets: sixty degrees.
+const LOOKS_ASIDE: f64 = 0.5;
+
+fn to_json(found: &Surroundings, collision: Option<Collision>) -> PyResult<String> {
     let targets = found.targets.iter();
     let found = Detections {
         targets: targets
@@ -125,9 +137,7 @@ fn to_json(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyRes
             normal: ground.up,
             offset_m: ground.camera_height_m,
         }),
-        collision: speed_mps.and_then(|speed| {
-            time_to_collision(&found.targets, speed, yaw_rate, &VehicleShape::default())
-        }),
+        collision,
     };
     serde_json::to_string(&found).map_err(|e| PyValueError::new_err(e.to_string()))
 }

@@ -199,6 +199,8 @@ def test_a_recording(drive):
     distance = np.linalg.norm(motion[:3, 3])
     assert motion[2, 3] < 0 and 0.1 < distance < 3
     assert np.allclose(motion @ recording.motion(1, 0), np.eye(4), atol=1e-6)
+    assert recording.camera_yaw_rad == pytest.approx(0, abs=0.05)
+    assert frames[0].yaw_rate_radps is None and abs(frames[1].yaw_rate_radps) < 1
     # The scan is exact, and only every second frame has one.
     truth = frames[0].ground_truth()
     assert truth.shape == frames[0].image.shape[:2] and (truth > 0).sum() > 100
