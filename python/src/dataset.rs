@@ -232,7 +232,8 @@ impl Frame {
                 return Err(PyValueError::new_err(message));
             }
         };
-        let truth = py.detach(|| self.dataset.ground_truth(self.index, kind));
+        let read = || self.dataset.ground_truth(self.index, kind);
+        let truth = py.detach(|| deepfusion_cli::in_this_process(read));
         let truth = truth.map_err(raise)?;
         truth
             .map(|depth| image_array(py, depth.height, depth.width, depth.data))

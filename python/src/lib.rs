@@ -43,6 +43,7 @@ mod _native {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         // NumPy's functions are looked up once, at the first array: here, where Ctrl-C cannot come between.
         drop(numpy::PyArray1::<f32>::zeros(module.py(), 0, false));
+        deepfusion_cli::loaded_here();
         super::error::set_default_hint(module.py())?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

@@ -100,14 +100,19 @@ impl Perception {
                 return Err(with_hint(message, Some(hint)));
             }
         };
-        let found = py.detach(|| {
+        let detect = |perceiver: &mut Perceiver| {
             let (small, k) = working_depth(&depth, &camera);
             let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
-            let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let mut found = perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])?;
             let whole = [camera.width, camera.height];
             scale_bounds(&mut found.targets, [small.width, small.height], whole);
             Ok::<_, deepfusion::perception::Error>(found)
+        };
+        let found = py.detach(|| {
+            // Taken outside of the pool, as that of a network is (`Model::predict`).
+            let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let perceiver = &mut *perceiver;
+            deepfusion_cli::in_this_process(|| detect(perceiver))
         });
         let found = found.map_err(raise)?;
         let collision = speed_mps.and_then(|speed| {

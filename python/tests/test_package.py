@@ -4,9 +4,11 @@ import ast
 import inspect
 import json
 import os
+import signal
 import subprocess
 import sys
 import sysconfig
+import textwrap
 import threading
 from pathlib import Path
 
@@ -317,6 +319,45 @@ def test_threads(drive, model):
         for thread in threads:
             thread.join()
         assert all(np.array_equal(a, b) for a, b in zip(expected, found))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_the_child_of_a_fork_computes(drive):
+    """As multiprocessing starts processes on Linux before Python 3.14, and DataLoader its workers: none of the parent's threads come along."""
+    code = """
+        import os, sys, warnings
+        import deepfusion, numpy as np
+        warnings.simplefilter("ignore")
+        frame = deepfusion.Dataset(sys.argv[1])[0]
+        model = deepfusion.load("tiny")
+        expected = model.predict(frame.image, frame.intrinsics).depth.tobytes()
+        truth = frame.ground_truth()
+        child = os.fork()
+        if child == 0:
+            same = deepfusion.Dataset(sys.argv[1])[0]
+            seen = model.predict(same.image, same.intrinsics)
+            assert seen.depth.tobytes() == expected
+            [again] = model.predict_many([same.image], same.intrinsics)
+            assert again.depth.tobytes() == expected
+            assert deepfusion.load("tiny").predict(same.image, same.intrinsics).depth.tobytes() == expected
+            deepfusion.perceive(seen.depth, same.intrinsics)
+            assert np.array_equal(same.ground_truth(), truth)
+            assert deepfusion.evaluate([seen], [truth])["n"] == 1
+            deepfusion.doctor(sys.argv[1])
+            print("the same", flush=True)
+            os._exit(0)
+        sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    """
+    words = [sys.executable, "-c", textwrap.dedent(code), str(drive)]
+    # A child that hangs is ended with its parent.
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        printed, _ = running.communicate(timeout=60)
+    except subprocess.TimeoutExpired:
+        os.killpg(running.pid, signal.SIGKILL)
+        running.communicate()
+        raise
+    assert (running.returncode, printed) == (0, "the same\n")
 
 
 def test_doctor(drive, tmp_path):
