@@ -166,6 +166,9 @@ class Dataset:
     def camera_yaw_rad(self) -> float | None:
         """By how much the camera looks to the left of the way straight ahead, radians; 0 where nothing says its mount, None for one that
         looks to the side or back (more than 60 degrees)."""
+    @property
+    def warnings(self) -> list[str]:
+        """What was taken for granted, looks odd or cannot be read, though it was opened: a line each. `Dataset(...)` warns of them (UserWarning)."""
     def motion(self, source: int, target: int) -> NDArray[np.float64] | None:
         """4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
         the vehicle's motion is not known."""

@@ -1,9 +1,11 @@
 //! Recordings.
 
 use std::path::PathBuf;
+use std::slice;
 use std::sync::Arc;
 
 use deepfusion::data::{self, Cameras, GtKind, OpenOptions};
+use deepfusion::jobs::recordings::warnings_of;
 use deepfusion::jobs::scene::{Motion, motion_known, yaw_rate};
 use nalgebra::Vector3;
 use numpy::ndarray::{Array2, Array3};
@@ -11,7 +13,7 @@ use numpy::{IntoPyArray, PyArray2, PyArray3};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::error::{raise, with_hint};
+use crate::error::{raise, warn, with_hint};
 use crate::interrupt::abandonable;
 use crate::model::image_array;
 
@@ -19,6 +21,8 @@ use crate::model::image_array;
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Dataset {
     inner: Arc<data::Dataset>,
+    /// What may not be meant of it.
+    warnings: Vec<String>,
 }
 
 #[pymethods]
@@ -43,8 +47,14 @@ impl Dataset {
             let hint = "drives are counted from 0; give the folder of one drive".to_owned();
             return Err(with_hint(message, Some(hint)));
         }
+        let inner = all.swap_remove(drive);
+        let warnings = warnings_of(&OpenOptions::default(), slice::from_ref(&inner));
+        for warning in &warnings {
+            warn(py, warning)?;
+        }
         Ok(Self {
-            inner: Arc::new(all.swap_remove(drive)),
+            inner: Arc::new(inner),
+            warnings,
         })
     }
 
@@ -97,6 +107,12 @@ impl Dataset {
     #[getter]
     fn layout(&self) -> &'static str {
         self.inner.kind().label()
+    }
+
+    /// What was taken for granted, looks odd or cannot be read, though it was opened: a line each. `Dataset(...)` warns of them (UserWarning).
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
     }
 
     /// 4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where

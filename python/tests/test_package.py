@@ -4,12 +4,14 @@ import ast
 import inspect
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import sysconfig
 import textwrap
 import threading
+import warnings
 from pathlib import Path
 
 import deepfusion
@@ -207,6 +209,30 @@ def test_a_recording(drive):
     truth = frames[0].ground_truth()
     assert truth.shape == frames[0].image.shape[:2] and (truth > 0).sum() > 100
     assert frames[1].ground_truth() is None
+
+
+def folder_of(drive, out):
+    """The same images as a plain folder with speeds, whose mount nothing says."""
+    frames = list(deepfusion.Dataset(drive))
+    shutil.copytree(Path(drive) / "image_02" / "data", out / "images")
+    (out / "frames.csv").write_text("time_s,file\n" + "".join(f"{f.time_s:.6f},{f.number:010}.png\n" for f in frames))
+    speeds = "".join(f"{f.time_s:.6f},{f.speed_mps},{f.yaw_rate_radps or 0.0}\n" for f in frames)
+    (out / "speed.csv").write_text("time_s,speed_mps,yaw_rate_radps\n" + speeds)
+    (out / "intrinsics.txt").write_text(" ".join(map(str, frames[0].intrinsics)))
+    return out
+
+
+def test_what_may_not_be_meant_of_a_recording_is_a_warning(drive, tmp_path):
+    folder = folder_of(drive, tmp_path / "folder")
+    with pytest.warns(UserWarning, match="straight ahead"):
+        recording = deepfusion.Dataset(folder)
+    assert any("straight ahead" in warning for warning in recording.warnings)
+    assert all(warning.startswith(str(folder)) for warning in recording.warnings)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert deepfusion.Dataset(drive).warnings == []
+        with pytest.raises(UserWarning, match="folder"):
+            deepfusion.Dataset(folder)
 
 
 def test_the_metrics_are_the_fields():
