@@ -11,7 +11,7 @@ Ctrl-C ends them with KeyboardInterrupt.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sized
+from collections.abc import Iterable, Mapping, Sized
 from itertools import zip_longest
 from os import PathLike
 from pathlib import Path
@@ -22,10 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._adapt import Adaptation, adapt
-from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__
+from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__, drives
 from ._perceive import Collision, Ground, Perception, Surroundings, Target, perceive
 from ._snippets import Snippets
 from ._train import Run, TrainEvent, train
+from ._types import Crop, DepthKind, Image, Precision, PredictionKind, Scene
 
 __all__ = [
     "Adaptation",
@@ -34,6 +35,7 @@ __all__ = [
     "DeepFusionError",
     "Frame",
     "Ground",
+    "Image",
     "Model",
     "Perception",
     "Prediction",
@@ -46,6 +48,7 @@ __all__ = [
     "adapt",
     "devices",
     "doctor",
+    "drives",
     "evaluate",
     "load",
     "networks",
@@ -57,7 +60,7 @@ __all__ = [
 
 
 def load(
-    model: str | PathLike[str] = "street", *, precision: str = "f32", data_set: str | None = None, device: str = "cpu"
+    model: str | PathLike[str] = "street", *, precision: Precision = "f32", data_set: str | None = None, device: str = "cpu"
 ) -> Model:
     """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
 
@@ -88,12 +91,12 @@ def evaluate(
     predictions: Iterable[ArrayLike | Prediction],
     ground_truth: Iterable[ArrayLike | None],
     *,
-    kind: str = "depth",
-    crop: str = "none",
+    kind: PredictionKind = "depth",
+    crop: Crop = "none",
     cap: float = 80.0,
     min_depth: float = 1e-3,
     allow_holes: bool = False,
-    gt_depth: str = "z",
+    gt_depth: DepthKind = "z",
     scale: float | None = None,
     points: int = 0,
     points_seed: int = 0,
@@ -144,7 +147,7 @@ def simulate(
     *,
     frames: int = 100,
     seed: int = 1,
-    scene: str = "urban",
+    scene: Scene = "urban",
     moving_cars: int = 0,
     riders: int = 0,
     varied: bool = False,
@@ -162,6 +165,14 @@ def simulate(
     return _native.simulate(out, frames, seed, scene, moving_cars, riders, varied, width, height, scan_every)
 
 
-def doctor(path: str | PathLike[str]) -> dict[str, Any]:
-    """Every reason why training on a recording would fail or give a wrong scale: what `deepfusion doctor PATH --json` prints."""
-    return json.loads(_native.doctor(path))
+def doctor(
+    path: str | PathLike[str],
+    *,
+    intrinsics: ArrayLike | None = None,
+    hfov_deg: float | None = None,
+    topics: Mapping[str, str] | None = None,
+    clock_offset_ms: float | None = None,
+) -> dict[str, Any]:
+    """Every reason why training on a recording would fail or give a wrong scale: what `deepfusion doctor PATH --json` prints, of a log of speeds
+    by itself as well. What the recording does not say can be said as for `Dataset`."""
+    return json.loads(_native.doctor(path, intrinsics, hfov_deg, topics, clock_offset_ms))

@@ -113,7 +113,7 @@ class Perception:
     """
 
     def __init__(self, *, exact: bool = False, **settings: Any) -> None:
-        self._native = _native.Perception(json.dumps(settings), exact)
+        self._native = _native.Perception(json.dumps(settings, default=lambda number: number.tolist()), exact)
 
     def detect(
         self,

@@ -2,6 +2,7 @@
 
 mod adapt;
 mod bulk;
+mod camera;
 mod command;
 mod dataset;
 mod device;
@@ -9,6 +10,7 @@ mod error;
 mod interrupt;
 mod measure;
 mod model;
+mod opening;
 mod perceive;
 mod train;
 
@@ -23,7 +25,7 @@ mod _native {
     #[pymodule_export]
     use super::command::command;
     #[pymodule_export]
-    use super::dataset::{Dataset, Frame};
+    use super::dataset::{Dataset, Frame, drives};
     #[pymodule_export]
     use super::device::{built, check_device};
     #[pymodule_export]

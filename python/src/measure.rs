@@ -1,21 +1,24 @@
 //! Evaluation, simulated drives, and what is wrong with a recording.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use deepfusion::Hint;
-use deepfusion::doctor as checks;
+use deepfusion::doctor::{Diagnosis, doctor_log, doctor_with, is_log};
 use deepfusion::eval::{
     Crop, Error, Evaluator, Grid, GroundTruth, Holes, Prediction as Predicted, Protocol, Scaling,
 };
+use deepfusion::logs::ReadOptions;
 use deepfusion::sim::{Scene, SimConfig, Simulation, write_kitti};
 use numpy::{PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::error::{raise, with_hint};
+use crate::camera::GivenCamera;
+use crate::error::{Failure, raise, with_hint};
 use crate::interrupt::{Stop, abandonable, interruptible};
 use crate::model::Prediction;
+use crate::opening::Opening;
 
 /// Compares predictions with ground truth, one image at a time.
 #[pyclass(frozen, module = "deepfusion._native")]
@@ -207,9 +210,36 @@ pub(crate) fn simulate(
 
 /// What `deepfusion doctor PATH` finds, as JSON.
 #[pyfunction]
-pub(crate) fn doctor(py: Python<'_>, path: PathBuf) -> PyResult<String> {
-    let diagnosis = abandonable(py, move || {
-        deepfusion_cli::in_options(checks::doctor(&path, None))
-    })?;
+#[pyo3(signature = (path, intrinsics, hfov_deg, topics, clock_offset_ms))]
+pub(crate) fn doctor(
+    py: Python<'_>,
+    path: PathBuf,
+    intrinsics: Option<GivenCamera>,
+    hfov_deg: Option<f64>,
+    topics: Option<&Bound<'_, PyAny>>,
+    clock_offset_ms: Option<f64>,
+) -> PyResult<String> {
+    let opening = Opening::new(intrinsics, hfov_deg, topics, clock_offset_ms)?;
+    let diagnosis = abandonable(py, move || diagnosis(&path, &opening))??;
     serde_json::to_string(&diagnosis.record()).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
+fn diagnosis(path: &Path, opening: &Opening) -> Result<Diagnosis, Failure> {
+    if is_log(path) {
+        if opening.says_something() {
+            return Err(Failure {
+                message: format!(
+                    "{}: a log of speeds by itself has no camera, topics or clock to compare with",
+                    path.display()
+                ),
+                hint: Some("doctor(path) looks at a log".into()),
+            });
+        }
+        let found = doctor_log(path, &ReadOptions::default());
+        return Ok(deepfusion_cli::in_options(found));
+    }
+    let found = doctor_with(path, &opening.options()?).unwrap_or_else(|error| {
+        Diagnosis::unopened(error.to_string(), error.hint()).with_log_within(path)
+    });
+    Ok(deepfusion_cli::in_options(found))
 }

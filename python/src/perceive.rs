@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use std::sync::{Mutex, PoisonError};
 
+use crate::camera::{GivenCamera, checked};
 use crate::error::{raise, with_hint};
-use crate::model::{GivenCamera, checked};
 
 /// Follows targets from image to image.
 #[pyclass(frozen, module = "deepfusion._native")]

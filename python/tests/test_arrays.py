@@ -168,6 +168,7 @@ def test_perception_says_what_is_wrong():
         with pytest.raises(deepfusion.DeepFusionError) as caught:
             deepfusion.perceive(depth, camera, **settings)
         assert expected in str(caught.value) + caught.value.hint
+    deepfusion.perceive(depth, camera, max_depth_m=np.float32(30), min_pixels=np.int64(20))
     with pytest.raises(deepfusion.DeepFusionError, match="max_depth_m"):
         deepfusion.perceive(depth, camera, max_depth_m=-1)
     with pytest.raises(deepfusion.DeepFusionError, match="camera"):

@@ -4,6 +4,7 @@ import ast
 import inspect
 import json
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -209,6 +210,187 @@ def test_a_recording(drive):
     truth = frames[0].ground_truth()
     assert truth.shape == frames[0].image.shape[:2] and (truth > 0).sum() > 100
     assert frames[1].ground_truth() is None
+
+
+def test_a_recording_is_a_sequence(drive, tmp_path):
+    recording = deepfusion.Dataset(drive)
+    assert [frame.number for frame in recording[1:]] == [1, 2] and recording[3:] == []
+    assert [frame.number for frame in recording[::-2]] == [2, 0] and recording[np.int64(1)].number == 1
+    assert np.array_equal(recording.motion(-1, 0), recording.motion(2, 0))
+    for wrong in (3, -4):
+        with pytest.raises(IndexError):
+            recording.motion(wrong, 0)
+    assert recording.numbers.tolist() == [0, 1, 2] and recording.numbers.dtype == np.int64
+    assert recording.times_s.tolist() == [frame.time_s for frame in recording]
+    assert recording.speeds_mps.tolist() == [frame.speed_mps for frame in recording]
+    frame = recording[0]
+    fx, fy, cx, cy = frame.intrinsics
+    assert frame.K.tolist() == [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
+    assert frame == recording[0] == deepfusion.Dataset(drive)[0] and hash(frame) == hash(recording[0])
+    assert frame != recording[1] and frame != "frame" and len({frame, recording[-3], recording[1]}) == 2
+    assert repr(frame).startswith("Frame(0 of") and repr(recording).startswith("Dataset(")
+    again = deepfusion.drives(drive)
+    assert [one.name for one in again] == [recording.name]
+    other = deepfusion.simulate(tmp_path / "other", frames=2, size=(320, 96), scan_every=0)
+    shutil.copytree(drive.parent, tmp_path / "both" / drive.parent.name)
+    both = tmp_path / "both" / drive.parent.name
+    shutil.copytree(other, both / f"{other.name[:-9]}0077_sync")
+    opened = deepfusion.drives(both)
+    assert [len(one) for one in opened] == [3, 2]
+    assert [pickle.loads(pickle.dumps(one)).name for one in opened] == [one.name for one in opened]
+
+
+def test_a_frame_is_an_image(drive, model):
+    recording = deepfusion.Dataset(drive)
+    for frame, seen in zip(recording, model.predict_many(recording, ahead=1), strict=True):
+        expected = model.predict(frame.image, frame.intrinsics)
+        assert np.array_equal(seen.depth, expected.depth) and seen.intrinsics == expected.intrinsics
+        assert np.array_equal(model.predict(frame).depth, expected.depth)
+    other = model.predict(frame, (100, 100, 160, 48))
+    assert other.intrinsics == (100, 100, 160, 48) and not np.array_equal(other.depth, expected.depth)
+
+
+def test_the_view_is_a_camera(drive, model):
+    frame = deepfusion.Dataset(drive)[0]
+    width = frame.image.shape[1]
+    fx, fy, cx, cy = model.predict(frame.image, hfov_deg=90).intrinsics
+    assert fx == pytest.approx(width / 2) and fy == fx and cx == pytest.approx((width - 1) / 2)
+    assert next(model.predict_many([frame], hfov_deg=90)).intrinsics == (fx, fy, cx, cy)
+    for wrong in [{"hfov_deg": 190}, {"hfov_deg": 90, "intrinsics": frame.intrinsics}]:
+        with pytest.raises(ValueError, match="hfov_deg"):
+            model.predict(frame, **wrong)
+
+
+def test_a_camera_that_nothing_says_is_warned_of_once(drive):
+    model = deepfusion.load("tiny")
+    image = deepfusion.Dataset(drive)[0].image
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.predict(image, (100, 100, 160, 48))
+        with pytest.raises(UserWarning, match="hfov_deg"):
+            model.predict(image)
+        model.predict(image)
+        list(model.another().predict_many([image]))
+
+
+def test_what_a_recording_does_not_say_can_be_said(drive, tmp_path):
+    folder = folder_of(drive, tmp_path / "folder")
+    (folder / "intrinsics.txt").unlink()
+    with pytest.raises(deepfusion.DeepFusionError):
+        deepfusion.Dataset(folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        plain = deepfusion.Dataset(folder, hfov_deg=90)
+        assert plain[0].intrinsics[0] == pytest.approx(160)
+        camera = (200.0, 200.0, 160.0, 48.0)
+        later = deepfusion.Dataset(folder, intrinsics=camera, clock_offset_ms=10)
+        assert later[0].intrinsics == camera
+        again = pickle.loads(pickle.dumps(later))
+        assert again[0].intrinsics == camera and again[0].time_s == later[0].time_s
+        split = tmp_path / "split.txt"
+        split.write_text(f"{folder.name} 1 l\n")
+        assert [frame.number for frame in deepfusion.Dataset(folder, hfov_deg=90, split=split)] == [1]
+        assert deepfusion.drives(folder, hfov_deg=90)[0][0].intrinsics == plain[0].intrinsics
+        report = deepfusion.doctor(folder, hfov_deg=90)
+        assert report["drives"][0]["frames"] == 3
+        assert deepfusion.doctor(folder)["drives"] == []
+    for wrong, said in [
+        ({"topics": {"image": ""}}, "topics"),
+        ({"topics": {"pictures": "/a"}}, "no role"),
+        ({"hfov_deg": 90, "intrinsics": camera}, "hfov_deg"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            deepfusion.Dataset(folder, **wrong)
+    with pytest.raises(TypeError, match="topics"):
+        deepfusion.Dataset(folder, topics=["image"])
+    # Topics are a bag's.
+    with pytest.raises(deepfusion.DeepFusionError):
+        deepfusion.Dataset(folder, hfov_deg=90, topics={"image": "/camera"})
+
+
+def test_a_log_by_itself(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,speed_mps\n" + "".join(f"{i / 10},{5 + i % 7}\n" for i in range(200)))
+    said = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(log), "--json"], capture_output=True, check=False)
+    assert deepfusion.doctor(log) == json.loads(said.stdout)
+    with pytest.raises(deepfusion.DeepFusionError, match="no camera"):
+        deepfusion.doctor(log, hfov_deg=90)
+
+
+def test_what_opens_again_is_pickled(drive, model, monkeypatch, tmp_path):
+    monkeypatch.chdir(Path(drive).parent)
+    recording = deepfusion.Dataset(Path(drive).name)
+    text = pickle.dumps((recording, recording[1], recording[2], model))
+    # Wherever the other process stands.
+    monkeypatch.chdir(tmp_path)
+    again, frame, last, network = pickle.loads(text)
+    assert again.name == recording.name and (frame, last) == (recording[1], recording[2])
+    expected = model.predict(recording[1]).depth
+    assert np.array_equal(network.predict(frame).depth, expected)
+    seen = model.predict(recording[0])
+    with pytest.raises(TypeError, match="prediction.depth"):
+        pickle.dumps(seen)
+    assert repr(model).startswith('Model("tiny", 320 x 96') and repr(seen) == "Prediction(96 x 320, camera known)"
+    assert np.asarray(seen) is seen.depth or np.shares_memory(np.asarray(seen), seen.depth)
+    assert np.array(seen, dtype=np.float64).dtype == np.float64
+
+
+def test_ctrl_c_in_the_callers_generator_ends_at_once(drive, model):
+    image = deepfusion.Dataset(drive)[0].image
+
+    def images():
+        yield image
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        next(model.predict_many(images(), (100, 100, 160, 48)))
+
+
+def test_one_thread_takes_predictions(drive, model):
+    image = deepfusion.Dataset(drive)[0].image
+    waits, goes_on = threading.Event(), threading.Event()
+
+    def images():
+        waits.set()
+        goes_on.wait(60)
+        yield image
+
+    predictions = model.predict_many(images(), (100, 100, 160, 48))
+    taken = []
+    thread = threading.Thread(target=lambda: taken.append(next(predictions)))
+    thread.start()
+    waits.wait(60)
+    try:
+        with pytest.raises(RuntimeError, match="another thread"):
+            next(predictions)
+    finally:
+        goes_on.set()
+        thread.join()
+    assert len(taken) == 1
+    with pytest.raises(ValueError, match="ahead"):
+        model.predict_many([], ahead=0)
+
+
+def test_what_is_no_image_says_what_makes_it_one(drive, model):
+    image = deepfusion.Dataset(drive)[0].image
+    for wrong, said in [
+        (image / np.float32(255), "found float32 96 x 320 x 3.*astype"),
+        (image[..., 0], "96 x 320: of grey"),
+        (np.dstack([image, image[..., :1]]), r"96 x 320 x 4: image\[\.\.\., :3\]"),
+        (image.transpose(2, 0, 1), "transpose"),
+        (image[None], "predict_many"),
+    ]:
+        with pytest.raises((TypeError, ValueError), match=said):
+            model.predict(wrong)
+    with pytest.raises(TypeError, match="3 x 3 matrix"):
+        model.predict(image, "the camera")
+    fx, fy, cx, cy = camera = deepfusion.Dataset(drive)[0].intrinsics
+    p = np.array([[fx, 0, cx, 0], [0, fy, cy, 0], [0, 0, 1, 0]])
+    assert model.predict(image, p).intrinsics == camera
+    p[0, 3] = -380
+    with pytest.raises(deepfusion.DeepFusionError, match="last column") as refused:
+        model.predict(image, p)
+    assert "P[:, :3]" in refused.value.hint
 
 
 def folder_of(drive, out):
