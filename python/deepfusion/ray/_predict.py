@@ -306,7 +306,7 @@ def predict(
 ) -> PredictSummary:
     """Depth of many images on a cluster, each exactly once.
 
-    `paths` are images, folders (with all below them) and globs; `output` is a folder. Both, and `model`, where it is no embedded
+    `paths` are images, folders (with all below them, but for `output` and earlier pictures of depth) and globs; `output` is a folder. Both, and `model`, where it is no embedded
     network, are paths that all machines see, or URLs; `storage_options` are those of their file system (fsspec's). The images are
     of one camera: `intrinsics` are fx, fy, cx, cy in its pixels, or the 3 x 3 matrix; without them each file's EXIF is asked, then the lens of the
     training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
@@ -367,7 +367,7 @@ def predict(
         device=device,
         gpus=gpus_per_worker,
     )
-    named = images(urls(paths), options)
+    named = images(urls(paths), options, job.output)
     if not ray.is_initialized():
         ray.init()
     if workers is None:
