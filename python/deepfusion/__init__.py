@@ -22,14 +22,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._adapt import Adaptation, adapt
+from ._events import (
+    CameraEvent,
+    PanelEvent,
+    SavedEvent,
+    StartedEvent,
+    StepEvent,
+    TrainEvent,
+    ValidatedEvent,
+    WarningEvent,
+)
 from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__, drives
 from ._perceive import Collision, Ground, Perception, Surroundings, Target, perceive
 from ._snippets import Snippets
-from ._train import Run, TrainEvent, train
+from ._train import Run, train
 from ._types import Crop, DepthKind, Image, Precision, PredictionKind, Scene
 
 __all__ = [
     "Adaptation",
+    "CameraEvent",
     "Collision",
     "Dataset",
     "DeepFusionError",
@@ -37,14 +48,20 @@ __all__ = [
     "Ground",
     "Image",
     "Model",
+    "PanelEvent",
     "Perception",
     "Prediction",
     "Predictions",
     "Run",
+    "SavedEvent",
     "Snippets",
+    "StartedEvent",
+    "StepEvent",
     "Surroundings",
     "Target",
     "TrainEvent",
+    "ValidatedEvent",
+    "WarningEvent",
     "adapt",
     "devices",
     "doctor",

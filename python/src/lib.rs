@@ -27,7 +27,7 @@ mod _native {
     #[pymodule_export]
     use super::dataset::{Dataset, Frame, drives};
     #[pymodule_export]
-    use super::device::{built, check_device};
+    use super::device::{built, check_device, fastest};
     #[pymodule_export]
     use super::error::DeepFusionError;
     #[pymodule_export]
