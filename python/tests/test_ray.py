@@ -631,3 +631,12 @@ def _has(package):
     from importlib.util import find_spec
 
     return find_spec(package) is not None
+
+
+def test_trials_share_what_training_takes(street):
+    """And each is given what it computes on."""
+    learning = _tune._learning("none", [street], "3", 0, None)
+    assert learning == {"init": "none", "validation": [str(street)], "camera": "3", "device": "cpu"}
+    for gpus, device, said in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:
+        with pytest.raises(ValueError, match=said):
+            _tune._learning(None, None, None, gpus, device)
