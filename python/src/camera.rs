@@ -20,11 +20,11 @@ impl<'py> FromPyObject<'_, 'py> for GivenCamera {
     type Error = PyErr;
 
     fn extract(camera: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(numbers) = camera.extract() {
+        if let Ok(numbers) = camera.extract::<[f64; 4]>() {
             Ok(Self::Numbers(numbers))
-        } else if let Ok(rows) = camera.extract() {
+        } else if let Ok(rows) = camera.extract::<[[f64; 3]; 3]>() {
             Ok(Self::Matrix(rows))
-        } else if let Ok(rows) = camera.extract() {
+        } else if let Ok(rows) = camera.extract::<[[f64; 4]; 3]>() {
             Ok(Self::Projection(rows))
         } else {
             Err(PyTypeError::new_err(format!(
