@@ -11,39 +11,61 @@ Ctrl-C ends them with KeyboardInterrupt.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sized
+from itertools import zip_longest
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._adapt import Adaptation, adapt
-from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__
+from ._events import (
+    CameraEvent,
+    PanelEvent,
+    SavedEvent,
+    StartedEvent,
+    StepEvent,
+    TrainEvent,
+    ValidatedEvent,
+    WarningEvent,
+)
+from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__, drives
 from ._perceive import Collision, Ground, Perception, Surroundings, Target, perceive
 from ._snippets import Snippets
-from ._train import Run, TrainEvent, train
+from ._train import Run, train
+from ._types import Crop, DepthKind, Image, Precision, PredictionKind, Scene
 
 __all__ = [
     "Adaptation",
+    "CameraEvent",
     "Collision",
     "Dataset",
     "DeepFusionError",
     "Frame",
     "Ground",
+    "Image",
     "Model",
+    "PanelEvent",
     "Perception",
     "Prediction",
     "Predictions",
     "Run",
+    "SavedEvent",
     "Snippets",
+    "StartedEvent",
+    "StepEvent",
     "Surroundings",
     "Target",
     "TrainEvent",
+    "ValidatedEvent",
+    "WarningEvent",
     "adapt",
     "devices",
     "doctor",
+    "drives",
     "evaluate",
     "load",
     "networks",
@@ -55,7 +77,7 @@ __all__ = [
 
 
 def load(
-    model: str | PathLike[str] = "street", *, precision: str = "f32", data_set: str | None = None, device: str = "cpu"
+    model: str | PathLike[str] = "street", *, precision: Precision = "f32", data_set: str | None = None, device: str = "cpu"
 ) -> Model:
     """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
 
@@ -83,32 +105,58 @@ def devices() -> list[str]:
 
 
 def evaluate(
-    predictions: Sequence[Any],
-    ground_truth: Sequence[Any],
+    predictions: Iterable[ArrayLike | Prediction],
+    ground_truth: Iterable[ArrayLike | None],
     *,
-    kind: str = "depth",
-    crop: str = "none",
+    kind: PredictionKind = "depth",
+    crop: Crop = "none",
     cap: float = 80.0,
     min_depth: float = 1e-3,
-    names: Sequence[str] | None = None,
+    allow_holes: bool = False,
+    gt_depth: DepthKind = "z",
+    scale: float | None = None,
+    points: int = 0,
+    points_seed: int = 0,
+    names: Iterable[str] | None = None,
 ) -> dict[str, Any]:
     """The field's seven metrics, unscaled and median-scaled: what `deepfusion eval --json` prints.
 
-    `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size; `ground_truth`
-    H x W arrays of metres, 0 where nothing was measured. `crop` is "none" or "garg"; what is measured lies between `min_depth`
-    and `cap` metres.
+    `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size, or what `Model.predict` gave, of
+    which the one or the other is taken; `ground_truth` are H x W arrays of metres, 0 where nothing was measured. Where one is None, the image
+    is left out. Both are taken pair by pair: generators will do. `crop` is "none" or "garg"; what is measured lies between `min_depth` and `cap`
+    metres.
+
+    With `allow_holes` predicted values that are NaN, infinite or not above 0 mean that there is none: they are left out, and counted as
+    `missing_rate`. `gt_depth` says in the report which depth the truth is: "z", "velodyne" or "annotated". `scale` is a fixed factor of a further
+    row; `points` draws so many pixels for the statistics of points, `points_seed` says which. `names` are the images', for messages.
     """
-    if len(predictions) != len(ground_truth):
+    if isinstance(predictions, Sized) and isinstance(ground_truth, Sized) and len(predictions) != len(ground_truth):
         raise ValueError(f"{len(predictions)} predictions for {len(ground_truth)} images of ground truth")
-    if names is None:
-        names = [f"{i:010}" for i in range(len(ground_truth))]
-    if len(names) != len(ground_truth):
+    if isinstance(names, Sized) and isinstance(ground_truth, Sized) and len(names) != len(ground_truth):
         raise ValueError(f"{len(names)} names for {len(ground_truth)} images")
-    pairs = [
-        (name, np.ascontiguousarray(p, dtype=np.float64), np.ascontiguousarray(t, dtype=np.float64))
-        for name, p, t in zip(names, predictions, ground_truth)
-    ]
-    return json.loads(_native.evaluate(pairs, kind, crop, cap, min_depth))
+    evaluation = _native.Evaluation(kind, crop, cap, min_depth, allow_holes, gt_depth, scale, points, points_seed)
+    columns = (predictions, ground_truth) if names is None else (predictions, ground_truth, names)
+    for i, row in enumerate(zip_longest(*columns, fillvalue=_ENDED)):
+        if any(value is _ENDED for value in row):
+            raise ValueError("predictions, ground_truth and names: one of them has " + (f"only {i}" if i else "none") + ", another more")
+        prediction, truth = row[:2]
+        if truth is None:
+            continue
+        if not isinstance(prediction, Prediction):
+            prediction = _plane(prediction, f"predictions[{i}]")
+        evaluation.add(row[2] if len(row) > 2 else f"{i:010}", prediction, _plane(truth, f"ground_truth[{i}]"))
+    return json.loads(evaluation.report())
+
+
+_ENDED = object()
+"""Stands for what an iterable has no more of."""
+
+
+def _plane(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 2:
+        raise ValueError(f"{what}: expected H x W, found {' x '.join(map(str, array.shape)) or 'a number'}")
+    return array
 
 
 def simulate(
@@ -116,7 +164,7 @@ def simulate(
     *,
     frames: int = 100,
     seed: int = 1,
-    scene: str = "urban",
+    scene: Scene = "urban",
     moving_cars: int = 0,
     riders: int = 0,
     varied: bool = False,
@@ -134,6 +182,14 @@ def simulate(
     return _native.simulate(out, frames, seed, scene, moving_cars, riders, varied, width, height, scan_every)
 
 
-def doctor(path: str | PathLike[str]) -> dict[str, Any]:
-    """Every reason why training on a recording would fail or give a wrong scale: what `deepfusion doctor PATH --json` prints."""
-    return json.loads(_native.doctor(path))
+def doctor(
+    path: str | PathLike[str],
+    *,
+    intrinsics: ArrayLike | None = None,
+    hfov_deg: float | None = None,
+    topics: Mapping[str, str] | None = None,
+    clock_offset_ms: float | None = None,
+) -> dict[str, Any]:
+    """Every reason why training on a recording would fail or give a wrong scale: what `deepfusion doctor PATH --json` prints, of a log of speeds
+    by itself as well. What the recording does not say can be said as for `Dataset`."""
+    return json.loads(_native.doctor(path, intrinsics, hfov_deg, topics, clock_offset_ms))

@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from . import _native
+from ._events import TrainEvent
 from ._native import Model
-from ._train import TrainEvent, _paths, _settings
+from ._train import _paths, _settings
 
 
 @dataclass(frozen=True)
@@ -52,12 +53,12 @@ def adapt(
     *,
     out: str | PathLike[str],
     data_set: str | None = None,
-    camera: str = "2",
+    camera: Literal["2", "3", "both"] = "2",
     clock_offset_ms: float | None = None,
     steps: int = 240,
     batch: int = 3,
     simulated: int = 2,
-    simulated_camera: str = "own",
+    simulated_camera: Literal["own", "any"] = "own",
     learning_rate: float = 5e-5,
     held_out: float = 0.25,
     speed_error: float = 0.03,
@@ -76,7 +77,7 @@ def adapt(
     is ahead of the vehicle's, where the recordings do not say. `speed_error` is one standard error of the speed, as a share of it. `config`
     changes any key of the configuration, as in `train`. `device` is where it learns and is judged, as in `load`.
 
-    The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, as in `train`; where it returns False or raises, or at Ctrl-C, what
+    The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, on another thread than the caller's, as in `train`; where it returns False or raises, or at Ctrl-C, what
     was learned is saved, and the same call goes on.
     """
     asked = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from . import _native
 from .distributed import Workers
 
 _LOCAL_RANKS = ("LOCAL_RANK", "OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "SLURM_LOCALID")
@@ -11,7 +12,12 @@ _LOCAL_RANKS = ("LOCAL_RANK", "OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "
 
 
 def own_gpu(device: str, workers: Workers | None) -> str:
-    """The device of one of several workers: "cuda" is then the GPU of its own number on its machine, of those that it sees."""
+    """The device of one of several workers: "cuda", and "auto" where that is CUDA, is then the GPU of its own number on its machine, of those
+    that it sees."""
+    if workers is not None and device == "auto":
+        fastest = _native.fastest()
+        # Another backend's number is of a card, not of a process.
+        device = "cuda" if fastest.partition(":")[0] == "cuda" else fastest
     if workers is None or device != "cuda":
         return device
     said = next((os.environ[name] for name in _LOCAL_RANKS if os.environ.get(name, "").isdecimal()), None)

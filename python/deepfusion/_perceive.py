@@ -73,7 +73,7 @@ class Surroundings:
     ground: Ground | None
     """None where none was found, and then there are no targets."""
     collision: Collision | None
-    """The first target that the vehicle's front would touch within 10 s, where its speed is given."""
+    """The first target that the vehicle's front would touch within 10 s, where its speed is given and the camera looks ahead."""
 
 
 def _surroundings(text: str) -> Surroundings:
@@ -113,7 +113,7 @@ class Perception:
     """
 
     def __init__(self, *, exact: bool = False, **settings: Any) -> None:
-        self._native = _native.Perception(json.dumps(settings), exact)
+        self._native = _native.Perception(json.dumps(settings, default=lambda number: number.tolist()), exact)
 
     def detect(
         self,
@@ -125,19 +125,24 @@ class Perception:
         world_from_cam: ArrayLike | None = None,
         speed_mps: float | None = None,
         yaw_rate_radps: float = 0.0,
+        camera_yaw_rad: float | None = 0.0,
     ) -> Surroundings:
         """The targets in a depth image: H x W metres, 0 where there is none; `intrinsics` (fx, fy, cx, cy, or the 3 x 3
         matrix) of that size, `sigma` its standard deviation.
 
         With `time_s` (seconds, on any clock) and `world_from_cam` (4 x 4, the camera to a frame that stays where it is) targets are
         followed: they keep their id, are reported once they were seen twice, and get a velocity. `speed_mps` and `yaw_rate_radps` (positive
-        to the left) are the vehicle's, for `Surroundings.collision`.
+        to the left) are the vehicle's, for `Surroundings.collision`, and `camera_yaw_rad` is by how much the camera looks to the left of the way
+        straight ahead (`Dataset.camera_yaw_rad`): of one that looks to the side, more than 60 degrees or None, nothing is said. Where the
+        motion from the last frame is not known, call `reset`, and begin anew with a pose.
         """
         as_f32 = lambda a: np.ascontiguousarray(a, dtype=np.float32)  # noqa: E731
         pose = None if world_from_cam is None else np.ascontiguousarray(world_from_cam, dtype=np.float64)
         sigma = None if sigma is None else as_f32(sigma)
         return _surroundings(
-            self._native.detect(as_f32(depth), intrinsics, sigma, time_s, pose, speed_mps, yaw_rate_radps)
+            self._native.detect(
+                as_f32(depth), intrinsics, sigma, time_s, pose, speed_mps, yaw_rate_radps, camera_yaw_rad
+            )
         )
 
     def reset(self) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._native import Dataset
+from ._types import Camera, DepthKind
 
 
 class Snippets:
@@ -28,14 +29,14 @@ class Snippets:
         path: str | PathLike[str],
         *,
         offsets: Sequence[int] = (-1, 1),
-        camera: str = "2",
+        camera: Camera = "2",
         drive: int = 0,
-        depth_kind: str = "z",
+        depth_kind: DepthKind = "z",
     ) -> None:
-        self._arguments: dict[str, Any] = {"path": path, "camera": camera, "drive": drive}
+        self.recording = Dataset(path, camera=camera, drive=drive)
+        """Opened again in another process."""
         self.offsets = tuple(offsets)
         self.depth_kind = depth_kind
-        self._opened: Dataset | None = None
         recording = self.recording
         # By the frames' numbers: between two that are there others may be missing.
         places = {frame.number: place for place, frame in enumerate(recording)}
@@ -49,16 +50,6 @@ class Snippets:
         self._sources = {place: sources for place, sources in found.items() if sources is not None}
         self.frames = list(self._sources)
 
-    @property
-    def recording(self) -> Dataset:
-        """The recording; opened again in another process."""
-        if self._opened is None:
-            self._opened = Dataset(**self._arguments)
-        return self._opened
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_opened": None}
-
     def __len__(self) -> int:
         return len(self.frames)
 
@@ -71,12 +62,11 @@ class Snippets:
         image = frame.image
         sources = self._sources[place]
         depth = frame.ground_truth(self.depth_kind)
-        fx, fy, cx, cy = frame.intrinsics
         return {
             "image": image,
             "sources": np.stack([self.recording[source].image for source in sources]),
             "source_from_target": np.stack([self._motion(place, source) for source in sources]),
-            "intrinsics": np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], np.float32),
+            "intrinsics": frame.K.astype(np.float32),
             "depth": np.zeros(image.shape[:2], np.float32) if depth is None else depth,
             "speed_mps": np.float32(np.nan if frame.speed_mps is None else frame.speed_mps),
             "number": frame.number,

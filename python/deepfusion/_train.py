@@ -9,25 +9,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from . import _native
 from ._devices import own_gpu
+from ._events import TrainEvent
 from ._native import Model
 from .distributed import Workers
-
-TrainEvent = dict[str, Any]
-"""What the trainer reports. `event["event"]` says which it is:
-
-- "started": from_step, steps, samples, validation_samples, mean_displacement_m (of a pair of frames, metres)
-- "step": step (from 1), steps, losses (name to value, as in log.csv; the mean of the step's samples), learning_rate,
-  images_per_second, remaining_s, scale_ratio (1 where the scale is metric, NaN where nothing says it), gradient_norm
-- "validated": step, losses, selection (what `best` is chosen by), scale_ratio, best (whether this is the best so far)
-- "saved": step, path of the checkpoint
-- "panel": step, name, image (3 x H x W, 0 to 1), disparity (H x W)
-- "camera": step, size (width, height), focal_px (fx, fy), sigma_px (of each, or None), at the end of a run that learns its camera
-- "warning": step, message
-"""
 
 
 @dataclass(frozen=True)
@@ -113,7 +101,7 @@ def train(
     out: str | PathLike[str] | None = None,
     init: str | PathLike[str] | None = None,
     validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
-    camera: str | None = None,
+    camera: Literal["2", "3", "both"] | None = None,
     resume: bool = False,
     workers: Workers | None = None,
     device: str = "cpu",
@@ -135,12 +123,14 @@ def train(
     the same arguments, `batch` and `accumulate` are each one's own, and worker 0 validates and writes the run. K workers learn what one
     learns with `accumulate` K times as large.
 
-    `device` is where it learns, as in `load`: "cpu", "auto", "cuda:1". With `workers` that torchrun, MPI or Slurm started, "cuda" is each one's
-    own GPU. On a GPU a preset has larger sizes, and `"precision": "bf16"` is for
+    `device` is where it learns, as in `load`: "cpu", "auto", "cuda:1". With `workers` that torchrun, MPI or Slurm started, "cuda", and "auto" where
+    that is CUDA, is each one's own GPU. On a GPU a preset has larger sizes, and `"precision": "bf16"` is for
     those with tensor cores.
 
     `callback` gets each `TrainEvent`; where it returns False, training stops after the step and the run is saved. What it raises
-    stops it as well, and is raised here. Ctrl-C saves the run and raises KeyboardInterrupt.
+    stops it as well, and is raised here. Ctrl-C saves the run and raises KeyboardInterrupt. It is called on another thread than the one that
+    calls `train`, which waits meanwhile: what belongs to a thread (`threading.local`, connections of `sqlite3`, windows) is to be made in it, or
+    reached by a queue.
     """
     settings: list[str] = []
     if isinstance(config, Mapping):

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use deepfusion::data::{Dataset, OpenOptions};
 use deepfusion::jobs::devices::ComputeDevice;
 use deepfusion::jobs::engine::EngineSettings;
+use deepfusion::jobs::recordings::warnings_of;
 use deepfusion::jobs::training::adaptation::{AdaptSettings, Adaptation, undo};
 use deepfusion::model::Compute;
 use deepfusion::runtime::{DepthEstimator, ModelSource};
@@ -88,13 +90,16 @@ pub(crate) fn adapt(
         let device = device::open(place)?;
         let given = ModelSource::named(&asked.model)?;
         let mut estimator = loaded(&given, asked.data_set.as_deref(), place)?;
-        let mut quiet = |_: &_, _: &[_]| ();
+        let mut of_recordings = Vec::new();
+        let mut opened = |options: &OpenOptions, recordings: &[Dataset]| {
+            of_recordings.extend(warnings_of(options, recordings));
+        };
         let adaptation = Adaptation::begin(
             given,
             asked.settings(place.compute())?,
             &mut estimator,
             &device,
-            &mut quiet,
+            &mut opened,
             judging,
         )?;
         let mut warnings = Warnings::default();
@@ -105,10 +110,11 @@ pub(crate) fn adapt(
         }
         let mut of_start = Vec::new();
         let mut trainer = adaptation.trainer(
-            &mut quiet,
+            &mut opened,
             &mut |warning| warnings.add(warning),
             &mut |start| of_start.extend(warning_of(&start)),
         )?;
+        warnings.add_others(of_recordings);
         warnings.others.append(&mut of_start);
         listener.warn(&warnings);
         listener.keep_log(&trainer)?;

@@ -11,21 +11,25 @@ use deepfusion::eval::IntervalFactors;
 use deepfusion::geometry::Intrinsics;
 use deepfusion::jobs::bulk::pipeline::Threads;
 use deepfusion::runtime::{Augmentation, PreparedImage, Preparer};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyException, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
 
+use crate::camera::AskedCamera;
 use crate::error::{Failure, raise};
-use crate::model::{Prediction, Source};
+use crate::model::{AssumedCamera, Prediction, Source};
 
 /// What is asked of the network.
 pub(crate) struct BulkRequest {
     pub images: Py<PyIterator>,
-    pub intrinsics: Option<[f64; 4]>,
+    pub camera: AskedCamera,
     pub focal_correction: bool,
     pub crop: bool,
     pub augmentation: Augmentation,
     pub factors: Arc<IntervalFactors>,
+    /// How many images may be on their way, where the caller says it.
+    pub ahead: Option<usize>,
+    pub assumed: Arc<AssumedCamera>,
 }
 
 /// Where an image's prediction is waited for.
@@ -69,7 +73,7 @@ impl Predictions {
         let (to_finish, seen) = sync_channel(2);
         let images = Arc::new(Mutex::new(images));
         let preparer = estimator.augmented(request.augmentation).map_err(raise)?;
-        let settings = (request.intrinsics, request.focal_correction, request.crop);
+        let settings = (request.camera, request.focal_correction, request.crop);
         let factors = request.factors.clone();
         for _ in 0..readers {
             let (images, to_network) = (Arc::clone(&images), to_network.clone());
@@ -85,10 +89,10 @@ impl Predictions {
             }
         })?;
         Ok(Self {
+            ahead: request.ahead.unwrap_or(2 * readers + 4),
             request,
             to_read: Some(to_read),
             waiting: Mutex::default(),
-            ahead: 2 * readers + 4,
         })
     }
 
@@ -106,6 +110,8 @@ impl Predictions {
             // What is no image is raised at its turn: those before it are on their way.
             let source = match image.and_then(|image| Source::of(&image)) {
                 Ok(source) => source,
+                // Ctrl-C, or the interpreter's end, waits for nobody.
+                Err(error) if !error.is_instance_of::<PyException>(py) => return Err(error),
                 Err(error) => {
                     waiting.push_back(Waiting::Wrong(error));
                     continue;
@@ -127,7 +133,19 @@ impl Predictions {
         slf
     }
 
-    fn __next__(&mut self, py: Python<'_>) -> PyResult<Option<Prediction>> {
+    fn __next__(slf: &Bound<'_, Self>) -> PyResult<Option<Prediction>> {
+        let next = slf.try_borrow_mut();
+        let mut next = next.map_err(|_| {
+            PyRuntimeError::new_err(
+                "predictions: another thread waits for the next one; give each thread an iterator of its own, of model.another()",
+            )
+        })?;
+        next.advance(slf.py())
+    }
+}
+
+impl Predictions {
+    fn advance(&mut self, py: Python<'_>) -> PyResult<Option<Prediction>> {
         self.fill(py)?;
         let waiting = self.waiting.get_mut();
         let waiting = waiting.unwrap_or_else(PoisonError::into_inner);
@@ -141,7 +159,13 @@ impl Predictions {
         let prediction = py.detach(move || next.recv());
         py.check_signals()?;
         match prediction {
-            Ok(prediction) => Ok(Some(prediction?)),
+            Ok(prediction) => {
+                let prediction = prediction?;
+                if !prediction.knows_camera() {
+                    self.request.assumed.warn(py)?;
+                }
+                Ok(Some(prediction))
+            }
             Err(_) => Err(PyRuntimeError::new_err(
                 "the thread of the network has ended",
             )),
@@ -158,12 +182,12 @@ fn read_images(
     images: &Mutex<Receiver<(Source, Answer)>>,
     to_network: &SyncSender<LoadedImage>,
     preparer: Preparer,
-    (intrinsics, focal_correction, crop): (Option<[f64; 4]>, bool, bool),
+    (asked, focal_correction, crop): (AskedCamera, bool, bool),
 ) {
     loop {
         let next = images.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok((source, answer)) = next else { return };
-        match source.read(intrinsics) {
+        match source.read(asked) {
             Err(failure) => drop(answer.send(Err(failure))),
             Ok((image, camera)) => {
                 let prepared = preparer.prepare(&image, camera.as_ref(), focal_correction, crop);

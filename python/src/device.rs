@@ -16,6 +16,12 @@ pub(crate) fn built() -> Vec<&'static str> {
     built.map(Backend::name).collect()
 }
 
+/// The device that "auto" is here, by its word.
+#[pyfunction]
+pub(crate) fn fastest() -> String {
+    devices::fastest().to_string()
+}
+
 /// Raises where a word is no device of this package; whether the machine has it is not asked.
 #[pyfunction]
 pub(crate) fn check_device(device: &str) -> PyResult<()> {

@@ -83,7 +83,7 @@ pub(crate) fn abandonable<R: Send + 'static>(
     let (send, mut result) = mpsc::channel();
     let worker = thread::Builder::new().spawn(move || {
         // Fails where nobody waits any more.
-        drop(send.send(work()));
+        drop(send.send(deepfusion_cli::in_this_process(work)));
     })?;
     loop {
         // The receiver is not shared between threads: it goes there and comes back.

@@ -2,6 +2,7 @@
 
 mod adapt;
 mod bulk;
+mod camera;
 mod command;
 mod dataset;
 mod device;
@@ -9,6 +10,7 @@ mod error;
 mod interrupt;
 mod measure;
 mod model;
+mod opening;
 mod perceive;
 mod train;
 
@@ -23,13 +25,13 @@ mod _native {
     #[pymodule_export]
     use super::command::command;
     #[pymodule_export]
-    use super::dataset::{Dataset, Frame};
+    use super::dataset::{Dataset, Frame, drives};
     #[pymodule_export]
-    use super::device::{built, check_device};
+    use super::device::{built, check_device, fastest};
     #[pymodule_export]
     use super::error::DeepFusionError;
     #[pymodule_export]
-    use super::measure::{doctor, evaluate, simulate};
+    use super::measure::{Evaluation, doctor, simulate};
     #[pymodule_export]
     use super::model::{Model, Prediction, load, networks};
     #[pymodule_export]
@@ -43,6 +45,7 @@ mod _native {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         // NumPy's functions are looked up once, at the first array: here, where Ctrl-C cannot come between.
         drop(numpy::PyArray1::<f32>::zeros(module.py(), 0, false));
+        deepfusion_cli::loaded_here();
         super::error::set_default_hint(module.py())?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

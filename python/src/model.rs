@@ -1,8 +1,10 @@
 //! Trained networks and what they say of an image.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use deepfusion::data::Dataset;
 use deepfusion::eval::{IntervalFactors, PostProcess};
 use deepfusion::geometry::cloud::PointCloud;
 use deepfusion::geometry::{DepthMap, Intrinsics};
@@ -13,17 +15,23 @@ use deepfusion::jobs::engine::EngineSettings;
 use deepfusion::jobs::evaluation::augmentation;
 use deepfusion::jobs::intervals::sigma;
 use deepfusion::runtime::{Augmentation, DepthEstimator, ModelSource, Precision, embedded_names};
-use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{
+    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
 use crate::bulk::{BulkRequest, Predictions};
+use crate::camera::{AskedCamera, GivenCamera};
+use crate::dataset::Frame;
 use crate::device;
 use crate::error::{Failure, raise, warn, with_hint};
 use crate::interrupt::abandonable;
+use crate::opening::absolute;
 use crate::perceive::depth_map;
 
 /// The names of the networks inside the package.
@@ -41,6 +49,12 @@ pub(crate) fn load(
     data_set: Option<String>,
     device: String,
 ) -> PyResult<Model> {
+    let mut loaded = LoadArguments {
+        model: model.clone(),
+        precision: precision.to_owned(),
+        data_set: data_set.clone(),
+        device: device.clone(),
+    };
     let precision = match precision {
         "f32" => Precision::F32,
         "bf16" => Precision::Bf16,
@@ -63,7 +77,11 @@ pub(crate) fn load(
         let factors = Arc::new(source.interval_factors()?);
         // What cannot be read is an error of whoever needs it.
         let stale = source.stale_calibrations().unwrap_or_default();
-        Ok((Model::new(estimator, place, factors), stale))
+        if source.folder().is_some() || model.is_file() {
+            // No embedded network's name: found from any folder.
+            loaded.model = absolute(model);
+        }
+        Ok((Model::new(estimator, place, factors, loaded), stale))
     };
     // Large weights are read, and packed or moved to a GPU: that can take a while.
     let (model, stale) = abandonable(py, open)??;
@@ -80,6 +98,35 @@ pub(crate) struct Model {
     device: ComputeDevice,
     /// By which what it says of its own error is stretched.
     factors: Arc<IntervalFactors>,
+    assumed: Arc<AssumedCamera>,
+    loaded: LoadArguments,
+}
+
+/// Whether Python was warned that the camera of an image is not known.
+#[derive(Default)]
+pub(crate) struct AssumedCamera(AtomicBool);
+
+impl AssumedCamera {
+    /// Once for all images of a network.
+    pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
+        if self.0.swap(true, Ordering::Relaxed) {
+            return Ok(());
+        }
+        warn(
+            py,
+            "nothing says the camera of an image: the lens of the training camera is assumed, and the metres are as right as that; \
+             give intrinsics, or hfov_deg",
+        )
+    }
+}
+
+/// What loads a network again, in another process as well.
+#[derive(Clone)]
+struct LoadArguments {
+    model: PathBuf,
+    precision: String,
+    data_set: Option<String>,
+    device: String,
 }
 
 impl Model {
@@ -87,11 +134,14 @@ impl Model {
         estimator: DepthEstimator,
         device: ComputeDevice,
         factors: Arc<IntervalFactors>,
+        loaded: LoadArguments,
     ) -> Self {
         Self {
             estimator: Mutex::new(estimator),
             device,
             factors,
+            assumed: Arc::default(),
+            loaded,
         }
     }
 
@@ -108,29 +158,32 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
-    /// `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix) EXIF is asked, of a file or of what PIL opened from one, then the lens of the training
-    /// camera is assumed, and the metres are as right as that.
+    /// Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, a file, or a frame of a
+    /// recording. The camera is `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix), or the one that sees `hfov_deg` degrees from left to right;
+    /// without either a frame has its own, and EXIF is asked, of a file or of what PIL opened from one. Then the lens of the training camera is
+    /// assumed, of which Python is warned once, and the metres are as right as that.
     ///
     /// `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
     /// image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two predictions of the image or of four
     /// (the image and the mirrored one; a smaller input and a larger one; both): it usually errs less on real streets, and takes two to
     /// five times as long. Several sizes are for networks that learned at several, as `street` did.
-    #[pyo3(signature = (image, intrinsics=None, *, focal_correction=true, stretch=false, post_process=None))]
+    #[expect(clippy::too_many_arguments, reason = "by name in Python")]
+    #[pyo3(signature = (image, intrinsics=None, *, hfov_deg=None, focal_correction=true, stretch=false, post_process=None))]
     fn predict(
         &self,
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
         intrinsics: Option<GivenCamera>,
+        hfov_deg: Option<f64>,
         focal_correction: bool,
         stretch: bool,
         post_process: Option<&str>,
     ) -> PyResult<Prediction> {
-        let intrinsics = numbers_of(intrinsics)?;
+        let asked = AskedCamera::new(intrinsics, hfov_deg)?;
         let augmentation = augmentation_named(post_process)?;
         let source = Source::of(image)?;
         let work = || -> Result<_, Failure> {
-            let (image, camera) = source.read(intrinsics)?;
+            let (image, camera) = source.read(asked)?;
             // Inside the pool, so that its many small parallel parts begin at once. The lock is taken outside: a thread of the pool that
             // waits for its parts takes up other work meanwhile, and another prediction would then wait for the lock below it, for ever.
             let prediction = self.with(|estimator| {
@@ -145,27 +198,38 @@ impl Model {
         };
         // The lock is taken without the interpreter's: another thread that holds it may be waiting for that.
         let (prediction, image, camera) = py.detach(work)?;
+        if camera.is_none() {
+            self.assumed.warn(py)?;
+        }
         let factors = Arc::clone(&self.factors);
         Ok(Prediction::new(prediction, image, camera, factors))
     }
 
-    /// The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
+    /// The predictions of images of one camera, or of frames, in their order, as `predict` gives them. While the network looks at one, the next
     /// are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
-    /// going on with `next` gives those behind it.
-    #[pyo3(signature = (images, intrinsics=None, *, focal_correction=true, stretch=false, post_process=None))]
+    /// going on with `next` gives those behind it. `ahead` is how many may be on their way at once, by default some for each thread; one thread
+    /// takes them at a time.
+    #[pyo3(signature = (images, intrinsics=None, *, hfov_deg=None, focal_correction=true, stretch=false, post_process=None, ahead=None))]
+    #[expect(clippy::too_many_arguments, reason = "by name in Python")]
     fn predict_many(
         &self,
         py: Python<'_>,
         images: &Bound<'_, PyAny>,
         intrinsics: Option<GivenCamera>,
+        hfov_deg: Option<f64>,
         focal_correction: bool,
         stretch: bool,
         post_process: Option<&str>,
+        ahead: Option<usize>,
     ) -> PyResult<Predictions> {
-        let intrinsics = numbers_of(intrinsics)?;
+        if ahead == Some(0) {
+            return Err(PyValueError::new_err("ahead: expected at least 1, found 0"));
+        }
         let request = BulkRequest {
             images: images.try_iter()?.unbind(),
-            intrinsics,
+            camera: AskedCamera::new(intrinsics, hfov_deg)?,
+            ahead,
+            assumed: Arc::clone(&self.assumed),
             focal_correction,
             crop: !stretch,
             augmentation: augmentation_named(post_process)?,
@@ -178,8 +242,12 @@ impl Model {
     /// The same network for another thread: it shares the weights.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
         let another = py.detach(|| self.with(|estimator| estimator.another()));
-        let another = another.map_err(raise)?;
-        Ok(Self::new(another, self.device, Arc::clone(&self.factors)))
+        let (factors, loaded) = (Arc::clone(&self.factors), self.loaded.clone());
+        let another = Self::new(another.map_err(raise)?, self.device, factors, loaded);
+        Ok(Self {
+            assumed: Arc::clone(&self.assumed),
+            ..another
+        })
     }
 
     /// Width and height trained with.
@@ -206,7 +274,28 @@ impl Model {
     fn device(&self) -> String {
         self.device.to_string()
     }
+
+    /// Pickled, it is loaded again: the weights stay where they are.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let again = py.import("deepfusion._native")?.getattr("load")?;
+        let LoadArguments {
+            model,
+            precision,
+            data_set,
+            device,
+        } = self.loaded.clone();
+        Ok((again, (model, precision, data_set, device)))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let (width, height) = self.size(py);
+        let name = self.loaded.model.display().to_string();
+        format!("Model({name:?}, {width} x {height}, {})", self.device)
+    }
 }
+
+/// What loads a model, and its arguments.
+type Reduced<'py> = (Bound<'py, PyAny>, (PathBuf, String, Option<String>, String));
 
 /// The predictions of each image by the name that the command line has for them.
 fn augmentation_named(name: Option<&str>) -> PyResult<Augmentation> {
@@ -225,64 +314,25 @@ fn augmentation_named(name: Option<&str>) -> PyResult<Augmentation> {
     }
 }
 
-/// A camera as Python gives it.
-#[derive(FromPyObject)]
-pub(crate) enum GivenCamera {
-    /// fx, fy, cx, cy.
-    #[pyo3(annotation = "fx, fy, cx, cy")]
-    Numbers([f64; 4]),
-    /// K, row by row.
-    #[pyo3(annotation = "3 x 3 matrix")]
-    Matrix([[f64; 3]; 3]),
-}
-
-impl GivenCamera {
-    /// fx, fy, cx, cy.
-    pub(crate) fn numbers(self) -> Result<[f64; 4], Failure> {
-        match self {
-            Self::Numbers(numbers) => Ok(numbers),
-            Self::Matrix([[fx, skew, cx], [zero, fy, cy], last])
-                if skew == 0.0 && zero == 0.0 && last == [0.0, 0.0, 1.0] =>
-            {
-                Ok([fx, fy, cx, cy])
-            }
-            Self::Matrix(rows) => Err(Failure {
-                message: format!("intrinsics: {rows:?} is not the matrix of a pinhole camera"),
-                hint: Some("fx 0 cx, 0 fy cy, 0 0 1".into()),
-            }),
-        }
-    }
-}
-
-fn numbers_of(camera: Option<GivenCamera>) -> Result<Option<[f64; 4]>, Failure> {
-    camera.map(GivenCamera::numbers).transpose()
-}
-
-/// A camera that can be one, of an image of this size.
-pub(crate) fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsics, Failure> {
-    let finite = [fx, fy, cx, cy].iter().all(|v| v.is_finite());
-    if !(finite && fx > 0.0 && fy > 0.0) {
-        return Err(Failure {
-            message: format!("intrinsics: {:?} is no camera", (fx, fy, cx, cy)),
-            hint: Some("fx, fy, cx, cy in pixels of this image; fx and fy above 0".into()),
-        });
-    }
-    Ok(Intrinsics::from_numbers([fx, fy, cx, cy], size))
-}
-
 /// Where an image is.
 pub(crate) enum Source {
     /// Here, and the camera that the file says which they were read from.
     Pixels(RgbImage, Option<Intrinsics>),
     /// In a file.
     File(PathBuf),
+    /// In a recording, which knows its camera.
+    Frame(Arc<Dataset>, usize),
 }
 
 impl Source {
-    /// From an array (NumPy's, or another's by DLPack), a PIL image, or a path.
+    /// From an array (NumPy's, or another's by DLPack), a PIL image, a path, or a frame.
     pub(crate) fn of(image: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(array) = image.extract::<PyReadonlyArray3<'_, u8>>() {
             return Ok(Self::Pixels(of_array(&array)?, None));
+        }
+        if let Ok(frame) = image.cast::<Frame>() {
+            let (recording, index) = frame.get().source();
+            return Ok(Self::Frame(recording, index));
         }
         if let Ok(path) = image.extract::<PathBuf>() {
             return Ok(Self::File(path));
@@ -294,9 +344,7 @@ impl Source {
         } else if image.hasattr("convert")? {
             // PIL's way, which others have as well.
             exif = exif_of_file(image)?;
-            let image = upright(image)?;
-            let rgb = image.call_method1("convert", ("RGB",))?;
-            numpy.call_method1("asarray", (rgb,))?
+            of_pil(&upright(image)?)?
         } else {
             numpy.call_method1("asarray", (image,))?
         };
@@ -306,28 +354,56 @@ impl Source {
                 let camera = exif.and_then(|exif| exif_block_camera(&exif, pixels.dimensions()));
                 Ok(Self::Pixels(pixels, camera.map(|camera| camera.intrinsics)))
             }
-            Err(_) => Err(PyTypeError::new_err(
-                "image: expected an H x W x 3 array of uint8, a PIL image, or a path",
-            )),
+            Err(_) => Err(no_image(&array)?),
         }
     }
 
-    /// The pixels, and the camera: the one given, else what EXIF says of the lens.
+    /// The pixels, and the camera: the one asked for, else the recording's, or what EXIF says of the lens.
     pub(crate) fn read(
         self,
-        intrinsics: Option<[f64; 4]>,
+        asked: AskedCamera,
     ) -> Result<(RgbImage, Option<Intrinsics>), Failure> {
-        let (image, from_file) = match self {
+        let (image, own) = match self {
             Self::Pixels(image, camera) => (image, camera),
             Self::File(path) => {
                 let photo = load_photo(&path)?;
                 (photo.image, photo.intrinsics)
             }
+            Self::Frame(recording, index) => {
+                let camera = recording.intrinsics(index);
+                (recording.load_image(index)?, Some(camera))
+            }
         };
-        let size = image.dimensions();
-        let given = intrinsics.map(|numbers| checked(numbers, size));
-        Ok((image, given.transpose()?.or(from_file)))
+        let given = asked.of(image.dimensions())?;
+        Ok((image, given.or(own)))
     }
+}
+
+/// What an array is that is no image, and what makes it one.
+fn no_image(array: &Bound<'_, PyAny>) -> PyResult<PyErr> {
+    let kind = array.getattr("dtype")?.str()?.to_string();
+    let shape: Vec<usize> = array.getattr("shape")?.extract()?;
+    let remedy = match shape.as_slice() {
+        [_, _, 3] if kind.starts_with("float") => {
+            ": where it is from 0 to 1, (image * 255).astype(\"uint8\")"
+        }
+        [_, _] => ": of grey, np.stack([image] * 3, -1), of uint8",
+        [_, _, _, 3] => ": predict_many takes several images",
+        [3, _, _] => ": image.transpose(1, 2, 0), of uint8",
+        _ => "",
+    };
+    Ok(PyTypeError::new_err(format!(
+        "image: expected an H x W x 3 array of uint8, a PIL image, a path or a Frame, found {kind} {}{remedy}",
+        sizes(&shape)
+    )))
+}
+
+fn sizes(shape: &[usize]) -> String {
+    let sizes: Vec<String> = shape.iter().map(usize::to_string).collect();
+    if sizes.is_empty() {
+        return "without a shape".into();
+    }
+    sizes.join(" x ")
 }
 
 /// The EXIF block of an image that PIL opened and nobody changed: of one that was cut, the focal length is no longer true.
@@ -354,11 +430,47 @@ fn upright<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         .call_method1("exif_transpose", (image,))
 }
 
+/// The pixels of a PIL image, H x W x 3. Its own conversion cuts 16-bit grey off at 255: here it becomes 8 bits as that of a file does.
+fn of_pil<'py>(image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = image.py();
+    let numpy = py.import("numpy")?;
+    // What only looks like PIL's need not have one.
+    let mode = image.getattr("mode").ok();
+    let mode: Option<String> = mode.and_then(|mode| mode.extract().ok());
+    match mode.as_deref() {
+        Some(mode) if mode.starts_with("I;16") => {
+            let grey = numpy.call_method1("asarray", (image, "uint16"))?;
+            let grey: PyReadonlyArray2<'_, u16> = grey.extract()?;
+            let grey = grey.as_array();
+            let size = (grey.nrows(), grey.ncols(), 3);
+            let eight_bits = |value: u16| ((u32::from(value) + 128) / 257) as u8;
+            let rgb =
+                Array3::from_shape_fn(size, |(row, column, _)| eight_bits(grey[(row, column)]));
+            Ok(rgb.into_pyarray(py).into_any())
+        }
+        Some(mode @ ("I" | "F")) => Err(PyTypeError::new_err(format!(
+            "image: a PIL image of mode {mode:?} has no fixed range: give one of 8 bits, or an array of uint8"
+        ))),
+        _ => {
+            let rgb = image.call_method1("convert", ("RGB",))?;
+            numpy.call_method1("asarray", (rgb,))
+        }
+    }
+}
+
 fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
     let [height, width, channels] = [0, 1, 2].map(|axis| array.shape()[axis]);
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
     let (Some((w, h)), 3, true) = (size, channels, width > 0 && height > 0) else {
-        let message = format!("image: expected H x W x 3, found {height} x {width} x {channels}");
+        let remedy = match (height, channels) {
+            (_, 4) => ": image[..., :3] leaves the fourth channel out",
+            (_, 1) => ": np.concatenate([image] * 3, -1) makes grey three channels",
+            (3, _) => ": image.transpose(1, 2, 0)",
+            _ => "",
+        };
+        let message = format!(
+            "image: expected H x W x 3 of uint8, found uint8 {height} x {width} x {channels}{remedy}"
+        );
         return Err(PyValueError::new_err(message));
     };
     let bytes: Vec<u8> = match array.as_slice() {
@@ -390,7 +502,7 @@ pub(crate) struct Prediction {
 }
 
 /// An array of H x W.
-type Plane = Py<PyArray2<f32>>;
+pub(crate) type Plane = Py<PyArray2<f32>>;
 
 impl Prediction {
     pub(crate) fn new(
@@ -419,6 +531,17 @@ impl Prediction {
         Some((depth, sigma))
     }
 
+    /// Whether anything says the camera.
+    pub(crate) fn knows_camera(&self) -> bool {
+        self.camera.is_some()
+    }
+
+    /// Whether the network saw the whole image.
+    pub(crate) fn saw_all(&self) -> bool {
+        let [width, height] = self.prediction.image_size;
+        self.prediction.window == [0, 0, width, height]
+    }
+
     /// With its depth made already.
     pub(crate) fn with_depth(self) -> Self {
         let made = Mutex::new(Some(self.prediction.depth()));
@@ -430,7 +553,7 @@ impl Prediction {
 impl Prediction {
     /// H x W metres at the image's size; 0 outside of what the network looked at. One array, made once.
     #[getter]
-    fn depth(&self, py: Python<'_>) -> PyResult<Plane> {
+    pub(crate) fn depth(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.depth.get_or_try_init(py, || {
             let made = self
                 .made
@@ -464,7 +587,7 @@ impl Prediction {
 
     /// 1/m, at the network's size. One array, made once.
     #[getter]
-    fn disparity(&self, py: Python<'_>) -> PyResult<Plane> {
+    pub(crate) fn disparity(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.disparity.get_or_try_init(py, || {
             let p = &self.prediction;
             image_array(py, p.height, p.width, p.disparity.clone())
@@ -492,6 +615,48 @@ impl Prediction {
 
     fn __dlpack_device__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.depth(py)?.bind(py).call_method0("__dlpack_device__")
+    }
+
+    /// `depth`: `np.asarray(prediction)` is that very array.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let depth = self.depth(py)?.into_bound(py).into_any();
+        let converted = match dtype {
+            None => depth.clone(),
+            Some(dtype) => {
+                let shared = PyDict::new(py);
+                shared.set_item("copy", false)?;
+                depth.call_method("astype", (dtype,), Some(&shared))?
+            }
+        };
+        match (copy, converted.is(&depth)) {
+            (Some(true), true) => converted.call_method0("copy"),
+            (Some(false), false) => Err(PyValueError::new_err(
+                "depth is float32: another dtype needs a copy",
+            )),
+            _ => Ok(converted),
+        }
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "a Prediction cannot be pickled: send its arrays, such as prediction.depth",
+        ))
+    }
+
+    fn __repr__(&self) -> String {
+        let [width, height] = self.prediction.image_size;
+        let camera = if self.camera.is_some() {
+            "known"
+        } else {
+            "assumed"
+        };
+        format!("Prediction({height} x {width}, camera {camera})")
     }
 
     /// Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3, of `depth` as it stands there; needs `intrinsics`.

@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use std::sync::{Mutex, PoisonError};
 
+use crate::camera::{GivenCamera, checked};
 use crate::error::{raise, with_hint};
-use crate::model::{GivenCamera, checked};
 
 /// Follows targets from image to image.
 #[pyclass(frozen, module = "deepfusion._native")]
@@ -66,7 +66,7 @@ impl Perception {
             .reset();
     }
 
-    #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps))]
+    #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps, camera_yaw_rad))]
     #[expect(clippy::too_many_arguments, reason = "by name in Python")]
     fn detect(
         &self,
@@ -78,6 +78,7 @@ impl Perception {
         world_from_cam: Option<PyReadonlyArray2<'_, f64>>,
         speed_mps: Option<f64>,
         yaw_rate_radps: f64,
+        camera_yaw_rad: Option<f64>,
     ) -> PyResult<String> {
         let depth = depth_map(&depth);
         let sigma = sigma.map(|sigma| depth_map(&sigma));
@@ -99,20 +100,36 @@ impl Perception {
                 return Err(with_hint(message, Some(hint)));
             }
         };
-        let found = py.detach(|| {
+        let detect = |perceiver: &mut Perceiver| {
             let (small, k) = working_depth(&depth, &camera);
             let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
-            let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let mut found = perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])?;
             let whole = [camera.width, camera.height];
             scale_bounds(&mut found.targets, [small.width, small.height], whole);
             Ok::<_, deepfusion::perception::Error>(found)
+        };
+        let found = py.detach(|| {
+            // Taken outside of the pool, as that of a network is (`Model::predict`).
+            let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let perceiver = &mut *perceiver;
+            deepfusion_cli::in_this_process(|| detect(perceiver))
         });
-        to_json(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
+        let found = found.map_err(raise)?;
+        let collision = speed_mps.and_then(|speed| {
+            let vehicle = VehicleShape {
+                camera_yaw_rad: camera_yaw_rad.filter(|yaw| yaw.cos() > LOOKS_ASIDE)?,
+                ..VehicleShape::default()
+            };
+            time_to_collision(&found.targets, speed, yaw_rate_radps, &vehicle)
+        });
+        to_json(&found, collision)
     }
 }
 
-fn to_json(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyResult<String> {
+/// Cosine of the angle from which on a camera does not look ahead, so that nothing is said of what the vehicle meets: sixty degrees.
+const LOOKS_ASIDE: f64 = 0.5;
+
+fn to_json(found: &Surroundings, collision: Option<Collision>) -> PyResult<String> {
     let targets = found.targets.iter();
     let found = Detections {
         targets: targets
@@ -125,9 +142,7 @@ fn to_json(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyRes
             normal: ground.up,
             offset_m: ground.camera_height_m,
         }),
-        collision: speed_mps.and_then(|speed| {
-            time_to_collision(&found.targets, speed, yaw_rate, &VehicleShape::default())
-        }),
+        collision,
     };
     serde_json::to_string(&found).map_err(|e| PyValueError::new_err(e.to_string()))
 }

@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use deepfusion::jobs::recordings::warnings_of;
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
 use deepfusion::jobs::training::resume::{MovedRecordings, ResumeRequest, go_on_with};
 use deepfusion::jobs::training::{RunLock, RunLog, Start, StartReport};
 use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
-use deepfusion::train::{Control, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
+use deepfusion::train::{
+    Control, LossTerms, SampleSet, SingleWorker, TrainEvent, Trainer, Workers,
+};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -168,6 +171,30 @@ impl Warnings {
             other => self.others.push(other.to_string()),
         }
     }
+
+    /// Each once: a recording may be opened to learn from and to validate on.
+    pub(crate) fn add_others(&mut self, warnings: Vec<String>) {
+        for warning in warnings {
+            if !self.others.contains(&warning) {
+                self.others.push(warning);
+            }
+        }
+    }
+}
+
+/// The samples of a configuration, and what may not be meant of them and of their recordings.
+fn samples(
+    config: &TrainConfig,
+    warnings: &mut Warnings,
+) -> Result<(SampleSet, SampleSet), Failure> {
+    let mut of_recordings = Vec::new();
+    let sets = open_samples(
+        config,
+        &mut |options, recordings| of_recordings.extend(warnings_of(options, recordings)),
+        &mut |warning| warnings.add(warning),
+    )?;
+    warnings.add_others(of_recordings);
+    Ok(sets)
 }
 
 /// What may not be meant of the weights to start from.
@@ -190,13 +217,12 @@ fn opened(
         None => Box::new(SingleWorker),
     };
     let leads = workers.rank() == 0;
-    let mut warn = |warning| warnings.add(warning);
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
         let lock = lock_of(&folder, leads)?;
         let config = go_on_with(&folder.read_settings()?, &asked.to_resume(place.compute())?)?;
         config.validate()?;
-        let sets = open_samples(&config, &mut |_, _| (), &mut warn)?;
+        let sets = samples(&config, warnings)?;
         let settings = config.clone();
         let trainer = Trainer::resume_among(workers, config, folder.clone(), sets, &device)?;
         // Only settings with which the run goes on.
@@ -217,7 +243,7 @@ fn opened(
     let start = Start::of(asked.init.as_deref(), &config, is_preset)?;
     start.record_in(&mut config)?;
     config.validate()?;
-    let sets = open_samples(&config, &mut |_, _| (), &mut warn)?;
+    let sets = samples(&config, warnings)?;
     let folder = if leads {
         RunFolder::create(&asked.out)?
     } else {

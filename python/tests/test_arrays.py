@@ -106,6 +106,12 @@ def test_targets_of_exact_depth(drive):
         frame_depth(drive, 0), frame.intrinsics, speed_mps=8.0, yaw_rate_radps=0.4
     )
     assert met.collision is not None and met.collision.id in {t.id for t in met.targets}
+    # A camera that looks to the side does not see what the vehicle's front meets.
+    for yaw in (None, 1.2, -1.2, 3.0):
+        aside = deepfusion.Perception(exact=True).detect(
+            frame_depth(drive, 0), frame.intrinsics, speed_mps=8.0, yaw_rate_radps=0.4, camera_yaw_rad=yaw
+        )
+        assert aside.targets and aside.collision is None
     nothing = deepfusion.perceive(np.zeros((96, 320)), (160, 160, 160, 48))
     assert nothing.targets == [] and nothing.ground is None
 
@@ -131,8 +137,20 @@ def test_targets_are_the_commands(drive, model, tmp_path):
             pose = pose @ recording.motion(i, i - 1)
         prediction = model.predict(frame.image, frame.intrinsics)
         ours = perception.detect(
-            prediction.depth, frame.intrinsics, sigma=prediction.sigma, time_s=frame.time_s, world_from_cam=pose
+            prediction.depth,
+            frame.intrinsics,
+            sigma=prediction.sigma,
+            time_s=frame.time_s,
+            world_from_cam=pose,
+            speed_mps=frame.speed_mps,
+            yaw_rate_radps=frame.yaw_rate_radps or 0.0,
+            camera_yaw_rad=recording.camera_yaw_rad,
         )
+        met = (theirs["collision_with"], theirs["time_to_collision_s"])
+        if ours.collision is None:
+            assert met == (None, None)
+        else:
+            assert (ours.collision.id, ours.collision.time_s) == (met[0], pytest.approx(met[1], abs=1e-6))
         assert [t.id for t in ours.targets] == [t["id"] for t in theirs["targets"]]
         for mine, other in zip(ours.targets, theirs["targets"]):
             assert np.allclose(mine.center_m, other["center_m"], atol=1e-6)
@@ -150,6 +168,7 @@ def test_perception_says_what_is_wrong():
         with pytest.raises(deepfusion.DeepFusionError) as caught:
             deepfusion.perceive(depth, camera, **settings)
         assert expected in str(caught.value) + caught.value.hint
+    deepfusion.perceive(depth, camera, max_depth_m=np.float32(30), min_pixels=np.int64(20))
     with pytest.raises(deepfusion.DeepFusionError, match="max_depth_m"):
         deepfusion.perceive(depth, camera, max_depth_m=-1)
     with pytest.raises(deepfusion.DeepFusionError, match="camera"):

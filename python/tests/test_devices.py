@@ -3,6 +3,7 @@
 import deepfusion
 import numpy as np
 import pytest
+from deepfusion import _native
 from deepfusion._devices import own_gpu
 
 QUICK = {"preset": "tiny", "steps": 2, "batch": 1, "size": {"width": 64, "height": 64}, "seed": 4, "validation_share": 0.2}
@@ -25,6 +26,7 @@ def test_the_processor_is_the_default(street):
 
 def test_auto_is_a_device_that_the_package_has():
     assert deepfusion.devices()[0] == "cpu"
+    assert _native.fastest().partition(":")[0] in deepfusion.devices()
     assert deepfusion.load("tiny", device="auto").device.partition(":")[0] in deepfusion.devices()
 
 
@@ -76,7 +78,12 @@ def test_each_worker_has_a_gpu_of_its_own(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     assert own_gpu("cuda", Workers()) == "cuda"
     monkeypatch.setenv("SLURM_LOCALID", "1")
-    assert [own_gpu(device, Workers()) for device in ("cuda", "vulkan", "cuda:0", "cpu", "auto")] == ["cuda:1", "vulkan", "cuda:0", "cpu", "auto"]
+    assert [own_gpu(device, Workers()) for device in ("cuda", "vulkan", "cuda:0", "cpu")] == ["cuda:1", "vulkan", "cuda:0", "cpu"]
+    # What "auto" is here: of four processes on four GPUs not the first card for all.
+    for fastest, own in [("cuda:0", "cuda:1"), ("cpu", "cpu"), ("vulkan:1", "vulkan:1")]:
+        monkeypatch.setattr(_native, "fastest", lambda fastest=fastest: fastest)
+        assert own_gpu("auto", Workers()) == own
+        assert own_gpu("auto", None) == "auto"
     assert own_gpu("cuda", None) == "cuda"
     # Each sees its own alone.
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "5")

@@ -4,10 +4,15 @@ import ast
 import inspect
 import json
 import os
+import pickle
+import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
+import textwrap
 import threading
+import warnings
 from pathlib import Path
 
 import deepfusion
@@ -170,6 +175,21 @@ def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
     assert not np.array_equal(mirrored, expected)
 
 
+def test_sixteen_bits_are_eight_as_in_a_file(drive, model, tmp_path):
+    """PIL's own conversion would make nearly all of it white."""
+    frame = deepfusion.Dataset(drive)[0]
+    grey = frame.image.mean(axis=2) * 257
+    file = tmp_path / "grey.png"
+    Image.fromarray(grey.astype(np.uint16)).save(file)
+    with Image.open(file) as opened:
+        if not opened.mode.startswith("I;16"):
+            pytest.skip("this Pillow reads 16 bits as 32")
+        assert np.array_equal(model.predict(opened, frame.intrinsics).depth, model.predict(file, frame.intrinsics).depth)
+    for values in [grey.astype(np.int32), grey.astype(np.float32)]:
+        with pytest.raises(TypeError, match="no fixed range"):
+            model.predict(Image.fromarray(values), frame.intrinsics)
+
+
 def test_a_recording(drive):
     recording = deepfusion.Dataset(drive)
     assert len(recording) == 3 and recording.layout == "KITTI raw"
@@ -184,10 +204,217 @@ def test_a_recording(drive):
     distance = np.linalg.norm(motion[:3, 3])
     assert motion[2, 3] < 0 and 0.1 < distance < 3
     assert np.allclose(motion @ recording.motion(1, 0), np.eye(4), atol=1e-6)
+    assert recording.camera_yaw_rad == pytest.approx(0, abs=0.05)
+    assert frames[0].yaw_rate_radps is None and abs(frames[1].yaw_rate_radps) < 1
     # The scan is exact, and only every second frame has one.
     truth = frames[0].ground_truth()
     assert truth.shape == frames[0].image.shape[:2] and (truth > 0).sum() > 100
     assert frames[1].ground_truth() is None
+
+
+def test_a_recording_is_a_sequence(drive, tmp_path):
+    recording = deepfusion.Dataset(drive)
+    assert [frame.number for frame in recording[1:]] == [1, 2] and recording[3:] == []
+    assert [frame.number for frame in recording[::-2]] == [2, 0] and recording[np.int64(1)].number == 1
+    assert np.array_equal(recording.motion(-1, 0), recording.motion(2, 0))
+    for wrong in (3, -4):
+        with pytest.raises(IndexError):
+            recording.motion(wrong, 0)
+    assert recording.numbers.tolist() == [0, 1, 2] and recording.numbers.dtype == np.int64
+    assert recording.times_s.tolist() == [frame.time_s for frame in recording]
+    assert recording.speeds_mps.tolist() == [frame.speed_mps for frame in recording]
+    frame = recording[0]
+    fx, fy, cx, cy = frame.intrinsics
+    assert frame.K.tolist() == [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
+    assert frame == recording[0] == deepfusion.Dataset(drive)[0] and hash(frame) == hash(recording[0])
+    assert frame != recording[1] and frame != "frame" and len({frame, recording[-3], recording[1]}) == 2
+    assert repr(frame).startswith("Frame(0 of") and repr(recording).startswith("Dataset(")
+    again = deepfusion.drives(drive)
+    assert [one.name for one in again] == [recording.name]
+    other = deepfusion.simulate(tmp_path / "other", frames=2, size=(320, 96), scan_every=0)
+    shutil.copytree(drive.parent, tmp_path / "both" / drive.parent.name)
+    both = tmp_path / "both" / drive.parent.name
+    shutil.copytree(other, both / f"{other.name[:-9]}0077_sync")
+    opened = deepfusion.drives(both)
+    assert [len(one) for one in opened] == [3, 2]
+    assert [pickle.loads(pickle.dumps(one)).name for one in opened] == [one.name for one in opened]
+
+
+def test_a_frame_is_an_image(drive, model):
+    recording = deepfusion.Dataset(drive)
+    for frame, seen in zip(recording, model.predict_many(recording, ahead=1), strict=True):
+        expected = model.predict(frame.image, frame.intrinsics)
+        assert np.array_equal(seen.depth, expected.depth) and seen.intrinsics == expected.intrinsics
+        assert np.array_equal(model.predict(frame).depth, expected.depth)
+    other = model.predict(frame, (100, 100, 160, 48))
+    assert other.intrinsics == (100, 100, 160, 48) and not np.array_equal(other.depth, expected.depth)
+
+
+def test_the_view_is_a_camera(drive, model):
+    frame = deepfusion.Dataset(drive)[0]
+    width = frame.image.shape[1]
+    fx, fy, cx, cy = model.predict(frame.image, hfov_deg=90).intrinsics
+    assert fx == pytest.approx(width / 2) and fy == fx and cx == pytest.approx((width - 1) / 2)
+    assert next(model.predict_many([frame], hfov_deg=90)).intrinsics == (fx, fy, cx, cy)
+    for wrong in [{"hfov_deg": 190}, {"hfov_deg": 90, "intrinsics": frame.intrinsics}]:
+        with pytest.raises(ValueError, match="hfov_deg"):
+            model.predict(frame, **wrong)
+
+
+def test_a_camera_that_nothing_says_is_warned_of_once(drive):
+    model = deepfusion.load("tiny")
+    image = deepfusion.Dataset(drive)[0].image
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.predict(image, (100, 100, 160, 48))
+        with pytest.raises(UserWarning, match="hfov_deg"):
+            model.predict(image)
+        model.predict(image)
+        list(model.another().predict_many([image]))
+
+
+def test_what_a_recording_does_not_say_can_be_said(drive, tmp_path):
+    folder = folder_of(drive, tmp_path / "folder")
+    (folder / "intrinsics.txt").unlink()
+    with pytest.raises(deepfusion.DeepFusionError):
+        deepfusion.Dataset(folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        plain = deepfusion.Dataset(folder, hfov_deg=90)
+        assert plain[0].intrinsics[0] == pytest.approx(160)
+        camera = (200.0, 200.0, 160.0, 48.0)
+        later = deepfusion.Dataset(folder, intrinsics=camera, clock_offset_ms=10)
+        assert later[0].intrinsics == camera
+        again = pickle.loads(pickle.dumps(later))
+        assert again[0].intrinsics == camera and again[0].time_s == later[0].time_s
+        split = tmp_path / "split.txt"
+        split.write_text(f"{folder.name} 1 l\n")
+        assert [frame.number for frame in deepfusion.Dataset(folder, hfov_deg=90, split=split)] == [1]
+        assert deepfusion.drives(folder, hfov_deg=90)[0][0].intrinsics == plain[0].intrinsics
+        report = deepfusion.doctor(folder, hfov_deg=90)
+        assert report["drives"][0]["frames"] == 3
+        assert deepfusion.doctor(folder)["drives"] == []
+    for wrong, said in [
+        ({"topics": {"image": ""}}, "topics"),
+        ({"topics": {"pictures": "/a"}}, "no role"),
+        ({"hfov_deg": 90, "intrinsics": camera}, "hfov_deg"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            deepfusion.Dataset(folder, **wrong)
+    with pytest.raises(TypeError, match="topics"):
+        deepfusion.Dataset(folder, topics=["image"])
+    # Topics are a bag's.
+    with pytest.raises(deepfusion.DeepFusionError):
+        deepfusion.Dataset(folder, hfov_deg=90, topics={"image": "/camera"})
+
+
+def test_a_log_by_itself(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,speed_mps\n" + "".join(f"{i / 10},{5 + i % 7}\n" for i in range(200)))
+    said = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(log), "--json"], capture_output=True, check=False)
+    assert deepfusion.doctor(log) == json.loads(said.stdout)
+    with pytest.raises(deepfusion.DeepFusionError, match="no camera"):
+        deepfusion.doctor(log, hfov_deg=90)
+
+
+def test_what_opens_again_is_pickled(drive, model, monkeypatch, tmp_path):
+    monkeypatch.chdir(Path(drive).parent)
+    recording = deepfusion.Dataset(Path(drive).name)
+    text = pickle.dumps((recording, recording[1], recording[2], model))
+    # Wherever the other process stands.
+    monkeypatch.chdir(tmp_path)
+    again, frame, last, network = pickle.loads(text)
+    assert again.name == recording.name and (frame, last) == (recording[1], recording[2])
+    expected = model.predict(recording[1]).depth
+    assert np.array_equal(network.predict(frame).depth, expected)
+    seen = model.predict(recording[0])
+    with pytest.raises(TypeError, match="prediction.depth"):
+        pickle.dumps(seen)
+    assert repr(model).startswith('Model("tiny", 320 x 96') and repr(seen) == "Prediction(96 x 320, camera known)"
+    assert np.asarray(seen) is seen.depth or np.shares_memory(np.asarray(seen), seen.depth)
+    assert np.array(seen, dtype=np.float64).dtype == np.float64
+
+
+def test_ctrl_c_in_the_callers_generator_ends_at_once(drive, model):
+    image = deepfusion.Dataset(drive)[0].image
+
+    def images():
+        yield image
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        next(model.predict_many(images(), (100, 100, 160, 48)))
+
+
+def test_one_thread_takes_predictions(drive, model):
+    image = deepfusion.Dataset(drive)[0].image
+    waits, goes_on = threading.Event(), threading.Event()
+
+    def images():
+        waits.set()
+        goes_on.wait(60)
+        yield image
+
+    predictions = model.predict_many(images(), (100, 100, 160, 48))
+    taken = []
+    thread = threading.Thread(target=lambda: taken.append(next(predictions)))
+    thread.start()
+    waits.wait(60)
+    try:
+        with pytest.raises(RuntimeError, match="another thread"):
+            next(predictions)
+    finally:
+        goes_on.set()
+        thread.join()
+    assert len(taken) == 1
+    with pytest.raises(ValueError, match="ahead"):
+        model.predict_many([], ahead=0)
+
+
+def test_what_is_no_image_says_what_makes_it_one(drive, model):
+    image = deepfusion.Dataset(drive)[0].image
+    for wrong, said in [
+        (image / np.float32(255), "found float32 96 x 320 x 3.*astype"),
+        (image[..., 0], "96 x 320: of grey"),
+        (np.dstack([image, image[..., :1]]), r"96 x 320 x 4: image\[\.\.\., :3\]"),
+        (image.transpose(2, 0, 1), "transpose"),
+        (image[None], "predict_many"),
+    ]:
+        with pytest.raises((TypeError, ValueError), match=said):
+            model.predict(wrong)
+    with pytest.raises(TypeError, match="3 x 3 matrix"):
+        model.predict(image, "the camera")
+    fx, fy, cx, cy = camera = deepfusion.Dataset(drive)[0].intrinsics
+    p = np.array([[fx, 0, cx, 0], [0, fy, cy, 0], [0, 0, 1, 0]])
+    assert model.predict(image, p).intrinsics == camera
+    p[0, 3] = -380
+    with pytest.raises(deepfusion.DeepFusionError, match="last column") as refused:
+        model.predict(image, p)
+    assert "P[:, :3]" in refused.value.hint
+
+
+def folder_of(drive, out):
+    """The same images as a plain folder with speeds, whose mount nothing says."""
+    frames = list(deepfusion.Dataset(drive))
+    shutil.copytree(Path(drive) / "image_02" / "data", out / "images")
+    (out / "frames.csv").write_text("time_s,file\n" + "".join(f"{f.time_s:.6f},{f.number:010}.png\n" for f in frames))
+    speeds = "".join(f"{f.time_s:.6f},{f.speed_mps},{f.yaw_rate_radps or 0.0}\n" for f in frames)
+    (out / "speed.csv").write_text("time_s,speed_mps,yaw_rate_radps\n" + speeds)
+    (out / "intrinsics.txt").write_text(" ".join(map(str, frames[0].intrinsics)))
+    return out
+
+
+def test_what_may_not_be_meant_of_a_recording_is_a_warning(drive, tmp_path):
+    folder = folder_of(drive, tmp_path / "folder")
+    with pytest.warns(UserWarning, match="straight ahead"):
+        recording = deepfusion.Dataset(folder)
+    assert any("straight ahead" in warning for warning in recording.warnings)
+    assert all(warning.startswith(str(folder)) for warning in recording.warnings)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert deepfusion.Dataset(drive).warnings == []
+        with pytest.raises(UserWarning, match="folder"):
+            deepfusion.Dataset(folder)
 
 
 def test_the_metrics_are_the_fields():
@@ -204,6 +431,43 @@ def test_the_metrics_are_the_fields():
     assert report["scale"]["median"] == pytest.approx(ratio, rel=1e-9)
     inverse = deepfusion.evaluate([1 / predicted], [truth], kind="disparity")
     assert inverse["unscaled"]["abs_rel"] == pytest.approx(report["unscaled"]["abs_rel"], rel=1e-6)
+
+
+def test_what_predicts_nothing_somewhere_can_be_left_out():
+    """`Prediction.depth` is 0 outside of what the network looked at."""
+    truth = np.full((4, 6), 10.0)
+    predicted = np.full((4, 6), 11.0)
+    predicted[:2] = 0
+    with pytest.raises(deepfusion.DeepFusionError, match="12 of 24") as refused:
+        deepfusion.evaluate([predicted], [truth])
+    assert "allow_holes=True" in refused.value.hint
+    report = deepfusion.evaluate([predicted], [truth], allow_holes=True, gt_depth="annotated", scale=0.5, points=4)
+    assert report["unscaled"]["abs_rel"] == pytest.approx(0.1) and report["missing_rate"] > 0
+    assert report["protocol"]["gt"] == "annotated"
+    assert report["fixed_scaled"]["factor"] == 0.5 and report["points"] is not None
+    with pytest.raises(ValueError, match="gt_depth"):
+        deepfusion.evaluate([predicted], [truth], gt_depth="lidar")
+    with pytest.raises(ValueError, match="1 x 4 x 6"):
+        deepfusion.evaluate([predicted[None]], [truth])
+
+
+def test_predictions_are_measured_as_they_come(drive, model):
+    recording = deepfusion.Dataset(drive)
+    camera = recording[0].intrinsics
+    truths = [frame.ground_truth() for frame in recording]
+    assert [truth is None for truth in truths] == [False, True, False]
+    images = [frame.image for frame in recording]
+    scans = [0, 2]
+    for kind in ("depth", "disparity"):
+        arrays = [getattr(model.predict(images[i], camera, stretch=True), kind) for i in scans]
+        expected = deepfusion.evaluate(arrays, [truths[i] for i in scans], kind=kind)
+        seen = model.predict_many(images, camera, stretch=True)
+        assert deepfusion.evaluate(seen, (truth for truth in truths), kind=kind) == expected
+    with pytest.raises(ValueError, match="only 2"):
+        deepfusion.evaluate(model.predict_many(images[:2], camera, stretch=True), truths)
+    with pytest.raises(deepfusion.DeepFusionError, match="no image has") as refused:
+        deepfusion.evaluate(images[:1], [None])
+    assert "no frame has ground truth" in refused.value.hint
 
 
 def test_errors_say_what_to_do(drive, model, tmp_path):
@@ -263,6 +527,45 @@ def test_threads(drive, model):
         for thread in threads:
             thread.join()
         assert all(np.array_equal(a, b) for a, b in zip(expected, found))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_the_child_of_a_fork_computes(drive):
+    """As multiprocessing starts processes on Linux before Python 3.14, and DataLoader its workers: none of the parent's threads come along."""
+    code = """
+        import os, sys, warnings
+        import deepfusion, numpy as np
+        warnings.simplefilter("ignore")
+        frame = deepfusion.Dataset(sys.argv[1])[0]
+        model = deepfusion.load("tiny")
+        expected = model.predict(frame.image, frame.intrinsics).depth.tobytes()
+        truth = frame.ground_truth()
+        child = os.fork()
+        if child == 0:
+            same = deepfusion.Dataset(sys.argv[1])[0]
+            seen = model.predict(same.image, same.intrinsics)
+            assert seen.depth.tobytes() == expected
+            [again] = model.predict_many([same.image], same.intrinsics)
+            assert again.depth.tobytes() == expected
+            assert deepfusion.load("tiny").predict(same.image, same.intrinsics).depth.tobytes() == expected
+            deepfusion.perceive(seen.depth, same.intrinsics)
+            assert np.array_equal(same.ground_truth(), truth)
+            assert deepfusion.evaluate([seen], [truth])["n"] == 1
+            deepfusion.doctor(sys.argv[1])
+            print("the same", flush=True)
+            os._exit(0)
+        sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    """
+    words = [sys.executable, "-c", textwrap.dedent(code), str(drive)]
+    # A child that hangs is ended with its parent.
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        printed, _ = running.communicate(timeout=60)
+    except subprocess.TimeoutExpired:
+        os.killpg(running.pid, signal.SIGKILL)
+        running.communicate()
+        raise
+    assert (running.returncode, printed) == (0, "the same\n")
 
 
 def test_doctor(drive, tmp_path):

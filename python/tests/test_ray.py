@@ -52,6 +52,21 @@ def street(tmp_path_factory):
 CAMERA = (140.0, 140.0, 96.0, 32.0)
 
 
+def test_outputs_are_no_inputs(street, tmp_path):
+    """Of a folder that is searched whole, in which the outputs lie as well."""
+    images = tmp_path / "images"
+    shutil.copytree(street, images)
+    for out in [images / "depth", images]:
+        for done, kept in [(6, 0), (0, 6)]:
+            summary = cluster.predict(images, "tiny", out, intrinsics=CAMERA, workers=2)
+            assert (summary.images, summary.done, summary.kept, summary.failed) == (6, done, kept, [])
+    # A picture of depth that no sidecar lists is an image as others are.
+    Image.new("RGB", (8, 8)).save(images / "a_depth.png")
+    (images / "a.json").write_text("{}")
+    assert len(_storage.images([str(images)], {}, str(images / "depth"))) == 7
+    assert len(_storage.images([str(images / "left")], {}, str(images))) == 3
+
+
 def test_each_image_once_and_as_the_command_does_it(street, tmp_path):
     out = tmp_path / "out"
     job = dict(intrinsics=CAMERA, save=("depth-png", "npy"), workers=2)
@@ -616,3 +631,12 @@ def _has(package):
     from importlib.util import find_spec
 
     return find_spec(package) is not None
+
+
+def test_trials_share_what_training_takes(street):
+    """And each is given what it computes on."""
+    learning = _tune._learning("none", [street], "3", 0, None)
+    assert learning == {"init": "none", "validation": [str(street)], "camera": "3", "device": "cpu"}
+    for gpus, device, said in [(-1, None, "gpus_per_trial"), (0, "auto", "needs gpus_per_trial"), (1, "cpu", "idle")]:
+        with pytest.raises(ValueError, match=said):
+            _tune._learning(None, None, None, gpus, device)

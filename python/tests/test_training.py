@@ -66,6 +66,19 @@ def test_the_same_seed_is_the_same_run(run, street, tmp_path):
     assert other.losses != run[0].losses
 
 
+def test_a_recordings_warnings_are_pythons(street, tmp_path):
+    """As the command prints them."""
+    folder = tmp_path / "folder"
+    frames = list(deepfusion.Dataset(street))
+    shutil.copytree(street / "image_02" / "data", folder / "images")
+    (folder / "frames.csv").write_text("time_s,file\n" + "".join(f"{f.time_s:.6f},{f.number:010}.png\n" for f in frames))
+    speeds = "".join(f"{f.time_s:.6f},{f.speed_mps},{f.yaw_rate_radps or 0.0}\n" for f in frames)
+    (folder / "speed.csv").write_text("time_s,speed_mps,yaw_rate_radps\n" + speeds)
+    (folder / "intrinsics.txt").write_text(" ".join(map(str, frames[0].intrinsics)))
+    with pytest.warns(UserWarning, match="folder"):
+        deepfusion.train({**SMALL, "steps": 1}, folder, out=tmp_path / "run", init="none")
+
+
 def test_a_callback_stops_and_the_run_goes_on(run, street, tmp_path):
     out = tmp_path / "stopped"
     stopped = deepfusion.train(

@@ -16,6 +16,7 @@ mod devices;
 mod engine;
 mod error;
 mod failure;
+mod forked;
 mod interrupt;
 mod model;
 mod output;
@@ -29,6 +30,7 @@ use clap::Parser;
 
 pub use allocator::keep_memory;
 pub use failure::in_options;
+pub use forked::{in_this_process, loaded_here};
 
 /// The command line that is run, for reports: in Python the process has another one.
 static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -62,8 +64,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 const STACK_BYTES: usize = 8 << 20;
 
 /// Runs `work` on one of rayon's threads: its parallel operations then start at once, where the main
-/// thread would hand each of them over and sleep. A training step has a great many of them.
+/// thread would hand each of them over and sleep. A training step has a great many of them. In the child of a fork it is a thread of that
+/// process's own pool ([`in_this_process`]).
 pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    if let Some(pool) = forked::pool() {
+        return pool.install(work);
+    }
     let pool = rayon::ThreadPoolBuilder::new().stack_size(STACK_BYTES);
     // A pool that exists already has the default stack, which release builds do not need.
     pool.build_global().ok();

@@ -11,6 +11,10 @@ use deepfusion_model::{
 
 use crate::{Error, Result};
 
+mod warnings;
+
+pub use self::warnings::{PlacedWarning, placed_warnings, warning_line, warnings_of};
+
 /// Opens the recordings at several paths, each drive and camera a data set.
 ///
 /// # Errors

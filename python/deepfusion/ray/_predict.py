@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from deepfusion._native import _PostProcess as PostProcess
+    from deepfusion._types import Precision
 
 _LOG = logging.getLogger(__name__)
 
@@ -69,7 +70,7 @@ class _Job:
 
     id: str
     model: str
-    precision: str
+    precision: Precision
     data_set: str | None
     intrinsics: tuple[float, float, float, float] | None
     focal_correction: bool
@@ -264,7 +265,7 @@ def _depth_png(depth: np.ndarray) -> bytes:
     return file.getvalue()
 
 
-def _check(model: str, precision: str, data_set: str | None, save: Sequence[str], post_process: PostProcess | None) -> None:
+def _check(model: str, precision: Precision, data_set: str | None, save: Sequence[str], post_process: PostProcess | None) -> None:
     """Raises what every worker would: a wrong name, a run without weights. This machine may lack their GPU, and their processors' precision."""
     opened = deepfusion.load(model, data_set=data_set)
     if precision == "int8":
@@ -275,11 +276,12 @@ def _check(model: str, precision: str, data_set: str | None, save: Sequence[str]
             if "needs a processor" not in str(error):
                 raise
     grey = np.full((64, 64, 3), 128, np.uint8)
+    camera = (64.0, 64.0, 31.5, 31.5)
     unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
     if post_process is not None:
         # A way of looking that the network cannot take.
-        opened.predict(grey, post_process=post_process)
-    if unsaid and opened.predict(grey).sigma is None:
+        opened.predict(grey, camera, post_process=post_process)
+    if unsaid and opened.predict(grey, camera).sigma is None:
         raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
 
 
@@ -294,7 +296,7 @@ def predict(
     cpus_per_worker: int = 1,
     gpus_per_worker: float = 0,
     device: str | None = None,
-    precision: str = "f32",
+    precision: Precision = "f32",
     data_set: str | None = None,
     focal_correction: bool = True,
     stretch: bool = False,
@@ -304,7 +306,7 @@ def predict(
 ) -> PredictSummary:
     """Depth of many images on a cluster, each exactly once.
 
-    `paths` are images, folders (with all below them) and globs; `output` is a folder. Both, and `model`, where it is no embedded
+    `paths` are images, folders (with all below them, but for `output` and earlier pictures of depth) and globs; `output` is a folder. Both, and `model`, where it is no embedded
     network, are paths that all machines see, or URLs; `storage_options` are those of their file system (fsspec's). The images are
     of one camera: `intrinsics` are fx, fy, cx, cy in its pixels, or the 3 x 3 matrix; without them each file's EXIF is asked, then the lens of the
     training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
@@ -365,7 +367,7 @@ def predict(
         device=device,
         gpus=gpus_per_worker,
     )
-    named = images(urls(paths), options)
+    named = images(urls(paths), options, job.output)
     if not ray.is_initialized():
         ray.init()
     if workers is None:

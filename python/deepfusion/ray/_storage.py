@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 import uuid
@@ -214,10 +215,12 @@ def _holds_a_run(folder: str) -> bool:
         return False
 
 
-def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, str]]:
+def images(given: Sequence[str], options: Mapping[str, Any], output: str | None = None) -> list[tuple[str, str]]:
     """Every image that files, folders (with those below them) and globs mean, once, with the name of its outputs: the path
-    below the folder or the glob's fixed part, without its ending; where two would have the same, the second gets `-2`."""
+    below the folder or the glob's fixed part, without its ending; where two would have the same, the second gets `-2`. Not what lies in
+    `output`, where that is a folder below them, nor pictures of depth that the sidecar of their image lists."""
     found: dict[str, str] = {}
+    outputs = None if output is None else _whole(*fsspec.core.url_to_fs(output, **options))
     for url in given:
         fs, path = fsspec.core.url_to_fs(url, **options)
         if any(sign in path for sign in "*?["):
@@ -229,7 +232,16 @@ def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, 
             below, paths = path.rpartition("/")[0], [path]
         else:
             raise FileNotFoundError(f"{url}: there is no such file or folder")
-        taken = [one for one in paths if PurePosixPath(one).suffix.lower() in _IMAGES]
+        # A folder of outputs that holds the inputs, or is theirs, holds more than outputs.
+        searched = _whole(fs, below)
+        own = outputs if outputs is not None and outputs != searched and outputs.startswith(searched) else None
+        taken = [
+            one
+            for one in paths
+            if PurePosixPath(one).suffix.lower() in _IMAGES
+            and not (own is not None and _whole(fs, one).startswith(own))
+            and not _is_output(fs, one)
+        ]
         if not taken:
             raise FileNotFoundError(f"{url}: holds no image (.png, .jpg or .jpeg)")
         for one in taken:
@@ -247,6 +259,22 @@ def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, 
         used.add(name)
         named.append((url, name))
     return named
+
+
+def _whole(fs: Any, path: str) -> str:
+    """A path with its file system's name, as that of a folder."""
+    return f"{fs.unstrip_protocol(path).rstrip('/')}/"
+
+
+def _is_output(fs: Any, path: str) -> bool:
+    """Whether a picture of depth lies beside the sidecar of its image, which lists it: depth of it means nothing."""
+    folder, _, file = path.rpartition("/")
+    if not file.endswith("_depth.png"):
+        return False
+    try:
+        return file in json.loads(fs.cat_file(f"{folder}/{file.removesuffix('_depth.png')}.json"))["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def weights_mark(model: str, options: Mapping[str, Any]) -> str | None:

@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ray import tune as ray_tune
 
 import deepfusion
 from deepfusion._train import _flat
 
+from ._devices import of_workers
 from ._storage import start, urls
 
 
@@ -45,7 +46,11 @@ def tune(
     out: str | PathLike[str] = "runs/tune",
     trials: int = 1,
     init: str | PathLike[str] | None = None,
+    validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+    camera: Literal["2", "3", "both"] | None = None,
     cpus_per_trial: int = 1,
+    gpus_per_trial: float = 0,
+    device: str | None = None,
     metric: str = "selection",
     mode: str = "min",
     scheduler: Any | None = None,
@@ -58,7 +63,12 @@ def tune(
     (grids: as often each of their points). `config` is a preset, or a dict over one. Each validation reports, so that a `scheduler`
     (`ASHAScheduler`) can stop what lags behind; `search` proposes values (Optuna's, for example). Each trial's run lies in a folder
     of its own below `out`, which all machines see.
+
+    `validation` and `camera` are those of `deepfusion.train`. With `gpus_per_trial` each trial is given a GPU, or a share of one, and learns
+    on it: `device` is "auto" by default, or the backend ("cuda", "vulkan"), without a number. By CUDA it sees the GPU that Ray gave it and no
+    other; by another backend all trials of a machine take the one that this prefers.
     """
+    learning = _learning(init, validation, camera, gpus_per_trial, device)
     fixed = {"preset": config} if isinstance(config, str) else dict(config)
     data = urls(data)
     folder = Path(out).absolute()
@@ -66,7 +76,7 @@ def tune(
     def settings(drawn: Mapping[str, Any]) -> dict[str, Any]:
         return merged(drawn)
 
-    return _run(settings, space, fixed, data, folder, trials, init, cpus_per_trial, metric, mode, scheduler, search)
+    return _run(settings, space, fixed, data, folder, trials, learning, (cpus_per_trial, gpus_per_trial), metric, mode, scheduler, search)
 
 
 def ablate(
@@ -77,12 +87,17 @@ def ablate(
     config: str | Mapping[str, Any] = "tiny",
     out: str | PathLike[str] = "runs/ablation",
     init: str | PathLike[str] | None = None,
+    validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+    camera: Literal["2", "3", "both"] | None = None,
     cpus_per_trial: int = 1,
+    gpus_per_trial: float = 0,
+    device: str | None = None,
 ) -> dict[str, list[Trial]]:
     """Trains every row, settings over `config`, with every seed, and gives the trials by row, in the order of `seeds`.
 
     `{"all": {}, "no smoothness": {"loss.smoothness": 0.0}}`; otherwise as `tune`.
     """
+    learning = _learning(init, validation, camera, gpus_per_trial, device)
     fixed = {"preset": config} if isinstance(config, str) else dict(config)
     named = {name: merged(row) for name, row in rows.items()}
 
@@ -91,7 +106,9 @@ def ablate(
 
     space = {"row": ray_tune.grid_search(list(named)), "seed": ray_tune.grid_search(list(seeds))}
     folder = Path(out).absolute()
-    tried = _run(settings, space, fixed, urls(data), folder, 1, init, cpus_per_trial, "selection", "min", None, None)
+    tried = _run(
+        settings, space, fixed, urls(data), folder, 1, learning, (cpus_per_trial, gpus_per_trial), "selection", "min", None, None
+    )
     by_seed = sorted(tried, key=lambda trial: list(seeds).index(trial.settings["seed"]))
     return {name: [trial for trial in by_seed if trial.row == name] for name in named}
 
@@ -120,6 +137,23 @@ def best_first(trials: Sequence[Trial], metric: str, mode: str) -> list[Trial]:
     return sorted(trials, key=key)
 
 
+def _learning(init: Any, validation: Any, camera: str | None, gpus: float, device: str | None) -> dict[str, Any]:
+    """The arguments of `deepfusion.train` that all trials have, as every machine understands them."""
+    if gpus < 0:
+        raise ValueError(f"gpus_per_trial: expected 0 or more, found {gpus}")
+    device = of_workers(device, gpus)
+    if gpus and ":" in device:
+        raise ValueError(f"device: each trial is given a GPU of its own: {device.partition(':')[0]!r}, found {device!r}")
+    if not gpus and device != "cpu":
+        raise ValueError(f"device: {device!r} needs gpus_per_trial, which gives each trial a GPU")
+    return {
+        "init": start(init),
+        "validation": None if validation is None else urls(validation),
+        "camera": camera,
+        "device": device,
+    }
+
+
 def _run(
     settings: Callable[[Mapping[str, Any]], dict[str, Any]],
     space: Mapping[str, Any],
@@ -127,13 +161,15 @@ def _run(
     data: list[str],
     folder: Path,
     samples: int,
-    init: Any,
-    cpus: int,
+    learning: dict[str, Any],
+    resources: tuple[int, float],
     metric: str,
     mode: str,
     scheduler: Any,
     search: Any,
 ) -> list[Trial]:
+    cpus, gpus = resources
+
     def trial(drawn: dict[str, Any]) -> None:
         import os
 
@@ -152,12 +188,11 @@ def _run(
                     figures["scale_ratio"] = event["scale_ratio"]
                 ray_tune.report(figures | dict(event["losses"] or {}))
 
-        deepfusion.train(merged(fixed, settings(drawn)), data, report, out=out, init=init)
+        deepfusion.train(merged(fixed, settings(drawn)), data, report, out=out, **learning)
 
-    init = start(init)
     folder.mkdir(parents=True, exist_ok=True)
     tuner = ray_tune.Tuner(
-        ray_tune.with_resources(trial, {"cpu": cpus}),
+        ray_tune.with_resources(trial, {"cpu": cpus, "gpu": gpus} if gpus else {"cpu": cpus}),
         param_space=dict(space),
         tune_config=ray_tune.TuneConfig(
             metric=metric, mode=mode, num_samples=samples, scheduler=scheduler, search_alg=search

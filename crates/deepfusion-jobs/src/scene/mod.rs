@@ -5,5 +5,5 @@ mod motion;
 mod scale_watch;
 
 pub use depth_watch::DepthWatch;
-pub use motion::{Motion, MotionTracker, StraightWay, motion_known};
+pub use motion::{Motion, MotionTracker, StraightWay, motion_known, yaw_rate};
 pub use scale_watch::{ScaleWatch, Unwatched, unwatched};

@@ -53,6 +53,14 @@ pub fn motion_known(dataset: &Dataset) -> bool {
     dataset.track().is_some() && dataset.yaw_known()
 }
 
+/// How fast the vehicle turned whose camera moved so in `seconds`, rad/s, positive to the left; `last_from_this` is the camera in the last
+/// frame's.
+#[must_use]
+pub fn yaw_rate(last_from_this: &Se3, seconds: f64) -> f64 {
+    // The camera's y points down: a turn to the left is a negative one about it.
+    -last_from_this.axis_angle().y / seconds
+}
+
 /// Adds up the camera's way over the frames of a recording.
 #[derive(Debug, Default)]
 pub struct MotionTracker {
@@ -99,8 +107,7 @@ impl MotionTracker {
         Motion {
             stamp,
             speed_mps: frame.speed_mps,
-            // The camera's y points down: a turn to the left is a negative one about it.
-            yaw_rate: step.map_or(0.0, |(_, motion, dt)| -motion.axis_angle().y / dt),
+            yaw_rate: step.map_or(0.0, |(_, motion, dt)| yaw_rate(&motion, dt)),
             last_from_this: step.map(|(_, motion, _)| motion),
             seconds: step.map(|(.., dt)| dt),
             goes_on: step.is_some(),
