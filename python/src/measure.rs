@@ -159,7 +159,7 @@ fn unknown(what: &str, expected: &str, found: &str) -> PyErr {
 
 fn grid<T: numpy::Element + Copy + Into<f64>>(array: &PyReadonlyArray2<'_, T>) -> PyResult<Grid> {
     let (height, width) = (array.shape()[0], array.shape()[1]);
-    let values = array.as_array().iter().map(|value| (*value).into());
+    let values = array.as_array().into_iter().map(|value| (*value).into());
     Grid::new(width, height, values.collect()).map_err(raise)
 }
 
