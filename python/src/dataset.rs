@@ -22,6 +22,9 @@ use crate::interrupt::abandonable;
 use crate::model::image_array;
 use crate::opening::{Opening, absolute};
 
+/// What pickle calls, and with what.
+type Reduced<'py, A> = (Bound<'py, PyAny>, A);
+
 /// A recording of any known layout: one drive, one camera.
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Dataset {
@@ -430,10 +433,7 @@ impl Frame {
     }
 
     /// Pickled, it is the same frame of the recording, which is opened again.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Py<Dataset>, usize))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, (Py<Dataset>, usize)>> {
         let of = py.import("operator")?.getattr("getitem")?;
         Ok((of, (self.dataset.clone_ref(py), self.place)))
     }
