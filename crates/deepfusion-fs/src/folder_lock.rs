@@ -9,7 +9,9 @@ use std::path::Path;
 /// not opened as a file, nothing is locked.
 #[derive(Debug)]
 pub struct FolderLock {
-    _folder: Option<File>,
+    folder: Option<File>,
+    /// The process that took it.
+    process: u32,
 }
 
 impl FolderLock {
@@ -19,12 +21,29 @@ impl FolderLock {
     /// [`TryLockError::WouldBlock`] where another has it; else what the system says: some network file systems do not lock folders.
     pub fn take(folder: &Path) -> Result<Self, TryLockError> {
         if !cfg!(unix) {
-            return Ok(Self { _folder: None });
+            return Ok(Self::of(None));
         }
         let folder = File::open(folder).map_err(TryLockError::Error)?;
         folder.try_lock()?;
-        Ok(Self {
-            _folder: Some(folder),
-        })
+        Ok(Self::of(Some(folder)))
+    }
+
+    fn of(folder: Option<File>) -> Self {
+        Self {
+            folder,
+            process: std::process::id(),
+        }
+    }
+}
+
+impl Drop for FolderLock {
+    /// The children of a fork hold the same lock: closed here, it would last as long as they do, and closed there, it goes on here.
+    fn drop(&mut self) {
+        if let Some(folder) = &self.folder
+            && self.process == std::process::id()
+        {
+            // What cannot be unlocked is freed with the last process that has it.
+            let _ = folder.unlock();
+        }
     }
 }

@@ -111,20 +111,28 @@ fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Datase
 
 /// Sorts recordings, and drops those given twice.
 fn each_once(mut recordings: Vec<Dataset>) -> Vec<Dataset> {
-    recordings.sort_by(|a, b| a.folder().cmp(b.folder()).then(a.name().cmp(b.name())));
+    let first = |dataset: &Dataset| -> PathBuf {
+        let frame = dataset.frames().first();
+        frame.map_or_else(PathBuf::new, |frame| frame.image.path().to_owned())
+    };
+    recordings.sort_by(|a, b| {
+        let names = (a.folder(), a.name()).cmp(&(b.folder(), b.name()));
+        // Files side by side may differ in their endings alone.
+        names.then_with(|| first(a).cmp(&first(b)))
+    });
     let mut seen = HashSet::new();
     recordings.retain(|dataset| {
-        let folder = dataset.folder();
-        let folder = std::fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-        let first = dataset.frames().first().map(|frame| frame.number);
+        let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let (folder, image) = (real(dataset.folder()), real(&first(dataset)));
+        let number = dataset.frames().first().map(|frame| frame.number);
         let (name, camera) = (dataset.name().to_owned(), dataset.camera());
-        seen.insert((folder, name, camera, first))
+        seen.insert((folder, image, name, camera, number))
     });
     recordings
 }
 
 /// The selected frames of recordings. They are named by their numbers, after the recording's name where there are others: a name that is another's
-/// too has a number, and so has one with which names of `images`, in small letters, begin.
+/// too has a number, and so has one whose frames might be named as one of `images`, in small letters.
 fn frames_of(recordings: Vec<Dataset>, images: &[String]) -> Vec<Input> {
     let alone = recordings.len() == 1 && images.is_empty();
     let mut names = UniqueNames::default();
@@ -132,12 +140,13 @@ fn frames_of(recordings: Vec<Dataset>, images: &[String]) -> Vec<Input> {
     for dataset in recordings {
         let dataset = Arc::new(dataset);
         let prefix = names.take_if(dataset.name(), |name| {
-            let begins = |image: &String| {
-                image
+            let named_alike = |image: &String| {
+                let rest = image
                     .strip_prefix(name)
-                    .is_some_and(|rest| rest.starts_with('-'))
+                    .and_then(|rest| rest.strip_prefix('-'));
+                rest.is_some_and(|rest| rest.bytes().take_while(u8::is_ascii_digit).count() >= 10)
             };
-            !images.iter().any(begins)
+            !images.iter().any(named_alike)
         });
         for index in dataset.selected() {
             let frame = &dataset.frames()[*index];
@@ -262,7 +271,13 @@ mod tests {
         assert_eq!(names(&[&tuesday, &monday]), both);
         // Given twice it is one.
         assert_eq!(names(&[&monday, &monday]), ["0000000000"]);
-        // An image may have the name of a frame.
+        // An image may have the name of a frame, or begin like it and have none.
+        let beside = root.path().join("drive-front.png");
+        std::fs::copy(root.path().join("monday/drive/images/0.png"), &beside).unwrap();
+        assert_eq!(
+            names(&[&beside.display().to_string(), &monday]),
+            ["drive-front", "drive-0000000000"]
+        );
         let image = root.path().join("drive-0000000000.png");
         std::fs::copy(root.path().join("monday/drive/images/0.png"), &image).unwrap();
         assert_eq!(

@@ -1,6 +1,7 @@
 use crate::error::MOST_SIGMA_SHARE;
 use crate::shared_frames::Files;
 use crate::stereo::{OtherCameras, StereoSource};
+use crate::window::Window;
 use crate::{DepthSet, Error, Learn, NoStereo, SampleProblem, Skipped, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
@@ -75,14 +76,17 @@ fn keep_apart(
 
 /// Leaves out of training what shows a held-out target as the other camera's view: where a split selects frames of each camera, other moments of each
 /// are held out. A recording of which nothing would be left keeps what it has.
-fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample]) {
-    let held = held_out.iter().map(|s| (s.dataset, s.snippet.target));
-    let held: HashSet<(usize, usize)> = held.collect();
-    let shows = |sample: &Sample| {
+fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample], datasets: &[Dataset]) {
+    let mut files = Files::default();
+    let mut place =
+        |(dataset, frame): (usize, usize)| files.place(&datasets[dataset].frames()[frame].image);
+    let targets = held_out.iter().map(|s| (s.dataset, s.snippet.target));
+    let held: HashSet<_> = targets.map(&mut place).collect();
+    let mut shows = |sample: &Sample| {
         let view = sample.stereo.as_ref();
-        view.is_some_and(|view| held.contains(&(view.dataset, view.frame)))
+        view.is_some_and(|view| held.contains(&place((view.dataset, view.frame))))
     };
-    let shown: Vec<bool> = samples.iter().map(shows).collect();
+    let shown: Vec<bool> = samples.iter().map(&mut shows).collect();
     retain_where_some_stay(samples, |sample| sample.dataset, |i| !shown[i]);
 }
 
@@ -150,7 +154,7 @@ impl SampleSet {
         };
         let (set_of, train) = shared(train);
         let (mut samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
-        leave_out_held_views(&mut samples, &held_out);
+        leave_out_held_views(&mut samples, &held_out, &train);
         if let (true, Some(first)) = (config.stereo, samples.first())
             && samples.iter().all(|sample| sample.stereo.is_none())
         {
@@ -331,13 +335,24 @@ impl SampleSet {
         self.samples.first().map(of).or_else(|| self.depth.camera())
     }
 
-    /// The camera of every sample with its place in `data.sets`, at the images' own sizes.
-    pub(crate) fn cameras(&self) -> impl Iterator<Item = (usize, Intrinsics)> {
-        let of = |sample: &Sample| {
+    /// f_y of every sample as the network sees it, with the sample's place in `data.sets`: video's images are shown whole, parts of the network's shape
+    /// are cut from those of known depth.
+    pub(crate) fn focal_lengths_px(
+        &self,
+        config: &TrainConfig,
+    ) -> impl Iterator<Item = (usize, f64)> {
+        let (width, height) = (config.size.width as u32, config.size.height as u32);
+        let of_video = move |sample: &Sample| {
             let camera = self.datasets[sample.dataset].intrinsics(sample.snippet.target);
-            (self.set_of[sample.dataset], camera)
+            let fy = camera.resized(width, height).fy;
+            (self.set_of[sample.dataset], fy)
         };
-        self.samples.iter().map(of).chain(self.depth.cameras())
+        let of_depth = move |(set, camera): (usize, Intrinsics)| {
+            let shown = Window::centred(&camera, config).of_camera(&camera);
+            (set, shown.resized(width, height).fy)
+        };
+        let depth = self.depth.cameras().map(of_depth);
+        self.samples.iter().map(of_video).chain(depth)
     }
 
     /// Whether there is nothing to learn from.

@@ -22,7 +22,7 @@ use burn::tensor::Device;
 use deepfusion_model::{CheckpointLacks, Error as ModelError};
 use deepfusion_nn::ops::is_cpu;
 use pace::{Pace, Smoothed};
-use start::{check_precision, check_samples, findings, turns_warning};
+use start::{check_precision, check_samples, findings, focal_warning, turns_warning};
 use std::path::Path;
 use std::time::Instant;
 use step::{Loaders, WorkerStep};
@@ -110,7 +110,7 @@ impl Trainer {
         check_camera(&config, [&train, &validation])?;
         let settings = config;
         let findings = findings(&settings, &train);
-        let config = findings.complete(settings.clone());
+        let config = findings.complete_for_training(settings.clone());
         let reads_late = !is_cpu(device);
         let device = device.clone().autodiff();
         let model = freeze(init(Model::new(&config, &device)?)?, &config, &train)?;
@@ -161,7 +161,7 @@ impl Trainer {
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
-        let config = folder.read_findings()?.complete(config);
+        let config = folder.read_findings()?.complete_for_training(config);
         check_precision(&config, device)?;
         check_samples(&config, &train, &validation)?;
         check_camera(&config, [&train, &validation])?;
@@ -262,6 +262,7 @@ impl Trainer {
         let warnings = [
             learned_focal::warning(&self.config, &self.train),
             turns_warning(&self.config, &self.train),
+            focal_warning(&self.config, &self.train),
             stereo::warning(&self.config, &self.train),
         ];
         for warning in warnings.into_iter().flatten() {

@@ -41,6 +41,11 @@ pub enum TrainWarning {
         /// How many more there are.
         others: usize,
     },
+    /// Cameras of several focal lengths in one of several data sets.
+    #[error(
+        "a data set has several focal lengths, and no canonical_focal_px: its metres are then those of no camera in particular; name one, or give each camera a set of its own"
+    )]
+    SeveralFocalLengths,
     /// Drives of one camera in a run that has stereo.
     #[error(
         "{drive}{} {} from {} own frames alone",

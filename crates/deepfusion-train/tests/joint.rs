@@ -169,10 +169,12 @@ fn cameras_of_one_set_are_brought_to_one_focal_length() {
         .remove(0);
     let fy = first.intrinsics(0).resized(96, 64).fy;
     assert_eq!(differ.config().canonical_focal_px, Some(fy));
-    // Whoever predicts with the run, or goes on from it, reads it; the settings are as they were given.
+    // Whoever predicts with the run goes by its camera, which has that focal length.
     let (folder, _) = RunFolder::open(differ.folder()).unwrap();
-    assert_eq!(folder.read_config().unwrap().canonical_focal_px, Some(fy));
-    assert_eq!(folder.read_settings().unwrap().canonical_focal_px, None);
+    assert_eq!(folder.read_config().unwrap().canonical_focal_px, None);
+    let findings = folder.read_findings().unwrap();
+    assert_eq!(findings.focal_px, Some(fy));
+    assert_eq!(findings.camera, Some(first.intrinsics(0)));
     let focal = |dataset: &Dataset| {
         let camera = dataset.intrinsics(0);
         differ

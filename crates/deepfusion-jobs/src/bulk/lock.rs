@@ -64,29 +64,39 @@ impl Lock {
         Ok(Self { _file: file })
     }
 
-    /// Takes the lock of all that is done in a folder, for work that has no shards: it is that of the only shard.
+    /// Takes the lock of all that is done in a folder, for work that has no shards: it is that of the only shard, while no other is worked on.
     ///
     /// # Errors
-    /// [`Error::FolderBusy`] where another process has it; a folder that cannot be written to.
+    /// [`Error::FolderBusy`] where another process has it, or a shard's; a folder that cannot be written to.
     pub fn take_whole(folder: &Path) -> Result<Self> {
-        Self::take(folder, Shard::WHOLE).map_err(|error| match error {
+        let lock = Self::take(folder, Shard::WHOLE).map_err(|error| match error {
             Error::Busy { folder, .. } => Error::FolderBusy { folder },
             other => other,
-        })
+        })?;
+        if any_of_others(folder, Shard::WHOLE.count, is_surely_held) {
+            let folder = folder.to_owned();
+            return Err(Error::FolderBusy { folder });
+        }
+        Ok(lock)
     }
 
     /// Whether a run is at work in the folder that shares the images among another number of shards than `count`: it may be writing of any of
     /// them. True, too, where nobody can tell.
     pub(super) fn is_held_by_others(folder: &Path, count: usize) -> bool {
-        let Ok(entries) = std::fs::read_dir(folder) else {
-            return true;
-        };
-        entries.flatten().any(|entry| {
-            let name = entry.file_name();
-            let others = name.to_str().and_then(shards_of_lock);
-            others.is_some_and(|others| others != count) && is_held(&entry.path())
-        })
+        any_of_others(folder, count, is_held)
     }
+}
+
+/// Whether this holds of a lock of another number of shards than `count`, or the folder cannot be listed.
+fn any_of_others(folder: &Path, count: usize, holds: impl Fn(&Path) -> bool) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return true;
+    };
+    entries.flatten().any(|entry| {
+        let name = entry.file_name();
+        let others = name.to_str().and_then(shards_of_lock);
+        others.is_some_and(|others| others != count) && holds(&entry.path())
+    })
 }
 
 /// Of how many shards one has this lock.
@@ -99,6 +109,12 @@ fn shards_of_lock(name: &str) -> Option<usize> {
 
 fn is_held(lock: &Path) -> bool {
     File::open(lock).is_ok_and(|file| file.try_lock_shared().is_err())
+}
+
+/// The same, but not where the file system has no locks: nothing would ever free a folder then.
+fn is_surely_held(lock: &Path) -> bool {
+    let held = |file: File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+    File::open(lock).is_ok_and(held)
 }
 
 #[cfg(test)]

@@ -390,11 +390,10 @@ impl Start {
 fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     let origin = || network.card.name.clone().into();
     let read = TrainConfig::from_run_table(network.card.config.clone());
-    let (mut config, found) = read.map_err(|e| ModelError::ConfigFile {
+    let (config, _) = read.map_err(|e| ModelError::ConfigFile {
         path: origin(),
         reason: e.into(),
     })?;
-    config.canonical_focal_px = config.canonical_focal_px.or(found.canonical_focal_px);
     Ok(config)
 }
 

@@ -26,9 +26,10 @@ pub struct TrainFindings {
     /// The camera trained with, at the size of its images; `None` for imported weights. Several cameras: the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
-    /// f_c as `canonical_focal_px`, where that is absent and the training data has several focal lengths: the first camera's, at network size.
+    /// f_c of training, as `canonical_focal_px`, where that is absent and the training data has several focal lengths: the first camera's, as the
+    /// network sees it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub canonical_focal_px: Option<f64>,
+    pub focal_px: Option<f64>,
     /// How well that camera is known, where the run learned it; written when it ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned_camera: Option<LearnedCamera>,
@@ -83,7 +84,7 @@ impl TrainFindings {
         Ok(found.unwrap_or_default())
     }
 
-    /// The configuration with the metres per unit and the focal length that it leaves open.
+    /// The configuration with the metres per unit that it leaves open.
     #[must_use]
     pub fn complete(&self, mut config: TrainConfig) -> TrainConfig {
         let fill = |open: &mut f64, found: Option<f64>| {
@@ -91,7 +92,6 @@ impl TrainFindings {
                 *open = found.unwrap_or(0.0);
             }
         };
-        config.canonical_focal_px = config.canonical_focal_px.or(self.canonical_focal_px);
         fill(&mut config.pose_net.metres_per_unit, self.metres_per_unit);
         for set in &mut config.data.sets {
             fill(
@@ -99,6 +99,14 @@ impl TrainFindings {
                 self.set(&set.name).and_then(|found| found.metres_per_unit),
             );
         }
+        config
+    }
+
+    /// The same for who learns on: with the focal length to which its samples are brought. Predictions go by the first camera, whose it is, and need none.
+    #[must_use]
+    pub fn complete_for_training(&self, config: TrainConfig) -> TrainConfig {
+        let mut config = self.complete(config);
+        config.canonical_focal_px = config.canonical_focal_px.or(self.focal_px);
         config
     }
 
@@ -250,7 +258,7 @@ mod tests {
         TrainFindings {
             metres_per_unit: Some(0.8),
             camera: Some(camera(230.4)),
-            canonical_focal_px: Some(230.4),
+            focal_px: Some(230.4),
             learned_camera: Some(LearnedCamera {
                 focal_px: [230.4, 230.4],
                 sigma_px: Some([3.0, 4.0]),
@@ -307,7 +315,9 @@ mod tests {
     fn what_is_open_is_filled_in_and_what_is_set_stays() {
         let complete = findings().complete(config());
         assert_eq!(complete.pose_net.metres_per_unit, 0.8);
-        assert_eq!(complete.canonical_focal_px, Some(230.4));
+        assert_eq!(complete.canonical_focal_px, None);
+        let training = findings().complete_for_training(config());
+        assert_eq!(training.canonical_focal_px, Some(230.4));
         let units = complete.data.sets.iter().map(|set| set.metres_per_unit);
         assert_eq!(units.collect::<Vec<_>>(), [1.1, 0.25]);
         let fx = |set| findings().camera_of(&complete, set).map(|k| k.fx);

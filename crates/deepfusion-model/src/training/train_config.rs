@@ -223,7 +223,7 @@ pub struct TrainConfig {
     pub view_motion: ViewMotion,
     /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network
     /// predicts depth × f_c/f_y, so that equal pixels mean equal output for every lens. Absent: it predicts depth for the
-    /// training camera; where several focal lengths are trained with, the first camera's is taken and kept among the findings.
+    /// training camera, and where several are trained with, for the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
     /// Weights that do not learn, by the beginning of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's

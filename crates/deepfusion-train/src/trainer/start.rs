@@ -3,7 +3,6 @@
 use super::validation::no_samples;
 use crate::{Error, SampleSet, TrainConfig, TrainWarning, ViewMotion};
 use burn::tensor::Device;
-use deepfusion_geometry::Intrinsics;
 use deepfusion_model::{SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, supports};
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,15 +30,22 @@ pub(super) fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings
             camera: own.camera(),
         }
     });
-    let several = config.canonical_focal_px.is_none() && has_several_focal_lengths(config, train);
     TrainFindings {
-        canonical_focal_px: several.then(|| first_focal_px(config, train)).flatten(),
+        focal_px: found_focal_px(config, train),
         metres_per_unit: unit(config.pose_net.metres_per_unit, train),
         camera: train.camera(),
         learned_camera: None,
         sets: sets.collect(),
         averaged: Vec::new(),
     }
+}
+
+/// The focal length to which all samples are brought where the configuration names none: the first one's, where they differ. Predictions then go by the
+/// first camera, as those of any run. Not with `data.sets`, whose predictions go by the camera of one of them.
+fn found_focal_px(config: &TrainConfig, train: &SampleSet) -> Option<f64> {
+    let open = config.canonical_focal_px.is_none() && config.data.sets.is_empty();
+    let first = train.focal_lengths_px(config).next()?.1;
+    (open && has_several_focal_lengths(config, train)).then_some(first)
 }
 
 /// Whether a pixel of known size would be of different depths, so that the network's metres need a focal length to be those of: cameras of one data set
@@ -50,21 +56,16 @@ fn has_several_focal_lengths(config: &TrainConfig, train: &SampleSet) -> bool {
         return true;
     }
     let mut sets: BTreeMap<usize, f64> = BTreeMap::new();
-    train.cameras().any(|(set, camera)| {
-        let fy = focal_px(config, &camera);
+    train.focal_lengths_px(config).any(|(set, fy)| {
         let first = *sets.entry(set).or_insert(fy);
         (fy / first - 1.0).abs() > FOCAL_TOLERANCE
     })
 }
 
-fn first_focal_px(config: &TrainConfig, train: &SampleSet) -> Option<f64> {
-    train.camera().map(|camera| focal_px(config, &camera))
-}
-
-/// f_y at network size.
-fn focal_px(config: &TrainConfig, camera: &Intrinsics) -> f64 {
-    let size = config.size;
-    camera.resized(size.width as u32, size.height as u32).fy
+/// With data sets: that one of them has several focal lengths, and nothing brings them together.
+pub(super) fn focal_warning(config: &TrainConfig, train: &SampleSet) -> Option<TrainWarning> {
+    let several = config.canonical_focal_px.is_none() && has_several_focal_lengths(config, train);
+    several.then_some(TrainWarning::SeveralFocalLengths)
 }
 
 /// # Errors
