@@ -152,6 +152,8 @@ mod tests {
         let second = Shard { index: 2, count: 2 };
         let lock = Lock::take(at, second).unwrap();
         assert!(held(1) && held(3));
+        let whole = Lock::take_whole(at).unwrap_err();
+        assert!(matches!(whole, Error::FolderBusy { .. }), "{whole}");
         // Its siblings have images of their own.
         assert!(!held(2));
         drop(lock);
