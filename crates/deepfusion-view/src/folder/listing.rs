@@ -13,9 +13,11 @@ use super::summary::Summary;
 
 /// Files that are written in place change without the folder noticing; so the folder is listed again after this time in any case.
 const RELIST_AFTER: Duration = Duration::from_secs(5);
-/// A folder that changes all the time, as while it is written to, is listed for one part in so many: a hundred thousand frames take seconds, and
-/// every other answer waits for them.
+/// A folder that takes long to list and changes all the time, as while it is written to, is listed for one part in so many: a hundred thousand frames
+/// take seconds, and every other answer waits for them.
 const LISTED_SHARE: u32 = 10;
+/// What takes as long.
+const LONG: Duration = Duration::from_millis(500);
 /// How long an answer may be held up by reading small files; the rest is read for the next one.
 const READING_TIME: Duration = Duration::from_millis(150);
 
@@ -45,7 +47,7 @@ impl Listed {
     fn stands(self, changed: SystemTime) -> bool {
         let age = self.done.elapsed();
         let unchanged = self.changed == changed && age < RELIST_AFTER;
-        unchanged || age < LISTED_SHARE * self.took
+        unchanged || (self.took >= LONG && age < LISTED_SHARE * self.took)
     }
 }
 
@@ -208,7 +210,7 @@ mod tests {
         let later = changed + Duration::from_secs(1);
         let quick = Listed {
             done,
-            took: Duration::ZERO,
+            took: LONG / 2,
             changed,
         };
         assert!(quick.stands(changed));
