@@ -166,6 +166,18 @@ pub(crate) fn read_or_default<T: serde::de::DeserializeOwned>(path: &Path) -> Re
     })
 }
 
+/// Whether a folder has settings as a recording: its own `dataset.toml`, or one in the folder above that is for the folders there, whatever is wrong with
+/// it.
+#[must_use]
+pub fn has_settings(folder: &Path) -> bool {
+    let is_above = |folder: &Path| {
+        let above = folder.parent().map(FolderConfig::read_for_folders);
+        above.is_some_and(|found| !matches!(found, Ok(None)))
+    };
+    folder.join(FolderConfig::NAME).exists()
+        || std::path::absolute(folder).is_ok_and(|folder| is_above(&folder))
+}
+
 impl FolderConfig {
     pub(crate) const NAME: &str = "dataset.toml";
 

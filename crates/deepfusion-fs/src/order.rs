@@ -33,7 +33,12 @@ fn of_names(mut a: &[u8], mut b: &[u8]) -> Ordering {
     loop {
         let (digits_a, digits_b) = (digits(a), digits(b));
         let (order, used) = if digits_a.is_empty() || digits_b.is_empty() {
-            let order = a.first().cmp(&b.first());
+            let order = if point && digits_a.is_empty() != digits_b.is_empty() {
+                // `130.png` before `130.5.png`.
+                digits_a.len().cmp(&digits_b.len())
+            } else {
+                a.first().cmp(&b.first())
+            };
             (point, number) = (number && a.first() == Some(&b'.'), false);
             (order, (1, 1))
         } else {
@@ -116,6 +121,7 @@ mod tests {
     #[test]
     fn digits_behind_a_point_are_a_fraction() {
         let names = [
+            "1305031102.png",
             "1305031102.1753.png",
             "1305031102.2.png",
             "1305031102.25.png",

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
+use deepfusion_data::{Dataset, DatasetKind, OpenOptions, has_settings};
 use deepfusion_fs::{absolute, natural_order};
 use deepfusion_images::is_image;
 use deepfusion_video::is_video;
@@ -36,7 +36,7 @@ const BAGS: [&str; 3] = ["bag", "mcap", "db3"];
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
 /// apart agree on both.
 ///
-/// A folder with images in it is a folder of images, unless it has a `dataset.toml`, depth beside colour, or is a comma2k19 segment, in
+/// A folder with images in it is a folder of images, unless it has a `dataset.toml` or one above it is for it, depth beside colour, or is a comma2k19 segment, in
 /// which a picture for an overview lies beside the video. Any other that [`Dataset::open`] takes is a recording, whose cameras are
 /// `options`' and its own. `opened` sees the recordings.
 ///
@@ -56,8 +56,7 @@ pub fn find_inputs(
                 std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
             let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
             let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
-            if images.is_empty() || path.join("dataset.toml").exists() || has_other_pictures(&path)
-            {
+            if images.is_empty() || has_settings(&path) || has_other_pictures(&path) {
                 recordings.extend(open(&path, argument, options)?);
             } else {
                 found.extend(images);
@@ -284,6 +283,26 @@ mod tests {
             names(&[&image.display().to_string(), &monday]),
             ["drive-0000000000", "drive-2-0000000000"]
         );
+    }
+
+    /// What a fleet's file says holds here as in training: else the same drive would have other metres.
+    #[test]
+    fn settings_for_folders_make_one_a_recording() {
+        let root = tempfile::tempdir().unwrap();
+        let drive = root.path().join("drive");
+        std::fs::create_dir(&drive).unwrap();
+        let image = image::RgbImage::from_pixel(64, 32, image::Rgb([90, 120, 60]));
+        image.save(drive.join("frame_1.png")).unwrap();
+        let is_recording = || {
+            let arguments = [drive.display().to_string()];
+            let inputs = find_inputs(&arguments, &OpenOptions::default(), |_| ()).unwrap();
+            assert_eq!(inputs.len(), 1);
+            inputs[0].frame.is_some()
+        };
+        assert!(!is_recording());
+        let settings = "for_folders = true\nfps = 10\nintrinsics = [40.0, 40.0, 32.0, 16.0]\n";
+        std::fs::write(root.path().join("dataset.toml"), settings).unwrap();
+        assert!(is_recording());
     }
 
     /// A comma2k19 segment has a picture for an overview beside its video.

@@ -3,6 +3,12 @@
 use crate::Error;
 use deepfusion_hint::Hint;
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What failed may go well later: somebody stopped ffmpeg, or has installed it, or made room. It is tried again a few times, not at once.
+const TRIES: u32 = 4;
+/// See [`TRIES`].
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// Whether all frames are kept in their folder, or why they cannot be; `None` until the first is asked for. Locked while they are made.
 #[derive(Debug, Default)]
@@ -13,11 +19,14 @@ pub(crate) struct Decoded(Mutex<Option<Result<(), Refusal>>>);
 struct Refusal {
     said: String,
     hint: Option<String>,
+    when: Instant,
+    /// How often it was tried.
+    tries: u32,
 }
 
 impl Decoded {
-    /// Has the frames made by the first call alone. What failed then is said again by all others: a video that is damaged, or larger than the
-    /// disk, is not decoded anew for each of its frames.
+    /// Has the frames made by the first call alone. What failed then is said again by the others: a video that is damaged, or larger than the
+    /// disk, is not decoded anew for each of its frames, but a few times at most.
     ///
     /// # Errors
     /// Those of `make`; [`Error::NotDecoded`] in their words where it failed before.
@@ -27,22 +36,25 @@ impl Decoded {
     ) -> Result<(), E> {
         // A thread that panicked while decoding left nothing behind.
         let mut outcome = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*outcome {
+        let tries = match &*outcome {
             Some(Ok(())) => return Ok(()),
-            Some(Err(refusal)) => return Err(refusal.again().into()),
-            None => {}
-        }
+            Some(Err(refusal)) if !refusal.is_to_be_tried(PAUSE) => {
+                return Err(refusal.again().into());
+            }
+            Some(Err(refusal)) => refusal.tries,
+            None => 0,
+        };
         let made = make();
         *outcome = Some(match &made {
             Ok(()) => Ok(()),
-            Err(error) => Err(Refusal::of(error)),
+            Err(error) => Err(Refusal::of(error, tries + 1)),
         });
         made
     }
 }
 
 impl Refusal {
-    fn of(error: &impl Hint) -> Self {
+    fn of(error: &impl Hint, tries: u32) -> Self {
         let mut said = error.to_string();
         let mut cause = error.source();
         while let Some(error) = cause {
@@ -53,12 +65,20 @@ impl Refusal {
             }
             cause = error.source();
         }
-        let hint = error.hint();
-        Self { said, hint }
+        Self {
+            said,
+            hint: error.hint(),
+            when: Instant::now(),
+            tries,
+        }
+    }
+
+    fn is_to_be_tried(&self, pause: Duration) -> bool {
+        self.tries < TRIES && self.when.elapsed() >= pause
     }
 
     fn again(&self) -> Error {
-        let Self { said, hint } = self.clone();
+        let Self { said, hint, .. } = self.clone();
         Error::NotDecoded { said, hint }
     }
 }
@@ -82,6 +102,15 @@ mod tests {
             assert_eq!(again.to_string(), full().to_string());
             assert_eq!(again.hint(), full().hint());
         }
+    }
+
+    #[test]
+    fn what_failed_is_tried_again_later_a_few_times() {
+        let full = Error::file(Path::new("cache"), ErrorKind::StorageFull.into());
+        let refusal = Refusal::of(&full, 1);
+        assert!(!refusal.is_to_be_tried(PAUSE));
+        assert!(refusal.is_to_be_tried(Duration::ZERO));
+        assert!(!Refusal::of(&full, TRIES).is_to_be_tried(Duration::ZERO));
     }
 
     #[test]

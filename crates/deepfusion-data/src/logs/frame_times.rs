@@ -234,10 +234,14 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
         });
     }
     let mut times = Vec::with_capacity(lines.len());
+    let mut zoned = None;
     for (line, text) in &lines {
         let ns = if dates {
-            let other = || parse_date(text).map(|(ns, _)| ns);
-            date_time::parse(text).ok().or_else(other)
+            let plain = || Some((date_time::parse(text).ok()?, false));
+            // Dates of which some say their zone and others do not are of two clocks.
+            let alike = |(_, own): &(i64, bool)| *zoned.get_or_insert(*own) == *own;
+            let date = plain().or_else(|| parse_date(text)).filter(alike);
+            date.map(|(ns, _)| ns)
         } else {
             // A line that is not a number has kept the unit from being known: it is the one to be named.
             number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text))

@@ -164,6 +164,14 @@ pub enum MotionWarning {
         /// The topic.
         topic: String,
     },
+    /// The messages of an odometry have no twist, and so much time is between its poses that nothing is known in between.
+    #[error(
+        "{topic}: no speed, as its messages have no twist, and its poses are too far apart in time"
+    )]
+    PosesFarApart {
+        /// The topic.
+        topic: String,
+    },
     /// The messages of an inertial unit say no angular rates.
     #[error(
         "{topic}: not read, as it has no angular rates: they are 0 throughout, or said not to be there"

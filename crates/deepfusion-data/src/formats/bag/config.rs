@@ -97,7 +97,7 @@ pub(super) struct TopicNames {
 
 impl TopicNames {
     /// The name for a role.
-    fn of(&self, role: TopicRole) -> Option<&str> {
+    pub(super) fn of(&self, role: TopicRole) -> Option<&str> {
         let name = match role {
             TopicRole::Image => &self.image,
             TopicRole::CameraInfo => &self.camera_info,

@@ -73,6 +73,8 @@ pub(super) struct Index {
     pub(super) tilts_rad: Vec<(i64, [f64; 2])>,
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
+    /// Whether a message of the inertial unit says that its rates are none.
+    rates_denied: bool,
     /// `world_from_vehicle`, exact.
     pub(super) truth: Vec<(i64, Se3)>,
     /// Where frames are in each other.
@@ -180,6 +182,11 @@ impl Index {
                 self.yaw_rate.clear();
                 MotionWarning::PosesOfOtherAxes { topic }
             }
+            PoseMotion::Moving(log) if log.speeds_mps.ns.is_empty() => {
+                self.speed_mps.clear();
+                self.yaw_rate.clear();
+                MotionWarning::PosesFarApart { topic }
+            }
             PoseMotion::Moving(log) => {
                 self.speed_mps = pairs(log.speeds_mps);
                 self.yaw_rate = log.yaw_rates_radps.map(pairs).unwrap_or_default();
@@ -209,14 +216,21 @@ impl Index {
             .push(MotionWarning::WorldAxes { topic }.into());
     }
 
-    /// An inertial unit that measures no rates is none here: its zeros are no straight drive. Some drivers publish a gyroscope and an
-    /// accelerometer as a topic each, others fill in the accelerations alone.
+    /// An inertial unit that measures no rates is none here: its zeros are no straight drive, nor is any rate that never changes and is said not to be
+    /// there. Some drivers publish a gyroscope and an accelerometer as a topic each, others fill in the accelerations alone.
     fn leave_out_rateless(&mut self, topics: &Topics) {
         let Some(topic) = topics.of(Role::Imu) else {
             return;
         };
-        let none = Vector3::<f64>::zeros();
-        let measures = |(_, sample): &(i64, ImuSample)| sample.angular_rate_radps != none;
+        let Some((_, first)) = self.imu.first() else {
+            return;
+        };
+        let idle = if self.rates_denied {
+            first.angular_rate_radps
+        } else {
+            Vector3::zeros()
+        };
+        let measures = |(_, sample): &(i64, ImuSample)| sample.angular_rate_radps != idle;
         if self.imu.iter().any(measures) {
             return;
         }
@@ -267,10 +281,8 @@ impl Index {
                 Role::CameraInfo => {}
                 Role::Imu => {
                     let imu: Imu = message.decode()?;
-                    // By the message's definition: there are no angular rates.
-                    if imu.angular_velocity_covariance[0] == -1.0 {
-                        continue;
-                    }
+                    // By the message's definition there are no angular rates then; some drivers say so of rates that are there.
+                    self.rates_denied |= imu.angular_velocity_covariance[0] == -1.0;
                     let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
                     let sample = ImuSample {
                         time_s: 0.0,

@@ -5,8 +5,12 @@ const LEAST_MPS: f64 = 2.0;
 /// Velocity across over velocity: 17° off the vehicle's x, which its rear axle does not do, nor a place ahead of it but in tight bends.
 const ACROSS: f64 = 0.3;
 
-/// Whether velocities (x, y; m/s) are along other axes than the vehicle's: of those that are fast enough, a quarter points far from x. Of
-/// all headings two thirds are, but streets may run east and west for most of a drive.
+/// The same, which no place on a vehicle has for long: 44°.
+const FAR_ACROSS: f64 = 0.7;
+
+/// Whether velocities (x, y; m/s) are along other axes than the vehicle's: of those that are fast enough, a quarter points far from x, and some point
+/// very far from it, or most are far. Of all headings two thirds are, but streets may run east and west for most of a drive; and the front of a
+/// vehicle in a car park is often far from its x, but never as far.
 pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bool {
     let across = velocities.filter_map(|(x, y)| {
         let speed = x.hypot(y);
@@ -14,8 +18,12 @@ pub(super) fn are_world_axes(velocities: impl Iterator<Item = (f64, f64)>) -> bo
     });
     let mut across: Vec<f64> = across.collect();
     across.sort_by(f64::total_cmp);
-    let quarter = across.get(3 * across.len() / 4);
-    quarter.is_some_and(|across| *across > ACROSS)
+    let of_all = |share: f64| {
+        let place = (share * across.len() as f64) as usize;
+        across.get(place).copied().unwrap_or(0.0)
+    };
+    let (half, quarter, few) = (of_all(0.5), of_all(0.75), of_all(0.95));
+    half > ACROSS || (quarter > ACROSS && few > FAR_ACROSS)
 }
 
 #[cfg(test)]
@@ -37,6 +45,9 @@ mod tests {
         // Bends at a place 1.5 m ahead of the axle, reversing, and what is too slow to have a direction.
         let bend = |i: i32| (8.0, 1.5 * 0.4 * f64::from(i % 3 - 1));
         assert!(!are_world_axes((0..99).map(bend)));
+        // A car park, by an antenna 2.7 m ahead of the axle: bends of 5 m radius for a third of the way.
+        let parking = |i: i32| (3.0, if i % 3 == 0 { 3.0 * 2.7 / 5.0 } else { 0.1 });
+        assert!(!are_world_axes((0..99).map(parking)));
         assert!(!are_world_axes((0..99).map(|_| (-5.0, 0.1))));
         assert!(!are_world_axes((0..99).map(|_| (0.1, 1.9))));
         assert!(!are_world_axes((0..99).map(|_| (5.0, f64::NAN))));

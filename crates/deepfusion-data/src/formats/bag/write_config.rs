@@ -1,5 +1,6 @@
 //! The file beside a bag, written of what was found in the bag: a beginning to correct and to complete.
 
+use super::commands::is_command;
 use super::config::{BagConfig, TopicNames};
 use super::index::Index;
 use super::mounts::Mounts;
@@ -170,8 +171,15 @@ fn topics_text(
         let about = about.map_or(String::new(), |t| {
             format!("   # {}, {}", t.type_name, count_of(t.count, "message"))
         });
+        // Written as a key it would stand for a choice of the user's, and nothing would warn of it any more.
+        let own_choice = is_command(name) && names.of(key).is_none();
+        let off = if own_choice && matches!(role, Role::Speed | Role::Steering) {
+            "# by its name a command: "
+        } else {
+            ""
+        };
         let name = Value::String(name.clone());
-        let _ = writeln!(text, "{key} = {name}{about}");
+        let _ = writeln!(text, "{off}{key} = {name}{about}");
     }
     for role in TopicRole::ALL
         .into_iter()
