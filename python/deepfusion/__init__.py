@@ -156,7 +156,8 @@ def _plane(values: ArrayLike, what: str) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 2:
         raise ValueError(f"{what}: expected H x W, found {' x '.join(map(str, array.shape)) or 'a number'}")
-    return array
+    # A column of records is a view whose numbers do not lie one behind the other.
+    return np.require(array, np.float64, ["C", "ALIGNED"])
 
 
 def simulate(

@@ -105,6 +105,13 @@ def _surroundings(text: str) -> Surroundings:
     )
 
 
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays as Python's own."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{value!r} is no setting")
+
+
 class Perception:
     """Follows targets over the frames of a recording; `perceive` is for single images.
 
@@ -113,7 +120,7 @@ class Perception:
     """
 
     def __init__(self, *, exact: bool = False, **settings: Any) -> None:
-        self._native = _native.Perception(json.dumps(settings, default=lambda number: number.tolist()), exact)
+        self._native = _native.Perception(json.dumps(settings, default=_plain), exact)
 
     def detect(
         self,

@@ -422,8 +422,11 @@ impl Frame {
         let same = |a: &Dataset, b: &Dataset| {
             a.folder == b.folder
                 && (a.inner.name(), a.inner.camera()) == (b.inner.name(), b.inner.camera())
+                // Bags of one name side by side, and the cameras of one bag.
+                && a.opening.topics() == b.opening.topics()
         };
-        self.index() == other.index() && same(own, others)
+        let file = |frame: &Self| frame.facts().image.path().to_owned();
+        self.index() == other.index() && same(own, others) && file(self) == file(&other)
     }
 
     fn __hash__(&self) -> u64 {

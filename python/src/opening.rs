@@ -25,6 +25,11 @@ pub(crate) struct Opening {
 }
 
 impl Opening {
+    /// The topics that are named.
+    pub(crate) fn topics(&self) -> &[NamedTopic] {
+        &self.topics
+    }
+
     pub(crate) fn new(
         intrinsics: Option<GivenCamera>,
         hfov_deg: Option<f64>,

@@ -451,6 +451,15 @@ def test_what_predicts_nothing_somewhere_can_be_left_out():
         deepfusion.evaluate([predicted[None]], [truth])
 
 
+def test_columns_of_records_are_measured():
+    """Their numbers do not lie one behind the other."""
+    truth = np.linspace(2, 30, 24).reshape(4, 6)
+    records = np.zeros((4, 6), dtype=[("z", "<f8"), ("ok", "u1")])
+    records["z"] = 1.1 * truth
+    report = deepfusion.evaluate([records["z"]], [truth])
+    assert report["unscaled"]["abs_rel"] == pytest.approx(0.1)
+
+
 def test_predictions_are_measured_as_they_come(drive, model):
     recording = deepfusion.Dataset(drive)
     camera = recording[0].intrinsics

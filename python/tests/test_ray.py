@@ -63,8 +63,8 @@ def test_outputs_are_no_inputs(street, tmp_path):
     # A picture of depth that no sidecar lists is an image as others are.
     Image.new("RGB", (8, 8)).save(images / "a_depth.png")
     (images / "a.json").write_text("{}")
-    assert len(_storage.images([str(images)], {}, str(images / "depth"))) == 7
-    assert len(_storage.images([str(images / "left")], {}, str(images))) == 3
+    assert len(_storage.images([str(images)], {})) == 7
+    assert len(_storage.images([str(images / "left")], {})) == 3
 
 
 def test_each_image_once_and_as_the_command_does_it(street, tmp_path):

@@ -83,7 +83,7 @@ fn a_run_becomes_a_file_that_is_its_network() {
         ("--model run --out new.onnx --size 100x64", "100×64"),
         ("--model run --out new.onnx --check-with text.so", "text.so"),
         ("--model run --out new.onnx --check-with none.so", "none.so"),
-        ("--model run --out no/folder/new.onnx", "new.onnx"),
+        ("--model run --out no/folder/new.onnx", "no/folder"),
     ] {
         let done = run(at, &format!("export {args}"));
         assert_eq!((done.code, done.stdout.as_str()), (1, ""), "{args}");

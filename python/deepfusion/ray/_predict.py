@@ -367,7 +367,7 @@ def predict(
         device=device,
         gpus=gpus_per_worker,
     )
-    named = images(urls(paths), options, job.output)
+    named = images(urls(paths), options)
     if not ray.is_initialized():
         ray.init()
     if workers is None:

@@ -215,12 +215,11 @@ def _holds_a_run(folder: str) -> bool:
         return False
 
 
-def images(given: Sequence[str], options: Mapping[str, Any], output: str | None = None) -> list[tuple[str, str]]:
+def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Every image that files, folders (with those below them) and globs mean, once, with the name of its outputs: the path
-    below the folder or the glob's fixed part, without its ending; where two would have the same, the second gets `-2`. Not what lies in
-    `output`, where that is a folder below them, nor pictures of depth that the sidecar of their image lists."""
+    below the folder or the glob's fixed part, without its ending; where two would have the same, the second gets `-2`. Not pictures of depth in a
+    folder or glob that the sidecar of their image lists: those are what an earlier job made."""
     found: dict[str, str] = {}
-    outputs = None if output is None else _whole(*fsspec.core.url_to_fs(output, **options))
     for url in given:
         fs, path = fsspec.core.url_to_fs(url, **options)
         if any(sign in path for sign in "*?["):
@@ -232,16 +231,8 @@ def images(given: Sequence[str], options: Mapping[str, Any], output: str | None 
             below, paths = path.rpartition("/")[0], [path]
         else:
             raise FileNotFoundError(f"{url}: there is no such file or folder")
-        # A folder of outputs that holds the inputs, or is theirs, holds more than outputs.
-        searched = _whole(fs, below)
-        own = outputs if outputs is not None and outputs != searched and outputs.startswith(searched) else None
-        taken = [
-            one
-            for one in paths
-            if PurePosixPath(one).suffix.lower() in _IMAGES
-            and not (own is not None and _whole(fs, one).startswith(own))
-            and not _is_output(fs, one)
-        ]
+        named_itself = paths == [path]
+        taken = [one for one in paths if PurePosixPath(one).suffix.lower() in _IMAGES and (named_itself or not _is_output(fs, one))]
         if not taken:
             raise FileNotFoundError(f"{url}: holds no image (.png, .jpg or .jpeg)")
         for one in taken:
@@ -259,11 +250,6 @@ def images(given: Sequence[str], options: Mapping[str, Any], output: str | None 
         used.add(name)
         named.append((url, name))
     return named
-
-
-def _whole(fs: Any, path: str) -> str:
-    """A path with its file system's name, as that of a folder."""
-    return f"{fs.unstrip_protocol(path).rstrip('/')}/"
 
 
 def _is_output(fs: Any, path: str) -> bool:
