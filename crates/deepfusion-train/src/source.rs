@@ -343,16 +343,20 @@ impl SampleSet {
     ) -> impl Iterator<Item = (usize, f64)> {
         let (width, height) = (config.size.width as u32, config.size.height as u32);
         let of_video = move |sample: &Sample| {
-            let camera = self.datasets[sample.dataset].intrinsics(sample.snippet.target);
+            // What is of no recording is an error of whoever loads it.
+            let camera = self
+                .datasets
+                .get(sample.dataset)?
+                .intrinsics(sample.snippet.target);
             let fy = camera.resized(width, height).fy;
-            (self.set_of[sample.dataset], fy)
+            Some((*self.set_of.get(sample.dataset)?, fy))
         };
         let of_depth = move |(set, camera): (usize, Intrinsics)| {
             let shown = Window::centred(&camera, config).of_camera(&camera);
             (set, shown.resized(width, height).fy)
         };
         let depth = self.depth.cameras().map(of_depth);
-        self.samples.iter().map(of_video).chain(depth)
+        self.samples.iter().filter_map(of_video).chain(depth)
     }
 
     /// Whether there is nothing to learn from.

@@ -156,9 +156,14 @@ fn cameras_of_one_set_are_brought_to_one_focal_length() {
     let with = |drives: &[PathBuf; 2], name: &str| {
         let mut config = config(&both.drives);
         config.data.sets.clear();
-        let samples = samples(&config, drives);
+        let open = |drive: &PathBuf| {
+            let opened = Dataset::open(drive, &OpenOptions::default());
+            (0, opened.unwrap().remove(0))
+        };
+        let recordings = drives.iter().map(open).collect();
+        let (train, held, _) = SampleSet::split_sets(&config, recordings, None).unwrap();
         let folder = RunFolder::create(&both._folder.path().join(name)).unwrap();
-        Trainer::create(config, folder, samples, &Device::flex(), Ok).unwrap()
+        Trainer::create(config, folder, (train, held), &Device::flex(), Ok).unwrap()
     };
     let [road, zoomed] = &both.drives;
     let alike = with(&[road.clone(), road.clone()], "alike");
