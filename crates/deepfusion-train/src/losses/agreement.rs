@@ -3,7 +3,7 @@ use super::mean::mean_where;
 use burn::tensor::{Bool, Tensor};
 
 /// The distance between the rigid flow and the optical flow where both explain the pixel: mean ‖p' − (p +
-/// f(p))‖₁ over the mask, in pixels.
+/// f(p))‖₁ over the mask of each image, in pixels, then over the images.
 ///
 /// # Shapes
 /// - `rigid`, `flow`: where each pixel goes, `[N, 2, H, W]`, in pixels

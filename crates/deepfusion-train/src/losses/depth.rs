@@ -1,5 +1,6 @@
 //! Learning from known depth (docs/concepts/learning-from-depth.md): error of log depth, and of its differences between neighbours.
 
+use super::mean::mean_over;
 use crate::DepthLossConfig;
 use burn::tensor::Tensor;
 
@@ -42,7 +43,7 @@ pub fn log_depth_error(metric_disparity: Tensor<4>, truth: &DepthTruth) -> Tenso
 }
 
 /// L_depth = Σ_s w_s·mean |e_s| + λ_g·Σ_k mean(|∂ₓᵏe₀| + |∂ᵧᵏe₀|), k = 1, 2, 4; w_0 = 1, w_s = 1/(4s). Means are over the
-/// pixels, and the pairs of pixels, whose depth is known or known to be far; without any the loss is 0.
+/// pixels, and the pairs of pixels, of each image whose depth is known or known to be far, then over the images; without any the loss is 0.
 ///
 /// # Shapes
 /// - `metric_disparities`: the scales, finest first, each enlarged to B×1×H×W, in 1/m
@@ -89,11 +90,6 @@ fn difference(error: &Tensor<4>, valid: &Tensor<4>, axis: usize, step: usize) ->
     let ((ahead, here), (also, counts)) = (pair(error), pair(valid));
     let both = also * counts;
     mean_over((ahead - here).abs() * both.clone(), both)
-}
-
-/// Σ values / Σ weights; the values are 0 where the weights are.
-fn mean_over(values: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
-    values.sum() / weights.sum().clamp_min(1.0)
 }
 
 #[cfg(test)]

@@ -90,8 +90,8 @@ fn contradictory(back_again: &Tensor<4, Bool>, in_view: &Tensor<4, Bool>) -> Ten
     few.expand(in_view.dims())
 }
 
-/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow in both directions. The two
-/// directions' pixels are pooled: L_f + L_b is twice the mean error, L_c the mean over both.
+/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow in both directions. Both
+/// directions' images count alike: L_f + L_b is twice the mean error, L_c the mean over both.
 ///
 /// # Shapes
 /// - `views`: the flow's and the reversed flow's, N and N, or one view that holds both along the batch

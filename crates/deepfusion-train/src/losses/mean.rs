@@ -1,18 +1,31 @@
 use burn::tensor::{Bool, Tensor};
 
-/// The mean of the values where the mask is true; 0, not NaN, if it is true nowhere.
+/// Σ values / Σ weights of each image, averaged over the images; an image whose weights are 0 gives 0, not NaN. The values are 0 where the
+/// weights are.
+///
+/// Each image counts alike, however many of its pixels do. So a batch's loss is the mean of its parts' losses, and K workers with batches of B
+/// learn what one learns with a batch of K·B.
 ///
 /// # Shapes
 /// - `values`: `[N, C, H, W]`
-/// - `mask`: `[N, 1, H, W]`; the mean is over its pixels and all channels
-pub(super) fn mean_where(values: Tensor<4>, mask: &Tensor<4, Bool>) -> Tensor<1> {
+/// - `weights`: `[N, 1, H, W]`, of all channels
+pub(super) fn mean_over(values: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
     let [_, channels, _, _] = values.dims();
-    let count = mask.clone().float().sum().clamp_min(1.0);
-    let outside = mask.clone().bool_not().expand(values.dims());
-    values
-        .mask_fill(outside, 0.0)
-        .sum()
+    let count = of_image(weights).clamp_min(1.0);
+    of_image(values)
         .div(count.mul_scalar(channels as f64))
+        .mean()
+}
+
+/// [`mean_over`] the pixels where the mask is true. What the values are elsewhere, NaN included, is of no account.
+pub(super) fn mean_where(values: Tensor<4>, mask: &Tensor<4, Bool>) -> Tensor<1> {
+    let outside = mask.clone().bool_not().expand(values.dims());
+    mean_over(values.mask_fill(outside, 0.0), mask.clone().float())
+}
+
+/// Sums of the images, N×1×1×1.
+fn of_image(values: Tensor<4>) -> Tensor<4> {
+    values.sum_dim(3).sum_dim(2).sum_dim(1)
 }
 
 /// The share of true pixels, one value.
@@ -37,5 +50,15 @@ mod tests {
         assert!((share(&first).into_scalar::<f32>() - 0.5).abs() < 1e-6);
         let none = mask.greater_elem(2.0);
         assert_eq!(mean_where(values, &none).into_scalar::<f32>(), 0.0);
+    }
+
+    /// One image shows a pixel, the other three.
+    #[test]
+    fn images_count_alike_whatever_they_show() {
+        let device = Device::flex();
+        let values = Tensor::<4>::from_data([[[[6.0, 9.0, 9.0]]], [[[1.0, 2.0, 3.0]]]], &device);
+        let mask = Tensor::<4>::from_data([[[[1.0, 0.0, 0.0]]], [[[1.0; 3]]]], &device);
+        let mean = mean_where(values, &mask.greater_elem(0.5)).into_scalar::<f32>();
+        assert!((mean - 4.0).abs() < 1e-6, "{mean}");
     }
 }

@@ -3,10 +3,12 @@
 
 use super::DepthTruth;
 use super::depth::log_depth_error;
+use super::mean::mean_over;
 use burn::tensor::Tensor;
 use deepfusion_model::LOG_SCALE_BOUNDS;
 
-/// L_nll = mean(|e|/b + ln b) over the pixels of known depth, e = ln D̂ − ln D. It is smallest where b is the expected error.
+/// L_nll = mean(|e|/b + ln b) over the pixels of known depth of each image, then over the images, e = ln D̂ − ln D. It is smallest where b
+/// is the expected error.
 /// No gradient reaches the depth: e counts as a constant.
 ///
 /// # Shapes
@@ -21,7 +23,7 @@ pub fn uncertainty(
     let error = log_depth_error(metric_disparity.detach(), truth).abs();
     let log_scale = log_scale.clamp(LOG_SCALE_BOUNDS.0, LOG_SCALE_BOUNDS.1);
     let each = error * log_scale.clone().neg().exp() + log_scale;
-    (each * known.clone()).sum() / known.sum().clamp_min(1.0)
+    mean_over(each * known.clone(), known)
 }
 
 #[cfg(test)]

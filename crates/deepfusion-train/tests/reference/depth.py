@@ -48,19 +48,24 @@ def errors(inverse, log_depth, known, far):
     return torch.where(known, e, torch.where(far, torch.clamp(e, max=0), torch.zeros_like(e)))
 
 
+def mean_of(values, where):
+    """Of each image, then over the images."""
+    return torch.stack([v[w].mean() for v, w in zip(values, where)]).mean()
+
+
 def loss(predictions, log_depth, known, far):
     valid = known | far
     e = errors(predictions[0], log_depth, known, far)
-    error, gradient = e[valid].abs().mean(), 0
+    error, gradient = mean_of(e.abs(), valid), 0
     for k in STEPS:
         for a, b, both in (
             (e[..., k:], e[..., :-k], valid[..., k:] & valid[..., :-k]),
             (e[..., k:, :], e[..., :-k, :], valid[..., k:, :] & valid[..., :-k, :]),
         ):
-            gradient = gradient + (a - b)[both].abs().mean()
+            gradient = gradient + mean_of((a - b).abs(), both)
     total = error + GRADIENT_WEIGHT * gradient
     for scale, inverse in enumerate(predictions[1:], 1):
-        total = total + errors(inverse, log_depth, known, far)[valid].abs().mean() / (4 * scale)
+        total = total + mean_of(errors(inverse, log_depth, known, far).abs(), valid) / (4 * scale)
     return total, error, gradient, e[known].mean()
 
 
@@ -104,7 +109,7 @@ assert np.abs(log_scale[..., None] - LOG_SCALE).min() > 1e-3
 scale = torch.from_numpy(log_scale).double().requires_grad_()
 b = torch.exp(scale.clamp(*LOG_SCALE))
 e = -torch.log(predictions[0].detach()) - log_depth
-nll = (-torch.distributions.Laplace(0.0, b).log_prob(e) - np.log(2))[known].mean()
+nll = mean_of(-torch.distributions.Laplace(0.0, b).log_prob(e) - np.log(2), known)
 nll.backward()
 tensors["uncertainty/log_scale"] = log_scale
 tensors["uncertainty/loss"] = nll.detach().float().reshape(1).numpy()

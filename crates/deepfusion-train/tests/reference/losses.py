@@ -77,8 +77,9 @@ def clear(margin, *distances):
 
 
 def masked_mean(values, mask):
+    """Of each image, then over the images."""
     mask = mask.expand_as(values)
-    return (values * mask).sum() / mask.sum()
+    return ((values * mask).sum((1, 2, 3)) / mask.sum((1, 2, 3))).mean()
 
 
 # --- the flow loss (Eq. 16-20) -------------------------------------------------------------------------------
@@ -128,7 +129,7 @@ while True:
     if clear(2e-3, *there[4], *back[4]):
         break
 assert 0.3 < there[3].double().mean() < 0.9
-# Both directions' pixels pooled, the two terms together.
+# Both directions' images together, and the two terms.
 error, trip, visible = (torch.cat([x, y]) for x, y in zip((there[0], there[2], there[3]), (back[0], back[2], back[3])))
 l_photo = 2 * masked_mean(error, visible)
 l_consistency = 2 * masked_mean(trip.abs(), visible)  # the L1 norm of two components is twice their mean
@@ -221,7 +222,7 @@ rigid = given("agreement/rigid", rng.uniform(0, 10, (N, 2, H, W)))
 flow = given("agreement/flow", rng.uniform(0, 10, (N, 2, H, W)))
 both = valid.expand(N, 2, H, W)
 distance = (rigid - flow).abs().sum(1, keepdim=True)
-done("agreement", distance[valid].mean(), rigid=rigid, flow=flow)
+done("agreement", masked_mean(distance, valid), rigid=rigid, flow=flow)
 
 write_safetensors(HERE / "losses.safetensors", tensors)
 print(f"{len(tensors)} tensors")
