@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::{CalibrationSource, DatasetKind, NamedTopic, TopicRole};
+use deepfusion_data::{CalibrationSource, DatasetKind, FileError, NamedTopic, TopicRole};
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 use deepfusion_runtime::EngineProblem;
@@ -244,7 +244,7 @@ impl Reportable for deepfusion_data::Error {
 
     fn missing(&self) -> Option<&Path> {
         match self {
-            Self::NoSuchPath { path } => Some(path),
+            Self::File(FileError::NoSuchPath { path }) => Some(path),
             _ => None,
         }
     }
@@ -380,7 +380,7 @@ impl Reportable for deepfusion_images::Error {
 
     fn missing(&self) -> Option<&Path> {
         match self {
-            Self::NoSuchPath { path } => Some(path),
+            Self::File(FileError::NoSuchPath { path }) => Some(path),
             _ => None,
         }
     }

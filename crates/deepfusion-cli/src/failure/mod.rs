@@ -185,10 +185,8 @@ mod tests {
         let full = std::io::Error::from(ErrorKind::StorageFull);
         let full = Failure::from(full).context("log.csv");
         assert!(full.hint().unwrap().contains("disk is full"));
-        let wrapped = Failure::from(deepfusion_data::Error::File {
-            path: "log.csv".into(),
-            source: ErrorKind::QuotaExceeded.into(),
-        });
+        let quota = ErrorKind::QuotaExceeded.into();
+        let wrapped = Failure::from(deepfusion_data::Error::file(Path::new("log.csv"), quota));
         assert!(wrapped.hint().unwrap().contains("disk is full"));
         let unwritten = serde_json::to_writer(&mut [0_u8; 0][..], &7).unwrap_err();
         let lost = deepfusion_data::Error::file(Path::new("a.png"), ErrorKind::TimedOut.into());

@@ -2,15 +2,12 @@
 
 use super::{Error, FoundInstead};
 use crate::{DatasetKind, ImageProblem, NamedTopic};
-use deepfusion_fs::Unfinished;
-use deepfusion_hint::{Hint, system_hint};
-use std::io::ErrorKind;
+use deepfusion_hint::Hint;
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::NoSuchPath { .. } => return Some(system_hint(ErrorKind::NotFound).into()),
-            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
+            Self::File(error) => return error.hint(),
             Self::UnknownLayout { .. } if self.needs_ros2() => {
                 "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }
@@ -26,7 +23,7 @@ impl Hint for Error {
                 return Some(format!("give them by themselves, one or several: {one}"));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
-            Self::Unfinished(_) => Unfinished::REMEDY,
+            Self::Unfinished(error) => return error.hint(),
             Self::Stopped { .. } => "start it again: nothing is in the way",
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
