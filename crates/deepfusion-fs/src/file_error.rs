@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_hint::{Hint, system_hint};
 
-use crate::moved_path;
+use crate::names::moved_path;
 
 /// A file or folder that could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]

@@ -48,7 +48,7 @@ pub enum ImageProblem {
 impl ImageProblem {
     /// What to do about it.
     #[must_use]
-    pub fn remedy(&self) -> &'static str {
+    pub fn hint(&self) -> &'static str {
         match self {
             Self::Truncated => {
                 "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
@@ -70,7 +70,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::File(error) => error.hint(),
-            Self::Image { problem, .. } => Some(problem.remedy().into()),
+            Self::Image { problem, .. } => Some(problem.hint().into()),
         }
     }
 }

@@ -97,7 +97,7 @@ fn has_other_pictures(folder: &Path) -> bool {
 fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
     match Dataset::open(path, options) {
         Ok(datasets) => Ok(datasets),
-        // A folder of ROS 2 bags has a remedy of its own.
+        // A folder of ROS 2 bags has a hint of its own.
         Err(deepfusion_data::Error::UnknownLayout { found, .. })
             if path.is_dir() && !found.has_ros2_bags() =>
         {

@@ -43,8 +43,8 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
         self.to_string()
     }
 
-    /// What to do about it, where that is known.
-    fn remedy(&self) -> Option<String>;
+    /// What to do about it, where that is known: the library's [`Hint`](deepfusion_hint::Hint), or which option does it.
+    fn hint_in_options(&self) -> Option<String>;
 
     /// How the program ends.
     fn exit(&self) -> Exit {
@@ -57,7 +57,7 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
     }
 }
 
-/// What to do about an error that knows no remedy.
+/// The hint of an error that has none of its own.
 const OURS_TO_MEND: &str =
     "if none of your inputs is at fault, this is a bug: please report it, with the command you ran";
 
@@ -117,9 +117,9 @@ impl Failure {
         self
     }
 
-    /// The error's own remedy, if it knows one.
+    /// The error's own hint, if it has one.
     pub(crate) fn hint(&self) -> Option<String> {
-        self.error.remedy()
+        self.error.hint_in_options()
     }
 
     /// The file or folder that is not there, where that is the error.

@@ -70,12 +70,12 @@ impl Hint for Error {
                 ));
             }
             Self::OwnCalibration { .. } => "open it without a camera of your own",
-            Self::CameraFile { problem, .. } => return Some(problem.remedy()),
-            Self::Columns { problem, .. } => return Some(problem.remedy()),
-            Self::Topic { problem, .. } => return Some(problem.remedy()),
-            Self::Frames { problem, .. } => return Some(problem.remedy()),
-            Self::NoTrack { reason, .. } => reason.remedy(),
-            Self::NoFrames { reason, .. } => reason.remedy(),
+            Self::CameraFile { problem, .. } => return Some(problem.hint()),
+            Self::Columns { problem, .. } => return Some(problem.hint()),
+            Self::Topic { problem, .. } => return Some(problem.hint()),
+            Self::Frames { problem, .. } => return Some(problem.hint()),
+            Self::NoTrack { reason, .. } => reason.hint(),
+            Self::NoFrames { reason, .. } => reason.hint(),
             Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
@@ -86,14 +86,14 @@ impl Hint for Error {
                 "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
             }
             Self::DepthKind { .. } => "camera z (kind z) is what every recording with depth has",
-            Self::Missing { part, .. } => part.remedy(),
+            Self::Missing { part, .. } => part.hint(),
             Self::NoImages { .. } => {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
             }
             Self::Image {
                 problem: ImageProblem::File(problem),
                 ..
-            } => problem.remedy(),
+            } => problem.hint(),
             Self::Image { .. } => "PNG and JPEG are read",
             Self::FrameSize { .. } => {
                 "use the images and the calibration of one recording; resized images need their own calibration"
