@@ -39,7 +39,7 @@ impl From<Failure> for PyErr {
     }
 }
 
-/// A library's error as an exception: its message, and its remedy as `hint` and as a note.
+/// A library's error as an exception: its message, with its hint as `hint` and as a note.
 pub(crate) fn raise(error: impl Hint) -> PyErr {
     with_hint(error.to_string(), error.hint())
 }
@@ -50,7 +50,7 @@ pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
-/// An exception with this message and remedy.
+/// An exception with this message and hint.
 pub(crate) fn with_hint(message: String, hint: Option<String>) -> PyErr {
     let error = DeepFusionError::new_err(message);
     Python::attach(|py| {

@@ -383,7 +383,7 @@ impl Source {
 fn no_image(array: &Bound<'_, PyAny>) -> PyResult<PyErr> {
     let kind = array.getattr("dtype")?.str()?.to_string();
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
-    let remedy = match shape.as_slice() {
+    let hint = match shape.as_slice() {
         [_, _, 3] if kind.starts_with("float") => {
             ": where it is from 0 to 1, (image * 255).astype(\"uint8\")"
         }
@@ -393,7 +393,7 @@ fn no_image(array: &Bound<'_, PyAny>) -> PyResult<PyErr> {
         _ => "",
     };
     Ok(PyTypeError::new_err(format!(
-        "image: expected an H x W x 3 array of uint8, a PIL image, a path or a Frame, found {kind} {}{remedy}",
+        "image: expected an H x W x 3 array of uint8, a PIL image, a path or a Frame, found {kind} {}{hint}",
         sizes(&shape)
     )))
 }
@@ -462,14 +462,14 @@ fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
     let [height, width, channels] = [0, 1, 2].map(|axis| array.shape()[axis]);
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
     let (Some((w, h)), 3, true) = (size, channels, width > 0 && height > 0) else {
-        let remedy = match (height, channels) {
+        let hint = match (height, channels) {
             (_, 4) => ": image[..., :3] leaves the fourth channel out",
             (_, 1) => ": np.concatenate([image] * 3, -1) makes grey three channels",
             (3, _) => ": image.transpose(1, 2, 0)",
             _ => "",
         };
         let message = format!(
-            "image: expected H x W x 3 of uint8, found uint8 {height} x {width} x {channels}{remedy}"
+            "image: expected H x W x 3 of uint8, found uint8 {height} x {width} x {channels}{hint}"
         );
         return Err(PyValueError::new_err(message));
     };

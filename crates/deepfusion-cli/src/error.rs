@@ -16,7 +16,7 @@ pub(crate) enum CliError {
         /// The file or folder.
         path: PathBuf,
         /// The option that allows it, or what else to do.
-        remedy: &'static str,
+        hint: &'static str,
     },
     /// A device that computes something else than the processor.
     #[cfg(feature = "train")]
@@ -33,7 +33,7 @@ pub(crate) enum CliError {
         /// Of how many.
         of: usize,
         /// What to do without.
-        remedy: String,
+        hint: String,
     },
     /// A file of a viewer that was not compiled in.
     #[cfg(not(feature = "rerun"))]
@@ -154,7 +154,7 @@ pub(crate) enum CliError {
         interrupted: bool,
         /// Whether the same command goes on with what is missing.
         resumes: bool,
-        /// The first remedy that one of the failures knows.
+        /// The first hint that one of the failures has.
         hint: Option<String>,
     },
     /// Nothing but what was written there before.
@@ -278,11 +278,11 @@ impl Reportable for CliError {
         }
     }
 
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
-            Self::Exists { remedy, .. } => Some((*remedy).to_owned()),
+            Self::Exists { hint, .. } => Some((*hint).to_owned()),
             #[cfg(feature = "train")]
-            Self::DeviceDiffers { remedy, .. } => Some(remedy.clone()),
+            Self::DeviceDiffers { hint, .. } => Some(hint.clone()),
             #[cfg(not(feature = "rerun"))]
             Self::NoRerun => Some(
                 "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),

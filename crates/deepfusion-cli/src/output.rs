@@ -72,7 +72,7 @@ pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf>
     if std::fs::read_dir(&folder).map_err(failed)?.next().is_some() {
         return Err(crate::error::CliError::Exists {
             path: folder,
-            remedy: "choose another folder, or empty this one first",
+            hint: "choose another folder, or empty this one first",
         }
         .into());
     }
@@ -92,7 +92,7 @@ pub(crate) fn require_new(file: &Path, overwrite: bool) -> Result<()> {
     if file.exists() && (!overwrite || file.is_dir()) {
         return Err(crate::error::CliError::Exists {
             path: file.to_owned(),
-            remedy: "choose another name, or give --overwrite to replace a file",
+            hint: "choose another name, or give --overwrite to replace a file",
         }
         .into());
     }

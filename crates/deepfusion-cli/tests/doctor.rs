@@ -209,7 +209,7 @@ fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     );
 }
 
-/// What `doctor` says of a log by itself: its findings' checks, texts and remedies.
+/// What `doctor` says of a log by itself: its findings' checks, texts and hints.
 fn of_log(at: &std::path::Path, arguments: &str) -> Vec<(String, String, String)> {
     let text = run(at, &format!("doctor {arguments} --json")).stdout;
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -227,10 +227,10 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
     let at =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../deepfusion-logs/tests/reference");
     let can = "--dbc vehicle.dbc --speed WheelSpeeds.VehicleSpeed";
-    let says = |arguments: &str, check: &str, what: &str, remedy: &str| {
+    let says = |arguments: &str, check: &str, what: &str, hint: &str| {
         let found = of_log(&at, arguments);
         let fits = |f: &&(String, String, String)| {
-            f.0 == check && f.1.contains(what) && f.2.contains(remedy)
+            f.0 == check && f.1.contains(what) && f.2.contains(hint)
         };
         assert!(
             found.iter().any(|f| fits(&f)),

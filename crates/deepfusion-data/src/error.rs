@@ -1,7 +1,7 @@
 //! What can go wrong with a recording.
 
 use crate::{CalibrationSource, DatasetKind, GtKind, NamedTopic};
-use deepfusion_fs::moved_path;
+use deepfusion_fs::FileError;
 use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 
@@ -47,20 +47,9 @@ pub use self::tracklets::{TrackletPart, TrackletPlace, TrackletsProblem};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is nothing at the path.
-    #[error("{}: no such file or folder", path.display())]
-    NoSuchPath {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// A file could not be opened, read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// A file or folder could not be opened, read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The path holds something, but nothing that is known.
     #[error(
         "{}: no recording of a known layout: {found}\nlooked for, and not there:\n{LOOKED_FOR}",
@@ -572,8 +561,7 @@ impl From<deepfusion_images::Error> for Error {
     fn from(error: deepfusion_images::Error) -> Self {
         use deepfusion_images::Error as Images;
         match error {
-            Images::NoSuchPath { path } => Self::NoSuchPath { path },
-            Images::File { path, source } => Self::File { path, source },
+            Images::File(error) => Self::File(error),
             Images::Image { path, problem } => Self::Image {
                 path,
                 problem: problem.into(),
@@ -594,26 +582,16 @@ impl From<deepfusion_video::Error> for Error {
 }
 
 impl Error {
-    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    /// An error of the system's at `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
-        let path = path.to_owned();
-        match source.kind() {
-            std::io::ErrorKind::NotFound => Self::NoSuchPath { path },
-            _ => Self::File { path, source },
-        }
+        FileError::new(path, source).into()
     }
 
     /// The same error with `to` in place of `from` in the path that it names: what was written aside is gone when it is read.
     pub(crate) fn moved(self, from: &Path, to: &Path) -> Self {
         match self {
-            Self::NoSuchPath { path } => Self::NoSuchPath {
-                path: moved_path(path, from, to),
-            },
-            Self::File { path, source } => Self::File {
-                path: moved_path(path, from, to),
-                source,
-            },
+            Self::File(error) => Self::File(error.moved(from, to)),
             other => other,
         }
     }

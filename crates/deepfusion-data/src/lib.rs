@@ -34,6 +34,7 @@ pub use dataset::{
     road_camera_height, speed_unit_warning,
 };
 pub use dataset_toml::has_settings;
+pub use deepfusion_fs::FileError;
 pub use deepfusion_images::{
     Photo, RgbImage, decode_rgb, image_size, load_photo, load_rgb, read_depth_png, resize_rgb,
     save_png, to_chw, to_network_input, write_depth_png,

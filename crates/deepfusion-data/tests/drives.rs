@@ -14,7 +14,7 @@ fn open(path: &Path) -> Result<Vec<Dataset>, Error> {
 
 fn refusal(path: &Path) -> String {
     let error = open(path).unwrap_err();
-    let hint = error.hint().expect("every refusal has a remedy");
+    let hint = error.hint().expect("every refusal has a hint");
     format!("{error}\nhint: {hint}")
 }
 
@@ -201,8 +201,8 @@ fn a_folder_within_a_drive_is_recognised() {
             "{text}"
         );
         let drive = drive.canonicalize().unwrap();
-        let remedy = format!("hint: give the drive: {}", drive.display());
-        assert!(text.ends_with(&remedy), "{text}");
+        let hint = format!("hint: give the drive: {}", drive.display());
+        assert!(text.ends_with(&hint), "{text}");
     }
 }
 

@@ -24,7 +24,7 @@ fn open(path: &Path) -> Dataset {
 
 fn refusal(path: &Path) -> String {
     let error = Dataset::open(path, &OpenOptions::default()).unwrap_err();
-    let hint = error.hint().expect("every refusal has a remedy");
+    let hint = error.hint().expect("every refusal has a hint");
     format!("{error}\nhint: {hint}")
 }
 

@@ -52,7 +52,7 @@ impl Recording for Messages {
             drive: "a".into(),
             reason: NoTrackReason::Other {
                 why: "no topic of speeds".into(),
-                remedy: "record one".into(),
+                hint: "record one".into(),
             },
         }
     }

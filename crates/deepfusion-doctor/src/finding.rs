@@ -56,8 +56,9 @@ pub struct Finding {
     pub figure: Option<Figure>,
     /// What is wrong, and what it does to a training; in JSON a sentence.
     pub what: FindingReason,
-    /// What to do about it: [`FindingReason::remedy`], or a program's own words.
-    pub remedy: String,
+    /// What to do about it: [`FindingReason::hint`], or a program's own words.
+    #[serde(rename = "remedy")]
+    pub hint: String,
 }
 
 /// How a check came out.
@@ -198,7 +199,7 @@ impl Outcome {
             check: self.check,
             frame,
             figure,
-            remedy: what.remedy(),
+            hint: what.hint(),
             what,
         });
     }

@@ -172,9 +172,9 @@ mod tests {
             "{what}"
         );
         assert!(
-            finding.remedy.contains("0.52") || finding.remedy.contains("0.515"),
+            finding.hint.contains("0.52") || finding.hint.contains("0.515"),
             "{}",
-            finding.remedy
+            finding.hint
         );
         // Half of everything is no usual size; the factor still tells.
         let half = Intrinsics {

@@ -1,7 +1,7 @@
 //! Every reason why training on a recording would fail, or give depths of a wrong scale, before it starts.
 //!
 //! [`doctor`] opens a recording and lets one check after the other look at it. A check measures a figure and compares
-//! it with a limit; what does not keep to it is a [`Finding`] with a remedy. The limits are such that the clean drives
+//! it with a limit; what does not keep to it is a [`Finding`] with a hint. The limits are such that the clean drives
 //! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them. What is wrong ([`FindingReason`], which
 //! knows what to do about it) and why a check could not look ([`SkipReason`]) are types, and sentences as text and in JSON.
 
@@ -103,10 +103,10 @@ pub struct DriveDiagnosis {
 impl Diagnosis {
     /// Of a recording that cannot be opened: why, and what to do about it, in a program's own words.
     #[must_use]
-    pub fn unopened(why: String, remedy: Option<String>) -> Self {
+    pub fn unopened(why: String, hint: Option<String>) -> Self {
         let unopened = Self::not_opened(FindingReason::Words(why));
-        match remedy {
-            Some(remedy) => unopened.reworded(|finding| finding.remedy.clone_from(&remedy)),
+        match hint {
+            Some(hint) => unopened.reworded(|finding| finding.hint.clone_from(&hint)),
             None => unopened,
         }
     }

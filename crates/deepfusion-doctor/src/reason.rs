@@ -49,14 +49,14 @@ pub enum FindingReason {
 impl FindingReason {
     /// What to do about it, in the library's words.
     #[must_use]
-    pub fn remedy(&self) -> String {
+    pub fn hint(&self) -> String {
         match self {
-            Self::Opening(reason) => reason.remedy(),
-            Self::Frames(reason) => reason.remedy().to_owned(),
-            Self::Camera(reason) => reason.remedy(),
-            Self::Motion(reason) => reason.remedy(),
-            Self::Pictures(reason) => reason.remedy(),
-            Self::Log(reason) => reason.remedy(),
+            Self::Opening(reason) => reason.hint(),
+            Self::Frames(reason) => reason.hint().to_owned(),
+            Self::Camera(reason) => reason.hint(),
+            Self::Motion(reason) => reason.hint(),
+            Self::Pictures(reason) => reason.hint(),
+            Self::Log(reason) => reason.hint(),
             Self::Words(_) => CORRECT.to_owned(),
         }
     }
@@ -95,7 +95,7 @@ mod tests {
             "dates without a zone, taken for UTC: hours off where they are local",
             "its gyroscope was warm",
         ];
-        let remedies = [
+        let hints = [
             "record an inertial unit or the steering angle",
             "sort the frames by time, or correct the time stamps",
             "rename image_02 to image_03 and the other way round",
@@ -104,10 +104,10 @@ mod tests {
             "say the log's time zone; pictures and speeds show what is left between the clocks",
             "correct what the message names",
         ];
-        for ((reason, said), remedy) in reasons.into_iter().zip(said).zip(remedies) {
+        for ((reason, said), hint) in reasons.into_iter().zip(said).zip(hints) {
             assert_eq!(reason.to_string(), said);
             assert_eq!(serde_json::to_value(&reason).unwrap(), said);
-            assert_eq!(reason.remedy(), remedy);
+            assert_eq!(reason.hint(), hint);
         }
     }
 }

@@ -117,6 +117,6 @@ mod tests {
             panic!("{outcome:?}")
         };
         assert_eq!(finding.severity, Severity::Error);
-        assert!(finding.remedy.contains("negate the yaw rate"));
+        assert!(finding.hint.contains("negate the yaw rate"));
     }
 }

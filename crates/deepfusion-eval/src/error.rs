@@ -159,7 +159,7 @@ impl Hint for Error {
                 Some("calibrate the network's uncertainty anew".into())
             }
             Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
-            Self::ArrayFile { reason, .. } => reason.remedy().map(str::to_owned),
+            Self::ArrayFile { reason, .. } => reason.hint().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(
                     "arrays are matched by name, and this file names its arrays like `{name}`; the same names are needed in both"

@@ -1,10 +1,10 @@
 //! Whether a folder is as empty as a writer wants it.
 
-use std::error::Error;
-use std::fmt;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
+
+use deepfusion_hint::Hint;
 
 use crate::partial::Partial;
 use crate::partial_folder::{PartialFolder, folder_of_lock};
@@ -20,28 +20,18 @@ pub enum InTheWay {
 
 /// Why a folder that looks empty is not: a hidden file or folder, this one, that a writer is writing, or left when it died, and which cannot be
 /// removed or is another machine's.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: the output folder is not empty: a writer left this in it, or is still writing it", path.display())]
 pub struct Unfinished {
     /// The hidden file or folder.
     pub path: PathBuf,
 }
 
-impl Unfinished {
-    /// What to do about it.
-    pub const REMEDY: &str = "if no program is writing there, remove it, and the file of its name with .lock; or choose another folder";
-}
-
-impl fmt::Display for Unfinished {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}: the output folder is not empty: a writer left this in it, or is still writing it",
-            self.path.display()
-        )
+impl Hint for Unfinished {
+    fn hint(&self) -> Option<String> {
+        Some("if no program is writing there, remove it, and the file of its name with .lock; or choose another folder".into())
     }
 }
-
-impl Error for Unfinished {}
 
 /// Removes what writers that died left in a folder ([`PartialFolder::remove_leftovers`]), and says whether something is in it still; there may be
 /// no such folder.

@@ -1,6 +1,8 @@
-//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut. And the order of names with numbers in them.
+//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut. And the order of names with numbers in them, and
+//! [`FileError`]: what the system says of a file.
 
 mod content;
+mod file_error;
 mod folder_lock;
 mod in_the_way;
 mod machine;
@@ -12,6 +14,7 @@ mod partial_folder;
 mod sync;
 
 pub use content::Content;
+pub use file_error::FileError;
 pub use folder_lock::FolderLock;
 pub use in_the_way::{InTheWay, Unfinished, in_the_way};
 pub use names::{absolute, create_unused, moved_path, unused};

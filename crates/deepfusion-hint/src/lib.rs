@@ -47,9 +47,9 @@ where
     format!("{count} {noun}{ending}")
 }
 
-/// An error that may know its remedy.
+/// An error that may say what to do about it.
 ///
-/// The remedy is said in the library's words: fields, files and values, never the options of a program. The command line says
+/// The hint is in the library's words: fields, files and values, never the options of a program. The command line says
 /// which option is meant.
 pub trait Hint: std::error::Error {
     /// What to do about it, in one line; none where the message itself says it.

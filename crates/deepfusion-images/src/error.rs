@@ -1,26 +1,15 @@
-use deepfusion_hint::{Hint, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::Hint;
 use image::ImageError;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with an image's file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is nothing at the path.
-    #[error("{}: no such file or folder", path.display())]
-    NoSuchPath {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// A file could not be opened, read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    /// A file or folder could not be opened, read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// An image that cannot be read.
     #[error("{}: {problem}", path.display())]
     Image {
@@ -59,7 +48,7 @@ pub enum ImageProblem {
 impl ImageProblem {
     /// What to do about it.
     #[must_use]
-    pub fn remedy(&self) -> &'static str {
+    pub fn hint(&self) -> &'static str {
         match self {
             Self::Truncated => {
                 "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
@@ -70,23 +59,18 @@ impl ImageProblem {
 }
 
 impl Error {
-    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    /// An error of the system's at `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
-        let path = path.to_owned();
-        match source.kind() {
-            ErrorKind::NotFound => Self::NoSuchPath { path },
-            _ => Self::File { path, source },
-        }
+        FileError::new(path, source).into()
     }
 }
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::NoSuchPath { .. } => Some(system_hint(ErrorKind::NotFound).into()),
-            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
-            Self::Image { problem, .. } => Some(problem.remedy().into()),
+            Self::File(error) => error.hint(),
+            Self::Image { problem, .. } => Some(problem.hint().into()),
         }
     }
 }

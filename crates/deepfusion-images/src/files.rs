@@ -11,7 +11,7 @@ use std::path::Path;
 /// alpha channel is left out.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], [`Error::File`], or [`Error::Image`] where the content is no such image or
+/// [`Error::File`], or [`Error::Image`] where the content is no such image or
 /// ends early.
 pub fn load_rgb(path: &Path) -> Result<RgbImage> {
     Ok(decode(path)?.into_rgb8())

@@ -14,6 +14,7 @@ mod known_cameras;
 mod photo;
 mod resize;
 
+pub use deepfusion_fs::FileError;
 pub use depth_png::{read_depth_png, write_depth_png};
 pub use endings::{IMAGE_ENDINGS, is_image};
 pub use error::{Error, ImageProblem, Result};

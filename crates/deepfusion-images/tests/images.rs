@@ -8,7 +8,7 @@
 
 use deepfusion_hint::Hint;
 use deepfusion_images::{
-    Error, ImageProblem, image_size, load_rgb, resize_rgb, to_chw, to_network_input,
+    Error, FileError, ImageProblem, image_size, load_rgb, resize_rgb, to_chw, to_network_input,
 };
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
@@ -131,7 +131,7 @@ fn other_files_are_refused_with_what_is_expected() {
         "{error}"
     );
     let missing = load_rgb(&dir.path().join("none.png")).unwrap_err();
-    assert!(matches!(missing, Error::NoSuchPath { .. }));
+    assert!(matches!(missing, Error::File(FileError::NoSuchPath { .. })));
 }
 
 proptest! {

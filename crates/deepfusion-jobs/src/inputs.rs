@@ -1,6 +1,7 @@
 //! The images that the arguments mean, each with the name of its outputs.
 
 use std::collections::HashSet;
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -75,8 +76,7 @@ pub fn find_inputs(
         && recordings.is_empty()
         && !found.iter().any(|path| path.exists())
     {
-        let path = path.clone();
-        return Err(deepfusion_data::Error::NoSuchPath { path }.into());
+        return Err(deepfusion_data::Error::file(path, ErrorKind::NotFound.into()).into());
     }
     let recordings = each_once(recordings);
     opened(&recordings);
@@ -97,7 +97,7 @@ fn has_other_pictures(folder: &Path) -> bool {
 fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
     match Dataset::open(path, options) {
         Ok(datasets) => Ok(datasets),
-        // A folder of ROS 2 bags has a remedy of its own.
+        // A folder of ROS 2 bags has a hint of its own.
         Err(deepfusion_data::Error::UnknownLayout { found, .. })
             if path.is_dir() && !found.has_ros2_bags() =>
         {

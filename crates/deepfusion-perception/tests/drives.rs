@@ -14,7 +14,7 @@ fn drive(scene: Scene, seed: u64) -> SimConfig {
     }
 }
 
-/// On many streets (`deepfusion eval-targets --depth truth`, docs/BENCHMARKS.md) both are above 0.9; these few were chosen
+/// On many streets (`deepfusion eval-targets --depth truth`, docs/benchmarks/targets.md) both are above 0.9; these few were chosen
 /// among those that were measured: they keep what was reached, they do not show it.
 #[test]
 fn targets_of_true_depth_are_where_the_simulator_put_them() {

@@ -8,6 +8,7 @@ use deepfusion_rosbag::{
     TopicInfo,
 };
 use std::collections::VecDeque;
+use std::io::ErrorKind;
 use std::iter::Peekable;
 use std::path::{Path, PathBuf};
 
@@ -77,7 +78,7 @@ impl Ros2Bag {
     /// MCAP files are mapped: they must not be shortened while the bag is open.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Storage`] for files of another kind, ones that are compressed as
+    /// [`Error::File`]; [`Error::Storage`] for files of another kind, ones that are compressed as
     /// a whole, and a `metadata.yaml` that cannot be read; [`Error::Feature`] for SQLite without the feature `ros2-sqlite`.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
@@ -91,9 +92,7 @@ impl Ros2Bag {
         let files = there.iter().map(|file| open_file(file));
         let files: Vec<_> = files.collect::<Result<_>>()?;
         match missing.first() {
-            Some(first) if files.is_empty() => Err(Error::NoSuchPath {
-                path: first.clone(),
-            }),
+            Some(first) if files.is_empty() => Err(Error::file(first, ErrorKind::NotFound.into())),
             _ => Ok(Self {
                 path: path.to_owned(),
                 connections: connections_of(&files),

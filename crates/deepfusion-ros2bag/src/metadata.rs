@@ -27,7 +27,7 @@ pub(crate) fn is_bag(folder: &Path) -> bool {
 /// The recording's files, in order of time.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Storage`] where it is no such file.
+/// [`Error::File`]; [`Error::Storage`] where it is no such file.
 pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let path = folder.join(NAME);
     let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;

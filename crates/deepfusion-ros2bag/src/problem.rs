@@ -92,7 +92,7 @@ impl Hint for StorageProblem {
             Self::Chunk { .. } => COPY_AGAIN,
             Self::PackedMessage { .. } => "the message is damaged",
             #[cfg(feature = "ros2-sqlite")]
-            Self::Sqlite(e) => sqlite::remedy(e),
+            Self::Sqlite(e) => sqlite::hint(e),
             #[cfg(feature = "ros2-sqlite")]
             Self::Message { .. } => "the message is damaged",
         };

@@ -9,7 +9,7 @@ use std::fmt;
 /// The largest chunk or message that is read, in bytes: what a damaged or hostile file can make one take.
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// The remedy for damage typical of an incomplete copy.
+/// The hint for damage typical of an incomplete copy.
 pub(crate) const COPY_AGAIN: &str = "copy the file again; what can be read of it is";
 
 /// A file of a bag.

@@ -3,7 +3,7 @@
 use crate::common::{reference, sha256};
 use deepfusion_hint::Hint;
 use deepfusion_ros2bag::{BagDamage, FileDamage, Ros2Bag};
-use deepfusion_rosbag::{Error, MessageSource, Selection};
+use deepfusion_rosbag::{Error, FileError, MessageSource, Selection};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -177,7 +177,10 @@ fn what_is_not_read_says_what_to_do() {
     let (error, _) = failed("a.db3", &[7; 4096]);
     assert!(error.contains("not an SQLite database"), "{error}");
     let missing = Ros2Bag::open(folder.path().join("none.mcap")).unwrap_err();
-    assert!(matches!(missing, Error::NoSuchPath { .. }), "{missing}");
+    assert!(
+        matches!(missing, Error::File(FileError::NoSuchPath { .. })),
+        "{missing}"
+    );
 
     let bag = folder.path().join("bag");
     std::fs::create_dir(&bag).unwrap();

@@ -81,7 +81,7 @@ impl Bag {
     /// that is still being recorded can be opened; what was appended later is not seen.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::File`], [`Error::NotABag`], [`Error::Version`], [`Error::Encrypted`].
+    /// [`Error::File`], [`Error::NotABag`], [`Error::Version`], [`Error::Encrypted`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         Self::open_with(path, BagOptions::default())
     }

@@ -1,25 +1,16 @@
 use crate::{BagProblem, MessageError, Time};
-use deepfusion_hint::{Hint, count_of, system_hint};
+use deepfusion_fs::FileError;
+use deepfusion_hint::{Hint, count_of};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a bag.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is nothing at the path.
-    #[error("{}: no such file or folder", path.display())]
-    NoSuchPath {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// A file could not be opened, read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// A file or folder could not be opened, read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The file is no bag.
     #[error("{}: not a ROS bag: expected `#ROSBAG V2.0`, it begins with {found}", path.display())]
     NotABag {
@@ -156,26 +147,22 @@ fn list(names: &[String]) -> String {
 }
 
 impl Error {
-    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    /// An error of the system's at `path`.
     #[must_use]
     pub fn file(path: &Path, source: std::io::Error) -> Self {
-        let path = path.to_owned();
-        match source.kind() {
-            std::io::ErrorKind::NotFound => Self::NoSuchPath { path },
-            _ => Self::File { path, source },
-        }
+        FileError::new(path, source).into()
     }
 }
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
-        use std::io::ErrorKind;
         let text = match self {
-            Self::NoSuchPath { .. } => return Some(system_hint(ErrorKind::NotFound).into()),
-            Self::File { source, .. } => match source.kind() {
-                ErrorKind::IsADirectory => "give the .bag file itself",
-                kind => return Some(system_hint(kind).into()),
-            },
+            Self::File(FileError::Io { source, .. })
+                if source.kind() == ErrorKind::IsADirectory =>
+            {
+                "give the .bag file itself"
+            }
+            Self::File(error) => return error.hint(),
             Self::NotABag { .. } => {
                 "a ROS 2 recording (.mcap, .db3) keeps its own ending; other files are no recordings of ROS"
             }

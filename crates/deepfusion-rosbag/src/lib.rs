@@ -42,6 +42,7 @@ pub use bag::{Bag, BagOptions};
 pub use bag_set::{BagSet, SetMessages};
 pub use compression::Compression;
 pub use connection::Connection;
+pub use deepfusion_fs::FileError;
 pub use error::{Error, Result};
 pub use message::{Message, Serialization};
 pub use message_source::{MessageIter, MessageSource};

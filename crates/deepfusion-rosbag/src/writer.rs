@@ -76,7 +76,7 @@ impl BagWriter {
     /// Begins a bag that will appear at `path`.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`] where the folder does not exist, [`Error::File`].
+    /// [`Error::File`].
     pub fn create(path: impl AsRef<Path>, options: WriterOptions) -> Result<Self> {
         let path = path.as_ref();
         let partial = Partial::beside(path);

@@ -7,6 +7,7 @@ use deepfusion_rosbag::{
     Bag, BagOptions, BagWriter, Compression, Error, ScanReason, Selection, Time, WriterOptions,
 };
 use proptest::prelude::*;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -317,6 +318,8 @@ fn other_files_are_refused_by_name() {
             .hint()
             .is_some()
     );
+    let folder = Error::file(Path::new("drives"), ErrorKind::IsADirectory.into());
+    assert_eq!(folder.hint().as_deref(), Some("give the .bag file itself"));
     let bag = Bag::open(reference("every_type_none.bag")).unwrap();
     let topic = bag
         .messages(Selection::topics(["/imu"]))

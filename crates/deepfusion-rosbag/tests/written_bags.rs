@@ -4,7 +4,9 @@
 use crate::common::{Lines, lines, read_json, sha256};
 use crate::written;
 use deepfusion_rosbag::msg::{Float32, Imu};
-use deepfusion_rosbag::{Bag, BagWriter, Compression, Error, Selection, Time, WriterOptions};
+use deepfusion_rosbag::{
+    Bag, BagWriter, Compression, Error, FileError, Selection, Time, WriterOptions,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -89,7 +91,10 @@ fn the_bag_appears_when_it_is_finished() {
     let missing = BagWriter::create(folder.path().join("no/a.bag"), WriterOptions::default())
         .err()
         .unwrap();
-    assert!(matches!(missing, Error::NoSuchPath { .. }), "{missing}");
+    assert!(
+        matches!(missing, Error::File(FileError::NoSuchPath { .. })),
+        "{missing}"
+    );
 }
 
 #[test]

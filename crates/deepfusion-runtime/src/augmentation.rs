@@ -1,6 +1,6 @@
 /// Test-time augmentation: several predictions of one image, at several input sizes, mirrored or not. The mean of their disparities usually
-/// errs less on images unlike those learned from, and takes the time of all (what it is worth, and where it is worse: docs/BENCHMARKS.md,
-/// "Test-time augmentation").
+/// errs less on images unlike those learned from, and takes the time of all (what it is worth, and where it is worse:
+/// docs/benchmarks/test-time-augmentation.md).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmentation {
     /// Input sizes, as multiples of the one that fits the image; each is rounded to one that the network takes.

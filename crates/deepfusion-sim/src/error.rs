@@ -89,7 +89,7 @@ impl Hint for Error {
             Self::OutputNotEmpty { .. } => {
                 Some("choose a new folder, or empty this one first".to_owned())
             }
-            Self::Unfinished(_) => Some(Unfinished::REMEDY.to_owned()),
+            Self::Unfinished(error) => error.hint(),
             Self::Io { source, .. } => Some(
                 match source.kind() {
                     std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
@@ -133,13 +133,7 @@ impl Error {
                 path: moved(path),
                 source,
             },
-            Self::Bag(BagError::NoSuchPath { path }) => {
-                Self::Bag(BagError::NoSuchPath { path: moved(path) })
-            }
-            Self::Bag(BagError::File { path, source }) => Self::Bag(BagError::File {
-                path: moved(path),
-                source,
-            }),
+            Self::Bag(BagError::File(error)) => Self::Bag(error.moved(from, to).into()),
             other => other,
         }
     }

@@ -199,7 +199,7 @@ fn a_scaled_focal_length_is_measured_by_the_turns() {
     );
     assert_eq!(finding.severity, Severity::Error);
     assert!((value(finding) - 1.0 / 1.4).abs() < 0.08, "{finding:?}");
-    assert!(finding.remedy.contains("fx and fy times 0."), "{finding:?}");
+    assert!(finding.hint.contains("fx and fy times 0."), "{finding:?}");
 }
 
 #[test]
@@ -219,10 +219,7 @@ fn a_matrix_of_another_size_is_named() {
         finding.what.to_string().contains("an image of about"),
         "{finding:?}"
     );
-    assert!(
-        finding.remedy.contains("the images' own size"),
-        "{finding:?}"
-    );
+    assert!(finding.hint.contains("the images' own size"), "{finding:?}");
 }
 
 #[test]
@@ -240,7 +237,7 @@ fn kilometres_an_hour_are_found_by_the_road() {
         (value(finding) / 1.65 / 3.6 - 1.0).abs() < 0.2,
         "{finding:?}"
     );
-    assert!(finding.remedy.contains("km/h"), "{finding:?}");
+    assert!(finding.hint.contains("km/h"), "{finding:?}");
 }
 
 /// Without roll and pitch rates eight seconds of bends do not place a clock: it is said, not guessed.
@@ -261,7 +258,7 @@ fn mirrored_images_turn_the_other_way() {
     let finding = found(&diagnosis, "turn", "correlation");
     assert_eq!(finding.severity, Severity::Error);
     assert!(value(finding) < -0.8, "{finding:?}");
-    assert!(finding.remedy.contains("mirror"), "{finding:?}");
+    assert!(finding.hint.contains("mirror"), "{finding:?}");
 }
 
 #[test]
@@ -272,12 +269,12 @@ fn a_camera_that_is_pitched_heads_elsewhere() {
     let heading = found(&diagnosis, "heading", "pitch");
     assert!((value(heading).abs() - 3.0).abs() < 0.7, "{heading:?}");
     assert!(
-        heading.remedy.contains("correct the camera's pitch"),
+        heading.hint.contains("correct the camera's pitch"),
         "{heading:?}"
     );
     let ground = found(&diagnosis, "ground", "pitch");
     assert!((value(ground).abs() - 3.0).abs() < 0.7, "{ground:?}");
-    assert!(ground.remedy.contains("cam_from_vehicle"), "{ground:?}");
+    assert!(ground.hint.contains("cam_from_vehicle"), "{ground:?}");
 }
 
 #[test]
@@ -292,7 +289,7 @@ fn blurred_frames_are_counted() {
     let finding = found(&diagnosis, "blur", "blurred frames");
     assert!((value(finding) - 12.5).abs() < 3.0, "{finding:?}");
     assert!(finding.what.to_string().contains("frame 3"), "{finding:?}");
-    assert!(finding.remedy.contains("expose shorter"), "{finding:?}");
+    assert!(finding.hint.contains("expose shorter"), "{finding:?}");
 }
 
 #[test]
@@ -302,7 +299,7 @@ fn a_drive_out_of_focus_is_reported() {
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "blur", "sharpness");
     assert!(value(finding) < 0.06, "{finding:?}");
-    assert!(finding.remedy.contains("focus"), "{finding:?}");
+    assert!(finding.hint.contains("focus"), "{finding:?}");
 }
 
 #[test]
@@ -320,7 +317,7 @@ fn a_jumping_exposure_is_counted() {
     // Up and down again: two jumps in ten neighbours.
     assert!((value(finding) - 20.0).abs() < 4.0, "{finding:?}");
     assert!(finding.what.to_string().contains("frame 5"), "{finding:?}");
-    assert!(finding.remedy.contains("exposure"), "{finding:?}");
+    assert!(finding.hint.contains("exposure"), "{finding:?}");
 }
 
 #[test]
@@ -340,7 +337,7 @@ fn an_ego_vehicle_in_view_is_measured_and_cut() {
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "bonnet", "bottom");
     assert!(value(finding) > 50.0, "{finding:?}");
-    assert!(finding.remedy.contains("keep rows 0 to 8"), "{finding:?}");
+    assert!(finding.hint.contains("keep rows 0 to 8"), "{finding:?}");
     let what = finding.what.to_string();
     assert!(
         what.starts_with("14 ") || what.starts_with("15 "),
@@ -366,7 +363,7 @@ fn a_black_frame_is_measured_and_cut() {
     ] {
         let finding = found(&diagnosis, "bonnet", side);
         assert!(value(finding) > 50.0, "{finding:?}");
-        assert!(finding.remedy.contains(kept), "{finding:?}");
+        assert!(finding.hint.contains(kept), "{finding:?}");
         // The rim itself may belong to either.
         let what = finding.what.to_string();
         let named = what.starts_with("12 ") || what.starts_with("13 ");
@@ -392,7 +389,7 @@ fn cameras_that_are_swapped_are_reported() {
     let finding = found(&diagnosis, "stereo", "disparity");
     assert_eq!(finding.severity, Severity::Error);
     assert!((value(finding) + 6.0).abs() < 0.5, "{finding:?}");
-    assert!(finding.remedy.contains("image_03"), "{finding:?}");
+    assert!(finding.hint.contains("image_03"), "{finding:?}");
 }
 
 #[test]
@@ -413,7 +410,7 @@ fn frames_between_which_hardly_anything_moves_are_reported() {
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "parallax", "parallax");
     assert!(value(finding) < 0.1, "{finding:?}");
-    assert!(finding.remedy.contains("frame_distance_m"), "{finding:?}");
+    assert!(finding.hint.contains("frame_distance_m"), "{finding:?}");
 }
 
 #[test]
@@ -429,7 +426,7 @@ fn standing_parts_are_counted() {
     let finding = found(&diagnosis, "standing", "0.5 m/s");
     assert!((value(finding) - 39.0).abs() < 2.0, "{finding:?}");
     assert!(
-        finding.remedy.contains("cut the standing parts out"),
+        finding.hint.contains("cut the standing parts out"),
         "{finding:?}"
     );
 }
@@ -447,7 +444,7 @@ fn lost_and_repeated_frames_are_counted() {
             && lost.what.to_string().contains("before frame 22"),
         "{lost:?}"
     );
-    assert!(lost.remedy.contains("recorder"), "{lost:?}");
+    assert!(lost.hint.contains("recorder"), "{lost:?}");
     let repeated = found(&diagnosis, "duplicates", "repeated");
     assert_eq!(repeated.severity, Severity::Error);
     assert!(
@@ -459,7 +456,7 @@ fn lost_and_repeated_frames_are_counted() {
             || repeated.what.to_string().contains("frame 31"),
         "{repeated:?}"
     );
-    assert!(repeated.remedy.contains("remove"), "{repeated:?}");
+    assert!(repeated.hint.contains("remove"), "{repeated:?}");
 }
 
 #[test]
@@ -492,7 +489,7 @@ fn what_lies_beside_the_drives_is_given_by_its_own_path() {
         (finding.check, finding.severity),
         ("opening", Severity::Note)
     );
-    assert!(finding.remedy.contains("by its own path"), "{finding:?}");
+    assert!(finding.hint.contains("by its own path"), "{finding:?}");
 }
 
 #[test]
@@ -500,7 +497,7 @@ fn what_cannot_be_opened_is_a_finding() {
     let folder = tempfile::tempdir().unwrap();
     let diagnosis = doctor(folder.path(), None);
     assert_eq!(diagnosis.worst(), Some(Severity::Error));
-    assert!(!diagnosis.findings()[0].1.remedy.is_empty());
+    assert!(!diagnosis.findings()[0].1.hint.is_empty());
 }
 
 #[test]
@@ -564,10 +561,7 @@ fn a_wrong_wheelbase_is_found_by_the_gyro() {
     let diagnosis = doctor(&path, None);
     let finding = found(&diagnosis, "steering", "turns by the gyro");
     assert!((value(finding) - 4.1 / 2.7).abs() < 0.03, "{finding:?}");
-    assert!(
-        finding.remedy.contains("wheelbase_m by 0.66"),
-        "{finding:?}"
-    );
+    assert!(finding.hint.contains("wheelbase_m by 0.66"), "{finding:?}");
 }
 
 #[test]

@@ -98,12 +98,10 @@ pub enum AnswerProblem {
     NoFrame,
 }
 
-impl ProgramProblem {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn remedy(&self) -> &'static str {
+impl Hint for ProgramProblem {
+    fn hint(&self) -> Option<String> {
         use ProgramTask::{Read, ReadLive, Write};
-        match self {
+        let text = match self {
             Self::NotInstalled(Read) => {
                 "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames elsewhere \
                  and give their folder"
@@ -131,13 +129,8 @@ impl ProgramProblem {
                 "see whether the disk is full and the pictures can be opened"
             }
             Self::Answer(_) => "is it a video, and whole?",
-            Self::Live(problem) => problem.remedy(),
-        }
-    }
-}
-
-impl Hint for ProgramProblem {
-    fn hint(&self) -> Option<String> {
-        Some(self.remedy().to_owned())
+            Self::Live(problem) => problem.hint(),
+        };
+        Some(text.to_owned())
     }
 }

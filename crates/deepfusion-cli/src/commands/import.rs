@@ -1,3 +1,4 @@
+use std::io::ErrorKind;
 use std::path::Path;
 
 use deepfusion_data::OpenOptions;
@@ -29,8 +30,7 @@ struct Imported<'a> {
 pub(super) fn run(args: &ImportArgs) -> Result<()> {
     let named = [&args.video, &args.images, &args.calibration];
     if let Some(path) = named.into_iter().flatten().find(|path| !path.exists()) {
-        let path = path.clone();
-        return Err(deepfusion_data::Error::NoSuchPath { path }.into());
+        return Err(deepfusion_data::Error::file(path, ErrorKind::NotFound.into()).into());
     }
     let options = ReadOptions {
         time: args.time.clone(),

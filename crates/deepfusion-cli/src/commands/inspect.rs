@@ -28,7 +28,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
             path: args.path.clone(),
             unreadable: inspection.unreadable.len(),
             recordings: inspection.unreadable.len() + inspection.drives.len(),
-            hint: first.error.remedy(),
+            hint: first.error.hint_in_options(),
         }
         .into());
     }
@@ -71,7 +71,7 @@ fn write_config(args: &InspectArgs, options: &OpenOptions) -> Result<Vec<PathBuf
     write_bag_config(&args.path, options, args.overwrite).map_err(|error| match error {
         Error::Exists { path } => CliError::Exists {
             path,
-            remedy: "it is this bag's already; --overwrite rewrites it and keeps its keys",
+            hint: "it is this bag's already; --overwrite rewrites it and keeps its keys",
         }
         .into(),
         other => other.into(),

@@ -8,8 +8,8 @@ use deepfusion_logs::{Error, Format};
 #[must_use]
 pub fn in_options(diagnosis: Diagnosis) -> Diagnosis {
     diagnosis.reworded(|finding| {
-        if let Some(words) = remedy(&finding.what) {
-            finding.remedy = words;
+        if let Some(words) = hint(&finding.what) {
+            finding.hint = words;
         }
         if let Some(words) = what(&finding.what) {
             finding.what = FindingReason::Words(words.to_owned());
@@ -31,7 +31,7 @@ fn what(reason: &FindingReason) -> Option<&'static str> {
 }
 
 /// What to do, where an option does it.
-fn remedy(reason: &FindingReason) -> Option<String> {
+fn hint(reason: &FindingReason) -> Option<String> {
     match reason {
         FindingReason::Log(reason) => of_log(reason),
         FindingReason::Motion(MotionReason::ClockOffset { camera_ahead_s, .. }) => Some(format!(
@@ -85,7 +85,7 @@ mod tests {
     use deepfusion_logs::{ColumnProblem, NoGps, SignalProblem};
 
     #[test]
-    fn every_remedy_that_an_option_does_names_it() {
+    fn every_hint_that_an_option_does_names_it() {
         let unreadable = |error: Error| LogReason::Unreadable(SharedError::from(error));
         let of_log = [
             LogReason::NoSpeed(NoGps::NoFix),
@@ -120,9 +120,9 @@ mod tests {
         };
         let of_log = of_log.into_iter().map(FindingReason::from);
         for reason in of_log.chain([clock.into()]) {
-            assert!(!reason.remedy().contains(" --"), "{reason}");
-            assert!(remedy(&reason).unwrap().contains("--"), "{reason}");
+            assert!(!reason.hint().contains(" --"), "{reason}");
+            assert!(hint(&reason).unwrap().contains("--"), "{reason}");
         }
-        assert_eq!(remedy(&FindingReason::Words("log a drive".into())), None);
+        assert_eq!(hint(&FindingReason::Words("log a drive".into())), None);
     }
 }

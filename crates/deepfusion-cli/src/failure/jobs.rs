@@ -65,9 +65,9 @@ impl Reportable for Error {
     }
 
     /// With the options that do it.
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         if let Some(error) = wrapped(self) {
-            return error.remedy();
+            return error.hint_in_options();
         }
         match self {
             Self::Exists { .. } => {
@@ -94,7 +94,7 @@ impl Reportable for Error {
             Self::Incomplete { .. } => Some(
                 "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
             ),
-            Self::CameraOf { source, .. } => source.remedy(),
+            Self::CameraOf { source, .. } => source.hint_in_options(),
             Self::NoTopic { problem, .. } => {
                 Some(problem.hint().unwrap_or_else(|| set_in_file("data.topics")))
             }

@@ -3,18 +3,18 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::{CalibrationSource, DatasetKind, NamedTopic, TopicRole};
+use deepfusion_data::{CalibrationSource, DatasetKind, FileError, NamedTopic, TopicRole};
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 use deepfusion_runtime::EngineProblem;
 
 use super::{Exit, Reportable};
 
-/// Errors whose own remedy names no setting that an option has.
+/// Errors whose own hint names no setting that an option has.
 macro_rules! as_the_library_says {
     ($($error:ty),* $(,)?) => {
         $(impl Reportable for $error {
-            fn remedy(&self) -> Option<String> {
+            fn hint_in_options(&self) -> Option<String> {
                 self.hint()
             }
         })*
@@ -46,7 +46,7 @@ impl Reportable for deepfusion_sim::Error {
         }
     }
 
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Config {
                 field, expected, ..
@@ -82,7 +82,7 @@ fn simulator_option(field: &str) -> Option<&'static str> {
 }
 
 impl Reportable for deepfusion_rosbag::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Feature { feature, .. } => Some(built_with(feature)),
             _ => self.hint(),
@@ -98,7 +98,7 @@ fn built_with(feature: &str) -> String {
 }
 
 impl Reportable for deepfusion_calibrate::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         use deepfusion_calibrate::Error as Problem;
         match self {
             Problem::NoBoard {
@@ -121,7 +121,7 @@ impl Reportable for deepfusion_calibrate::Error {
 }
 
 impl Reportable for deepfusion_doctor::NoCameraAhead {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         let hint = self.hint();
         match self {
             // These end with the offset that is to be given.
@@ -134,7 +134,7 @@ impl Reportable for deepfusion_doctor::NoCameraAhead {
 }
 
 impl Reportable for deepfusion_logs::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         use deepfusion_logs::ColumnProblem as Problem;
         Some(match self {
             Self::Column { problem, .. } => match problem {
@@ -156,7 +156,7 @@ impl Reportable for deepfusion_logs::Error {
 }
 
 impl Reportable for deepfusion_video::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Silent { .. } => Some("is the source sending? --timeout S waits longer".into()),
             _ => self.hint(),
@@ -188,12 +188,12 @@ impl Reportable for deepfusion_data::Error {
         }
     }
 
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         let hint = self.hint();
         let or = |option: &str| hint.as_ref().map(|hint| format!("{hint}, or {option}"));
         match self {
             Self::UnknownLayout { .. } if self.needs_ros2() => Some(built_with("ros2")),
-            Self::Bag(error) => error.remedy(),
+            Self::Bag(error) => error.hint_in_options(),
             Self::NoCameraFile {
                 layout: DatasetKind::RgbD,
                 ..
@@ -229,8 +229,8 @@ impl Reportable for deepfusion_data::Error {
             Self::NoTopics { .. } => Some("leave --topic out, or give bags alone".into()),
             Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
             Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
-            Self::Video(error) => error.remedy(),
-            Self::Log(error) => error.remedy(),
+            Self::Video(error) => error.hint_in_options(),
+            Self::Log(error) => error.hint_in_options(),
             _ => hint,
         }
     }
@@ -244,14 +244,14 @@ impl Reportable for deepfusion_data::Error {
 
     fn missing(&self) -> Option<&Path> {
         match self {
-            Self::NoSuchPath { path } => Some(path),
+            Self::File(FileError::NoSuchPath { path }) => Some(path),
             _ => None,
         }
     }
 }
 
 impl Reportable for deepfusion_eval::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
                 "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
@@ -273,7 +273,7 @@ impl Reportable for deepfusion_eval::Error {
 }
 
 impl Reportable for deepfusion_eval::compare::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or what `eval --json` printed"
@@ -289,7 +289,7 @@ impl Reportable for deepfusion_eval::compare::Error {
 }
 
 impl Reportable for deepfusion_instances::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Class { known, .. } if known.is_empty() => {
                 Some("the file names no classes: leave --classes out, and all are taken".into())
@@ -319,7 +319,7 @@ impl Reportable for deepfusion_model::Error {
         }
     }
 
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::EncodersOnly { .. } => {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
@@ -363,7 +363,7 @@ pub(crate) fn set_in_file(field: &str) -> String {
 }
 
 impl Reportable for deepfusion_onnx::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Node { .. } | Self::Model { .. } => {
                 Some("only files written by `deepfusion export` of this version are read".into())
@@ -374,20 +374,20 @@ impl Reportable for deepfusion_onnx::Error {
 }
 
 impl Reportable for deepfusion_images::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         self.hint()
     }
 
     fn missing(&self) -> Option<&Path> {
         match self {
-            Self::NoSuchPath { path } => Some(path),
+            Self::File(FileError::NoSuchPath { path }) => Some(path),
             _ => None,
         }
     }
 }
 
 impl Reportable for deepfusion_render::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::Log { .. } => {
                 Some("it should be the log.csv that `train` wrote into the run's folder".into())
@@ -405,7 +405,7 @@ impl Reportable for deepfusion_runtime::Error {
         }
     }
 
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::NoSuchModel { known, .. } => {
                 const WROTE: &str = "give the folder that `train`, `adapt`, `demo` or a command of `weights` wrote";
@@ -425,9 +425,9 @@ impl Reportable for deepfusion_runtime::Error {
                 "look at some of your images first: deepfusion weights calibrate --model RUN DRIVE; `--precision bf16` needs no calibration"
                     .into(),
             ),
-            Self::Weights(error) => error.remedy(),
-            Self::Model(error) => error.remedy(),
-            Self::Onnx(error) => error.remedy(),
+            Self::Weights(error) => error.hint_in_options(),
+            Self::Model(error) => error.hint_in_options(),
+            Self::Onnx(error) => error.hint_in_options(),
             _ => self.hint(),
         }
     }
@@ -436,15 +436,15 @@ impl Reportable for deepfusion_runtime::Error {
 /// What an engine's problem says of its own.
 fn of_engine(problem: &EngineProblem) -> Option<String> {
     match problem {
-        EngineProblem::Fused(error) => error.remedy(),
-        EngineProblem::Onnx(error) => error.remedy(),
-        EngineProblem::Network(error) => error.remedy(),
+        EngineProblem::Fused(error) => error.hint_in_options(),
+        EngineProblem::Onnx(error) => error.hint_in_options(),
+        EngineProblem::Network(error) => error.hint_in_options(),
         other => other.hint(),
     }
 }
 
 impl Reportable for deepfusion_weights::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::NotEmbedded { known, .. } if known.is_empty() => Some(
                 "train one (deepfusion train --data DRIVE) and give its folder: --model RUN".into(),
@@ -475,10 +475,10 @@ impl Reportable for deepfusion_train::Error {
         }
     }
 
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
-            Self::Data(error) => error.remedy(),
-            Self::Model(error) => error.remedy(),
+            Self::Data(error) => error.hint_in_options(),
+            Self::Model(error) => error.hint_in_options(),
             Self::NoSamples { .. } => self
                 .hint()
                 .map(|hint| format!("{hint}; `deepfusion data inspect` shows what is there")),
@@ -519,7 +519,7 @@ impl Reportable for deepfusion_train::Error {
 }
 
 impl Reportable for deepfusion_view::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         match self {
             Self::NoSuchFolder { .. } => {
                 Some("give the folder that `predict --out` or `perceive --out` wrote".into())
@@ -553,11 +553,11 @@ impl Reportable for deepfusion_view::Error {
     }
 }
 
-/// Other people's errors, which know no remedy.
+/// Other people's errors, which have no hint.
 macro_rules! foreign {
     ($($error:ty),* $(,)?) => {
         $(impl Reportable for $error {
-            fn remedy(&self) -> Option<String> {
+            fn hint_in_options(&self) -> Option<String> {
                 None
             }
         })*
@@ -567,13 +567,13 @@ macro_rules! foreign {
 foreign!(clap::Error, toml::de::Error, toml::ser::Error);
 
 impl Reportable for std::io::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         Some(system_hint(self.kind()).into())
     }
 }
 
 impl Reportable for serde_json::Error {
-    fn remedy(&self) -> Option<String> {
+    fn hint_in_options(&self) -> Option<String> {
         self.io_error_kind().map(|kind| system_hint(kind).into())
     }
 }

@@ -43,8 +43,8 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
         self.to_string()
     }
 
-    /// What to do about it, where that is known.
-    fn remedy(&self) -> Option<String>;
+    /// What to do about it, where that is known: the library's [`Hint`](deepfusion_hint::Hint), or which option does it.
+    fn hint_in_options(&self) -> Option<String>;
 
     /// How the program ends.
     fn exit(&self) -> Exit {
@@ -57,7 +57,7 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
     }
 }
 
-/// What to do about an error that knows no remedy.
+/// The hint of an error that has none of its own.
 const OURS_TO_MEND: &str =
     "if none of your inputs is at fault, this is a bug: please report it, with the command you ran";
 
@@ -117,9 +117,9 @@ impl Failure {
         self
     }
 
-    /// The error's own remedy, if it knows one.
+    /// The error's own hint, if it has one.
     pub(crate) fn hint(&self) -> Option<String> {
-        self.error.remedy()
+        self.error.hint_in_options()
     }
 
     /// The file or folder that is not there, where that is the error.
@@ -185,10 +185,8 @@ mod tests {
         let full = std::io::Error::from(ErrorKind::StorageFull);
         let full = Failure::from(full).context("log.csv");
         assert!(full.hint().unwrap().contains("disk is full"));
-        let wrapped = Failure::from(deepfusion_data::Error::File {
-            path: "log.csv".into(),
-            source: ErrorKind::QuotaExceeded.into(),
-        });
+        let quota = ErrorKind::QuotaExceeded.into();
+        let wrapped = Failure::from(deepfusion_data::Error::file(Path::new("log.csv"), quota));
         assert!(wrapped.hint().unwrap().contains("disk is full"));
         let unwritten = serde_json::to_writer(&mut [0_u8; 0][..], &7).unwrap_err();
         let lost = deepfusion_data::Error::file(Path::new("a.png"), ErrorKind::TimedOut.into());

@@ -30,7 +30,7 @@ impl CameraCalibration {
     /// say the image's size, that is `image_size`.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::File`], [`Error::CameraFile`] for a file of another kind, a lens model
+    /// [`Error::File`], [`Error::CameraFile`] for a file of another kind, a lens model
     /// other than Brown and Conrady's and the fisheye model of Kannala and Brandt, or numbers that make no camera.
     pub fn read(path: &Path, image_size: (u32, u32)) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;

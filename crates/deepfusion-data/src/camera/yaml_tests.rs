@@ -151,7 +151,7 @@ fn other_lenses_are_named() {
             refusal.to_string(),
             format!("the lens model '{model}' is not supported")
         );
-        assert!(refusal.remedy().contains("radtan"));
+        assert!(refusal.hint().contains("radtan"));
     }
 }
 

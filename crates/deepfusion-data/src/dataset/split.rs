@@ -32,7 +32,7 @@ impl Split {
     /// [`crate::Dataset::scenario`] that is.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`] / [`Error::File`], or [`Error::Split`] with the number of a bad line.
+    /// [`Error::File`], or [`Error::Split`] with the number of a bad line.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let (mut entries, mut scenarios) = (Vec::new(), Vec::new());

@@ -44,7 +44,7 @@ pub enum NoFramesReason {
 }
 
 impl NoFramesReason {
-    pub(super) fn remedy(&self) -> &'static str {
+    pub(super) fn hint(&self) -> &'static str {
         match self {
             Self::NoPicture => "name the folder of the images in dataset.toml: images = \"…\"",
             Self::NoColour => "fetch the sequence's images",
@@ -87,12 +87,12 @@ pub enum NoTrackReason {
         /// What is missing.
         why: Cow<'static, str>,
         /// What to do.
-        remedy: Cow<'static, str>,
+        hint: Cow<'static, str>,
     },
 }
 
 impl NoTrackReason {
-    pub(super) fn remedy(&self) -> &str {
+    pub(super) fn hint(&self) -> &str {
         match self {
             Self::NoSpeeds { layout } => speeds_from(*layout),
             Self::UntimedPoses => {
@@ -100,7 +100,7 @@ impl NoTrackReason {
             }
             Self::NoTimes => "add frames.csv, timestamps.txt or fps in dataset.toml",
             Self::NoSpeedTopic => SPEED_TOPIC,
-            Self::Other { remedy, .. } => remedy,
+            Self::Other { hint, .. } => hint,
         }
     }
 }

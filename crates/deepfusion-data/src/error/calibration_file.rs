@@ -72,7 +72,7 @@ pub enum CalibrationFileProblem {
 }
 
 impl CalibrationFileProblem {
-    pub(crate) fn remedy(&self) -> &'static str {
+    pub(crate) fn hint(&self) -> &'static str {
         match self {
             Self::Model { .. } => {
                 "calibrate with Brown and Conrady's model (OpenCV's default, ROS plumb_bob or \

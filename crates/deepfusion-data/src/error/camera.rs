@@ -73,9 +73,9 @@ impl CameraProblem {
         "film through the linear lens, or calibrate this one as a fisheye lens";
 
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
-            Self::File(problem) => problem.remedy(),
+            Self::File(problem) => problem.hint(),
             Self::Implausible(_) => "give the calibration of these images, in their own pixels",
             Self::Lens(problem) => return problem.hint().unwrap_or_default(),
             Self::CameraInfo(CameraInfoProblem::NoProjection) => {

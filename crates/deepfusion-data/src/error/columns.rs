@@ -94,7 +94,7 @@ fn is_or_are(count: usize) -> &'static str {
 }
 
 impl ColumnsProblem {
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::NoColumn { example, .. } => {
                 return format!("the first line names the columns, such as {example}");

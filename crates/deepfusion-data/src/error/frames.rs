@@ -38,8 +38,8 @@ pub enum FramesProblem {
 
 impl FramesProblem {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
-        let (remedy, config) = match self {
+    pub(super) fn hint(&self) -> String {
+        let (hint, config) = match self {
             Self::TwoWays { mount, config, .. } => (
                 format!("say it: [{mount}] translation = […], rotation = […]"),
                 config,
@@ -48,6 +48,6 @@ impl FramesProblem {
                 (format!("frames.vehicle = \"{first}\""), config)
             }
         };
-        format!("{remedy} (in {})", config.display())
+        format!("{hint} (in {})", config.display())
     }
 }

@@ -2,15 +2,12 @@
 
 use super::{Error, FoundInstead};
 use crate::{DatasetKind, ImageProblem, NamedTopic};
-use deepfusion_fs::Unfinished;
-use deepfusion_hint::{Hint, system_hint};
-use std::io::ErrorKind;
+use deepfusion_hint::Hint;
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let text = match self {
-            Self::NoSuchPath { .. } => return Some(system_hint(ErrorKind::NotFound).into()),
-            Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
+            Self::File(error) => return error.hint(),
             Self::UnknownLayout { .. } if self.needs_ros2() => {
                 "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }
@@ -26,7 +23,7 @@ impl Hint for Error {
                 return Some(format!("give them by themselves, one or several: {one}"));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
-            Self::Unfinished(_) => Unfinished::REMEDY,
+            Self::Unfinished(error) => return error.hint(),
             Self::Stopped { .. } => "start it again: nothing is in the way",
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
@@ -73,12 +70,12 @@ impl Hint for Error {
                 ));
             }
             Self::OwnCalibration { .. } => "open it without a camera of your own",
-            Self::CameraFile { problem, .. } => return Some(problem.remedy()),
-            Self::Columns { problem, .. } => return Some(problem.remedy()),
-            Self::Topic { problem, .. } => return Some(problem.remedy()),
-            Self::Frames { problem, .. } => return Some(problem.remedy()),
-            Self::NoTrack { reason, .. } => reason.remedy(),
-            Self::NoFrames { reason, .. } => reason.remedy(),
+            Self::CameraFile { problem, .. } => return Some(problem.hint()),
+            Self::Columns { problem, .. } => return Some(problem.hint()),
+            Self::Topic { problem, .. } => return Some(problem.hint()),
+            Self::Frames { problem, .. } => return Some(problem.hint()),
+            Self::NoTrack { reason, .. } => reason.hint(),
+            Self::NoFrames { reason, .. } => reason.hint(),
             Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
@@ -89,14 +86,14 @@ impl Hint for Error {
                 "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
             }
             Self::DepthKind { .. } => "camera z (kind z) is what every recording with depth has",
-            Self::Missing { part, .. } => part.remedy(),
+            Self::Missing { part, .. } => part.hint(),
             Self::NoImages { .. } => {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
             }
             Self::Image {
                 problem: ImageProblem::File(problem),
                 ..
-            } => problem.remedy(),
+            } => problem.hint(),
             Self::Image { .. } => "PNG and JPEG are read",
             Self::FrameSize { .. } => {
                 "use the images and the calibration of one recording; resized images need their own calibration"

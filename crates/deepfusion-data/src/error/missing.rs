@@ -63,12 +63,12 @@ pub enum MissingPart {
         /// What it would hold.
         what: Cow<'static, str>,
         /// How to get it.
-        remedy: Cow<'static, str>,
+        hint: Cow<'static, str>,
     },
 }
 
 impl MissingPart {
-    pub(super) fn remedy(&self) -> &str {
+    pub(super) fn hint(&self) -> &str {
         match self {
             Self::Intrinsics | Self::VelodynePlace | Self::ImuPlace => {
                 "put the calibration files of that date (KITTI offers them as <date>_calib.zip) into the date folder"
@@ -91,7 +91,7 @@ impl MissingPart {
             Self::NuScenesTable => "unpack the data set's metadata (v1.0-*_meta.tgz) again",
             Self::SegmentTimes => "fetch global_pose of the segment",
             Self::Motion => "give each frame its time and speed",
-            Self::Other { remedy, .. } => remedy,
+            Self::Other { hint, .. } => hint,
         }
     }
 }
@@ -108,7 +108,7 @@ mod tests {
             path: "oxts".into(),
             part: MissingPart::Other {
                 what: "the wheels' speeds".into(),
-                remedy: "record them".into(),
+                hint: "record them".into(),
             },
         };
         assert_eq!(

@@ -74,7 +74,7 @@ pub enum TopicProblem {
 
 impl TopicProblem {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         match self {
             Self::NoTopic {
                 role,

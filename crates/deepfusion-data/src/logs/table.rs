@@ -26,7 +26,7 @@ impl Table {
     /// Reads a table whose values are apart by commas, semicolons or tabs, whichever its header has.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Table`] where a row has another number of values
+    /// [`Error::File`]; [`Error::Table`] where a row has another number of values
     /// than the header.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;

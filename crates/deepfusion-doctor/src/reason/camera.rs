@@ -106,7 +106,7 @@ pub enum CameraReason {
 
 impl CameraReason {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::View { .. } => {
                 "calibrate at the size of these images; a focal length in millimetres has to be divided by the size of a pixel"
@@ -326,7 +326,7 @@ mod tests {
             camera_by_deg: -3.04,
             angle: RoadAngle::Roll,
         };
-        for (reason, remedy) in [
+        for (reason, hint) in [
             (
                 of_another_size,
                 "give the matrix of the images' own size: fx and cx times 0.5153, fy and cy times 0.5120",
@@ -344,7 +344,7 @@ mod tests {
                 "turn the camera on the vehicle (cam_from_vehicle) anticlockwise by that angle, or correct the roll of the LiDAR on the camera by it",
             ),
         ] {
-            assert_eq!(reason.remedy(), remedy);
+            assert_eq!(reason.hint(), hint);
         }
     }
 

@@ -72,7 +72,7 @@ pub enum FramesReason {
 
 impl FramesReason {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> &'static str {
+    pub(super) fn hint(&self) -> &'static str {
         match self {
             Self::Backwards { .. } => "sort the frames by time, or correct the time stamps",
             Self::Lost { .. } => {

@@ -98,7 +98,7 @@ pub enum LogReason {
 
 impl LogReason {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::Unreadable(error) => {
                 let hint = error.hint().unwrap_or_else(|| super::CORRECT.to_owned());
@@ -174,7 +174,7 @@ mod tests {
             format!("table with 13 speeds and 1 yaw rate: {said}")
         );
         assert_eq!(
-            holds.remedy(),
+            holds.hint(),
             "make a drive of drive.csv with its video and the camera; then examine the drive"
         );
     }

@@ -123,7 +123,7 @@ pub enum MotionReason {
 
 impl MotionReason {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::Road(warning) => match warning.likely_unit() {
                 Some(unit) => {
@@ -307,7 +307,7 @@ mod tests {
             camera_ahead_s: 0.12,
         };
         let km_h = road(1.6 * 3.6);
-        for (reason, remedy) in [
+        for (reason, hint) in [
             (
                 km_h,
                 "divide the speeds: they seem to be in km/h (speed_unit says so for tables and bare numbers)",
@@ -326,7 +326,7 @@ mod tests {
                  (PTP, trigger)",
             ),
         ] {
-            assert_eq!(reason.remedy(), remedy);
+            assert_eq!(reason.hint(), hint);
         }
     }
 }

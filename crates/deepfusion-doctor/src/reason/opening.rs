@@ -42,7 +42,7 @@ pub enum OpeningReason {
 
 impl OpeningReason {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::Recording(error) => {
                 return error.hint().unwrap_or_else(|| super::CORRECT.to_owned());

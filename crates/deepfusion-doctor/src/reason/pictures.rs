@@ -74,7 +74,7 @@ pub enum PicturesReason {
 
 impl PicturesReason {
     /// What to do about it.
-    pub(super) fn remedy(&self) -> String {
+    pub(super) fn hint(&self) -> String {
         let text = match self {
             Self::LittleParallax => {
                 "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or drives at more speed"
@@ -212,7 +212,7 @@ mod tests {
             share: 0.99,
             across,
         };
-        for (reason, remedy) in [
+        for (reason, hint) in [
             (
                 rim(ImageSide::Bottom, 94),
                 "cut them off: keep rows 0 to 81",
@@ -230,7 +230,7 @@ mod tests {
                 "cut them off: keep columns 0 to 307",
             ),
         ] {
-            assert_eq!(reason.remedy(), remedy);
+            assert_eq!(reason.hint(), hint);
         }
     }
 }

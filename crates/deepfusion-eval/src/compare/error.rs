@@ -1,25 +1,14 @@
+use deepfusion_fs::FileError;
 use deepfusion_hint::{Hint, system_hint};
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong while evaluations are read and put side by side.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is nothing at the path.
-    #[error("{}: no such file or folder", path.display())]
-    NoSuchPath {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// A file could not be opened, read or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// A file or folder could not be opened, read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A file that is no evaluation.
     #[error("{}: no evaluation: {reason}", path.display())]
     NotAnEvaluation {
@@ -82,21 +71,16 @@ pub enum PublishedProblem {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    /// An error of the system's at `path`.
     pub(super) fn file(path: &Path, source: std::io::Error) -> Self {
-        let path = path.to_owned();
-        match source.kind() {
-            ErrorKind::NotFound => Self::NoSuchPath { path },
-            _ => Self::File { path, source },
-        }
+        FileError::new(path, source).into()
     }
 }
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::NoSuchPath { .. } => Some(system_hint(ErrorKind::NotFound).into()),
-            Self::File { source, .. } => Some(system_hint(source.kind()).into()),
+            Self::File(error) => error.hint(),
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or an evaluation as JSON".into(),
             ),

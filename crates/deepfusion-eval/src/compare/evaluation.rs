@@ -42,8 +42,7 @@ impl Evaluation {
     /// Rows of the same name are told apart by their paths and checkpoints.
     ///
     /// # Errors
-    /// [`Error::NotEvaluated`], [`Error::NotAnEvaluation`], [`Error::Version`], [`Error::NoSuchPath`],
-    /// [`Error::File`].
+    /// [`Error::NotEvaluated`], [`Error::NotAnEvaluation`], [`Error::Version`], [`Error::File`].
     pub fn collect(paths: &[PathBuf]) -> Result<Vec<Self>> {
         let mut all = Vec::new();
         let mut digests = HashMap::new();

@@ -17,6 +17,7 @@ mod runs;
 mod saved;
 mod table;
 
+pub use deepfusion_fs::FileError;
 pub use error::{Error, EvaluationProblem, PublishedProblem, Result};
 pub use evaluation::{Evaluation, Origin};
 pub use metric_scale::{LEAST_IMAGES, LEAST_STEPS, MetricScale, TRUSTED_WITHIN, Verdict};

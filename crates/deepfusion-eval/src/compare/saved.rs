@@ -217,7 +217,7 @@ impl SavedEvaluation {
 /// SHA-256 of a file's bytes, in hexadecimal.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`] or [`Error::File`] naming the file.
+/// [`Error::File`] naming the file.
 pub fn sha256_of_file(path: &Path) -> Result<String> {
     let failed = |e| Error::file(path, e);
     let mut file = std::fs::File::open(path).map_err(failed)?;

@@ -61,7 +61,7 @@ pub enum ArrayProblem {
 
 impl ArrayProblem {
     /// What to do about it, if there is something.
-    pub(super) fn remedy(&self) -> Option<&'static str> {
+    pub(super) fn hint(&self) -> Option<&'static str> {
         match self {
             Self::NotArrays => Some(
                 "write it with numpy.savez (arrays with names) or numpy.save (N×H×W in split order)",

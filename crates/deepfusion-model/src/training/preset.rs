@@ -62,7 +62,7 @@ pub enum Compute {
 
 /// Fewer steps than this teach a network from scratch hardly anything, however short the drive: on 154 frames, 1,200
 /// steps of `light` came to an abs_rel of 0.24 to 0.26 on another street, where 20 epochs would be 240 steps of twelve
-/// (docs/BENCHMARKS.md).
+/// (docs/benchmarks/kitti.md).
 const MIN_STEPS: usize = 1200;
 
 impl Preset {

@@ -381,7 +381,7 @@ impl TrainConfig {
             }
             "attention" => {
                 // Not the paper's product, which starts at a quarter of the feature: from scratch it cost 7 to 9 % of
-                // abs_rel at 1,000 steps (docs/BENCHMARKS.md).
+                // abs_rel at 1,000 steps (docs/benchmarks/paper.md).
                 net.attention.get_or_insert(AttentionConfig {
                     form: AttentionForm::Residual,
                     ..AttentionConfig::default()

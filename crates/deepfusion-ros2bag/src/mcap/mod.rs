@@ -66,7 +66,7 @@ impl McapFile {
     /// Opens a file by its summary; without one, by reading all of it.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::NoSuchPath`]; [`Error::Storage`] for a file of another kind.
+    /// [`Error::File`]; [`Error::Storage`] for a file of another kind.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let failed = |e| Error::file(path, e);
         let file = File::open(path).map_err(failed)?;

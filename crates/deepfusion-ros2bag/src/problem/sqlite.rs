@@ -15,7 +15,7 @@ pub(super) fn said(e: &rusqlite::Error) -> String {
 }
 
 /// What to do about it.
-pub(super) fn remedy(e: &rusqlite::Error) -> &'static str {
+pub(super) fn hint(e: &rusqlite::Error) -> &'static str {
     match e.sqlite_error_code() {
         Some(ErrorCode::NotADatabase) => "give the recording's own .db3 file",
         Some(ErrorCode::DatabaseCorrupt) => "copy the file again",

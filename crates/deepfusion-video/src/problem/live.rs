@@ -66,7 +66,7 @@ fn ended(code: Option<i32>) -> String {
 }
 
 impl LiveProblem {
-    pub(crate) fn remedy(&self) -> &'static str {
+    pub(crate) fn hint(&self) -> &'static str {
         match self {
             Self::CameraNumber => {
                 "`ffmpeg -list_devices true -f dshow -i dummy` lists them: camera:NAME"

@@ -40,7 +40,7 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
         device: chosen.to_string(),
         wrong,
         of: found.operations.len(),
-        remedy: remedy(&found.good_for()),
+        hint: hint(&found.good_for()),
     }
     .into())
 }
@@ -90,7 +90,7 @@ fn line(check: &OperationCheck) -> String {
 }
 
 /// What to do without on a device.
-fn remedy(good_for: &DeviceUse) -> String {
+fn hint(good_for: &DeviceUse) -> String {
     match good_for {
         DeviceUse::Nothing => {
             "use `--device cpu`: depth would not be what was trained; another backend or a newer driver may be right".into()
@@ -125,9 +125,9 @@ mod tests {
 
     #[test]
     fn what_to_do_without_is_said_in_options() {
-        assert!(remedy(&DeviceUse::Nothing).contains("--device cpu"));
-        assert!(remedy(&DeviceUse::Prediction).starts_with("predict on it"));
-        let of = |parts: &[NeededBy]| remedy(&DeviceUse::TrainingWithout(parts.to_vec()));
+        assert!(hint(&DeviceUse::Nothing).contains("--device cpu"));
+        assert!(hint(&DeviceUse::Prediction).starts_with("predict on it"));
+        let of = |parts: &[NeededBy]| hint(&DeviceUse::TrainingWithout(parts.to_vec()));
         assert_eq!(
             of(&[NeededBy::Flow, NeededBy::Affine]),
             "train on it with `--without flow`, `--without affine`"

@@ -55,7 +55,7 @@ fn text(machine: &Machine) -> String {
             "for a GPU, build with --features vulkan, wgpu, cuda or metal".into(),
         );
     }
-    for (name, tool, remedy) in [
+    for (name, tool, hint) in [
         (
             "ffmpeg",
             &machine.ffmpeg,
@@ -71,7 +71,7 @@ fn text(machine: &Machine) -> String {
         if tool.is_found() {
             line(name, tool.to_string());
         } else {
-            line(name, format!("not usable: {tool} ({remedy})"));
+            line(name, format!("not usable: {tool} ({hint})"));
         }
     }
     line(

@@ -53,7 +53,7 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     };
     options.camera_ahead_s = clocks::seconds_of(args.clock_offset, path, &options)?;
     let diagnosis = doctor_with(path, &options).unwrap_or_else(|error| {
-        Diagnosis::unopened(error.message(), error.remedy()).with_log_within(path)
+        Diagnosis::unopened(error.message(), error.hint_in_options()).with_log_within(path)
     });
     let diagnosis = in_options(diagnosis);
     show(&diagnosis, args)?;
@@ -171,7 +171,7 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
         if let Some(figure) = &finding.figure {
             let _ = writeln!(text, "  measured: {figure}");
         }
-        let _ = writeln!(text, "  remedy: {}", finding.remedy);
+        let _ = writeln!(text, "  remedy: {}", finding.hint);
     }
     let number = |severity: Severity| count_of(diagnosis.count(severity), &severity.to_string());
     let _ = writeln!(

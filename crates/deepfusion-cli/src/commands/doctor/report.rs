@@ -25,7 +25,7 @@ pub(super) fn write(
             vec![
                 format!("{} [{}] {}", finding.severity, finding.check, finding.what),
                 figure.unwrap_or_default(),
-                finding.remedy.clone(),
+                finding.hint.clone(),
                 drive.unwrap_or_default().to_owned(),
                 finding.frame.map(|n| n.to_string()).unwrap_or_default(),
             ]

@@ -6,13 +6,13 @@ use deepfusion_jobs::bulk::ImageWarning;
 pub(super) fn print(warning: ImageWarning) {
     match warning {
         ImageWarning::AssumedCamera { calibration } => {
-            let remedy = match calibration {
+            let hint = match calibration {
                 Some(file) => format!("is this its calibration? --calib {}", file.display()),
                 None => "give --intrinsics, --hfov or --calib".into(),
             };
             tracing::warn!(
                 "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
-                 only as right as that is (camera_known: false; {remedy})"
+                 only as right as that is (camera_known: false; {hint})"
             );
         }
         ImageWarning::LearnedCamera => tracing::warn!(

@@ -11,6 +11,7 @@ use crate::formats::layout::Layout;
 use crate::{ConfigProblem, Error, Mount, NamedTopic, OpenOptions, Result, TopicRole};
 use deepfusion_hint::count_of;
 use std::fmt::Write as _;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -60,9 +61,7 @@ pub fn write_bag_config(
 /// The bag's own file, which no other bag of its folder reads.
 fn target(bag: &Path) -> Result<PathBuf> {
     let first = BagConfig::candidates(bag).into_iter().next();
-    first.ok_or_else(|| Error::NoSuchPath {
-        path: bag.to_owned(),
-    })
+    first.ok_or_else(|| Error::file(bag, ErrorKind::NotFound.into()))
 }
 
 /// The text of a bag's file.

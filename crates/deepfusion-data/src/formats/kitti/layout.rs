@@ -77,7 +77,7 @@ impl Drive {
 /// in order of their names. None where there is no drive.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], [`Error::File`].
+/// [`Error::File`].
 pub fn find_drives(path: &Path) -> Result<Vec<Drive>> {
     // `.` and links have names too once they are resolved: the drive's and the date's are needed.
     let root = path.canonicalize().map_err(|e| Error::file(path, e))?;

@@ -20,7 +20,7 @@ pub(super) fn file(path: &Path) -> FoundInstead {
 /// A folder without a recording; it is read, and those in it, without what is hidden.
 ///
 /// # Errors
-/// [`Error::File`], [`Error::NoSuchPath`].
+/// [`Error::File`].
 pub(super) fn folder(folder: &Path) -> Result<FoundInstead> {
     let mut kinds = BTreeMap::new();
     let (mut files, mut first) = (0_usize, None);

@@ -28,7 +28,7 @@ impl Dataset {
     /// read with this one stands among the [warnings](Self::warnings) of the first ([`Self::passed_over`]).
     ///
     /// # Errors
-    /// [`Error::UnknownLayout`] where no layout fits, [`Error::FolderOfRecordings`], [`Error::NoSuchPath`], [`Error::Missing`]
+    /// [`Error::UnknownLayout`] where no layout fits, [`Error::FolderOfRecordings`], [`Error::File`], [`Error::Missing`]
     /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
     /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
     /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
@@ -47,7 +47,7 @@ impl Dataset {
     /// The layout in which [`Self::open`] reads what is at a path, found without opening it.
     ///
     /// # Errors
-    /// [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::NoSuchPath`], [`Error::Config`], [`Error::SeveralVersions`].
+    /// [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::File`], [`Error::Config`], [`Error::SeveralVersions`].
     pub fn kind_at(path: &Path) -> Result<DatasetKind> {
         Ok(Layout::of(path)?.kind())
     }
@@ -88,7 +88,7 @@ impl Layout {
     /// The first layout that fits.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::SeveralVersions`].
+    /// [`Error::File`], [`Error::UnknownLayout`], [`Error::FolderOfRecordings`], [`Error::SeveralVersions`].
     pub(crate) fn of(path: &Path) -> Result<Self> {
         if let Some(layout) = Self::known(path)? {
             return Ok(layout);

@@ -38,7 +38,7 @@ pub(crate) struct TableFolder {
 /// The data set at a path: its root, or the folder of its tables.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], [`Error::File`]; [`Error::SeveralVersions`] for a root with several folders of tables.
+/// [`Error::File`]; [`Error::SeveralVersions`] for a root with several folders of tables.
 pub(crate) fn find(path: &Path) -> Result<Option<TableFolder>> {
     let folder = path.canonicalize().map_err(|e| Error::file(path, e))?;
     if !folder.is_dir() {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// look at both: a part of a data set is often a link to another disk.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], [`Error::File`].
+/// [`Error::File`].
 fn both_names(path: &Path) -> Result<Vec<PathBuf>> {
     let real = path.canonicalize().map_err(|e| Error::file(path, e))?;
     let given = std::path::absolute(path).ok();

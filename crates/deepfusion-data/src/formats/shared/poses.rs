@@ -26,7 +26,7 @@ pub(crate) fn motion_of_rows(numbers: &[f64]) -> Option<Se3> {
 /// The lines of a file of poses, each of `columns` finite numbers; with the line's number, counted from 1. Empty lines are skipped.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Pose`] with line and column.
+/// [`Error::File`]; [`Error::Pose`] with line and column.
 pub(crate) fn rows_of_numbers(path: &Path, columns: usize) -> Result<Vec<(usize, Vec<f64>)>> {
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
     let text = String::from_utf8_lossy(&bytes);

@@ -17,7 +17,7 @@ use super::DemoSettings;
 use crate::Result;
 use crate::training::Start;
 
-/// Added to the demo's seed. What learning adds differs from street to street: docs/BENCHMARKS.md.
+/// Added to the demo's seed. What learning adds differs from street to street: docs/benchmarks/demo.md.
 const STREET_SEED: u64 = 21;
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
 const FRAMES: usize = 200;
