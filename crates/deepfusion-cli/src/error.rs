@@ -306,7 +306,7 @@ impl Reportable for CliError {
                 Some(hint) => format!("{hint}; then {}", again(*resumes)),
                 None => format!("mend them, then {}", again(*resumes)),
             }),
-            Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
+            Self::Unfit { .. } => Some("each finding above has its hint; --verbose prints every figure".into()),
             Self::Unreadable { unreadable, recordings, hint, .. } => Some(format!(
                 "each is listed with its reason; {}{}",
                 hint.as_deref().unwrap_or("mend them"),

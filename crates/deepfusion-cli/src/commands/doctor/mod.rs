@@ -171,7 +171,7 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
         if let Some(figure) = &finding.figure {
             let _ = writeln!(text, "  measured: {figure}");
         }
-        let _ = writeln!(text, "  remedy: {}", finding.hint);
+        let _ = writeln!(text, "  hint: {}", finding.hint);
     }
     let number = |severity: Severity| count_of(diagnosis.count(severity), &severity.to_string());
     let _ = writeln!(

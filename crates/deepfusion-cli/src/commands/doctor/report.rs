@@ -35,7 +35,7 @@ pub(super) fn write(
     report = if rows.is_empty() {
         report.paragraph("None: every figure keeps to its limit.")
     } else {
-        report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows)
+        report.table(&["finding", "measured", "hint", "drive", "frame"], &rows)
     };
     let rows = lines::rows(diagnosis).into_iter();
     let rows: Vec<Vec<String>> = rows
