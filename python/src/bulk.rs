@@ -15,9 +15,10 @@ use pyo3::exceptions::{PyException, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
 
-use crate::camera::AskedCamera;
+use crate::camera::{AskedCamera, AssumedCamera};
 use crate::error::{Failure, raise};
-use crate::model::{AssumedCamera, Prediction, Source};
+use crate::image::Source;
+use crate::prediction::Prediction;
 
 /// What is asked of the network.
 pub(crate) struct BulkRequest {

@@ -1,10 +1,12 @@
 //! Cameras as Python gives them.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use deepfusion::geometry::{HFOV_DEG, Intrinsics};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::error::Failure;
+use crate::error::{Failure, warn};
 
 /// Four numbers, or a matrix.
 pub(crate) enum GivenCamera {
@@ -117,5 +119,23 @@ impl AskedCamera {
             Self::Numbers(numbers) => checked(numbers, size).map(Some),
             Self::View(degrees) => Ok(Some(Intrinsics::from_hfov(degrees, size))),
         }
+    }
+}
+
+/// Whether Python was warned that the camera of an image is not known.
+#[derive(Default)]
+pub(crate) struct AssumedCamera(AtomicBool);
+
+impl AssumedCamera {
+    /// Once for all images of a network.
+    pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
+        if self.0.swap(true, Ordering::Relaxed) {
+            return Ok(());
+        }
+        warn(
+            py,
+            "nothing says the camera of an image: the lens of the training camera is assumed, and the metres are as right as that; \
+             give intrinsics, or hfov_deg",
+        )
     }
 }

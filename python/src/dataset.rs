@@ -16,10 +16,10 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PySlice};
 
+use crate::arrays::image_array;
 use crate::camera::GivenCamera;
 use crate::error::{Failure, raise, warn, with_hint};
 use crate::interrupt::abandonable;
-use crate::model::image_array;
 use crate::opening::{Opening, absolute};
 
 /// What pickle calls, and with what.

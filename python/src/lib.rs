@@ -1,17 +1,20 @@
 //! The Python module `deepfusion._native`. `deepfusion/__init__.py` is what people import; `_native.pyi` has the types.
 
 mod adapt;
+mod arrays;
 mod bulk;
 mod camera;
 mod command;
 mod dataset;
 mod device;
 mod error;
+mod image;
 mod interrupt;
 mod measure;
 mod model;
 mod opening;
 mod perceive;
+mod prediction;
 mod train;
 
 use pyo3::prelude::*;
@@ -33,9 +36,11 @@ mod _native {
     #[pymodule_export]
     use super::measure::{Evaluation, doctor, simulate};
     #[pymodule_export]
-    use super::model::{Model, Prediction, load, networks};
+    use super::model::{Model, load, networks};
     #[pymodule_export]
     use super::perceive::Perception;
+    #[pymodule_export]
+    use super::prediction::Prediction;
     #[pymodule_export]
     use super::train::train;
 

@@ -17,8 +17,8 @@ use pyo3::prelude::*;
 use crate::camera::GivenCamera;
 use crate::error::{Failure, raise, with_hint};
 use crate::interrupt::{Stop, abandonable, interruptible};
-use crate::model::Prediction;
 use crate::opening::Opening;
+use crate::prediction::Prediction;
 
 /// Compares predictions with ground truth, one image at a time.
 #[pyclass(frozen, module = "deepfusion._native")]

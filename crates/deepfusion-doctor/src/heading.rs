@@ -6,9 +6,8 @@
 
 use super::epipolar::{self, EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
-use super::no_heading::NoHeading;
 use super::reason::{CameraReason, HeadingAngle};
-use super::skip::{CameraSkip, UnsureHeading};
+use super::skip::{CameraSkip, NoHeading, UnsureHeading};
 use super::survey::Survey;
 use deepfusion_data::{Dataset, Heading};
 use nalgebra::Vector2;

@@ -23,7 +23,6 @@ mod image_quality;
 mod intrinsics;
 mod lidar_speed;
 mod log;
-mod no_heading;
 mod opening;
 mod parallax;
 mod plots;
@@ -49,7 +48,6 @@ pub use depth_pictures::{DepthPicture, depth_pictures};
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use heading::heading;
 pub use log::{doctor_log, is_log};
-pub use no_heading::NoHeading;
 pub use plots::{DrivePlots, Line};
 pub use reason::{
     CameraReason, CentreCoordinate, FindingReason, FramesReason, HeadingAngle, ImageSide,
@@ -59,7 +57,8 @@ pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
 pub use seen_turns::seen_turns;
 pub use shared_error::SharedError;
 pub use skip::{
-    CameraSkip, ClockSkip, FramesSkip, LogSkip, MotionSkip, PicturesSkip, SkipReason, UnsureHeading,
+    CameraSkip, ClockSkip, FramesSkip, LogSkip, MotionSkip, NoHeading, PicturesSkip, SkipReason,
+    UnsureHeading,
 };
 pub use summary::CheckSummary;
 

@@ -7,7 +7,7 @@ mod log;
 mod motion;
 mod pictures;
 
-pub use self::camera::{CameraSkip, UnsureHeading};
+pub use self::camera::{CameraSkip, NoHeading, UnsureHeading};
 pub use self::clock::ClockSkip;
 pub use self::frames::FramesSkip;
 pub use self::log::LogSkip;

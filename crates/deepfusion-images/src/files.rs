@@ -1,4 +1,4 @@
-//! Images from files and to them.
+//! Images from files and to them, and which files are images.
 
 use super::jpeg;
 use crate::{Error, ImageProblem, Result};
@@ -6,6 +6,16 @@ use image::{DynamicImage, ImageError, ImageFormat, ImageReader, ImageResult, Rgb
 use std::fs::File;
 use std::io::{BufRead, BufWriter, Cursor, Seek};
 use std::path::Path;
+
+/// Endings of the files that are taken for images, in small letters.
+pub const IMAGE_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// Whether a file is named like an image.
+#[must_use]
+pub fn is_image(path: &Path) -> bool {
+    let ending = path.extension().and_then(|e| e.to_str());
+    ending.is_some_and(|e| IMAGE_ENDINGS.contains(&e.to_ascii_lowercase().as_str()))
+}
 
 /// Reads a PNG or JPEG, told apart by content, as 8-bit RGB. Grey becomes RGB, 16 bits become 8, an
 /// alpha channel is left out.
@@ -132,5 +142,22 @@ fn write_failed(path: &Path, error: ImageError) -> Error {
     match error {
         ImageError::IoError(source) => Error::file(path, source),
         other => Error::file(path, std::io::Error::other(other)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn endings_of_either_case_are_known() {
+        for (name, image) in [
+            ("a/0.PNG", true),
+            ("0.jpeg", true),
+            ("0.png.json", false),
+            ("png", false),
+        ] {
+            assert_eq!(is_image(Path::new(name)), image, "{name}");
+        }
     }
 }

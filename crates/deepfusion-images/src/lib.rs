@@ -5,7 +5,6 @@
 //! gives the network's numbers, [`read_depth_png`] and [`write_depth_png`] read and write depth as KITTI does.
 
 mod depth_png;
-mod endings;
 mod error;
 mod exif_camera;
 mod files;
@@ -16,10 +15,11 @@ mod resize;
 
 pub use deepfusion_fs::FileError;
 pub use depth_png::{read_depth_png, write_depth_png};
-pub use endings::{IMAGE_ENDINGS, is_image};
 pub use error::{Error, ImageProblem, Result};
 pub use exif_camera::{ExifCamera, exif_block_camera, exif_camera};
-pub use files::{decode, decode_bytes, decode_rgb, image_size, load_rgb, save_png};
+pub use files::{
+    IMAGE_ENDINGS, decode, decode_bytes, decode_rgb, image_size, is_image, load_rgb, save_png,
+};
 pub use image::RgbImage;
 pub use photo::{Photo, load_photo};
 pub use resize::{resize_rgb, to_chw, to_network_input};

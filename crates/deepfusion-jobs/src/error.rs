@@ -6,16 +6,14 @@ use deepfusion_runtime::Precision;
 
 use crate::bulk::Shard;
 
-mod camera;
 #[cfg(feature = "train")]
 mod contradiction;
 mod hint;
 mod reasons;
 
-pub use self::camera::UnfitCamera;
 #[cfg(feature = "train")]
 pub use self::contradiction::{Contradiction, RequestedValue, RunHas, Setting};
-pub use self::reasons::{NoMean, OtherJob, StaleReason};
+pub use self::reasons::{NoMean, OtherJob, StaleReason, UnfitCamera};
 
 /// What can go wrong with work over recordings and folders.
 #[derive(Debug, thiserror::Error)]

@@ -1,3 +1,6 @@
+//! How files are written, and under which names.
+
+use std::collections::HashSet;
 use std::path::Path;
 
 use deepfusion_data::Error as DataError;
@@ -5,4 +8,31 @@ use deepfusion_data::Error as DataError;
 /// Writes a file, whole or not at all.
 pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), DataError> {
     deepfusion_fs::write(path, bytes).map_err(|e| DataError::file(path, e))
+}
+
+/// Names for outputs of which no two are the same, not even to a file system for which `A` is `a`.
+#[derive(Debug, Default)]
+pub(crate) struct UniqueNames {
+    lowercase: HashSet<String>,
+}
+
+impl UniqueNames {
+    /// This name, with a number where it is taken: `a`, `a-2`, `a-3`.
+    pub(crate) fn take(&mut self, name: &str) -> String {
+        self.take_if(name, |_| true)
+    }
+
+    /// The same, among the names that `free` allows in small letters.
+    pub(crate) fn take_if(&mut self, name: &str, free: impl Fn(&str) -> bool) -> String {
+        let mut candidate = name.to_owned();
+        let mut number = 1;
+        loop {
+            let lowercase = candidate.to_lowercase();
+            if free(&lowercase) && self.lowercase.insert(lowercase) {
+                return candidate;
+            }
+            number += 1;
+            candidate = format!("{name}-{number}");
+        }
+    }
 }

@@ -10,7 +10,7 @@ use deepfusion_fs::{absolute, natural_order};
 use deepfusion_images::is_image;
 use deepfusion_video::is_video;
 
-use crate::unique_names::UniqueNames;
+use crate::files::UniqueNames;
 use crate::{Error, Result};
 
 /// An image, and what its outputs are called.

@@ -90,7 +90,6 @@ mod stale_calibration;
 mod target_finder;
 #[cfg(feature = "train")]
 pub mod training;
-mod unique_names;
 pub mod verdict;
 
 pub use error::{Error, NoMean, OtherJob, Result, StaleReason};

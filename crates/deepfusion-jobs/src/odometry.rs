@@ -1,7 +1,5 @@
 //! The pose network's motions, chained, beside the drives' true paths.
 
-mod warning;
-
 use std::path::Path;
 
 use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind};
@@ -12,11 +10,8 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_render::TopView;
 use deepfusion_train::PosePredictor;
 
-pub use self::warning::OdometryWarning;
-
 use crate::Result;
-use crate::files::write;
-use crate::unique_names::UniqueNames;
+use crate::files::{UniqueNames, write};
 
 /// Exact poses of simulated drives.
 const EXACT_POSES: &str = "poses.txt";
@@ -24,6 +19,22 @@ const EXACT_POSES: &str = "poses.txt";
 const PAIRS: usize = 8;
 /// Another focal length than the one trained with, at network size, by more than this share is a warning.
 const FOCAL_TOLERANCE: f64 = 0.05;
+
+/// By what a path of the pose network may be wrong.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OdometryWarning {
+    /// The network sees pixels, and another focal length shows it another motion.
+    #[error(
+        "{drive}: its focal length is {ratio:.2} times the one trained with, at network size; poses are not corrected for it"
+    )]
+    OtherFocalLength {
+        /// The drive's name.
+        drive: String,
+        /// Its focal length over the one trained with, both at the network's size.
+        ratio: f64,
+    },
+}
 
 /// A track for each stretch of the recordings without a gap, and in words what their truth is. `progress` takes the frames seen and in
 /// all, `warn` by what a drive's path may be wrong.
@@ -180,4 +191,21 @@ fn focal_ratio(predictor: &PosePredictor, dataset: &Dataset) -> Option<f64> {
     let at_network_size = |k: Intrinsics| k.resized(size.width as u32, size.height as u32);
     let here = at_network_size(dataset.intrinsics(frame));
     Some(here.fx / at_network_size(train).fx)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_focal_length_is_said_as_a_ratio() {
+        let warning = OdometryWarning::OtherFocalLength {
+            drive: "park".into(),
+            ratio: 1.234,
+        };
+        assert_eq!(
+            warning.to_string(),
+            "park: its focal length is 1.23 times the one trained with, at network size; poses are not corrected for it"
+        );
+    }
 }

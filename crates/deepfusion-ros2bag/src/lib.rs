@@ -13,7 +13,6 @@
 //! need. Without that feature a `.db3` is an [`Error::Feature`](deepfusion_rosbag::Error::Feature).
 
 mod bag;
-mod damage;
 mod mcap;
 mod metadata;
 mod packed;
@@ -22,8 +21,7 @@ mod problem;
 mod sqlite;
 mod storage;
 
-pub use bag::{Ros2Bag, is_ros2_bag};
-pub use damage::{BagDamage, FileDamage};
+pub use bag::{BagDamage, FileDamage, Ros2Bag, is_ros2_bag};
 pub use mcap::{ChunkProblem, McapDamage, McapProblem, RecordProblem};
 pub use packed::PackedProblem;
 pub use problem::StorageProblem;

@@ -1,12 +1,10 @@
 //! SQLite files (`.db3`), in which every message is a row.
 
-mod damage;
 mod rows;
-
-pub use self::damage::DatabaseDamage;
 
 use crate::problem::StorageProblem;
 use crate::storage::{Channel, MOST_BYTES, Storage, hull};
+use deepfusion_hint::count_of;
 use deepfusion_rosbag::{Error, MessageIter, Result, Selection, SourceDamage, Time};
 use rows::{Key, Rows};
 use rusqlite::limits::Limit;
@@ -14,6 +12,20 @@ use rusqlite::{Connection, ErrorCode, OpenFlags};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
+
+/// What is wrong with a database that is read as far as it goes.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error(
+    "the database is damaged ({reason}); {} {} found",
+    count_of(*messages, "message"),
+    if *messages == 1 { "was" } else { "were" }
+)]
+pub struct DatabaseDamage {
+    /// What SQLite said.
+    pub reason: Arc<rusqlite::Error>,
+    /// How many messages were found all the same.
+    pub messages: usize,
+}
 
 /// A database of messages, open for reading.
 pub(crate) struct SqliteFile {

@@ -1,13 +1,11 @@
 use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
-mod no_stereo;
 mod samples;
 mod stopped;
 
-pub use self::no_stereo::NoStereo;
 pub(crate) use self::samples::MOST_SIGMA_SHARE;
-pub use self::samples::{SampleProblem, SharedFrames, Skipped};
+pub use self::samples::{NoStereo, SampleProblem, SharedFrames, Skipped};
 pub use self::stopped::{LoaderProblem, ThreadsProblem, WorkersProblem};
 
 /// What can go wrong while learning.

@@ -1,12 +1,10 @@
 //! What can be wrong with a program, and with what it reads.
 
-mod camera_mode;
 mod live;
 mod packet;
 
-pub use self::camera_mode::CameraModeProblem;
 pub(crate) use self::live::quoted;
-pub use self::live::{LiveFrameProblem, LiveProblem, SourceKind};
+pub use self::live::{CameraModeProblem, LiveFrameProblem, LiveProblem, SourceKind};
 pub use self::packet::PacketProblem;
 
 use deepfusion_hint::{Hint, count_of};

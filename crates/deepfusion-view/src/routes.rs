@@ -18,7 +18,7 @@ use deepfusion_hint::Hint;
 use deepfusion_render::{ColourMap, DepthScale};
 use serde::Serialize;
 
-use crate::folder::{FrameFile, Track, frame_json, picture_of, targets_of};
+use crate::folder::{FrameFile, Track, details_of, picture_of, targets_of};
 use crate::http::{Request, Response};
 use crate::{DepthFile, Error, Folder, FolderKind, assets, training};
 
@@ -157,7 +157,7 @@ fn depth_colours(scale: &DepthScale) -> Vec<[u8; 3]> {
 fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
     let (path, training) = (folder.path(), folder.kind() == FolderKind::Training);
     match rest {
-        ["index"] if !training => Response::json(&folder.index_json(request.number("known"))),
+        ["index"] if !training => Response::json(&folder.index(request.number("known"))),
         ["tracks"] if !training => {
             let from = request.number("from").unwrap_or(0) as usize;
             let count = request.number("count").unwrap_or(1).min(MOST_TRACK_FRAMES) as usize;
@@ -169,7 +169,7 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
             match folder.entry(name) {
                 None => Response::problem(404, &format!("there is no frame {name}"), None),
                 Some(entry) => match *what {
-                    "frame" => Response::json(&frame_json(path, &entry)),
+                    "frame" => Response::json(&details_of(path, &entry)),
                     "depth" => map(
                         path,
                         entry.depth.as_ref(),

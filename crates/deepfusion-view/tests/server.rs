@@ -86,6 +86,46 @@ fn a_frame_has_its_camera_targets_and_picture() {
     assert_eq!(index["series"]["problem"], json!([null, null]));
 }
 
+fn keys(object: &Value) -> String {
+    let object = object.as_object().unwrap();
+    object
+        .keys()
+        .map(String::as_str)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[test]
+fn what_is_not_known_of_a_frame_is_left_out_or_null() {
+    let folder = results(2);
+    for file in ["000001.json", "000001_image.png", "000001_targets.json"] {
+        std::fs::remove_file(folder.path().join(file)).unwrap();
+    }
+    let server = Running::start(folder.path(), None);
+    let whole = server.json("/api/runs/0/frame/000000");
+    assert_eq!(
+        keys(&whole),
+        "depth depth_m focal_factor image intrinsics intrinsics_from name picture problems revision scale_trusted targets unit window"
+    );
+    assert_eq!(keys(&whole["picture"]), "path size");
+    let poor = server.json("/api/runs/0/frame/000001");
+    assert_eq!(keys(&poor), "depth name problems revision targets");
+    assert_eq!(poor["targets"], Value::Null);
+    let index = server.json("/api/runs/0/index");
+    assert_eq!(
+        keys(&index),
+        "failure has_depth has_sigma names pending revisions series version"
+    );
+    assert_eq!(
+        keys(&index["series"]),
+        "far_m latency_ms near_m nearest_m problem scale_ratio scale_state speed_mps targets time_s time_to_collision_s"
+    );
+    assert_eq!(index["series"]["targets"], json!([1, null]));
+    let version = index["version"].as_u64().unwrap();
+    let known = server.json(&format!("/api/runs/0/index?known={version}"));
+    assert_eq!(known, json!({"unchanged": true, "version": version}));
+}
+
 #[test]
 fn the_watch_over_the_metres_is_shown_of_predictions_too() {
     let folder = results(2);

@@ -1,6 +1,6 @@
 //! What every layout becomes: a [`Dataset`] of [`Frame`]s, with [`Snippet`]s to train on.
 //!
-//! `recording` is what a layout has to offer, `drive` what is made of it; `ego` says how the camera moved, `split` and `selection` which
+//! `recording` and `parts` are what a layout has to offer, `drive` what is made of it; `ego` says how the camera moved, `split` and `selection` which
 //! frames are meant, `inspection` what is there, `warning` what is unsure about it.
 
 mod camera;
@@ -13,6 +13,7 @@ mod inspection;
 mod inspection_text;
 mod kind;
 mod options;
+mod parts;
 mod recording;
 mod seen_turn;
 pub(crate) mod selection;
@@ -24,7 +25,7 @@ mod warning;
 
 pub use camera::{Camera, Cameras, NoSuchCamera};
 pub use coverage::SplitCoverage;
-pub use drive::{Dataset, DatasetParts};
+pub use drive::Dataset;
 pub use ego::{Ego, EgoMotion, NoMotion, Receiver};
 pub use frame::{Frame, FrameImage};
 pub use heading::Heading;
@@ -35,6 +36,7 @@ pub use inspection::{
 pub use kind::DatasetKind;
 pub use options::OpenOptions;
 pub(crate) use options::numbers_of_hfov;
+pub use parts::DatasetParts;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
 pub use seen_turn::SeenTurn;
 pub use snippet::{Snippet, Source, hold_out};

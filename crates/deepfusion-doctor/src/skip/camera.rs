@@ -1,8 +1,7 @@
 //! Why nothing shows where the camera looks.
 
-use crate::no_heading::NoHeading;
 use crate::reason::HeadingAngle;
-use deepfusion_hint::count_of;
+use deepfusion_hint::{Hint, count_of};
 use std::fmt;
 
 /// Why nothing shows where the camera looks.
@@ -75,6 +74,26 @@ impl fmt::Display for UnsureHeading {
 fn together(unsure: &[UnsureHeading]) -> String {
     let unsure: Vec<String> = unsure.iter().map(UnsureHeading::to_string).collect();
     unsure.join(", ")
+}
+
+/// Why images do not show where a camera heads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{} straight ahead, {needed} are needed", count_of(*straight, "pair"))]
+#[non_exhaustive]
+pub struct NoHeading {
+    /// Pairs of them that were taken driving straight ahead.
+    pub straight: usize,
+    /// How many are needed.
+    pub needed: usize,
+}
+
+impl Hint for NoHeading {
+    fn hint(&self) -> Option<String> {
+        Some(
+            "give a drive with more of it straight ahead, or the camera's place on the vehicle"
+                .into(),
+        )
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use deepfusion_video::{VideoPicture, shown_for, write_video};
 
 use super::manifest::Manifest;
-use crate::unique_names::UniqueNames;
+use crate::files::UniqueNames;
 use crate::{Error, Input, Result};
 
 /// What the name of a video ends with.

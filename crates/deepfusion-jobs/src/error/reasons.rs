@@ -1,7 +1,8 @@
 //! In what something differs from what it has to be.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use deepfusion_geometry::ImplausibleCamera;
 use deepfusion_hint::count_of;
 use deepfusion_records::Difference;
 
@@ -97,5 +98,35 @@ impl std::fmt::Display for NoMean {
                 write!(f, "{key} is {found}, and {first} in the first network")
             }
         }
+    }
+}
+
+/// Why a camera cannot be an image's.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnfitCamera {
+    /// No camera is like that.
+    #[error(transparent)]
+    Implausible(ImplausibleCamera),
+    /// It is that of images of another size.
+    #[error("{}", other_size(file.as_deref(), *made_for, *image))]
+    OtherSize {
+        /// The calibration's file, where it is one for a lens.
+        file: Option<PathBuf>,
+        /// Width and height of its images.
+        made_for: (u32, u32),
+        /// Those of this one.
+        image: (u32, u32),
+    },
+}
+
+fn other_size(file: Option<&Path>, made_for: (u32, u32), image: (u32, u32)) -> String {
+    let ((width, height), (w, h)) = (made_for, image);
+    match file {
+        None => format!("the calibration is for {width}x{height}, the image has {w}x{h}"),
+        Some(file) => format!(
+            "{} is for images of {width}x{height}, this one has {w}x{h}",
+            file.display()
+        ),
     }
 }

@@ -2,7 +2,6 @@
 
 mod chosen_images;
 mod comparison;
-mod comparison_page;
 pub mod confidence;
 mod coverage;
 mod division;
@@ -30,10 +29,9 @@ use crate::{Error, Result, files};
 
 pub use self::chosen_images::{ChosenImage, Standing, chosen_images};
 pub use self::comparison::Comparison;
-pub use self::comparison_page::comparison_page;
 pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
 pub use self::measurement::{Measurement, MeasurementRequest};
-pub use self::model_sheet::ModelSheet;
+pub use self::model_sheet::{ModelSheet, comparison_page};
 pub use self::outcome::EvaluationOutcome;
 pub use self::page::{EvaluationPage, MeasuredDepth};
 pub use self::saved::EvaluationRequest;

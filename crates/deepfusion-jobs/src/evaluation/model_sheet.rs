@@ -1,16 +1,22 @@
-//! The same images by several models, side by side.
+//! Several models side by side: the same images by each, and the page of them.
+
+use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Dataset, GtKind, RgbImage};
+use deepfusion_eval::compare::Tables;
 use deepfusion_render::{
-    DepthScale, Tile, depth_picture, shrink_depth, shrink_picture, sparse_depth_picture,
+    DepthScale, HtmlReport, PictureFormat, Tile, depth_legend, depth_picture, shrink_depth,
+    shrink_picture, sparse_depth_picture,
 };
 use deepfusion_runtime::DepthEstimator;
 
 use super::predict;
-use crate::Result;
+use crate::{Result, name_of};
 
 /// Width of each picture.
 const TILE_WIDTH: u32 = 420;
+/// Width of the legend.
+const LEGEND_WIDTH: u32 = 700;
 
 /// A row an image, a column a model, with the scans at the end where there are any.
 pub struct ModelSheet<'a> {
@@ -112,4 +118,30 @@ fn spread(datasets: &[Dataset], count: usize) -> Vec<(usize, usize)> {
     (0..count)
         .map(|i| frames[(2 * i + 1) * frames.len() / (2 * count)])
         .collect()
+}
+
+/// The page of these tables of runs, with pictures of a recording where there are any ([`ModelSheet`]); `command` makes it again.
+///
+/// # Errors
+/// A picture that cannot be encoded.
+pub fn comparison_page(
+    runs: &[PathBuf],
+    tables: &Tables,
+    pictures: Option<(&Path, &[Vec<Tile>])>,
+    command: &str,
+) -> Result<HtmlReport> {
+    let names: Vec<_> = runs.iter().map(|p| name_of(p)).collect();
+    let mut page = HtmlReport::new("Depth, side by side", names.join(", ")).wide();
+    page = page.comparison(tables);
+    if let Some((recording, rows)) = pictures {
+        page = page
+            .section(&format!("Pictures of {}", name_of(recording)))
+            .picture_grid(rows)?
+            .picture(
+                "Depth in metres, the same colours in all pictures",
+                &depth_legend(LEGEND_WIDTH, &DepthScale::default()),
+                PictureFormat::Png,
+            )?;
+    }
+    Ok(page.section("Again").command(command))
 }

@@ -22,8 +22,8 @@ pub use self::report::TargetReport;
 pub use self::source::{DepthSource, PredictedDepth};
 use self::tracklets::Labels;
 use self::visibility::visibility;
+use crate::files::UniqueNames;
 use crate::scene::MotionTracker;
-use crate::unique_names::UniqueNames;
 use crate::{Error, Result};
 
 /// Looks at labelled frames, and scores the targets that it finds.

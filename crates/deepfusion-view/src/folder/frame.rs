@@ -1,5 +1,6 @@
 //! The details of one frame.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -7,8 +8,8 @@ use std::path::{Path, PathBuf};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_images::image_size;
 use deepfusion_records::PredictionRecord;
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::Value;
 
 use super::entry::Entry;
 use super::problem::FrameProblem;
@@ -34,15 +35,39 @@ const PASSED_ON: [&str; 12] = [
 
 /// A frame as the page gets it: the camera, which parts there are, the targets, and what is wrong with any of them. Everything but
 /// `name` may be missing.
-pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
-    let (mut frame, problems) = frame_and_problems(folder, entry);
-    let said: Vec<String> = problems.iter().map(FrameProblem::to_string).collect();
-    frame["problems"] = json!(said);
-    frame
+#[derive(Debug, Serialize)]
+pub(crate) struct FrameDetails {
+    /// Its file's name.
+    depth: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intrinsics: Option<Intrinsics>,
+    name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<ShownPicture>,
+    #[serde(serialize_with = "as_sentences")]
+    pub problems: Vec<FrameProblem>,
+    revision: u64,
+    /// As their file has them.
+    targets: Option<Value>,
+    /// Of the sidecar, as it has them: those of [`PASSED_ON`] that are there.
+    #[serde(flatten)]
+    passed_on: BTreeMap<&'static str, Value>,
 }
 
-/// The same, with what is wrong apart.
-pub(crate) fn frame_and_problems(folder: &Path, entry: &Entry) -> (Value, Vec<FrameProblem>) {
+/// Where a frame's picture lies, and its size.
+#[derive(Debug, Serialize)]
+struct ShownPicture {
+    path: String,
+    /// Width and height.
+    size: (u32, u32),
+}
+
+fn as_sentences<S: Serializer>(problems: &[FrameProblem], out: S) -> Result<S::Ok, S::Error> {
+    out.collect_seq(problems.iter().map(FrameProblem::to_string))
+}
+
+/// What there is of a frame.
+pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
     let SmallFiles {
         sidecar,
         targets,
@@ -51,22 +76,12 @@ pub(crate) fn frame_and_problems(folder: &Path, entry: &Entry) -> (Value, Vec<Fr
     } = SmallFiles::read(folder, entry);
     let record = sidecar.as_ref().map(|s| &s.record);
     let said_size = record.and_then(|r| r.size).map(|[w, h]| (w, h));
-    let mut frame = json!({
-        "name": entry.name,
-        "revision": entry.revision(),
-        "depth": entry.depth.as_ref().map(|d| &d.file),
-        "targets": targets.map(|t| t.json),
-    });
-    for field in PASSED_ON {
-        if let Some(value) = sidecar.as_ref().and_then(|s| s.json.get(field)) {
-            frame[field] = value.clone();
-        }
-    }
+    let (mut intrinsics, mut shown) = (None, None);
     match record.map(|r| (r.intrinsics, said_size)) {
         Some((Some(k), Some((width, height)))) => {
             let camera = Intrinsics::from_numbers(k, (width, height));
             match camera.implausible() {
-                None => frame["intrinsics"] = json!(camera),
+                None => intrinsics = Some(camera),
                 Some(why) => problems.push(FrameProblem::Camera(why)),
             }
         }
@@ -80,8 +95,10 @@ pub(crate) fn frame_and_problems(folder: &Path, entry: &Entry) -> (Value, Vec<Fr
     }
     match picture(folder, entry, record) {
         Ok(picture) => {
-            frame["picture"] =
-                json!({ "size": picture.size, "path": picture.path.display().to_string() });
+            shown = Some(ShownPicture {
+                path: picture.path.display().to_string(),
+                size: picture.size,
+            });
             match said_size.filter(|said| *said != picture.size) {
                 Some(expected) => problems.push(FrameProblem::PictureSize {
                     found: picture.size,
@@ -106,7 +123,20 @@ pub(crate) fn frame_and_problems(folder: &Path, entry: &Entry) -> (Value, Vec<Fr
         Some(_) => {}
         None => problems.push(FrameProblem::NoDepth),
     }
-    (frame, problems)
+    let said = |field: &str| sidecar.as_ref()?.json.get(field).cloned();
+    let passed_on = PASSED_ON
+        .into_iter()
+        .filter_map(|field| Some((field, said(field)?)));
+    FrameDetails {
+        depth: entry.depth.as_ref().map(|d| d.file.clone()),
+        intrinsics,
+        name: entry.name.clone(),
+        picture: shown,
+        problems,
+        revision: entry.revision(),
+        targets: targets.map(|t| t.json),
+        passed_on: passed_on.collect(),
+    }
 }
 
 /// A frame's targets, short.

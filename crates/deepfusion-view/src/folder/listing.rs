@@ -5,9 +5,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use serde_json::{Value, json};
-
 use super::entry::{Entry, FrameFile, frame_and_kind};
+use super::index::Index;
 use super::order::natural;
 use super::summary::Summary;
 
@@ -161,41 +160,9 @@ impl Listing {
         }
     }
 
-    /// The list as sent to the page: columns with one entry per frame.
-    pub(super) fn json(&self, known: Option<u64>, failure: Option<String>) -> Value {
-        let version = self.version;
-        if known == Some(version) && failure.is_none() {
-            return json!({ "version": version, "unchanged": true });
-        }
-        let column = |of: fn(&Summary) -> Value| -> Vec<Value> {
-            let values = self
-                .entries
-                .iter()
-                .map(|e| e.summary.as_ref().map_or(Value::Null, of));
-            values.collect()
-        };
-        json!({
-            "version": version,
-            "failure": failure,
-            "pending": self.entries.iter().filter(|e| e.summary.is_none()).count(),
-            "names": self.entries.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(),
-            "revisions": self.entries.iter().map(Entry::revision).collect::<Vec<_>>(),
-            "has_depth": self.entries.iter().map(|e| u8::from(e.depth.is_some())).collect::<Vec<_>>(),
-            "has_sigma": self.entries.iter().map(|e| u8::from(e.sigma.is_some())).collect::<Vec<_>>(),
-            "series": {
-                "problem": column(|s| json!(s.problem)),
-                "time_s": column(|s| json!(s.time_s)),
-                "near_m": column(|s| json!(s.depth_m.map(|d| d[0]))),
-                "far_m": column(|s| json!(s.depth_m.map(|d| d[1]))),
-                "targets": column(|s| json!(s.targets)),
-                "nearest_m": column(|s| json!(s.nearest_m)),
-                "speed_mps": column(|s| json!(s.speed_mps)),
-                "time_to_collision_s": column(|s| json!(s.time_to_collision_s)),
-                "scale_ratio": column(|s| json!(s.scale_ratio)),
-                "scale_state": column(|s| json!(s.scale_state)),
-                "latency_ms": column(|s| json!(s.latency_ms)),
-            },
-        })
+    /// The list as sent to the page; only a note that nothing changed if its `known` version is current.
+    pub(super) fn index(&self, known: Option<u64>, failure: Option<String>) -> Index {
+        Index::of(&self.entries, self.version, known, failure)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod entry;
 mod frame;
+mod index;
 mod listing;
 mod order;
 mod problem;
@@ -12,15 +13,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) use entry::{Entry, FrameFile};
-#[cfg(feature = "rerun")]
-pub(crate) use frame::frame_and_problems;
-pub(crate) use frame::{Track, frame_json, picture_of, targets_of};
+pub(crate) use frame::{Track, details_of, picture_of, targets_of};
 pub use problem::FrameProblem;
 #[cfg(feature = "rerun")]
 pub(crate) use small_files::SmallFiles;
 #[cfg(feature = "rerun")]
 pub(crate) use summary::Summary;
 
+use self::index::Index;
 use self::listing::Listing;
 use crate::training;
 use crate::{Error, FolderKind, Result};
@@ -102,12 +102,12 @@ impl Folder {
         )
     }
 
-    /// The list of frames as JSON, refreshed; only a note that nothing changed if the client's `known` version is current.
-    pub(crate) fn index_json(&self, known: Option<u64>) -> serde_json::Value {
+    /// The list of frames for a client that has the `known` version of it, refreshed.
+    pub(crate) fn index(&self, known: Option<u64>) -> Index {
         let mut listing = self.listing();
         let failure = listing.refresh().err().map(|e| e.to_string());
         listing.summarise();
-        listing.json(known, failure)
+        listing.index(known, failure)
     }
 
     /// A frame that the listing holds.

@@ -14,7 +14,7 @@ use re_sdk_types::datatypes::ChannelDatatype;
 use super::recording::Recording;
 use super::targets::{SeenTarget, boxes, ground, velocities};
 use super::tracks::Tracks;
-use crate::folder::{Entry, SmallFiles, Summary, frame_and_problems, picture_of};
+use crate::folder::{Entry, SmallFiles, Summary, details_of, picture_of};
 use crate::{DepthCode, DepthFile, EncodingProblem, FrameProblem};
 
 /// Logs frames in their order.
@@ -32,11 +32,11 @@ impl FrameLogger {
         entry: &Entry,
         place: usize,
     ) -> Result<Vec<FrameProblem>, EncodingProblem> {
-        let (frame, mut problems) = frame_and_problems(folder, entry);
+        let details = details_of(folder, entry);
+        let (camera, mut problems) = (details.intrinsics, details.problems);
         let summary = Summary::read(folder, entry);
         let time = time_of(place, summary.time_s);
 
-        let camera: Option<Intrinsics> = serde_json::from_value(frame["intrinsics"].clone()).ok();
         let targets = SmallFiles::read(folder, entry).targets;
         let targets = targets.map_or_else(FrameRecord::default, |t| t.record);
         let world_from_cam = targets.camera_motion;

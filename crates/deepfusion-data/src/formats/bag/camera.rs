@@ -3,11 +3,11 @@
 use super::config::BagConfig;
 use super::index::Index;
 use super::source;
-use super::topics::{Role, Topics};
+use super::topics::Topics;
 use crate::camera::FISHEYE;
 use crate::{
     CalibrationPlace, CalibrationSource, CameraCalibration, CameraInfoProblem, CameraProblem,
-    ConfigProblem, Error, Lens, OpenOptions, Result,
+    ConfigProblem, Error, Lens, OpenOptions, Result, TopicRole,
 };
 use deepfusion_geometry::{Distortion, Intrinsics};
 use deepfusion_rosbag::MessageSource;
@@ -29,7 +29,7 @@ pub(super) fn find(
     options: &OpenOptions,
 ) -> Result<(Lens, CalibrationPlace, bool)> {
     let bag = messages.path();
-    let topic = topics.of(Role::Image).unwrap_or_default();
+    let topic = topics.of(TopicRole::Image).unwrap_or_default();
     let rectified = is_rectified(topic);
     let place = |file: &Path, field| CalibrationPlace {
         source: file.into(),

@@ -7,10 +7,10 @@ use super::frames::Frames;
 use super::odometry_poses::{PoseMotion, motion_of};
 use super::packet::{VideoTopic, packet};
 use super::readings::{Reading, reading, steering};
-use super::topics::{Role, Topics};
+use super::topics::Topics;
 use super::world_axes::are_world_axes;
 use crate::logs::samples::Samples;
-use crate::{DataWarning, Error, ImageProblem, MotionWarning, Result};
+use crate::{DataWarning, Error, ImageProblem, MotionWarning, Result, TopicRole};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
@@ -115,9 +115,7 @@ impl Index {
     ) -> Result<Self> {
         let can = Can::of(config)?;
         let mut index = Self::default();
-        let mut names: Vec<&str> = topics.found.iter().map(|(_, name)| name.as_str()).collect();
-        names.dedup();
-        for message in bag.messages(Selection::topics(names))? {
+        for message in bag.messages(Selection::topics(topics.names()))? {
             let read = message
                 .map_err(Error::from)
                 .and_then(|message| index.add(bag, &message, topics, config, &can));
@@ -128,7 +126,7 @@ impl Index {
             }
         }
         if !index.fixes.is_empty() {
-            let topic = topics.of(Role::Speed).unwrap_or_default();
+            let topic = topics.of(TopicRole::Speed).unwrap_or_default();
             let most = config.vehicle.max_gap_s;
             let found = index.fixes.speeds(topic, most, &mut index.computed);
             index.speed_mps = found.speeds_mps;
@@ -174,7 +172,7 @@ impl Index {
         if poses.is_empty() || poses.len() != self.speed_mps.len() {
             return;
         }
-        let topic = topics.of(Role::Speed).unwrap_or_default().to_owned();
+        let topic = topics.of(TopicRole::Speed).unwrap_or_default().to_owned();
         let warning = match motion_of(bag, poses) {
             PoseMotion::Standing => return,
             PoseMotion::OtherAxes => {
@@ -211,7 +209,7 @@ impl Index {
         for ((_, speed), across) in self.speed_mps.iter_mut().zip(across) {
             *speed = speed.hypot(across);
         }
-        let topic = topics.of(Role::Speed).unwrap_or_default().to_owned();
+        let topic = topics.of(TopicRole::Speed).unwrap_or_default().to_owned();
         self.computed
             .push(MotionWarning::WorldAxes { topic }.into());
     }
@@ -219,7 +217,7 @@ impl Index {
     /// An inertial unit that measures no rates is none here: its zeros are no straight drive, nor is any rate that never changes and is said not to be
     /// there. Some drivers publish a gyroscope and an accelerometer as a topic each, others fill in the accelerations alone.
     fn leave_out_rateless(&mut self, topics: &Topics) {
-        let Some(topic) = topics.of(Role::Imu) else {
+        let Some(topic) = topics.of(TopicRole::Imu) else {
             return;
         };
         let Some((_, first)) = self.imu.first() else {
@@ -240,6 +238,16 @@ impl Index {
         self.computed.push(MotionWarning::NoRates { topic }.into());
     }
 
+    fn add_frames(&mut self, message: &Message<'_>) -> Result<()> {
+        let transforms = if message.is::<OldTFMessage>() {
+            message.decode::<OldTFMessage>()?.transforms
+        } else {
+            message.decode::<TFMessage>()?.transforms
+        };
+        transforms.iter().for_each(|t| self.frames.add(t));
+        Ok(())
+    }
+
     fn add(
         &mut self,
         bag: &dyn MessageSource,
@@ -248,25 +256,28 @@ impl Index {
         config: &BagConfig,
         can: &Can,
     ) -> Result<()> {
+        if topics.holds_frames(message.topic()) {
+            return self.add_frames(message);
+        }
         let at_ns = stamp(message);
         let mut timed = false;
         for role in topics.roles(message.topic()) {
-            if role == Role::Image
+            if role == TopicRole::Image
                 && let Some((codec, packet)) = packet(bag.path(), message)?
                 && !VideoTopic::add(&mut self.video, message.topic(), (codec, &packet))
             {
                 continue;
             }
-            timed |= !matches!(role, Role::CameraInfo | Role::Frames);
+            timed |= role != TopicRole::CameraInfo;
             match role {
-                Role::Image | Role::Lidar | Role::Dynamic => {
+                TopicRole::Image | TopicRole::Lidar | TopicRole::Dynamic => {
                     let place = MessageRef {
                         recorded: message.time(),
                         stamp_ns: at_ns,
                     };
                     let (places, frame) = match role {
-                        Role::Image => (&mut self.images, Some(&mut self.image_frame)),
-                        Role::Dynamic => (&mut self.dynamic, None),
+                        TopicRole::Image => (&mut self.images, Some(&mut self.image_frame)),
+                        TopicRole::Dynamic => (&mut self.dynamic, None),
                         _ => (&mut self.scans, Some(&mut self.lidar_frame)),
                     };
                     places.push(place);
@@ -274,12 +285,12 @@ impl Index {
                         *frame = message.header_frame();
                     }
                 }
-                Role::CameraInfo if self.camera_info.is_none() => {
+                TopicRole::CameraInfo if self.camera_info.is_none() => {
                     self.camera_info = Some(message.decode::<CameraInfo>()?);
                     self.camera_info_frame = message.header_frame();
                 }
-                Role::CameraInfo => {}
-                Role::Imu => {
+                TopicRole::CameraInfo => {}
+                TopicRole::Imu => {
                     let imu: Imu = message.decode()?;
                     // By the message's definition there are no angular rates then; some drivers say so of rates that are there.
                     self.rates_denied |= imu.angular_velocity_covariance[0] == -1.0;
@@ -294,18 +305,10 @@ impl Index {
                         self.imu_frame = Some(imu.header.frame_id).filter(|f| !f.is_empty());
                     }
                 }
-                Role::Speed if message.is::<NavSatFix>() => {
+                TopicRole::Speed if message.is::<NavSatFix>() => {
                     self.fixes.add(at_ns, &message.decode()?);
                 }
-                Role::Frames => {
-                    let transforms = if message.is::<OldTFMessage>() {
-                        message.decode::<OldTFMessage>()?.transforms
-                    } else {
-                        message.decode::<TFMessage>()?.transforms
-                    };
-                    transforms.iter().for_each(|t| self.frames.add(t));
-                }
-                Role::Speed => {
+                TopicRole::Speed => {
                     let Reading {
                         speed_mps,
                         across_mps,
@@ -324,16 +327,16 @@ impl Index {
                         self.tilt_rates.push((at_ns, [roll, pitch]));
                     }
                 }
-                Role::Steering => {
+                TopicRole::Steering => {
                     self.steering_rad.push((at_ns, steering(message)?));
                 }
-                Role::Can => {
+                TopicRole::Can => {
                     let frame: Frame = message.decode()?;
                     let said = can.read(&frame, at_ns);
                     self.speed_mps.extend(said.speed_mps);
                     self.steering_rad.extend(said.steering_rad);
                 }
-                Role::Truth => {
+                TopicRole::Truth => {
                     let odometry: Odometry = message.decode()?;
                     let (p, q) = (odometry.pose.pose.position, odometry.pose.pose.orientation);
                     let place = Vector3::new(p.x, p.y, p.z);

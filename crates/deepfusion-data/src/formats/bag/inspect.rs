@@ -4,9 +4,9 @@ use super::config::BagConfig;
 use super::index::Index;
 use super::mounts::Mounts;
 use super::streams::{damage_of, oddities_of, streams};
-use super::topics::{Role, Topics};
+use super::topics::Topics;
 use super::{sensors, source};
-use crate::{DatasetKind, DriveInspection, Inspection, OpenOptions, Result, SpeedRange};
+use crate::{DatasetKind, DriveInspection, Inspection, OpenOptions, Result, SpeedRange, TopicRole};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::Signal;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Optio
     let config = BagConfig::of(path, options)?;
     let bag = source::open(path)?;
     let topics = Topics::find(bag.as_ref(), &config)?;
-    if topics.of(Role::Image).is_some() {
+    if topics.of(TopicRole::Image).is_some() {
         return Ok(None);
     }
     let index = Index::read(bag.as_ref(), &topics, &config)?;

@@ -8,7 +8,7 @@ use super::packet::VideoTopic;
 use super::recording::BagRecording;
 use super::scans::BagScans;
 use super::streams::{damage_of, oddities_of, streams};
-use super::topics::{Role, Topics};
+use super::topics::Topics;
 use super::video::BagVideo;
 use super::{camera, image, sensors, source};
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
@@ -16,7 +16,7 @@ use crate::logs::frame_times::numbers_by_time;
 use crate::logs::speed_log::receiver;
 use crate::{
     Camera, CameraWarning, DataWarning, Dataset, DatasetParts, Error, Frame, FrameImage,
-    IncompleteWarning, MotionModel, MountWarning, NoFramesReason, OpenOptions, Result,
+    IncompleteWarning, MotionModel, MountWarning, NoFramesReason, OpenOptions, Result, TopicRole,
 };
 use deepfusion_geometry::{StampedPose, Trajectory};
 use deepfusion_rosbag::MessageSource;
@@ -75,7 +75,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let picture = match &video {
         Some(video) => video.first(bag.as_ref())?,
         None => {
-            let topic = topics.of(Role::Image).unwrap_or_default();
+            let topic = topics.of(TopicRole::Image).unwrap_or_default();
             image::decode(bag.as_ref(), &image::message(bag.as_ref(), topic, &first)?)?
         }
     };
@@ -110,12 +110,12 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         camera_ahead_s: clock.camera_ahead_s,
         scenario: config.scenario.clone(),
     };
-    let scans = match (topics.of(Role::Lidar), mounts.cam_from_lidar) {
+    let scans = match (topics.of(TopicRole::Lidar), mounts.cam_from_lidar) {
         (Some(topic), Some(cam_from_lidar)) => Some(Arc::new(BagScans {
             bag: Arc::clone(&bag),
             topic: topic.to_owned(),
             places: clock.timed(&index.scans),
-            dynamic: topics.of(Role::Dynamic).map(|topic| DynamicPoints {
+            dynamic: topics.of(TopicRole::Dynamic).map(|topic| DynamicPoints {
                 topic: topic.to_owned(),
                 places: clock.timed(&index.dynamic),
             }),

@@ -3,12 +3,12 @@
 use super::image;
 use super::index::MessageRef;
 use super::scans::{BagScans, MovingPoints};
-use super::topics::{Role, Topics};
+use super::topics::Topics;
 use super::video::BagVideo;
 use crate::{
     CalibrationPlace, CameraPath, DataWarning, Dataset, DatasetKind, DynamicAgreement, Error,
     Frame, FrameImage, GtKind, ImageProblem, Lens, LidarMotion, Mount, MovingLabels, MovingSource,
-    NoTrackReason, Recording, Result, ScanTruth, Stream,
+    NoTrackReason, Recording, Result, ScanTruth, Stream, TopicRole,
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Se3, Trajectory};
@@ -66,7 +66,7 @@ impl Recording for BagRecording {
             let image = video.load(self.bag.as_ref(), index)?;
             return self.lens.correct(image.ok_or_else(missing)?);
         }
-        let topic = self.topics.of(Role::Image).unwrap_or_default();
+        let topic = self.topics.of(TopicRole::Image).unwrap_or_default();
         let place = usize::try_from(index).ok();
         let place = place.and_then(|index| self.images.get(index));
         let place = place.ok_or_else(missing)?;

@@ -2,8 +2,8 @@
 
 use super::index::Index;
 use super::packet::VideoTopic;
-use super::topics::{Role, Topics};
-use crate::{DataWarning, IncompleteWarning, Result, Stream, TimesWarning};
+use super::topics::Topics;
+use crate::{DataWarning, IncompleteWarning, Result, Stream, TimesWarning, TopicRole};
 use deepfusion_rosbag::MessageSource;
 
 pub(super) fn streams(
@@ -15,25 +15,27 @@ pub(super) fn streams(
     let streams = all.iter().map(|topic| {
         let role = topics.roles(&topic.name).next();
         let (kind, times): (_, Vec<i64>) = match role {
-            Some(Role::Image) => ("image", index.images.iter().map(|p| p.stamp_ns).collect()),
-            Some(Role::Lidar) => (
+            Some(TopicRole::Image) => ("image", index.images.iter().map(|p| p.stamp_ns).collect()),
+            Some(TopicRole::Lidar) => (
                 "point_cloud",
                 index.scans.iter().map(|p| p.stamp_ns).collect(),
             ),
-            Some(Role::Dynamic) => (
+            Some(TopicRole::Dynamic) => (
                 "point_cloud",
                 index.dynamic.iter().map(|p| p.stamp_ns).collect(),
             ),
-            Some(Role::Imu) => ("imu", index.imu.iter().map(|s| s.0).collect()),
-            Some(Role::Speed) if !index.fixes.is_empty() => {
+            Some(TopicRole::Imu) => ("imu", index.imu.iter().map(|s| s.0).collect()),
+            Some(TopicRole::Speed) if !index.fixes.is_empty() => {
                 ("speed", index.fixes.times().collect())
             }
-            Some(Role::Frames) => ("frames", Vec::new()),
-            Some(Role::Speed) => ("speed", index.speed_mps.iter().map(|s| s.0).collect()),
-            Some(Role::Steering) => ("steering", index.steering_rad.iter().map(|s| s.0).collect()),
-            Some(Role::Truth) => ("pose", index.truth.iter().map(|s| s.0).collect()),
-            Some(Role::CameraInfo) => ("camera_info", Vec::new()),
-            Some(Role::Can) => ("can", Vec::new()),
+            Some(TopicRole::Speed) => ("speed", index.speed_mps.iter().map(|s| s.0).collect()),
+            Some(TopicRole::Steering) => {
+                ("steering", index.steering_rad.iter().map(|s| s.0).collect())
+            }
+            Some(TopicRole::Truth) => ("pose", index.truth.iter().map(|s| s.0).collect()),
+            Some(TopicRole::CameraInfo) => ("camera_info", Vec::new()),
+            Some(TopicRole::Can) => ("can", Vec::new()),
+            None if topics.holds_frames(&topic.name) => ("frames", Vec::new()),
             None => ("other", Vec::new()),
         };
         let origin = times.first().copied().unwrap_or_default();

@@ -11,44 +11,12 @@ use deepfusion_rosbag::msg::{
 use deepfusion_rosbag::{MessageSource, RosMessage, TopicInfo};
 use std::path::Path;
 
-/// What a topic is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
-    Image,
-    CameraInfo,
-    Lidar,
-    Dynamic,
-    Imu,
-    Speed,
-    Steering,
-    Can,
-    Truth,
-    /// Transforms of frames; as many topics as there are.
-    Frames,
-}
-
-impl Role {
-    /// Its key in `[topics]`; frames have none.
-    pub(super) fn key(self) -> Option<TopicRole> {
-        Some(match self {
-            Self::Image => TopicRole::Image,
-            Self::CameraInfo => TopicRole::CameraInfo,
-            Self::Lidar => TopicRole::Lidar,
-            Self::Dynamic => TopicRole::Dynamic,
-            Self::Imu => TopicRole::Imu,
-            Self::Speed => TopicRole::Speed,
-            Self::Steering => TopicRole::Steering,
-            Self::Can => TopicRole::Can,
-            Self::Truth => TopicRole::Truth,
-            Self::Frames => return None,
-        })
-    }
-}
-
 /// The topics that are read, and what for.
 #[derive(Debug, Clone)]
 pub(super) struct Topics {
-    pub(super) found: Vec<(Role, String)>,
+    pub(super) found: Vec<(TopicRole, String)>,
+    /// Those of transforms, as many as there are: none has a key in `[topics]`.
+    pub(super) frames: Vec<String>,
     /// Whether there are those that only a simulator can write.
     pub(super) simulated: bool,
     /// What was taken for want of something better.
@@ -92,35 +60,35 @@ impl Topics {
                 .map_or_else(|| image(&super::packet::TYPES), |found| Ok(Some(found)))?,
             Some(_) => image(&images)?,
         };
-        add(Role::Image, image.clone());
+        add(TopicRole::Image, image.clone());
         add(
-            Role::CameraInfo,
+            TopicRole::CameraInfo,
             search.camera_info(&names.camera_info, image.as_deref())?,
         );
         let clouds = [PointCloud2::<'_>::TYPE];
         let lidar = search.one(TopicRole::Lidar, &names.lidar, &clouds, |t| {
             !is_dynamic(&t.name)
         })?;
-        add(Role::Lidar, lidar.clone());
+        add(TopicRole::Lidar, lidar.clone());
         add(
-            Role::Dynamic,
+            TopicRole::Dynamic,
             search.dynamic(&names.dynamic, lidar.as_deref())?,
         );
         add(
-            Role::Imu,
+            TopicRole::Imu,
             search.one(TopicRole::Imu, &names.imu, &[Imu::TYPE], |_| true)?,
         );
         let can = config.can.as_ref();
         let steered = can.is_some_and(|can| can.steering.is_some());
         let driven = can.is_some_and(|can| can.speed.is_some());
         if !search.on_can(TopicRole::Steering, steered, &names.steering)? {
-            add(Role::Steering, search.steering(&names.steering)?);
+            add(TopicRole::Steering, search.steering(&names.steering)?);
         }
         if !search.on_can(TopicRole::Speed, driven, &names.speed)? {
-            add(Role::Speed, search.speed(&names.speed)?);
+            add(TopicRole::Speed, search.speed(&names.speed)?);
         }
         if steered || driven {
-            add(Role::Can, Some(search.can(&names.can)?));
+            add(TopicRole::Can, Some(search.can(&names.can)?));
         }
         let truth = match &names.truth {
             Some(_) => search.one(TopicRole::Truth, &names.truth, &[Odometry::TYPE], |_| true)?,
@@ -129,31 +97,44 @@ impl Topics {
                 .find(|t| t.name.starts_with(TRUTH) && t.type_name == Odometry::TYPE)
                 .map(|t| t.name.clone()),
         };
-        add(Role::Truth, truth);
-        let frames = [TFMessage::TYPE, OldTFMessage::TYPE];
-        for topic in &all {
-            if frames.contains(&topic.type_name.as_str()) {
-                add(Role::Frames, Some(topic.name.clone()));
-            }
-        }
+        add(TopicRole::Truth, truth);
+        let transforms = [TFMessage::TYPE, OldTFMessage::TYPE];
+        let of_frames = all
+            .iter()
+            .filter(|t| transforms.contains(&t.type_name.as_str()));
+        let frames = of_frames.map(|t| t.name.clone()).collect();
         let warnings = commands(&found, config);
         Ok(Self {
             found,
+            frames,
             simulated: are_simulated(&all),
             warnings,
         })
     }
 
     /// The topic of a role.
-    pub(super) fn of(&self, role: Role) -> Option<&str> {
+    pub(super) fn of(&self, role: TopicRole) -> Option<&str> {
         let found = self.found.iter().find(|(r, _)| *r == role);
         found.map(|(_, name)| name.as_str())
     }
 
     /// What a topic is for; one topic can have several roles (speed and steering).
-    pub(super) fn roles<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = Role> + 'a {
+    pub(super) fn roles<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = TopicRole> + 'a {
         let of_topic = self.found.iter().filter(move |(_, name)| name == topic);
         of_topic.map(|(role, _)| *role)
+    }
+
+    /// Whether a topic holds transforms of frames.
+    pub(super) fn holds_frames(&self, topic: &str) -> bool {
+        self.frames.iter().any(|name| name == topic)
+    }
+
+    /// The names of all of them.
+    pub(super) fn names(&self) -> Vec<&str> {
+        let found = self.found.iter().map(|(_, name)| name);
+        let mut names: Vec<&str> = found.chain(&self.frames).map(String::as_str).collect();
+        names.dedup();
+        names
     }
 }
 
@@ -165,18 +146,19 @@ fn are_simulated(all: &[TopicInfo]) -> bool {
 }
 
 /// A warning for each command that stands for what was measured, as nothing better is there; none for one that is named.
-fn commands(found: &[(Role, String)], config: &BagConfig) -> Vec<DataWarning> {
+fn commands(found: &[(TopicRole, String)], config: &BagConfig) -> Vec<DataWarning> {
     let names = &config.topics;
     let steers = config.vehicle.wheelbase_m.is_some();
     let taken = found.iter().filter_map(|(role, topic)| {
-        let role = match role {
-            Role::Speed if names.speed.is_none() => TopicRole::Speed,
+        let is_used = match role {
+            TopicRole::Speed => names.speed.is_none(),
             // Without a wheelbase no steering angle is used.
-            Role::Steering if names.steering.is_none() && steers => TopicRole::Steering,
-            _ => return None,
+            TopicRole::Steering => names.steering.is_none() && steers,
+            _ => false,
         };
-        let topic = topic.clone();
-        is_command(&topic).then(|| DataWarning::from(MotionWarning::Commanded { topic, role }))
+        let (topic, role) = (topic.clone(), *role);
+        (is_used && is_command(&topic))
+            .then(|| DataWarning::from(MotionWarning::Commanded { topic, role }))
     });
     taken.collect()
 }

@@ -6,7 +6,7 @@ use super::index::Index;
 use super::mounts::Mounts;
 use super::open::open_bag;
 use super::source;
-use super::topics::{Role, Topics};
+use super::topics::Topics;
 use crate::formats::layout::Layout;
 use crate::{ConfigProblem, Error, Mount, NamedTopic, OpenOptions, Result, TopicRole};
 use deepfusion_hint::count_of;
@@ -149,10 +149,9 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
 
 /// Takes the signals out of `[can]` that a named topic stands for now: both would contradict each other.
 fn remove_named_signals(can: &mut Table, topics: &Topics, names: &TopicNames) {
-    for role in [Role::Speed, Role::Steering] {
-        let Some(key) = role.key() else { continue };
-        if topics.of(role).is_some() || names.is_none(key) {
-            can.remove(key.name());
+    for role in [TopicRole::Speed, TopicRole::Steering] {
+        if topics.of(role).is_some() || names.is_none(role) {
+            can.remove(role.name());
         }
     }
 }
@@ -165,20 +164,19 @@ fn topics_text(
 ) -> String {
     let mut text = String::from("\n[topics]\n");
     for (role, name) in &topics.found {
-        let Some(key) = role.key() else { continue };
         let about = all.iter().find(|t| t.name == *name);
         let about = about.map_or(String::new(), |t| {
             format!("   # {}, {}", t.type_name, count_of(t.count, "message"))
         });
         // Written as a key it would stand for a choice of the user's, and nothing would warn of it any more.
-        let own_choice = is_command(name) && names.of(key).is_none();
-        let off = if own_choice && matches!(role, Role::Speed | Role::Steering) {
+        let own_choice = is_command(name) && names.of(*role).is_none();
+        let off = if own_choice && matches!(role, TopicRole::Speed | TopicRole::Steering) {
             "# by its name a command: "
         } else {
             ""
         };
         let name = Value::String(name.clone());
-        let _ = writeln!(text, "{off}{key} = {name}{about}");
+        let _ = writeln!(text, "{off}{role} = {name}{about}");
     }
     for role in TopicRole::ALL
         .into_iter()
