@@ -1,14 +1,21 @@
+mod corrections;
+mod gradients;
+mod undecided;
 mod values;
 
 use crate::{Error, Model};
-use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{Gradients, Tensor, TensorData};
-use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
-use deepfusion_nn::ops::{self, has_kernels};
+use burn::module::{Module, ModuleMapper, Param};
+use burn::tensor::{Bool, Tensor, TensorData};
+use corrections::{BETA1, BETA2, corrections};
+use deepfusion_kernels::{AdamStep, adam};
+use deepfusion_nn::ops::AdamFactors;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use undecided::Undecided;
 use values::{Values, to_vec, update_on_device};
+
+pub use gradients::NamedGradients;
+pub(crate) use undecided::MOST_UNDECIDED;
 
 /// A parameter's moments, in the same place as its gradient.
 #[derive(Debug, Clone)]
@@ -20,12 +27,22 @@ struct Moments {
 /// Adam (Kingma and Ba), β₁ = 0.9, β₂ = 0.999, ε = 1e-8, with the gradient clipped by its norm.
 ///
 /// The moments are kept by the parameters' names. On the processor the update is one pass over parameter, gradient and moments. On a GPU
-/// all of them stay there, and a step needs one number from it, the gradient's norm: it decides whether there is a step, and by how much the
-/// gradient is shortened.
+/// all of them stay there. The gradient's norm decides whether there is a step, and by how much the gradient is shortened: a run with one
+/// worker leaves both to the GPU, and reads only now and then which steps were made.
 #[derive(Debug, Clone, Default)]
 pub struct Adam {
     moments: BTreeMap<String, Moments>,
+    /// Steps made, without those of `undecided`.
     steps: u32,
+    undecided: Option<Undecided>,
+}
+
+/// A step that was begun and is to be applied: [`Adam::begin`].
+#[derive(Debug, Clone)]
+pub struct PreparedStep {
+    pub(crate) settings: AdamStep,
+    /// In place of those of `settings` where the device has computed them.
+    pub(crate) factors: Option<AdamFactors>,
 }
 
 /// The outcome of a step.
@@ -40,143 +57,8 @@ pub enum StepOutcome {
     Skipped,
 }
 
-/// Values that are read from a device at once: 32 MB, so that neither memory nor the largest buffer of a small GPU is exceeded.
-const AT_ONCE: usize = 8 << 20;
-
-/// A step's gradients by parameter name.
-#[derive(Debug, Default)]
-pub struct NamedGradients(BTreeMap<String, Values>);
-
-impl NamedGradients {
-    /// Adds the gradients of the module's parameters, named with `prefix`, times `scale`.
-    pub fn add<M: Module>(
-        &mut self,
-        prefix: &str,
-        module: &M,
-        gradients: &mut Gradients,
-        scale: f32,
-    ) {
-        module.visit(&mut Collect {
-            path: vec![prefix.to_owned()],
-            gradients,
-            into: self,
-            scale,
-        });
-    }
-
-    /// Adds a parameter's gradient to what there is of it.
-    fn insert(&mut self, name: String, gradient: Values) {
-        match self.0.entry(name) {
-            Entry::Vacant(entry) => {
-                entry.insert(gradient);
-            }
-            Entry::Occupied(mut entry) => entry.get_mut().add(gradient),
-        }
-    }
-
-    /// All values one after the other, in the order of the names.
-    pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
-        // Those on the device in few transfers.
-        let mut read = Vec::new();
-        let mut waiting: Vec<Tensor<1>> = Vec::new();
-        for values in self.0.values() {
-            let Values::Device(values) = values else {
-                continue;
-            };
-            let together: usize = waiting.iter().map(|tensor| tensor.dims()[0]).sum();
-            if together > 0 && together + values.dims()[0] > AT_ONCE {
-                read.extend(to_vec(Tensor::cat(std::mem::take(&mut waiting), 0)));
-            }
-            waiting.push(values.clone());
-        }
-        if !waiting.is_empty() {
-            read.extend(to_vec(Tensor::cat(waiting, 0)));
-        }
-        let mut rest = read.as_slice();
-        for values in self.0.values() {
-            match values {
-                Values::Host(values) => flat.extend_from_slice(values),
-                Values::Device(values) => {
-                    let (own, others) = rest.split_at(values.dims()[0]);
-                    flat.extend_from_slice(own);
-                    rest = others;
-                }
-            }
-        }
-    }
-
-    /// Takes the values back from where [`Self::append_to`] put them.
-    pub(crate) fn take_from(&mut self, flat: &[f32]) {
-        let mut rest = flat;
-        for values in self.0.values_mut() {
-            let (own, others) = rest.split_at(values.len());
-            match values {
-                Values::Host(values) => values.copy_from_slice(own),
-                Values::Device(values) => *values = Tensor::from_data(own, &values.device()),
-            }
-            rest = others;
-        }
-    }
-
-    pub(crate) fn norm(&self) -> f64 {
-        let (on_host, on_device) = self.squares();
-        let on_device = on_device.map_or(0.0, |sum| f64::from(sum.into_scalar::<f32>()));
-        (on_host + on_device).sqrt()
-    }
-
-    /// The sum of squares: of the values in main memory, and, if there are any, of those on the device, one value there.
-    pub(crate) fn squares(&self) -> (f64, Option<Tensor<1>>) {
-        let mut on_host = 0.0;
-        let mut on_device = Vec::new();
-        for values in self.0.values() {
-            match values {
-                Values::Host(values) => on_host += sum_of_squares(values),
-                Values::Device(values) => on_device.push(values.clone()),
-            }
-        }
-        let on_device = (!on_device.is_empty()).then(|| ops::sum_of_squares(&on_device));
-        (on_host, on_device)
-    }
-}
-
-struct Collect<'a> {
-    path: Vec<String>,
-    gradients: &'a mut Gradients,
-    into: &'a mut NamedGradients,
-    scale: f32,
-}
-
-impl ModuleVisitor for Collect<'_> {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.push(name.to_owned());
-    }
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.pop();
-    }
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let Some(gradient) = param.val().grad_remove(self.gradients) else {
-            return;
-        };
-        let count = gradient.shape().num_elements();
-        let found = if has_kernels(&gradient) {
-            let mut values = to_vec(gradient);
-            if self.scale != 1.0 {
-                values.iter_mut().for_each(|v| *v *= self.scale);
-            }
-            Values::Host(values)
-        } else {
-            let gradient = gradient.reshape([count]);
-            Values::Device(match self.scale {
-                1.0 => gradient,
-                scale => gradient.mul_scalar(scale),
-            })
-        };
-        self.into.insert(self.path.join("."), found);
-    }
-}
-
 impl Adam {
-    /// Steps made.
+    /// Steps made, as far as it is known: without those that a device has decided about since it was last asked.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
@@ -192,37 +74,26 @@ impl Adam {
         learning_rate: f64,
         clip_norm: f64,
         weight_decay: f64,
-    ) -> (StepOutcome, Option<AdamStep>) {
-        self.begin_with_norm(gradients.norm(), learning_rate, clip_norm, weight_decay)
-    }
-
-    /// The same where the gradient's norm is known.
-    pub(crate) fn begin_with_norm(
-        &mut self,
-        norm: f64,
-        learning_rate: f64,
-        clip_norm: f64,
-        weight_decay: f64,
-    ) -> (StepOutcome, Option<AdamStep>) {
+    ) -> (StepOutcome, Option<PreparedStep>) {
+        let norm = gradients.norm();
         if !norm.is_finite() {
             return (StepOutcome::Skipped, None);
         }
         self.steps += 1;
-        let (beta1, beta2) = (0.9_f64, 0.999_f64);
         let scale = if clip_norm > 0.0 && norm > clip_norm {
             clip_norm / norm
         } else {
             1.0
         };
-        let step = AdamStep {
-            learning_rate: learning_rate as f32,
-            beta1: beta1 as f32,
-            beta2: beta2 as f32,
-            epsilon: 1e-8,
-            correction1: (1.0 - beta1.powi(self.steps as i32)) as f32,
-            correction2: (1.0 - beta2.powi(self.steps as i32)) as f32,
-            gradient_scale: scale as f32,
-            weight_decay: weight_decay as f32,
+        let [correction1, correction2] = corrections(self.steps);
+        let step = PreparedStep {
+            settings: AdamStep {
+                correction1,
+                correction2,
+                gradient_scale: scale as f32,
+                ..settings(learning_rate, weight_decay)
+            },
+            factors: None,
         };
         let outcome = StepOutcome::Done {
             gradient_norm: norm,
@@ -230,18 +101,58 @@ impl Adam {
         (outcome, Some(step))
     }
 
+    /// The same of gradients on a device that decides by itself, with nothing read from it: `squares`, `[1]`, is the sum of their squares.
+    /// The step is made if that and the `losses` are finite. Returns whether it is, `[1]`; [`Self::settle`] is told when it was read, at the
+    /// latest after [`MOST_UNDECIDED`] steps.
+    #[must_use]
+    pub(crate) fn begin_on_device(
+        &mut self,
+        (losses, squares): (Tensor<1>, Tensor<1>),
+        learning_rate: f64,
+        clip_norm: f64,
+        weight_decay: f64,
+    ) -> (Tensor<1, Bool>, PreparedStep) {
+        let steps = self.steps;
+        let undecided = self
+            .undecided
+            .get_or_insert_with(|| Undecided::after(steps, &squares.device()));
+        let is_made = Tensor::cat(vec![losses, squares.clone()], 0)
+            .is_finite()
+            .all();
+        let scale = if clip_norm > 0.0 {
+            // min(1, clip_norm / norm); without a gradient nothing is divided by zero.
+            let norm = squares.clamp_min(f32::MIN_POSITIVE).sqrt();
+            norm.recip().mul_scalar(clip_norm).clamp_max(1.0)
+        } else {
+            squares.ones_like()
+        };
+        let corrections = undecided.begin(&is_made);
+        let step = PreparedStep {
+            settings: settings(learning_rate, weight_decay),
+            factors: Some(AdamFactors::decided(scale, corrections, is_made.clone())),
+        };
+        (is_made, step)
+    }
+
+    /// Of the steps that were begun on a device, so many were made: all of them have been heard of.
+    pub(crate) fn settle(&mut self, made: u32) {
+        self.steps += made;
+        self.undecided = None;
+    }
+
     /// Updates the parameters of one module, named with `prefix`.
     #[must_use]
     pub fn apply<M: Module>(
         &mut self,
-        step: &AdamStep,
+        step: &PreparedStep,
         prefix: &str,
         module: M,
         gradients: &NamedGradients,
     ) -> M {
         module.map(&mut Update {
             path: vec![prefix.to_owned()],
-            step,
+            step: &step.settings,
+            factors: step.factors.clone(),
             gradients,
             moments: &mut self.moments,
         })
@@ -319,7 +230,25 @@ impl Adam {
                 others: 0,
             }));
         }
-        Ok(Self { moments, steps })
+        Ok(Self {
+            moments,
+            steps,
+            undecided: None,
+        })
+    }
+}
+
+/// A step that changes its gradient in nothing and corrects no moments.
+fn settings(learning_rate: f64, weight_decay: f64) -> AdamStep {
+    AdamStep {
+        learning_rate: learning_rate as f32,
+        beta1: BETA1 as f32,
+        beta2: BETA2 as f32,
+        epsilon: 1e-8,
+        correction1: 1.0,
+        correction2: 1.0,
+        gradient_scale: 1.0,
+        weight_decay: weight_decay as f32,
     }
 }
 
@@ -346,6 +275,8 @@ fn parameter_lengths(model: &Model) -> BTreeMap<String, usize> {
 struct Update<'a> {
     path: Vec<String>,
     step: &'a AdamStep,
+    /// Computed on the device, or brought there for the first parameter that needs them.
+    factors: Option<AdamFactors>,
     gradients: &'a NamedGradients,
     moments: &'a mut BTreeMap<String, Moments>,
 }
@@ -359,7 +290,7 @@ impl ModuleMapper for Update<'_> {
     }
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let name = self.path.join(".");
-        let Some(gradient) = self.gradients.0.get(&name) else {
+        let Some(gradient) = self.gradients.by_name.get(&name) else {
             return param;
         };
         // A parameter's first step makes its moments; those of a file were held against it when they were read.
@@ -372,6 +303,7 @@ impl ModuleMapper for Update<'_> {
             ..*self.step
         };
         let Moments { first, second } = moments;
+        let factors = &mut self.factors;
         param.map(|tensor| match gradient {
             Values::Host(gradient) => {
                 let (shape, device) = (tensor.dims(), tensor.device());
@@ -383,7 +315,10 @@ impl ModuleMapper for Update<'_> {
             }
             Values::Device(gradient) => {
                 let moments = [&*first, &*second].map(|moment| moment.beside(gradient));
-                let (moved, [m, v]) = update_on_device(&step, tensor, gradient.clone(), moments);
+                let known = || AdamFactors::of(&step, &gradient.device());
+                let factors = factors.get_or_insert_with(known);
+                let learned = (gradient.clone(), moments);
+                let (moved, [m, v]) = update_on_device(&step, factors, tensor, learned);
                 (*first, *second) = (Values::Device(m), Values::Device(v));
                 moved
             }

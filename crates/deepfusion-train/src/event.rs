@@ -19,7 +19,8 @@ pub enum TrainEvent {
         /// The data's mean displacement per pair, in metres.
         mean_displacement_m: f64,
     },
-    /// A step of the optimiser was made.
+    /// A step of the optimiser was made, or skipped. On a GPU the numbers of some steps are read together, and their events come one after
+    /// the other then.
     Step {
         /// Counted from 1.
         step: usize,
@@ -87,6 +88,6 @@ pub enum TrainEvent {
 pub enum Control {
     /// Go on.
     Continue,
-    /// Save and stop.
+    /// Save and stop, after the last step that was made.
     Stop,
 }

@@ -44,7 +44,7 @@ mod workers;
 /// The device on which networks are trained: `Device::flex()` is the CPU.
 pub use burn::tensor::Device;
 
-pub use adam::{Adam, NamedGradients, StepOutcome};
+pub use adam::{Adam, NamedGradients, PreparedStep, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::Checkpoints;

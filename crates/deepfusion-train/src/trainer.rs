@@ -1,11 +1,13 @@
 //! A training run: from its first step, or its last checkpoint, to its end.
 
 mod among;
+mod figures;
 mod pace;
 mod report;
 mod schedule;
 mod start;
 mod step;
+mod told;
 mod validation;
 
 pub use validation::validation_loss;
@@ -16,16 +18,16 @@ use crate::stereo;
 use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
-    Sampler, StepOutcome, TrainConfig, TrainEvent, TrainWarning, WorkersProblem,
+    Sampler, TrainConfig, TrainEvent, WorkersProblem,
 };
 use burn::tensor::Device;
 use deepfusion_model::{CheckpointLacks, Error as ModelError};
 use deepfusion_nn::ops::is_cpu;
-use pace::{Pace, Smoothed};
 use start::{check_precision, check_samples, findings, focal_warning, turns_warning};
 use std::path::Path;
 use std::time::Instant;
-use step::{Loaders, WorkerStep};
+use step::Loaders;
+use told::{ReadInterval, Told};
 
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
@@ -42,9 +44,10 @@ pub struct Trainer {
     train: SampleSet,
     validation: SampleSet,
     workers: WorkerGroup,
-    /// Whether the numbers of a step's batches are read together at its end: a GPU would wait for each of them. On the processor they cost
-    /// nothing, and a loss that is not finite is found before its gradients are computed.
+    /// Whether numbers are left on the device at first: a GPU would wait for each of them to be read. On the processor they cost nothing,
+    /// and a loss that is not finite is found before its gradients are computed.
     reads_late: bool,
+    read_interval: ReadInterval,
 }
 
 /// How a run ended.
@@ -134,6 +137,7 @@ impl Trainer {
             validation,
             workers,
             reads_late,
+            read_interval: ReadInterval::USUAL,
         })
     }
 
@@ -184,6 +188,7 @@ impl Trainer {
             validation,
             workers: WorkerGroup::of(workers),
             reads_late,
+            read_interval: ReadInterval::USUAL,
         })
     }
 
@@ -271,95 +276,40 @@ impl Trainer {
         }
         let start = Instant::now();
         let mut saved = start;
-        let mut pace = Pace::new();
-        let (mut skipped_in_row, mut stopped) = (0, false);
-        let mut ratio = Smoothed::new();
-        let mut low_view = Smoothed::new();
-        let mut moving = Smoothed::new();
+        let mut told = Told::new(steps);
+        let mut stopped = false;
         while self.state.step < steps && !stopped {
             let learned = self.learn(&loaders, self.schedule(steps));
             // One that failed does not leave the others waiting for its gradients.
             let [failed] = self.workers.any([learned.is_err()])?;
-            let WorkerStep {
-                mut gradients,
-                mut losses,
-                names,
-                images,
-                panel,
-                monitors,
-                gradient_norm,
-                ..
-            } = learned?;
+            if learned.is_err() {
+                // What went before is heard of before.
+                self.tell_waiting(&mut told, listen)?;
+            }
+            let mut learned = learned?;
             if failed {
                 return Err(self.another_failed());
             }
-            self.workers.average(&mut gradients, &mut losses)?;
-            for (all, of_step) in [
-                (&mut ratio, monitors.ratio),
-                (&mut low_view, monitors.valid),
-                (&mut moving, monitors.moving),
-            ] {
-                of_step.into_iter().for_each(|value| all.add(value));
-            }
-            let learning_rate = self.learning_rate(steps);
-            let (outcome, step) = self.adam.begin_with_norm(
-                gradient_norm.unwrap_or_else(|| gradients.norm()),
-                learning_rate,
-                self.config.clip_norm,
-                self.config.weight_decay,
-            );
-            if let Some(step) = step {
-                self.apply(step, &gradients);
-            }
-            self.state.step += 1;
-            let gradient_norm = match outcome {
-                StepOutcome::Done { gradient_norm } => {
-                    skipped_in_row = 0;
-                    gradient_norm
-                }
-                StepOutcome::Skipped => {
-                    self.state.skipped += 1;
-                    skipped_in_row += 1;
-                    if skipped_in_row == MAX_SKIPPED {
-                        return Err(Error::GradientsNotFinite {
-                            count: skipped_in_row,
-                            step: self.state.step,
-                            frames: names.join(", "),
-                        });
-                    }
-                    listen(TrainEvent::Warning {
-                        step: self.state.step,
-                        warning: TrainWarning::StepSkipped { frames: names },
-                    });
-                    f64::NAN
-                }
-            };
-            pace.step(images * self.workers.count());
-            let control = listen(TrainEvent::Step {
-                step: self.state.step,
-                steps,
-                losses,
-                learning_rate,
-                images_per_second: pace.images_per_second(),
-                remaining_s: pace.seconds_per_step() * (steps - self.state.step) as f64,
-                scale_ratio: ratio.value(),
-                gradient_norm,
-            });
+            let losses = &mut learned.figures.losses;
+            self.workers.average(&mut learned.gradients, losses)?;
+            let panel = learned.panel.take();
+            let control = self.make_step(learned, &mut told, listen)?;
             let save = self.workers.leads() && self.checkpoint_is_due(saved.elapsed());
             let [stop, save] = self.workers.any([control == Control::Stop, save])?;
             stopped = stop;
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
             if due || stopped || save {
+                stopped |= self.tell_waiting(&mut told, listen)? == Control::Stop;
                 self.share_statistics()?;
                 let reported = if due || stopped {
-                    let shares = [low_view.value(), moving.value()];
-                    self.report(listen, panel, shares, due).and_then(|()| {
-                        if stopped || self.state.step == steps {
-                            self.report_camera(listen)
-                        } else {
-                            Ok(())
-                        }
-                    })
+                    self.report(listen, panel, told.shares(), due)
+                        .and_then(|()| {
+                            if stopped || self.state.step == steps {
+                                self.report_camera(listen)
+                            } else {
+                                Ok(())
+                            }
+                        })
                 } else {
                     self.save_last(listen)
                 };

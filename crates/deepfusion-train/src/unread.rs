@@ -11,8 +11,10 @@ pub(crate) type TermField = fn(&mut LossTerms) -> &mut f64;
 pub(crate) struct Unread {
     fields: Vec<TermField>,
     scale: Option<Scale>,
-    /// Those of the fields, then those of the scale, one value each.
-    values: Vec<Tensor<1>>,
+    /// Those of the fields, one value each.
+    terms: Vec<Tensor<1>>,
+    /// What says the scale, one value each.
+    of_scale: Vec<Tensor<1>>,
 }
 
 /// By what a scale is measured.
@@ -32,42 +34,59 @@ pub(crate) struct BatchNumbers {
 }
 
 impl Unread {
-    /// Keeps a term, one value. All terms come before what says the scale.
+    /// Keeps a term, one value.
     pub(crate) fn note(&mut self, field: TermField, value: Tensor<1>) {
-        debug_assert!(self.scale.is_none(), "the scale's numbers are the last");
         self.fields.push(field);
-        self.keep(value);
+        self.terms.push(value.detach().inner());
     }
 
     /// Keeps a batch's displacements, measured and predicted, each summed.
     pub(crate) fn note_displacements(&mut self, displacements: [Tensor<1>; 2]) {
-        self.scale = Some(Scale::Displacement);
-        displacements.into_iter().for_each(|value| self.keep(value));
+        self.keep_scale(Scale::Displacement, displacements.into());
     }
 
     /// Keeps the mean of ln(predicted / true depth).
     pub(crate) fn note_bias(&mut self, bias: Tensor<1>) {
-        self.scale = Some(Scale::Bias);
-        self.keep(bias);
+        self.keep_scale(Scale::Bias, vec![bias]);
     }
 
-    fn keep(&mut self, value: Tensor<1>) {
-        self.values.push(value.detach().inner());
+    fn keep_scale(&mut self, scale: Scale, values: Vec<Tensor<1>>) {
+        self.scale = Some(scale);
+        let values = values.into_iter().map(|value| value.detach().inner());
+        self.of_scale = values.collect();
+    }
+
+    /// Gives the terms' values away; [`Self::numbers`] still knows whose they are.
+    pub(crate) fn take_terms(&mut self) -> Vec<Tensor<1>> {
+        std::mem::take(&mut self.terms)
+    }
+
+    /// Gives the values away that say the scale.
+    pub(crate) fn take_scale(&mut self) -> Vec<Tensor<1>> {
+        std::mem::take(&mut self.of_scale)
+    }
+
+    /// How many terms there are.
+    pub(crate) fn term_count(&self) -> usize {
+        self.fields.len()
     }
 
     /// Reads one batch's numbers.
-    pub(crate) fn read(self) -> BatchNumbers {
-        let numbers = transfer(self.values.clone());
-        self.numbers(&mut numbers.into_iter())
+    pub(crate) fn read(mut self) -> BatchNumbers {
+        read_at_once(&mut [&mut self]).remove(0)
     }
 
-    /// The batch's own among numbers that were read, in the order in which they were kept.
-    fn numbers(&self, read: &mut impl Iterator<Item = f64>) -> BatchNumbers {
-        let mut terms = LossTerms::default();
-        for (field, value) in self.fields.iter().zip(read.by_ref()) {
-            *field(&mut terms) = value;
+    /// The batch's own among numbers that were read: the terms, and what says the scale, each in the order of the batches.
+    pub(crate) fn numbers(
+        &self,
+        terms: &mut impl Iterator<Item = f64>,
+        of_scale: &mut impl Iterator<Item = f64>,
+    ) -> BatchNumbers {
+        let mut own = LossTerms::default();
+        for (field, value) in self.fields.iter().zip(terms) {
+            *field(&mut own) = value;
         }
-        let mut next = || read.next().unwrap_or(f64::NAN);
+        let mut next = || of_scale.next().unwrap_or(f64::NAN);
         let scale_ratio = match self.scale {
             None => f64::NAN,
             Some(Scale::Displacement) => {
@@ -76,20 +95,30 @@ impl Unread {
             }
             Some(Scale::Bias) => (-next()).exp(),
         };
-        BatchNumbers { terms, scale_ratio }
+        BatchNumbers {
+            terms: own,
+            scale_ratio,
+        }
     }
 }
 
-/// Reads the numbers of batches, and one value more if it is there, in one transfer from the device.
-pub(crate) fn read_at_once(
-    batches: &[&Unread],
-    more: Option<Tensor<1>>,
-) -> (Vec<BatchNumbers>, Option<f64>) {
-    let values = batches.iter().flat_map(|batch| batch.values.clone());
-    let mut read = transfer(values.chain(more).collect()).into_iter();
-    let numbers = batches.iter().map(|batch| batch.numbers(&mut read));
-    let numbers = numbers.collect();
-    (numbers, read.next())
+/// Reads the numbers of batches in one transfer from the device.
+pub(crate) fn read_at_once(batches: &mut [&mut Unread]) -> Vec<BatchNumbers> {
+    let mut values = Vec::new();
+    for batch in &mut *batches {
+        values.extend(batch.take_terms());
+    }
+    let terms = values.len();
+    for batch in &mut *batches {
+        values.extend(batch.take_scale());
+    }
+    let read = transfer(values);
+    let (terms, of_scale) = read.split_at(terms);
+    let (mut terms, mut of_scale) = (terms.iter().copied(), of_scale.iter().copied());
+    let numbers = batches.iter();
+    numbers
+        .map(|batch| batch.numbers(&mut terms, &mut of_scale))
+        .collect()
 }
 
 #[cfg(test)]
@@ -98,7 +127,8 @@ thread_local! {
     pub(crate) static TRANSFERS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
-fn transfer(values: Vec<Tensor<1>>) -> Vec<f64> {
+/// Reads all values, in one transfer from their device.
+pub(crate) fn transfer(values: Vec<Tensor<1>>) -> Vec<f64> {
     if values.is_empty() {
         return Vec::new();
     }
@@ -141,14 +171,12 @@ mod tests {
         };
         check(&video().read(), &depth().read());
         let before = TRANSFERS.get();
-        let more = value(9.0).inner();
-        let (all, more) = read_at_once(&[&video(), &plain, &depth()], Some(more));
+        let all = read_at_once(&mut [&mut video(), &mut plain, &mut depth()]);
         assert_eq!(TRANSFERS.get() - before, 1);
         check(&all[0], &all[2]);
-        assert_eq!((all[1].terms.flow, more), (8.0, Some(9.0)));
+        assert_eq!(all[1].terms.flow, 8.0);
         assert!(all[1].scale_ratio.is_nan());
-        let (none, more) = read_at_once(&[], None);
-        assert!(none.is_empty() && more.is_none());
+        assert!(read_at_once(&mut []).is_empty());
         assert_eq!(TRANSFERS.get() - before, 1, "nothing to read");
     }
 }

@@ -1,7 +1,7 @@
 //! The operations composed of Burn's own: what the backends without kernels run, and what the
 //! kernels are tested against.
 
-use super::{BatchNormOutput, ConvOptions};
+use super::{AdamFactors, BatchNormOutput, ConvOptions};
 use burn::tensor::{
     Bool, Int, Tensor,
     module::{avg_pool2d, max_pool2d},
@@ -296,19 +296,28 @@ pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
 #[must_use]
 pub fn adam(
     step: &AdamStep,
+    factors: &AdamFactors,
     values: Tensor<1>,
     gradient: Tensor<1>,
-    [first, second]: [Tensor<1>; 2],
+    moments: [Tensor<1>; 2],
 ) -> (Tensor<1>, [Tensor<1>; 2]) {
-    let gradient = gradient.mul_scalar(step.gradient_scale);
+    let [scale, correction1, correction2, is_made] = factors.each();
+    let [old_first, old_second] = moments;
+    let gradient = gradient.mul(scale);
     let squared = gradient.clone() * gradient.clone();
-    let first = first.mul_scalar(step.beta1) + gradient.mul_scalar(1.0 - step.beta1);
-    let second = second.mul_scalar(step.beta2) + squared.mul_scalar(1.0 - step.beta2);
-    let root = second.clone().div_scalar(step.correction2).sqrt();
-    let direction = first.clone().div_scalar(step.correction1) / root.add_scalar(step.epsilon);
-    let kept = values.mul_scalar(1.0 - step.learning_rate * step.weight_decay);
+    let first = old_first.clone().mul_scalar(step.beta1) + gradient.mul_scalar(1.0 - step.beta1);
+    let second = old_second.clone().mul_scalar(step.beta2) + squared.mul_scalar(1.0 - step.beta2);
+    let root = second.clone().div(correction2).sqrt();
+    let direction = first.clone().div(correction1) / root.add_scalar(step.epsilon);
+    let kept = values
+        .clone()
+        .mul_scalar(1.0 - step.learning_rate * step.weight_decay);
+    let moved = kept - direction.mul_scalar(step.learning_rate);
+    // Chosen, not multiplied: a gradient of NaN is none afterwards.
+    let stays = is_made.lower_elem(0.5).expand(values.dims());
+    let chosen = |new: Tensor<1>, old: Tensor<1>| new.mask_where(stays.clone(), old);
     (
-        kept - direction.mul_scalar(step.learning_rate),
-        [first, second],
+        chosen(moved, values),
+        [chosen(first, old_first), chosen(second, old_second)],
     )
 }

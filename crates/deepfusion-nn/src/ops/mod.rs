@@ -16,6 +16,7 @@ macro_rules! record {
     };
 }
 
+mod adam_factors;
 mod autocast;
 mod autodiff;
 mod composed;
@@ -29,6 +30,7 @@ use burn::tensor::{Bool, DType, Device, Tensor, TensorData};
 use deepfusion_kernels::AdamStep;
 use kernel::KernelOps;
 
+pub use adam_factors::AdamFactors;
 pub use autocast::{autocast, supports};
 pub use composed::{
     adam as composed_adam, add_relu as composed_add_relu, batch_norm as composed_batch_norm,
@@ -460,13 +462,15 @@ pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
     ))
 }
 
-/// Adam's step of one parameter, as [`deepfusion_kernels::adam`], where the parameter is: its values and both moments after it.
+/// Adam's step of one parameter, as [`deepfusion_kernels::adam`], where the parameter is: its values and both moments after it. What
+/// `factors` hold of the step is theirs, and not `step`'s; of a step that is not made all three stay, whatever the gradient is.
 ///
 /// # Shapes
 /// - all: `[count]`, without autodiff
 #[must_use]
 pub fn adam(
     step: &AdamStep,
+    factors: &AdamFactors,
     values: Tensor<1>,
     gradient: Tensor<1>,
     [first, second]: [Tensor<1>; 2],
@@ -478,12 +482,13 @@ pub fn adam(
             gradient.into_dispatch(),
             first.into_dispatch(),
             second.into_dispatch(),
+            factors.together().into_dispatch(),
             *step,
         );
         let moments = [first, second].map(Tensor::from_dispatch);
         return (Tensor::from_dispatch(values), moments);
     }
-    composed::adam(step, values, gradient, [first, second])
+    composed::adam(step, factors, values, gradient, [first, second])
 }
 
 /// The sum of the squares of all values of flat tensors on one device, without autodiff: one value, where they are.

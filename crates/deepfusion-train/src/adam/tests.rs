@@ -28,7 +28,7 @@ fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
             let loss = motion.axis_angle.sum() * 100.0 + motion.translation.sum();
             let (mut raw, mut of_batch) = (loss.backward(), NamedGradients::default());
             of_batch.add("pose", &pose_net, &mut raw, 0.5);
-            for (name, values) in of_batch.0 {
+            for (name, values) in of_batch.by_name {
                 // As a GPU's would be.
                 let tensor = || Tensor::from_data(values.to_vec().as_slice(), &Device::flex());
                 let values = if as_tensors {
@@ -103,7 +103,9 @@ fn a_step_is_the_kernels() {
             weight_decay: 0.1,
         };
         adam(&step, &mut p, gradient, &mut m, &mut v);
-        (parameter, moments) = update_on_device(&step, parameter, tensor(gradient), moments);
+        let factors = AdamFactors::of(&step, &device);
+        let learned = (tensor(gradient), moments);
+        (parameter, moments) = update_on_device(&step, &factors, parameter, learned);
         let pairs = [
             (&p, to_vec(parameter.clone().inner())),
             (&m, to_vec(moments[0].clone())),
@@ -125,8 +127,10 @@ fn gradients_pass_through_main_memory_and_back() {
     let device = Device::flex();
     let mut gradients = NamedGradients::default();
     let tensor = Tensor::from_data([1.0_f32, 2.0], &device);
-    gradients.0.insert("a".into(), Values::Host(vec![3.0]));
-    gradients.0.insert("b".into(), Values::Device(tensor));
+    gradients
+        .by_name
+        .insert("a".into(), Values::Host(vec![3.0]));
+    gradients.by_name.insert("b".into(), Values::Device(tensor));
     assert!((gradients.norm() - 14.0_f64.sqrt()).abs() < 1e-6);
     let mut flat = Vec::new();
     gradients.append_to(&mut flat);
@@ -135,4 +139,75 @@ fn gradients_pass_through_main_memory_and_back() {
     flat.clear();
     gradients.append_to(&mut flat);
     assert_eq!(flat, [30.0, 10.0, 20.0]);
+}
+
+/// Where a device decides, the steps that it makes are those that the host would make: clipped as far, and corrected by the number of
+/// steps that were made. One with a gradient or a loss that is not finite changes nothing.
+#[test]
+fn a_device_decides_as_the_host_does() {
+    let device = Device::flex().autodiff();
+    let start = || Param::<Tensor<2>>::from_data([[0.5_f32, -1.0, 2.0], [0.1, -0.3, 4.0]], &device);
+    let gradient = |values: [f32; 6]| {
+        let mut gradients = NamedGradients::on_device();
+        let tensor = Tensor::from_data(values, &Device::flex());
+        gradients.insert("p".into(), Values::Device(tensor));
+        gradients
+    };
+    let nan = f32::NAN;
+    let steps = [
+        ([0.3, -4.0, 1e-3, 0.0, 1.0, 2.0], 0.25),
+        ([0.3, nan, 1e-3, 0.0, 1.0, 2.0], 0.25),
+        ([0.1, 0.2, -0.1, 0.0, 0.05, 0.1], 0.25),
+        ([0.1, 0.2, -0.1, 0.0, 0.05, 0.1], nan),
+        ([0.0; 6], 0.25),
+        ([f32::INFINITY, 0.2, -0.1, 0.0, 0.05, 0.1], 0.25),
+        ([1.0, -3.0, 2.0, 1e-5, 0.0, 7.0], 0.25),
+    ];
+    let learned = |read_every: usize, clip_norm: f64| {
+        let (mut parameter, mut adam) = (start(), Adam::default());
+        let mut waiting = Vec::new();
+        for (number, (values, loss)) in steps.into_iter().enumerate() {
+            let gradients = gradient(values);
+            let loss = Tensor::from_data([loss], &Device::flex());
+            let squares = gradients.squares().1.unwrap();
+            let checked = (loss, squares);
+            let (is_made, step) = adam.begin_on_device(checked, 1e-2, clip_norm, 0.1);
+            parameter = adam.apply(&step, "p", parameter, &gradients);
+            waiting.push(is_made.float());
+            if (number + 1) % read_every == 0 {
+                let made = to_vec(Tensor::cat(std::mem::take(&mut waiting), 0));
+                adam.settle(made.iter().sum::<f32>() as u32);
+            }
+        }
+        let made = waiting.into_iter().flat_map(to_vec).sum::<f32>();
+        adam.settle(made as u32);
+        (to_vec(parameter.val()), adam.state(), adam.steps())
+    };
+    for clip_norm in [0.7, 0.0] {
+        let (mut parameter, mut adam) = (start(), Adam::default());
+        for (values, loss) in steps {
+            let gradients = gradient(values);
+            let (_, step) = adam.begin(&gradients, 1e-2, clip_norm, 0.1);
+            let Some(step) = step.filter(|_| loss.is_finite()) else {
+                // The loss would have ended a run before it began the step.
+                adam.steps -= u32::from(loss.is_nan());
+                continue;
+            };
+            parameter = adam.apply(&step, "p", parameter, &gradients);
+        }
+        assert_eq!(adam.steps(), 4);
+        let each = learned(1, clip_norm);
+        assert_eq!(each.2, 4);
+        let ours = to_vec(parameter.val());
+        for (a, b) in ours.iter().zip(&each.0) {
+            assert!((a - b).abs() <= 1e-6, "{ours:?} and {:?}", each.0);
+        }
+        assert!(apart(&adam.state(), &each.1) < 1e-6);
+        // When it is read changes nothing.
+        for read_every in [3, 7] {
+            let some = learned(read_every, clip_norm);
+            assert_eq!((&some.0, some.2), (&each.0, each.2), "{read_every}");
+            assert_eq!(apart(&some.1, &each.1), 0.0);
+        }
+    }
 }

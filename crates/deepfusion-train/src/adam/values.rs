@@ -2,7 +2,7 @@
 
 use burn::tensor::Tensor;
 use deepfusion_kernels::AdamStep;
-use deepfusion_nn::ops;
+use deepfusion_nn::ops::{self, AdamFactors};
 
 /// A parameter's gradient or one of its moments, flat.
 #[derive(Debug, Clone)]
@@ -77,13 +77,13 @@ impl Values {
 /// them stay on the GPU.
 pub(super) fn update_on_device<const D: usize>(
     step: &AdamStep,
+    factors: &AdamFactors,
     parameter: Tensor<D>,
-    gradient: Tensor<1>,
-    moments: [Tensor<1>; 2],
+    (gradient, moments): (Tensor<1>, [Tensor<1>; 2]),
 ) -> (Tensor<D>, [Tensor<1>; 2]) {
     let shape = parameter.dims();
     let values = parameter.inner().reshape([gradient.dims()[0]]);
-    let (moved, moments) = ops::adam(step, values, gradient, moments);
+    let (moved, moments) = ops::adam(step, factors, values, gradient, moments);
     (moved.reshape(shape).autodiff().require_grad(), moments)
 }
 

@@ -1,7 +1,7 @@
 //! How fast a run goes.
 
 use std::collections::VecDeque;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Number of steps over which the scale ratio is averaged, and the pace.
 const SMOOTHING: usize = 20;
@@ -44,12 +44,23 @@ impl Pace {
         }
     }
 
-    pub(super) fn step(&mut self, images: usize) {
+    /// Time since the last lap.
+    pub(super) fn since_lap(&self) -> Duration {
+        self.last.elapsed()
+    }
+
+    /// Ends a lap of some steps: the seconds that each took.
+    pub(super) fn lap(&mut self, steps: usize) -> f64 {
+        let seconds = self.last.elapsed().as_secs_f64();
+        self.last = Instant::now();
+        seconds / steps as f64
+    }
+
+    pub(super) fn step(&mut self, images: usize, seconds: f64) {
         if self.seconds.len() == SMOOTHING {
             self.seconds.pop_front();
         }
-        self.seconds.push_back(self.last.elapsed().as_secs_f64());
-        self.last = Instant::now();
+        self.seconds.push_back(seconds);
         self.images = images as f64;
     }
 
@@ -74,5 +85,23 @@ mod tests {
         mean.add(2.0);
         mean.add(f64::NAN);
         assert_eq!(mean.value(), 2.0);
+    }
+
+    /// Steps that are heard of together share their time.
+    #[test]
+    fn the_pace_is_the_mean_of_the_last_steps() {
+        let mut pace = Pace::new();
+        for (images, seconds) in [(4, 9.0), (4, 3.0), (8, 3.0)] {
+            pace.step(images, seconds);
+        }
+        assert_eq!(pace.seconds_per_step(), 5.0);
+        assert_eq!(pace.images_per_second(), 8.0 / 5.0);
+        for _ in 0..SMOOTHING {
+            pace.step(8, 2.0);
+        }
+        assert_eq!(pace.seconds_per_step(), 2.0);
+        let passed = pace.since_lap().as_secs_f64();
+        assert!(pace.lap(4) >= passed / 4.0);
+        assert!(pace.lap(1) < 1.0, "a lap begins where the last one ended");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Trainer;
 use crate::losses::speed_weight;
-use crate::{LearningRateSchedule, Schedule, TrainConfig};
+use crate::{LearningRateSchedule, PreparedStep, Schedule, TrainConfig};
 use deepfusion_kernels::AdamStep;
 use std::time::Duration;
 
@@ -36,12 +36,15 @@ impl Trainer {
     }
 
     /// A step of the optimiser at the focal length's own learning rate, as far into its schedule as the networks'.
-    pub(super) fn focal_step(&self, step: AdamStep) -> AdamStep {
+    pub(super) fn focal_step(&self, step: PreparedStep) -> PreparedStep {
         let own = self.config.learned_camera();
-        let share = f64::from(step.learning_rate) / self.config.learning_rate;
-        AdamStep {
-            learning_rate: own.map_or(0.0, |camera| share * camera.learning_rate) as f32,
-            weight_decay: 0.0,
+        let share = f64::from(step.settings.learning_rate) / self.config.learning_rate;
+        PreparedStep {
+            settings: AdamStep {
+                learning_rate: own.map_or(0.0, |camera| share * camera.learning_rate) as f32,
+                weight_decay: 0.0,
+                ..step.settings
+            },
             ..step
         }
     }

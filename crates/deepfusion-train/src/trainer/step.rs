@@ -1,30 +1,43 @@
 //! What one worker learns from its part of a step: losses, and their gradients by name; and the step of the optimiser.
 
 use super::Trainer;
+use super::figures::{Figures, UnreadBatch, UnreadStep};
 use crate::model::displacements;
-use crate::unread::{Unread, read_at_once};
+use crate::unread::read_at_once;
 use crate::workers::WorkerGroup;
 use crate::{
     Adam, BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass,
-    LoaderProblem, LossTerms, Model, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
+    LoaderProblem, Model, NamedGradients, PreparedStep, SamplePanel, SampleSet, Schedule,
+    TrainConfig,
 };
 use burn::tensor::Tensor;
-use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops::autocast;
 
 /// The name of the focal length among parameters and moments.
 const FOCAL: &str = "focal";
 
 impl Trainer {
-    /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches.
+    /// Whether the device decides about its steps, and their numbers wait there for those of others. What several workers clip is the mean
+    /// of their gradients, which passes through main memory in any case.
+    pub(super) fn decides_on_device(&self) -> bool {
+        self.reads_late && self.workers.count() == 1
+    }
+
+    /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches. Where the device decides about the
+    /// step, its losses are still there.
     ///
     /// # Errors
     /// [`Error::NotFinite`] of the first batch with such a loss, else that of a batch that could not be made.
     pub(super) fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<WorkerStep, Error> {
         let mut learned = WorkerStep::default();
+        if self.reads_late {
+            learned.gradients = NamedGradients::on_device();
+        }
         let learning = self.learn_batches(loaders, schedule, &mut learned);
-        // Of what failed, a loss that waits to be read was the first.
-        self.read(&mut learned)?;
+        if learning.is_err() || !self.decides_on_device() {
+            // Of what failed, a loss that waits to be read was the first.
+            self.read(&mut learned)?;
+        }
         learning.map(|()| learned)
     }
 
@@ -98,51 +111,45 @@ impl Trainer {
         self.read(learned)
     }
 
-    /// Reads the numbers of the batches that wait for it: a single transfer from the device. Where they are read late it is a single worker's
-    /// only one in a step, with the norm of its gradient; several workers read their gradients, too. A step needs it before it changes anything: a loss that is not finite
-    /// ends the run, such a gradient skips the step, and Adam counts those that were made.
+    /// Reads the numbers of the batches that wait for it: a single transfer from the device.
     fn read(&self, learned: &mut WorkerStep) -> Result<(), Error> {
-        let batches = std::mem::take(&mut learned.unread);
-        // What several workers clip is the mean of their gradients.
-        let norm_is_due = self.reads_late && self.workers.count() == 1;
-        let squares = norm_is_due.then(|| learned.gradients.squares());
-        let on_device = squares.as_ref().and_then(|squares| squares.1.clone());
-        let unread: Vec<&Unread> = batches.iter().map(|batch| &batch.numbers).collect();
-        let (numbers, on_device) = read_at_once(&unread, on_device);
-        let scale = 1.0 / self.config.accumulate as f64;
-        for (batch, numbers) in batches.iter().zip(numbers) {
-            let terms = &numbers.terms;
-            self.check_finite(terms, &batch.names)?;
-            learned.losses.add(terms, scale);
-            if batch.is_video {
-                learned.monitors.valid.push(terms.valid_share);
-                learned.monitors.moving.push(terms.moving_share);
-            }
-            if batch.says_scale {
-                learned.monitors.ratio.push(numbers.scale_ratio);
-            }
+        let mut batches = std::mem::take(&mut learned.unread);
+        let mut unread: Vec<_> = batches.iter_mut().map(|b| &mut b.numbers).collect();
+        let numbers = read_at_once(&mut unread);
+        let (share, step) = (1.0 / self.config.accumulate as f64, self.state.step + 1);
+        for (batch, numbers) in batches.iter().zip(&numbers) {
+            learned.figures.add(batch, numbers, share, step)?;
         }
-        learned.gradient_norm =
-            squares.map(|(on_host, _)| (on_host + on_device.unwrap_or(0.0)).sqrt());
         Ok(())
     }
 
-    /// # Errors
-    /// [`Error::NotFinite`] naming the first term that is not finite.
-    fn check_finite(&self, terms: &LossTerms, names: &[String]) -> Result<(), Error> {
-        match terms.not_finite() {
-            None => Ok(()),
-            Some((term, value)) => Err(Error::NotFinite {
-                step: self.state.step + 1,
-                term,
-                value,
-                frames: names.join(", "),
-            }),
+    /// A step that the device decides about: it is made if all losses and the gradient's norm are finite.
+    pub(super) fn step_on_device(
+        &mut self,
+        mut batches: Vec<UnreadBatch>,
+        gradients: &NamedGradients,
+        learning_rate: f64,
+    ) -> UnreadStep {
+        let mut terms = Vec::new();
+        for batch in &mut batches {
+            terms.extend(batch.numbers.take_terms());
         }
+        let losses = Tensor::cat(terms, 0);
+        // None are in main memory.
+        let (_, squares) = gradients.squares();
+        let squares = squares.unwrap_or_else(|| Tensor::zeros([1], &losses.device()));
+        let (is_made, step) = self.adam.begin_on_device(
+            (losses.clone(), squares.clone()),
+            learning_rate,
+            self.config.clip_norm,
+            self.config.weight_decay,
+        );
+        self.apply(step, gradients);
+        UnreadStep::new(batches, [losses, squares], is_made)
     }
 
     /// A step of the optimiser on everything that learns.
-    pub(super) fn apply(&mut self, step: AdamStep, gradients: &NamedGradients) {
+    pub(super) fn apply(&mut self, step: PreparedStep, gradients: &NamedGradients) {
         // Moved, not cloned: what nobody else holds is changed where it is.
         let Some(model) = self.model.take() else {
             return;
@@ -177,7 +184,7 @@ impl Model {
 
     /// The networks after a step of the optimiser. A learned focal length stays: its step is another.
     #[must_use]
-    pub fn updated(self, adam: &mut Adam, step: &AdamStep, gradients: &NamedGradients) -> Self {
+    pub fn updated(self, adam: &mut Adam, step: &PreparedStep, gradients: &NamedGradients) -> Self {
         Self {
             depth_net: adam.apply(step, "depth", self.depth_net, gradients),
             pose_net: self
@@ -223,34 +230,13 @@ impl Loaders {
 #[derive(Default)]
 pub(super) struct WorkerStep {
     pub(super) gradients: NamedGradients,
-    pub(super) losses: LossTerms,
+    pub(super) figures: Figures,
     /// Drives and frames.
     pub(super) names: Vec<String>,
     pub(super) images: usize,
     pub(super) panel: Option<PanelInput>,
-    pub(super) monitors: Monitors,
-    /// Norm of the gradients, where it was read with the losses.
-    pub(super) gradient_norm: Option<f64>,
-    /// Batches of which losses and monitors lack the numbers.
-    unread: Vec<UnreadBatch>,
-}
-
-/// A batch whose numbers are still on the device.
-struct UnreadBatch {
-    numbers: Unread,
-    /// Drives and frames.
-    names: Vec<String>,
-    is_video: bool,
-    /// Whether its scale is the run's: known depth says it only where no PoseNet on video does.
-    says_scale: bool,
-}
-
-/// Figures of each batch that are smoothed over the steps.
-#[derive(Default)]
-pub(super) struct Monitors {
-    pub(super) ratio: Vec<f64>,
-    pub(super) valid: Vec<f64>,
-    pub(super) moving: Vec<f64>,
+    /// Batches whose numbers the figures lack.
+    pub(super) unread: Vec<UnreadBatch>,
 }
 
 /// What a panel shows.

@@ -1,14 +1,16 @@
-//! Numbers that are read at a step's end, as on a GPU, on the processor.
+//! Numbers that wait to be read, as on a GPU, on the processor.
 
-use super::step::Monitors;
+use super::figures::Monitors;
+use super::step::WorkerStep;
 use super::*;
 use crate::unread::TRANSFERS;
-use crate::{NamedGradients, Preset};
+use crate::{NamedGradients, Preset, TrainWarning};
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use std::error::Error as StdError;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::time::Duration;
 
 fn drive(folder: &Path) -> PathBuf {
     let street = Simulation::new(&SimConfig {
@@ -42,9 +44,15 @@ fn started(drive: &Path, run: &Path, reads_late: bool, init: fn(Model) -> Model)
     trainer
 }
 
+/// From the run's first batch on, all of them.
+fn loaders(trainer: &Trainer) -> Loaders {
+    let alone = WorkerGroup::of(Box::new(SingleWorker));
+    Loaders::training(&trainer.config, &trainer.train, 0, &alone)
+}
+
 /// A first step's losses and gradients, and how often numbers were read.
 fn learned(trainer: &Trainer) -> (Result<WorkerStep, Error>, usize) {
-    let loaders = Loaders::training(&trainer.config, &trainer.train, 0, &trainer.workers);
+    let loaders = loaders(trainer);
     let before = TRANSFERS.get();
     let learned = trainer.learn(&loaders, trainer.schedule(1));
     (learned, TRANSFERS.get() - before)
@@ -82,7 +90,7 @@ impl Workers for OneOfTwo {
     }
 }
 
-/// Losses, monitors and the norm are those that are read batch by batch, in a single transfer.
+/// Losses, monitors and the norm are those that are read batch by batch, in a single transfer: what several workers read at a step's end.
 #[test]
 fn numbers_read_at_the_end_are_those_read_at_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -90,14 +98,17 @@ fn numbers_read_at_the_end_are_those_read_at_once() {
     let (soon, transfers) = learned(&started(&drive, &run("soon"), false, |model| model));
     assert_eq!(transfers, 2);
     let mut trainer = started(&drive, &run("late"), true, |model| model);
+    let (waits, transfers) = learned(&trainer);
+    assert_eq!((transfers, waits.unwrap().unread.len()), (0, 2));
+    trainer.workers = WorkerGroup::of(Box::new(OneOfTwo));
     let (late, transfers) = learned(&trainer);
     assert_eq!(transfers, 1);
 
     let (soon, late) = (soon.unwrap(), late.unwrap());
-    let terms = |step: &WorkerStep| step.losses.named().map(|(_, value)| value);
-    assert!(soon.losses.total > 0.0);
+    let terms = |step: &WorkerStep| step.figures.losses.named().map(|(_, value)| value);
+    assert!(soon.figures.losses.total > 0.0);
     assert_close(terms(&soon), terms(&late));
-    let monitors = [&soon, &late].map(|step| &step.monitors);
+    let monitors = [&soon, &late].map(|step| &step.figures.monitors);
     assert_eq!(monitors[0].ratio.len(), 2);
     let parts: [fn(&Monitors) -> Vec<f64>; 3] = [
         |m| m.ratio.clone(),
@@ -109,30 +120,27 @@ fn numbers_read_at_the_end_are_those_read_at_once() {
     }
     assert_eq!((soon.names, soon.images), (late.names, late.images));
     assert_eq!(flat(&soon.gradients).len(), flat(&late.gradients).len());
-    assert_eq!(soon.gradient_norm, None);
-    assert_eq!(late.gradient_norm, Some(late.gradients.norm()));
-    assert_close(late.gradient_norm, [soon.gradients.norm()]);
+    // One is summed in single precision.
+    let ratio = late.gradients.norm() / soon.gradients.norm();
+    assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
+}
 
-    // The gradient of several workers is the mean of theirs, whose norm none of them knows yet.
-    trainer.workers = WorkerGroup::of(Box::new(OneOfTwo));
-    assert_eq!(learned(&trainer).0.unwrap().gradient_norm, None);
+/// A model whose motions are NaN.
+fn damaged(mut model: Model) -> Model {
+    let output = &mut model.pose_net.as_mut().unwrap().decoder.output;
+    let bias = output.bias.take();
+    output.bias = bias.map(|b| b.map(|b| b.inner().mul_scalar(f32::NAN).autodiff().require_grad()));
+    model
 }
 
 /// A loss that is not finite is the same error, of the same batch, whenever it is read.
 #[test]
 fn a_loss_that_is_not_finite_is_named_either_way() {
-    let damaged = |mut model: Model| {
-        let output = &mut model.pose_net.as_mut().unwrap().decoder.output;
-        output.bias = output
-            .bias
-            .take()
-            .map(|bias| bias.map(|b| b.inner().mul_scalar(f32::NAN).autodiff().require_grad()));
-        model
-    };
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let [soon, late] = [("soon", false), ("late", true)].map(|(name, reads_late)| {
-        let trainer = started(&drive, &folder.path().join(name), reads_late, damaged);
+        let mut trainer = started(&drive, &folder.path().join(name), reads_late, damaged);
+        trainer.workers = WorkerGroup::of(Box::new(OneOfTwo));
         let (learned, transfers) = learned(&trainer);
         assert_eq!(transfers, 1);
         let Err(error) = learned else {
@@ -142,4 +150,289 @@ fn a_loss_that_is_not_finite_is_named_either_way() {
         error.to_string()
     });
     assert_eq!(soon, late);
+}
+
+/// So many steps together, and nothing before.
+fn every(together: usize) -> ReadInterval {
+    ReadInterval {
+        alone: 0,
+        together,
+        time: Duration::MAX,
+    }
+}
+
+/// A run of some steps whose numbers are read every so many, and nothing is held out.
+fn run_of(steps: usize, drive: &Path, run: &Path, read_every: Option<usize>) -> Trainer {
+    let mut trainer = started(drive, run, read_every.is_some(), |model| model);
+    trainer.read_interval = every(read_every.unwrap_or(1));
+    // A validation would read them before.
+    (trainer.config.steps, trainer.config.validate_every) = (Some(steps), 1000);
+    trainer.config.clip_norm = 0.05;
+    trainer.validation.samples.clear();
+    trainer
+}
+
+/// What a run said of its steps.
+#[derive(Default)]
+struct Said {
+    /// Number, loss, norm and scale of each.
+    steps: Vec<(usize, f64, f64, f64)>,
+    /// After so many transfers.
+    transfers: Vec<usize>,
+    skipped: Vec<usize>,
+}
+
+impl Said {
+    fn hear(&mut self, event: &TrainEvent) -> Control {
+        match event {
+            TrainEvent::Step {
+                step,
+                losses,
+                gradient_norm,
+                scale_ratio,
+                ..
+            } => {
+                let said = (*step, losses.total, *gradient_norm, *scale_ratio);
+                self.steps.push(said);
+                self.transfers.push(TRANSFERS.get());
+            }
+            TrainEvent::Warning {
+                step,
+                warning: TrainWarning::StepSkipped { .. },
+            } => self.skipped.push(*step),
+            _ => {}
+        }
+        Control::Continue
+    }
+
+    fn numbers(&self) -> Vec<usize> {
+        self.steps.iter().map(|step| step.0).collect()
+    }
+
+    fn losses(&self) -> impl Iterator<Item = f64> {
+        self.steps.iter().map(|step| step.1)
+    }
+}
+
+fn weights(trainer: &Trainer) -> Vec<f64> {
+    let model = trainer.model();
+    let networks = [
+        deepfusion_nn::weights::collect(&model.depth_net),
+        deepfusion_nn::weights::collect(model.pose_net.as_ref().unwrap()),
+    ];
+    let tensors = networks.iter().flat_map(|n| &n.tensors);
+    // Those that learn: running statistics follow the images of every step, made or skipped.
+    let learning = tensors.filter(|(name, _)| !name.contains("running"));
+    let values = learning.flat_map(|(_, tensor)| &tensor.values);
+    values.map(|v| f64::from(*v)).collect()
+}
+
+/// Numbers that are read now and then are the same as those of each step, of the same weights.
+#[test]
+fn a_run_that_is_read_now_and_then_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    let run = |read_every: Option<usize>| {
+        let at = folder.path().join(format!("{read_every:?}"));
+        let (mut trainer, mut said) = (run_of(12, &drive, &at, read_every), Said::default());
+        let before = TRANSFERS.get();
+        let summary = trainer.run(&mut |event| said.hear(&event)).unwrap();
+        assert_eq!((summary.step, summary.skipped), (12, 0));
+        assert_eq!(said.numbers(), (1..=12).collect::<Vec<_>>());
+        assert_eq!(trainer.adam.steps(), 12);
+        said.transfers.iter_mut().for_each(|t| *t -= before);
+        (said, weights(&trainer))
+    };
+    let (each, each_weights) = run(Some(1));
+    assert_eq!(each.transfers, (1..=12).collect::<Vec<_>>());
+    let (some, some_weights) = run(Some(5));
+    assert_eq!(some.transfers, [1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3]);
+    let figures = |said: &Said| {
+        let steps = said.steps.iter();
+        let figures = steps.flat_map(|(_, loss, norm, ratio)| [*loss, *norm, *ratio]);
+        figures.collect::<Vec<_>>()
+    };
+    assert_close(figures(&each), figures(&some));
+    assert_close(each_weights, some_weights);
+
+    // On the processor's own way, whose rounding is another.
+    let (soon, _) = run(None);
+    assert_close(soon.losses().take(1), some.losses().take(1));
+    for (a, b) in soon.losses().zip(some.losses()) {
+        assert!((a / b - 1.0).abs() < 0.02, "{a} and {b}");
+    }
+}
+
+/// Makes steps of what `learn` gives for each.
+fn by_hand(
+    trainer: &mut Trainer,
+    steps: usize,
+    said: &mut Said,
+    learn: fn(&mut Trainer, &Loaders, usize) -> WorkerStep,
+) -> (Told, Result<(), Error>) {
+    let (loaders, mut told) = (loaders(trainer), Told::new(steps));
+    for number in 1..=steps {
+        let learned = learn(trainer, &loaders, number);
+        let mut listen = |event: TrainEvent| said.hear(&event);
+        if let Err(error) = trainer.make_step(learned, &mut told, &mut listen) {
+            return (told, Err(error));
+        }
+    }
+    (told, Ok(()))
+}
+
+/// A gradient of NaN skips its own step alone, and Adam does not count it.
+#[test]
+fn a_gradient_that_is_not_finite_skips_one_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    let run = |read_every: Option<usize>| {
+        let at = folder.path().join(format!("{read_every:?}"));
+        let (mut trainer, mut said) = (run_of(6, &drive, &at, read_every), Said::default());
+        let (mut told, made) = by_hand(&mut trainer, 6, &mut said, |trainer, loaders, number| {
+            let mut learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
+            if number == 3 {
+                let mut values = flat(&learned.gradients);
+                values[7] = f32::NAN;
+                learned.gradients.take_from(&values);
+            }
+            learned
+        });
+        made.unwrap();
+        let mut listen = |event: TrainEvent| said.hear(&event);
+        trainer.tell_waiting(&mut told, &mut listen).unwrap();
+        assert_eq!((trainer.state.step, trainer.state.skipped), (6, 1));
+        assert_eq!(trainer.adam.steps(), 5);
+        assert_eq!(said.skipped, [3]);
+        assert_eq!(said.numbers(), [1, 2, 3, 4, 5, 6]);
+        for (number, loss, norm, _) in &said.steps {
+            assert!(loss.is_finite());
+            assert_eq!(norm.is_nan(), *number == 3);
+        }
+        let weights = weights(&trainer);
+        assert!(weights.iter().all(|weight| weight.is_finite()));
+        (said, weights)
+    };
+    let (each, each_weights) = run(Some(1));
+    let (some, some_weights) = run(Some(4));
+    assert_close(each.losses(), some.losses());
+    assert_close(each_weights, some_weights);
+    let (soon, _) = run(None);
+    for (a, b) in soon.losses().zip(some.losses()) {
+        assert!((a / b - 1.0).abs() < 0.02, "{a} and {b}");
+    }
+}
+
+/// A loss of NaN in the middle ends the run when it is read, by its own step's name; that step was not made, and what went before it is told.
+#[test]
+fn a_loss_that_is_not_finite_is_found_late() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    let (mut trainer, mut said) = (
+        run_of(6, &drive, &folder.path().join("run"), Some(5)),
+        Said::default(),
+    );
+    let (_, made) = by_hand(&mut trainer, 6, &mut said, |trainer, loaders, number| {
+        let good = trainer.model.clone();
+        if number == 3 {
+            trainer.model = good.clone().map(damaged);
+        }
+        let learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
+        trainer.model = good;
+        learned
+    });
+    let error = made.unwrap_err();
+    assert!(matches!(error, Error::NotFinite { step: 3, .. }), "{error}");
+    assert_eq!(said.numbers(), [1, 2]);
+    assert_eq!((trainer.state.step, trainer.adam.steps()), (5, 4));
+    assert!(weights(&trainer).iter().all(|weight| weight.is_finite()));
+}
+
+/// A checkpoint waits for the numbers of the steps before it, and is not written after a loss of NaN.
+#[test]
+fn nothing_is_saved_after_a_loss_that_is_not_finite() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    let models: [(&str, fn(Model) -> Model); 2] = [("good", |model| model), ("damaged", damaged)];
+    for (name, init) in models {
+        let mut trainer = started(&drive, &folder.path().join(name), true, init);
+        trainer.read_interval = every(5);
+        (trainer.config.steps, trainer.config.validate_every) = (Some(3), 1000);
+        trainer.config.checkpoint_minutes = 1e-9;
+        trainer.validation.samples.clear();
+        let (before, mut said) = (weights(&trainer), Said::default());
+        let outcome = trainer.run(&mut |event| said.hear(&event));
+        let saved = trainer.folder.checkpoint_path(CheckpointKind::Last);
+        if name == "good" {
+            assert_eq!(outcome.unwrap().step, 3);
+            assert_eq!(said.numbers(), [1, 2, 3]);
+            assert!(saved.exists());
+            assert_eq!(trainer.adam.steps(), 3);
+        } else {
+            let error = outcome.unwrap_err();
+            assert!(matches!(error, Error::NotFinite { step: 1, .. }), "{error}");
+            assert!(said.steps.is_empty() && !saved.exists());
+            let bits = |weights: Vec<f64>| weights.into_iter().map(f64::to_bits);
+            assert!(bits(before).eq(bits(weights(&trainer))), "no step was made");
+        }
+    }
+}
+
+/// Who stops a run hears of all steps that were made, and its checkpoint is of the last.
+#[test]
+fn a_run_stops_with_the_steps_that_were_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    let mut trainer = run_of(9, &drive, &folder.path().join("run"), Some(4));
+    let mut said = Said::default();
+    let summary = trainer.run(&mut |event| {
+        said.hear(&event);
+        let stops = matches!(event, TrainEvent::Step { step: 2, .. });
+        if stops {
+            Control::Stop
+        } else {
+            Control::Continue
+        }
+    });
+    let summary = summary.unwrap();
+    assert!(summary.stopped);
+    assert_eq!((summary.step, trainer.adam.steps()), (4, 4));
+    assert_eq!(said.numbers(), [1, 2, 3, 4]);
+    assert!(
+        trainer
+            .folder
+            .checkpoint_path(CheckpointKind::Last)
+            .exists()
+    );
+}
+
+/// The first steps are heard of one by one; later ones at the latest after a while.
+#[test]
+fn steps_are_read_when_it_is_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    for (interval, expected) in [
+        (
+            ReadInterval {
+                alone: 2,
+                ..every(9)
+            },
+            [1, 2, 3, 3, 3],
+        ),
+        (
+            ReadInterval {
+                time: Duration::ZERO,
+                ..every(9)
+            },
+            [1, 2, 3, 4, 5],
+        ),
+    ] {
+        let at = folder.path().join(format!("{}", interval.alone));
+        let (mut trainer, mut said) = (run_of(5, &drive, &at, Some(9)), Said::default());
+        trainer.read_interval = interval;
+        let before = TRANSFERS.get();
+        trainer.run(&mut |event| said.hear(&event)).unwrap();
+        let transfers = said.transfers.iter().map(|t| t - before);
+        assert_eq!(transfers.collect::<Vec<_>>(), expected);
+    }
 }

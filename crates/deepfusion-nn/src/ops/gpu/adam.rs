@@ -15,12 +15,13 @@ use deepfusion_kernels::AdamStep;
 /// The step.
 #[backend_extension(Cube)]
 pub(in super::super) trait AdamOps: Backend {
-    /// Values and both moments after the step; all four are flat.
+    /// Values and both moments after the step; all four are flat. `factors` are those of `AdamFactors`.
     fn kernel_adam(
         values: FloatTensor<Self>,
         gradient: FloatTensor<Self>,
         first: FloatTensor<Self>,
         second: FloatTensor<Self>,
+        factors: FloatTensor<Self>,
         step: AdamStep,
     ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
 
@@ -109,14 +110,12 @@ fn adam(
     gradient: &[f32],
     first: &[f32],
     second: &[f32],
+    factors: &[f32],
     new_values: &mut [f32],
     new_first: &mut [f32],
     new_second: &mut [f32],
-    gradient_scale: f32,
     beta1: f32,
     beta2: f32,
-    correction1: f32,
-    correction2: f32,
     epsilon: f32,
     learning_rate: f32,
     kept: f32,
@@ -125,13 +124,16 @@ fn adam(
     if at >= values.len() {
         terminate!();
     }
-    let g = gradient[at] * gradient_scale;
+    let g = gradient[at] * factors[0];
     let m = first[at] * beta1 + g * (1.0f32 - beta1);
     let v = second[at] * beta2 + g * g * (1.0f32 - beta2);
-    let direction = m / correction1 / ((v / correction2).sqrt() + epsilon);
-    new_values[at] = values[at] * kept - direction * learning_rate;
-    new_first[at] = m;
-    new_second[at] = v;
+    let direction = m / factors[1] / ((v / factors[2]).sqrt() + epsilon);
+    let moved = values[at] * kept - direction * learning_rate;
+    // Chosen, not multiplied: a gradient of NaN is none afterwards.
+    let is_made = factors[3] > 0.5f32;
+    new_values[at] = select(is_made, moved, values[at]);
+    new_first[at] = select(is_made, m, first[at]);
+    new_second[at] = select(is_made, v, second[at]);
 }
 
 impl AdamOps for CubeBackend {
@@ -170,6 +172,7 @@ impl AdamOps for CubeBackend {
         gradient: CubeTensor,
         first: CubeTensor,
         second: CubeTensor,
+        factors: CubeTensor,
         step: AdamStep,
     ) -> (CubeTensor, CubeTensor, CubeTensor) {
         let [new, new_first, new_second] = [(); 3].map(|()| {
@@ -185,14 +188,12 @@ impl AdamOps for CubeBackend {
             input(gradient),
             input(first),
             input(second),
+            input(factors),
             output(&new),
             output(&new_first),
             output(&new_second),
-            step.gradient_scale,
             step.beta1,
             step.beta2,
-            step.correction1,
-            step.correction2,
             step.epsilon,
             step.learning_rate,
             1.0f32 - step.learning_rate * step.weight_decay,

@@ -1,0 +1,148 @@
+//! What a step has to say: of each batch on the device at first, then read.
+
+use crate::unread::{BatchNumbers, Unread, transfer};
+use crate::{Error, LossTerms, StepOutcome};
+use burn::tensor::{Bool, Tensor};
+
+/// A batch whose numbers are still on the device.
+pub(super) struct UnreadBatch {
+    pub(super) numbers: Unread,
+    /// Drives and frames.
+    pub(super) names: Vec<String>,
+    pub(super) is_video: bool,
+    /// Whether its scale is the run's: known depth says it only where no PoseNet on video does.
+    pub(super) says_scale: bool,
+}
+
+/// Figures of each batch that are smoothed over the steps.
+#[derive(Default)]
+pub(super) struct Monitors {
+    pub(super) ratio: Vec<f64>,
+    pub(super) valid: Vec<f64>,
+    pub(super) moving: Vec<f64>,
+}
+
+/// What the batches of a step say.
+#[derive(Default)]
+pub(super) struct Figures {
+    /// The mean over the batches.
+    pub(super) losses: LossTerms,
+    pub(super) monitors: Monitors,
+}
+
+impl Figures {
+    /// Adds a batch of a step, a `share` of it.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] naming the first term that is not finite.
+    pub(super) fn add(
+        &mut self,
+        batch: &UnreadBatch,
+        numbers: &BatchNumbers,
+        share: f64,
+        step: usize,
+    ) -> Result<(), Error> {
+        let terms = &numbers.terms;
+        if let Some((term, value)) = terms.not_finite() {
+            return Err(Error::NotFinite {
+                step,
+                term,
+                value,
+                frames: batch.names.join(", "),
+            });
+        }
+        self.losses.add(terms, share);
+        if batch.is_video {
+            self.monitors.valid.push(terms.valid_share);
+            self.monitors.moving.push(terms.moving_share);
+        }
+        if batch.says_scale {
+            self.monitors.ratio.push(numbers.scale_ratio);
+        }
+        Ok(())
+    }
+}
+
+/// A step that the device has decided about, and its numbers there.
+pub(super) struct UnreadStep {
+    batches: Vec<UnreadBatch>,
+    /// The terms of all batches, the gradient's sum of squares, 1 where the step was made and 0 where not, and what says the scale.
+    values: Tensor<1>,
+}
+
+impl UnreadStep {
+    /// Of what has to be finite: the batches' terms and the gradient's sum of squares, in this order.
+    pub(super) fn new(
+        mut batches: Vec<UnreadBatch>,
+        checked: [Tensor<1>; 2],
+        is_made: Tensor<1, Bool>,
+    ) -> Self {
+        let mut values: Vec<_> = checked.into();
+        values.push(is_made.float());
+        for batch in &mut batches {
+            values.extend(batch.numbers.take_scale());
+        }
+        Self {
+            batches,
+            values: Tensor::cat(values, 0),
+        }
+    }
+
+    /// Reads the numbers of steps in one transfer from the device.
+    pub(super) fn read(steps: &[&Self]) -> Vec<ReadStep> {
+        let values = steps.iter().map(|step| step.values.clone());
+        let mut read = transfer(values.collect()).into_iter();
+        let of_step = |step: &&Self| {
+            let terms = step.batches.iter().map(|batch| batch.numbers.term_count());
+            let terms: usize = terms.sum();
+            let mut next = |count: usize| -> Vec<f64> { read.by_ref().take(count).collect() };
+            let (terms, decided) = (next(terms), next(2));
+            ReadStep {
+                of_scale: next(step.values.dims()[0] - terms.len() - decided.len()),
+                terms,
+                gradient_norm: decided[0].sqrt(),
+                is_made: decided[1] > 0.5,
+            }
+        };
+        steps.iter().map(of_step).collect()
+    }
+
+    /// What the batches say, each a `share` of the step with this number.
+    ///
+    /// # Errors
+    /// As [`Figures::add`].
+    pub(super) fn figures(
+        &self,
+        read: &ReadStep,
+        share: f64,
+        step: usize,
+    ) -> Result<Figures, Error> {
+        let mut figures = Figures::default();
+        let (mut terms, mut of_scale) = (read.terms.iter().copied(), read.of_scale.iter().copied());
+        for batch in &self.batches {
+            let numbers = batch.numbers.numbers(&mut terms, &mut of_scale);
+            figures.add(batch, &numbers, share, step)?;
+        }
+        Ok(figures)
+    }
+}
+
+/// The numbers of a step that the device has decided about.
+pub(super) struct ReadStep {
+    terms: Vec<f64>,
+    of_scale: Vec<f64>,
+    gradient_norm: f64,
+    pub(super) is_made: bool,
+}
+
+impl ReadStep {
+    pub(super) fn outcome(&self) -> StepOutcome {
+        if self.is_made {
+            StepOutcome::Done {
+                gradient_norm: self.gradient_norm,
+            }
+        } else {
+            StepOutcome::Skipped
+        }
+    }
+}

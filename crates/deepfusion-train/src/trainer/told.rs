@@ -1,0 +1,222 @@
+//! What a run says of its steps: each at once, or some together, whose numbers waited on the device.
+
+use super::figures::{Figures, Monitors, UnreadStep};
+use super::pace::{Pace, Smoothed};
+use super::step::WorkerStep;
+use super::{MAX_SKIPPED, Trainer};
+use crate::adam::MOST_UNDECIDED;
+use crate::{Control, Error, StepOutcome, TrainEvent, TrainWarning};
+use std::time::Duration;
+
+/// When numbers are read that wait on the device. Whatever else is due, a validation, a checkpoint or the run's end, reads them before.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ReadInterval {
+    /// The first steps of a call are read one by one: they say how long a run will take, and most of what goes wrong does so there.
+    pub(super) alone: usize,
+    /// So many steps together at most, and no more than [`MOST_UNDECIDED`].
+    pub(super) together: usize,
+    /// No longer than this after the last ones: where steps are slow, someone waits for each, and to stop a run is to answer its event.
+    pub(super) time: Duration,
+}
+
+impl ReadInterval {
+    pub(super) const USUAL: Self = Self {
+        alone: 10,
+        together: MOST_UNDECIDED,
+        time: Duration::from_secs(1),
+    };
+}
+
+/// A step of the run, made or skipped.
+pub(super) struct Step {
+    /// Counted from 1.
+    number: usize,
+    /// Drives and frames.
+    names: Vec<String>,
+    /// Of all workers.
+    images: usize,
+    learning_rate: f64,
+}
+
+/// What was said of the steps of a run, and those of which nothing was yet.
+pub(super) struct Told {
+    /// Steps of the whole run.
+    pub(super) steps: usize,
+    /// In this call.
+    told: usize,
+    waiting: Vec<(Step, UnreadStep)>,
+    skipped_in_row: usize,
+    pace: Pace,
+    ratio: Smoothed,
+    low_view: Smoothed,
+    moving: Smoothed,
+}
+
+impl Told {
+    pub(super) fn new(steps: usize) -> Self {
+        Self {
+            steps,
+            told: 0,
+            waiting: Vec::new(),
+            skipped_in_row: 0,
+            pace: Pace::new(),
+            ratio: Smoothed::new(),
+            low_view: Smoothed::new(),
+            moving: Smoothed::new(),
+        }
+    }
+
+    /// The shares of pixels that are in view, and of dynamic ones.
+    pub(super) fn shares(&self) -> [f64; 2] {
+        [self.low_view.value(), self.moving.value()]
+    }
+
+    fn add(&mut self, monitors: Monitors) {
+        for (all, of_step) in [
+            (&mut self.ratio, monitors.ratio),
+            (&mut self.low_view, monitors.valid),
+            (&mut self.moving, monitors.moving),
+        ] {
+            of_step.into_iter().for_each(|value| all.add(value));
+        }
+    }
+
+    fn reading_is_due(&self, interval: ReadInterval) -> bool {
+        self.told < interval.alone
+            || self.waiting.len() >= interval.together.min(MOST_UNDECIDED)
+            || self.pace.since_lap() >= interval.time
+    }
+}
+
+impl Trainer {
+    /// Makes a step of what was learned, or skips it where its gradient is not finite, and says so: at once, or, where the device decides,
+    /// when the numbers of the steps are due to be read.
+    ///
+    /// # Errors
+    /// As [`Self::tell_waiting`].
+    pub(super) fn make_step(
+        &mut self,
+        learned: WorkerStep,
+        told: &mut Told,
+        listen: &mut dyn FnMut(TrainEvent) -> Control,
+    ) -> Result<Control, Error> {
+        let WorkerStep {
+            gradients,
+            figures,
+            names,
+            images,
+            unread,
+            ..
+        } = learned;
+        let learning_rate = self.learning_rate(told.steps);
+        let step = Step {
+            number: self.state.step + 1,
+            names,
+            images: images * self.workers.count(),
+            learning_rate,
+        };
+        if self.decides_on_device() {
+            let unread = self.step_on_device(unread, &gradients, learning_rate);
+            self.state.step += 1;
+            told.waiting.push((step, unread));
+            return if told.reading_is_due(self.read_interval) {
+                self.tell_waiting(told, listen)
+            } else {
+                Ok(Control::Continue)
+            };
+        }
+        let (outcome, prepared) = self.adam.begin(
+            &gradients,
+            learning_rate,
+            self.config.clip_norm,
+            self.config.weight_decay,
+        );
+        if let Some(prepared) = prepared {
+            self.apply(prepared, &gradients);
+        }
+        self.state.step += 1;
+        let seconds = told.pace.lap(1);
+        self.tell(told, step, (figures, outcome), seconds, listen)
+    }
+
+    /// Reads the numbers of the steps that wait on the device, in one transfer, and says of each what it was. Nothing is done where none
+    /// waits. Until then the host does not know how many steps Adam has made: a checkpoint has to wait for it.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] of the first step with such a loss: nothing is said of the steps after it. The device has not made that step, so
+    /// the weights are as good as before. Running statistics of batch norms are not: the forward pass moves them at once, and they stay NaN
+    /// where the images' features were. The run ends here, before anything is written, and goes on from the checkpoint before.
+    /// [`Error::GradientsNotFinite`].
+    pub(super) fn tell_waiting(
+        &mut self,
+        told: &mut Told,
+        listen: &mut dyn FnMut(TrainEvent) -> Control,
+    ) -> Result<Control, Error> {
+        let waiting = std::mem::take(&mut told.waiting);
+        if waiting.is_empty() {
+            return Ok(Control::Continue);
+        }
+        let unread: Vec<&UnreadStep> = waiting.iter().map(|(_, unread)| unread).collect();
+        let read = UnreadStep::read(&unread);
+        let made = read.iter().filter(|step| step.is_made).count();
+        self.adam.settle(made as u32);
+        let seconds = told.pace.lap(waiting.len());
+        let share = 1.0 / self.config.accumulate as f64;
+        let mut control = Control::Continue;
+        for ((step, unread), read) in waiting.into_iter().zip(read) {
+            let figures = unread.figures(&read, share, step.number)?;
+            let said = (figures, read.outcome());
+            // Who asks to stop hears of the steps that were made already.
+            if self.tell(told, step, said, seconds, listen)? == Control::Stop {
+                control = Control::Stop;
+            }
+        }
+        Ok(control)
+    }
+
+    /// Says what a step was.
+    fn tell(
+        &mut self,
+        told: &mut Told,
+        step: Step,
+        (figures, outcome): (Figures, StepOutcome),
+        seconds: f64,
+        listen: &mut dyn FnMut(TrainEvent) -> Control,
+    ) -> Result<Control, Error> {
+        told.told += 1;
+        told.add(figures.monitors);
+        let gradient_norm = match outcome {
+            StepOutcome::Done { gradient_norm } => {
+                told.skipped_in_row = 0;
+                gradient_norm
+            }
+            StepOutcome::Skipped => {
+                self.state.skipped += 1;
+                told.skipped_in_row += 1;
+                if told.skipped_in_row == MAX_SKIPPED {
+                    return Err(Error::GradientsNotFinite {
+                        count: told.skipped_in_row,
+                        step: step.number,
+                        frames: step.names.join(", "),
+                    });
+                }
+                listen(TrainEvent::Warning {
+                    step: step.number,
+                    warning: TrainWarning::StepSkipped { frames: step.names },
+                });
+                f64::NAN
+            }
+        };
+        told.pace.step(step.images, seconds);
+        Ok(listen(TrainEvent::Step {
+            step: step.number,
+            steps: told.steps,
+            losses: figures.losses,
+            learning_rate: step.learning_rate,
+            images_per_second: told.pace.images_per_second(),
+            remaining_s: told.pace.seconds_per_step() * (told.steps - step.number) as f64,
+            scale_ratio: told.ratio.value(),
+            gradient_norm,
+        }))
+    }
+}
