@@ -44,12 +44,12 @@ pub enum TimesWarning {
         /// The line of the first, counted from 1.
         line: u64,
     },
-    /// The times of another program's log are dates without a zone.
+    /// The times of a log, or of a list of the frames' times, are dates without a zone.
     #[error(
         "{log}: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)"
     )]
     NoZone {
-        /// The log's name.
+        /// The name of the log or the list.
         log: String,
     },
     /// A video's frames have no times.
