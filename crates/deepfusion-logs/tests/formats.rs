@@ -86,6 +86,29 @@ fn a_row_that_goes_back_is_left_out() {
     assert!(error.contains("0.4 s before the row above"), "{error}");
 }
 
+/// A clock that leaps ahead for a row, among the last of the table: the row is left out, not those after it.
+#[test]
+fn a_row_that_leaps_ahead_costs_itself_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("trip.csv");
+    let row = |i: i32| {
+        let early = if i == 197 { 86_400 } else { 0 };
+        format!("{},{i},0.1\n", f64::from(i + early) / 10.0)
+    };
+    let rows: String = (0..200).map(row).collect();
+    std::fs::write(&file, format!("time_s,speed_mps,yaw_rate_radps\n{rows}")).unwrap();
+    let log = read(&file, &ReadOptions::default()).unwrap();
+    assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
+    assert!(log.speeds.iter().all(|speed| speed.mps != 197.0));
+    assert_eq!(log.speeds[198].mps, 199.0);
+    let said = LogNote::from(TableNote::Ahead {
+        ahead: 1,
+        rows: 200,
+    });
+    let times = log.notes.iter().filter(|note| **note == said);
+    assert_eq!(times.count(), 1, "{:?}", log.notes);
+}
+
 #[test]
 fn a_tables_yaw_rate_is_read_where_its_unit_is_said() {
     let folder = tempfile::tempdir().unwrap();
