@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Camera, Cameras, Dataset, Heading, NamedTopic, OpenOptions, Split};
-use deepfusion_doctor::{heading, seen_turns};
+use deepfusion_doctor::heading;
 use deepfusion_model::{
     DataSetConfig, Error as ModelError, ExpectedSetting, TrainConfig, ViewMotion,
 };
@@ -12,8 +12,10 @@ use deepfusion_model::{
 use crate::drives::first_of_drive;
 use crate::{Error, Result};
 
+mod kept_turns;
 mod warnings;
 
+use self::kept_turns::seen_turns;
 pub use self::warnings::{PlacedWarning, placed_warnings, warning_line, warnings_of};
 
 /// Opens the recordings at several paths, each drive and camera a data set.
@@ -43,8 +45,10 @@ pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Datase
 }
 
 /// As [`open_aimed`], for what learns from the vehicle's motion: where its roll and pitch are not recorded, they are taken from the images
-/// ([`seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of such a drive,
-/// twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show.
+/// ([`deepfusion_doctor::seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of
+/// such a drive, twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show. Turns that took
+/// more than ten seconds are kept in a hidden file of the recording's folder, where it can be written into, and are found anew once the images
+/// or what else they follow from have changed.
 ///
 /// # Errors
 /// As [`open_recordings`].
