@@ -2,7 +2,7 @@
 
 use crate::common::bag::{CAMERA, TinyBag};
 use crate::common::text_of;
-use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_kitti, inspect};
+use deepfusion_data::{Dataset, Error, OpenOptions, convert_to_kitti, inspect, write_bag_config};
 use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::Frame;
 use std::fs;
@@ -99,6 +99,26 @@ fn a_speed_on_the_bus_is_not_mixed_with_a_topics() {
         });
         near(drive.speed(), 10.0);
     }
+}
+
+/// A bag with a speed's topic that is not to be read, and the speed on the bus: the file says so, also once it is written anew.
+#[test]
+fn no_topic_and_a_signal_do_not_contradict_each_other() {
+    let drive = Drive::new(&format!("{INLINE}[topics]\nspeed = \"none\"\n"), |bag| {
+        bag.can("/can", &ten_mps()).twist("/twist", 5.0);
+    });
+    near(drive.speed(), 10.0);
+    write_bag_config(&drive.bag, &OpenOptions::default(), true).unwrap();
+    let written = fs::read_to_string(drive.bag.with_extension("toml")).unwrap();
+    says(&written, &["speed = \"none\"", "[can]"]);
+    near(drive.speed(), 10.0);
+    // A caller's word leaves the signal out, too.
+    let options = OpenOptions {
+        topics: vec!["speed=none".parse().unwrap()],
+        ..OpenOptions::default()
+    };
+    let without = Dataset::open(&drive.bag, &options).unwrap().remove(0);
+    assert_eq!(without.frames()[12].speed_mps, None);
 }
 
 /// All bits set is J1939's way to say that there is no value: here 655.35 km/h.

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 fn main() -> Result<()> {
     for path in std::env::args_os().skip(1).map(PathBuf::from) {
         for drive in Dataset::open(&path, &OpenOptions::default())? {
-            let turns = deepfusion_doctor::seen_turns(&drive);
+            let turns = deepfusion_doctor::seen_turns(&drive).turns;
             let pairs = drive.frames().len().saturating_sub(1);
             println!("{}: {} turns of {pairs} pairs", drive.name(), turns.len());
             print_errors(&drive.ego()?, &turns);

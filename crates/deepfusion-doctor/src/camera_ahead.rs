@@ -311,7 +311,7 @@ pub fn common_camera_ahead<'a>(
 ) -> Result<CommonCameraAhead, NoCameraAhead> {
     let mut drives: Vec<&Dataset> = Vec::new();
     for dataset in datasets {
-        let same = |d: &&Dataset| d.folder() == dataset.folder() && d.name() == dataset.name();
+        let same = |d: &&Dataset| d.place() == dataset.place() && d.name() == dataset.name();
         if !drives.iter().any(same) {
             drives.push(dataset);
         }

@@ -54,7 +54,7 @@ pub use reason::{
     LogReason, MotionReason, OpeningReason, PicturesReason, RoadAngle,
 };
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
-pub use seen_turns::seen_turns;
+pub use seen_turns::{SEEN_TURNS_VERSION, TurnsOfImages, seen_turns};
 pub use shared_error::SharedError;
 pub use skip::{
     CameraSkip, ClockSkip, FramesSkip, LogSkip, MotionSkip, NoHeading, PicturesSkip, SkipReason,

@@ -20,16 +20,29 @@ const MOST_YAW: f64 = 0.08;
 /// Passes over a pair whose yaw nobody measured: the way that it went depends on it.
 const PASSES: usize = 3;
 
+/// The way in which turns are found. Who changes it counts this up: turns that are kept are good for one way alone.
+pub const SEEN_TURNS_VERSION: u32 = 1;
+
+/// What [`seen_turns`] finds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TurnsOfImages {
+    /// The turns, in the order of time.
+    pub turns: Vec<SeenTurn>,
+    /// How many images could not be read; where that was a disk's fault, another time shows more.
+    pub unread: usize,
+}
+
 /// How the vehicle turned from each image to the next, in their order, where enough points show it and the way between them is known.
 /// Reads all images.
 #[must_use]
-pub fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
+pub fn seen_turns(dataset: &Dataset) -> TurnsOfImages {
     let Some(ego) = dataset.ego().ok().map(Ego::level) else {
-        return Vec::new();
+        return TurnsOfImages::default();
     };
     let count = dataset.frames().len().saturating_sub(1);
     let mut found = Vec::with_capacity(count);
     let mut last = SmallImage::read(dataset, 0);
+    let mut unread = usize::from(last.is_none());
     for first in (0..count).step_by(AT_ONCE) {
         let end = (first + AT_ONCE).min(count);
         let read: Vec<_> = (first + 1..end + 1)
@@ -46,9 +59,13 @@ pub fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
             })
             .collect();
         found.extend(turns);
+        unread += read.iter().filter(|image| image.is_none()).count();
         last = read.into_iter().next_back().flatten();
     }
-    found
+    TurnsOfImages {
+        turns: found,
+        unread,
+    }
 }
 
 /// An image, small and grey, and its camera.

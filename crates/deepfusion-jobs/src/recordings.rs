@@ -4,15 +4,18 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{Camera, Cameras, Dataset, Heading, NamedTopic, OpenOptions, Split};
-use deepfusion_doctor::{heading, seen_turns};
+use deepfusion_doctor::heading;
 use deepfusion_model::{
     DataSetConfig, Error as ModelError, ExpectedSetting, TrainConfig, ViewMotion,
 };
 
+use crate::drives::first_of_drive;
 use crate::{Error, Result};
 
+mod kept_turns;
 mod warnings;
 
+use self::kept_turns::seen_turns;
 pub use self::warnings::{PlacedWarning, placed_warnings, warning_line, warnings_of};
 
 /// Opens the recordings at several paths, each drive and camera a data set.
@@ -28,24 +31,24 @@ pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
 }
 
 /// As [`open_recordings`], for what takes the vehicle's motion: a camera whose mount is not given is turned to where its images show that
-/// it looks ([`heading`]), where they do, and the drive's warnings then say so. Reads up to 160 images of such a drive, if its yaw rate is
-/// known.
+/// it looks ([`heading`]), where they do, and the drive's warnings then say so. Two cameras of a drive are turned as the images of the first
+/// show it: how they are to each other is known. Reads up to 160 images of such a drive, if its yaw rate is known.
 ///
 /// # Errors
 /// As [`open_recordings`].
 pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let mut datasets = open_recordings(paths, options)?;
-    for dataset in datasets.iter_mut().filter(|d| d.mount_assumed()) {
-        if let Some(heading) = sure_heading(dataset) {
-            dataset.aim(&heading);
-        }
+    for rig in unaimed_rigs(&datasets, |_| true) {
+        aim(&mut datasets, &rig, sure_heading);
     }
     Ok(datasets)
 }
 
 /// As [`open_aimed`], for what learns from the vehicle's motion: where its roll and pitch are not recorded, they are taken from the images
-/// ([`seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of such a drive,
-/// twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show.
+/// ([`deepfusion_doctor::seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of
+/// such a drive, twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show. Turns that took
+/// more than ten seconds are kept in a hidden file of the recording's folder, where it can be written into, and are found anew once the images
+/// or what else they follow from have changed.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -70,19 +73,52 @@ fn open_turning(
     is_to_turn: impl Fn(&Dataset) -> bool,
 ) -> Result<Vec<Dataset>> {
     let mut datasets = open_aimed(paths, options)?;
-    for dataset in datasets.iter_mut().filter(|d| is_to_turn(d)) {
-        if !dataset.yaw_known() && dataset.mount_assumed() {
-            // Where it heads shows once its turns are known, and these are surer once it is known where it heads.
+    for rig in unaimed_rigs(&datasets, |d| is_to_turn(d) && !d.yaw_known()) {
+        // Where it heads shows once its turns are known, and these are surer once it is known where it heads.
+        aim(&mut datasets, &rig, |dataset| {
             let mut turning = dataset.clone();
             turning.take_turns(&seen_turns(dataset));
-            if let Some(heading) = sure_heading(&turning) {
-                dataset.aim(&heading);
-            }
-        }
+            sure_heading(&turning)
+        });
+    }
+    for dataset in datasets.iter_mut().filter(|d| is_to_turn(d)) {
         let turns = seen_turns(dataset);
         dataset.take_turns(&turns);
     }
     Ok(datasets)
+}
+
+/// The cameras of such drives whose mounts are not given, by index: the two of one drive together. Where those of two topics of a bag are to each
+/// other, nobody knows.
+fn unaimed_rigs(datasets: &[Dataset], is_such: impl Fn(&Dataset) -> bool) -> Vec<Vec<usize>> {
+    let drives = first_of_drive(datasets);
+    let mut rigs: Vec<Vec<usize>> = Vec::new();
+    for (i, dataset) in datasets.iter().enumerate() {
+        if !dataset.mount_assumed() || !is_such(dataset) {
+            continue;
+        }
+        let is_beside = |other: &usize| {
+            drives[*other] == drives[i] && datasets[*other].camera() != dataset.camera()
+        };
+        match rigs.iter_mut().find(|rig| rig.iter().all(is_beside)) {
+            Some(rig) => rig.push(i),
+            None => rigs.push(vec![i]),
+        }
+    }
+    rigs
+}
+
+/// Aims the cameras of a rig as the images of the first show it that do.
+fn aim(datasets: &mut [Dataset], rig: &[usize], heading: impl Fn(&Dataset) -> Option<Heading>) {
+    let seen = rig.iter().find_map(|i| {
+        let dataset = &datasets[*i];
+        Some((heading(dataset)?, dataset.cam_from_vehicle()?))
+    });
+    if let Some((heading, cam_from_vehicle)) = seen {
+        for i in rig {
+            datasets[*i].aim_beside(&heading, &cam_from_vehicle);
+        }
+    }
 }
 
 /// Where a camera heads, where its images show it well enough.
@@ -402,6 +438,50 @@ mod tests {
         let given = &open_aimed(&[folder], &options)?[0];
         assert!(!given.mount_assumed());
         assert!(straight(ahead(given)));
+        Ok(())
+    }
+
+    /// Each by itself, two cameras would look apart by what their images do not show so well, and be no stereo pair any more.
+    #[test]
+    fn two_cameras_of_a_drive_are_aimed_as_one() -> std::result::Result<(), Box<dyn Error>> {
+        let at = tempfile::tempdir()?;
+        let simulation = Simulation::new(&SimConfig {
+            seed: 5,
+            frames: 60,
+            width: 320,
+            height: 192,
+            scan_every: 0,
+            stereo_baseline_m: 0.5,
+            ..SimConfig::default()
+        })?;
+        let root = write_kitti(
+            &simulation,
+            at.path(),
+            &mut |_, _| ControlFlow::Continue(()),
+        )?;
+        let options = OpenOptions {
+            camera: Cameras::Both,
+            ..OpenOptions::default()
+        };
+        let folder = Dataset::open(&root, &options)?[0].folder().to_owned();
+        let file = folder.join("dataset.toml");
+        let notes = fs::read_to_string(&file).unwrap_or_default();
+        fs::write(&file, format!("mount_known = false\n{notes}"))?;
+        let paths = [root];
+        let right_from_left = |drives: &[Dataset]| {
+            let mounts = [0, 1].map(|i| drives[i].cam_from_vehicle().unwrap());
+            mounts[1] * mounts[0].inverse()
+        };
+        let taken = open_recordings(&paths, &options)?;
+        assert!(taken.iter().all(Dataset::mount_assumed));
+        let aimed = open_aimed(&paths, &options)?;
+        assert!(!aimed.iter().any(Dataset::mount_assumed));
+        let changed = right_from_left(&taken).inverse() * right_from_left(&aimed);
+        assert!(changed.angle() < 1e-6 && changed.translation().norm() < 1e-6);
+        let turned =
+            taken[0].cam_from_vehicle().unwrap().inverse() * aimed[0].cam_from_vehicle().unwrap();
+        assert!(turned.angle() > 1e-5, "nothing was found");
+        assert_eq!(said(&aimed[0]), said(&aimed[1]));
         Ok(())
     }
 

@@ -56,7 +56,7 @@ pub fn open_samples(
     let mut checked = HashSet::new();
     for (_, dataset) in &train {
         // Both cameras of a drive have one speed.
-        if checked.insert((dataset.folder().to_owned(), dataset.name().to_owned()))
+        if checked.insert((dataset.place().to_owned(), dataset.name().to_owned()))
             && let Some(warning) = speed_warning(dataset)
         {
             warn(SampleWarning::Speed(dataset.name().to_owned(), warning));

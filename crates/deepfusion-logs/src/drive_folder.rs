@@ -133,8 +133,9 @@ impl DriveFolder<'_> {
         }
         let first = self.log.speeds.first().map_or(0, |s| s.ns);
         match (self.log.clock, &self.media) {
-            (Clock::Video, _) | (Clock::Date, _) | (_, Media::Images(_)) => Ok((None, Vec::new())),
             (Clock::LocalDate, Media::Video(_)) => Ok((None, vec![ClockNote::NoZone.into()])),
+            (Clock::LocalDate, Media::Images(_)) => Ok((None, vec![ClockNote::LocalDates.into()])),
+            (Clock::Video, _) | (Clock::Date, _) | (_, Media::Images(_)) => Ok((None, Vec::new())),
             (Clock::Free, Media::Video(_)) if (0..NEAR_START_NS).contains(&first) => {
                 Ok((None, vec![ClockNote::OwnStart.into()]))
             }
@@ -292,6 +293,32 @@ mod tests {
             assert_eq!(target.exists(), fine, "nothing is left of a refused one");
             let target = target.with_extension("said");
             folder(&log, Some(first_ns)).write(&target).unwrap();
+        }
+    }
+
+    /// The table that is written says nothing of a zone any more.
+    #[test]
+    fn dates_without_a_zone_are_said_to_be_taken_for_utc() {
+        let out = tempfile::tempdir().unwrap();
+        let images = || Media::Images("images".into());
+        for (name, clock, media, said) in [
+            ("a", Clock::LocalDate, images(), Some(ClockNote::LocalDates)),
+            ("b", Clock::Date, images(), None),
+            (
+                "c",
+                Clock::LocalDate,
+                Media::Video("a.mp4".into()),
+                Some(ClockNote::NoZone),
+            ),
+        ] {
+            let log = log(clock, 1_777_636_800_000_000_000);
+            let drive = DriveFolder {
+                media,
+                ..folder(&log, None)
+            };
+            let notes = drive.write(&out.path().join(name)).unwrap();
+            let said: Vec<LogNote> = said.into_iter().map(LogNote::from).collect();
+            assert_eq!(notes, said, "{name}");
         }
     }
 

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::log::{DriveLog, Format, ReadOptions};
 use crate::note::{LogNote, TurnsNote};
 use crate::problem::SpeedProblem;
-use crate::rows::{Backwards, text_of};
+use crate::rows::{Astray, text_of};
 use crate::table::Table;
 use crate::turns::{Heading, Sensor, yaw_rates};
 use crate::wide_table::{self, Times};
@@ -101,8 +101,7 @@ fn axes(table: &Table, options: &ReadOptions, log: &mut DriveLog) -> Result<Vec<
         .as_deref()
         .is_some_and(|u| u.contains('°') || u.contains("deg"));
     let factor = if degrees { 1_f64.to_radians() } else { 1.0 };
-    let (mut all, mut last) = (Vec::with_capacity(table.len()), None);
-    let (mut back, mut used) = (Backwards::default(), 0);
+    let mut rows = Vec::with_capacity(table.len());
     for row in 0..table.len() {
         let values = (
             table.number(row, x)?,
@@ -112,22 +111,18 @@ fn axes(table: &Table, options: &ReadOptions, log: &mut DriveLog) -> Result<Vec<
         let (Some(x), Some(y), Some(z)) = values else {
             continue;
         };
-        let Some(ns) = times.ns(table, row, last, &mut back)? else {
-            continue;
-        };
-        used += 1;
-        if last == Some(ns) {
-            continue;
-        }
-        last = Some(ns);
-        all.push(Sensor {
-            ns,
-            value: Vector3::new(x, y, z) * factor,
-        });
+        rows.push((row, Vector3::new(x, y, z) * factor));
     }
-    let of_back = back.note(used)?;
-    let of_back = of_back.map(|note| of_file(table, note.into()));
-    log.notes.extend(of_back);
+    let mut astray = Astray::default();
+    let rows = times.in_order(table, rows, &mut astray)?;
+    let of_order = astray.notes(rows.len())?.into_iter();
+    log.notes
+        .extend(of_order.map(|note| of_file(table, note.into())));
+    let readings = rows.into_iter();
+    let readings = readings.map(|(ns, (_, value))| Sensor { ns, value });
+    let mut all: Vec<Sensor> = readings.collect();
+    // Of rows of one moment the first.
+    all.dedup_by_key(|reading| reading.ns);
     Ok(all)
 }
 
@@ -141,27 +136,24 @@ fn headings(table: &Table, options: &ReadOptions) -> Result<Vec<Heading>> {
         return Ok(Vec::new());
     };
     let times = Times::of(table, options)?;
-    let (mut all, mut last) = (Vec::new(), None);
-    let (mut back, mut used) = (Backwards::default(), 0);
+    let mut rows = Vec::new();
     for row in 0..table.len() {
         let (Some(degrees), Some(speed)) = (table.number(row, bearing)?, table.number(row, speed)?)
         else {
             continue;
         };
-        let Some(ns) = times.ns(table, row, last, &mut back)? else {
-            continue;
-        };
-        used += 1;
-        last = Some(ns);
-        // Below a brisk walk the course of a receiver is noise.
-        if speed > 3.0 && degrees >= 0.0 {
-            all.push(Heading {
-                ns,
-                clockwise_rad: degrees.to_radians(),
-            });
-        }
+        rows.push((row, (degrees, speed)));
     }
-    // The speeds of these rows have a note of their own.
-    back.note(used)?;
-    Ok(all)
+    let mut astray = Astray::default();
+    let rows = times.in_order(table, rows, &mut astray)?;
+    // The speeds of these rows have notes of their own.
+    astray.notes(rows.len())?;
+    // Below a brisk walk the course of a receiver is noise.
+    let is_known = |(degrees, speed): (f64, f64)| speed > 3.0 && degrees >= 0.0;
+    let known = rows.into_iter().filter(|(_, (_, read))| is_known(*read));
+    let headings = known.map(|(ns, (_, (degrees, _)))| Heading {
+        ns,
+        clockwise_rad: degrees.to_radians(),
+    });
+    Ok(headings.collect())
 }

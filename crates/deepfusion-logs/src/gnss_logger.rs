@@ -5,7 +5,7 @@ use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::note::{FixesNote, LogNote};
 use crate::numbers::{Cell, cell};
 use crate::problem::{LineField, SpeedProblem, TableProblem};
-use crate::rows::{Backwards, enough, left_out};
+use crate::rows::{Astray, enough, left_out};
 use crate::table::short;
 use std::path::Path;
 
@@ -56,8 +56,7 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
             .is_some_and(|p| p.eq_ignore_ascii_case("gps"))
     };
     let satellites = fixes().any(|(_, row)| is_satellite(&row));
-    let (mut speeds, mut rows, mut absent, mut repeated) = (Vec::<Speed>::new(), 0, 0, 0);
-    let mut back = Backwards::default();
+    let (mut found, mut rows, mut absent) = (Vec::new(), 0, 0);
     for (line, row) in fixes() {
         if satellites && !is_satellite(&row) {
             continue;
@@ -79,34 +78,31 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
             absent += 1;
             continue;
         };
-        let ns = (ms * 1e6).round() as i64;
-        match speeds.last() {
-            Some(last) if ns < last.ns => {
-                back.leave_out(|| {
-                    let back_s = (last.ns - ns) as f64 * 1e-9;
-                    let problem = TableProblem::FixBackwards { back_s };
-                    BadLine::new(line, "Fix, UnixTimeMillis", problem).of(path)
-                });
-                continue;
-            }
-            Some(last) if ns == last.ns => {
-                repeated += 1;
-                continue;
-            }
-            _ => {}
-        }
         let sigma = accuracy.map(number).transpose()?.flatten();
-        speeds.push(Speed {
-            ns,
+        let speed = Speed {
+            ns: (ms * 1e6).round() as i64,
             mps,
             sigma_mps: sigma.filter(|s| *s > 0.0),
-        });
+        };
+        found.push((speed.ns, (line, speed)));
     }
+    let mut astray = Astray::default();
+    let in_order = astray.leave_out(found, |(line, _), back_ns| {
+        let back_s = back_ns as f64 * 1e-9;
+        let problem = TableProblem::FixBackwards { back_s };
+        BadLine::new(*line, "Fix, UnixTimeMillis", problem).of(path)
+    });
+    let of_order = astray.notes(in_order.len())?;
+    let used = in_order.len();
+    let mut speeds: Vec<Speed> = in_order.into_iter().map(|(_, (_, speed))| speed).collect();
+    // Of fixes of one moment the first.
+    speeds.dedup_by_key(|speed| speed.ns);
+    let repeated = used - speeds.len();
     let mut notes = vec![LogNote::from(FixesNote::FixRows {
         of_satellites: satellites,
     })];
     left_out(&mut notes, rows, absent, repeated);
-    notes.extend(back.note(speeds.len() + repeated)?.map(LogNote::from));
+    notes.extend(of_order.into_iter().map(LogNote::from));
     enough(path, &speeds)?;
     Ok(DriveLog {
         format: Format::GnssLogger,

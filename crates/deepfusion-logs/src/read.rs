@@ -2,7 +2,7 @@
 
 use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{Clock, DriveLog, ReadOptions};
-use crate::note::ClockNote;
+use crate::note::{ClockNote, LogNote};
 use crate::rows::text_of;
 use crate::table::Table;
 use crate::{can_trace, export_folder, gnss_logger, gpmf, gpx, receiver, tall_table, wide_table};
@@ -59,6 +59,10 @@ pub fn read_all(
                 if log.clock == Clock::Free {
                     first.notes.push(ClockNote::SameStart.into());
                 }
+                // Where both lack it, it is said of the speeds.
+                if log.clock == Clock::LocalDate && first.clock != log.clock {
+                    first.notes.push(of_file(path, ClockNote::LocalDates));
+                }
                 first.yaw_rates = log.yaw_rates;
                 first.notes.extend(log.notes);
             }
@@ -66,6 +70,15 @@ pub fn read_all(
         }
     }
     Ok(merged)
+}
+
+/// What is said of one of several logs.
+fn of_file(path: &Path, note: ClockNote) -> LogNote {
+    let name = path.file_name().unwrap_or_default();
+    LogNote::OfFile {
+        file: name.to_string_lossy().into_owned(),
+        note: Box::new(note.into()),
+    }
 }
 
 /// Reads a log.

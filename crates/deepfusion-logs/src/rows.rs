@@ -38,34 +38,86 @@ pub(crate) fn left_out(notes: &mut Vec<LogNote>, rows: usize, absent: usize, rep
     }
 }
 
-/// A log may have one row in so many that goes back in time.
-const ONE_BACK_IN: usize = 100;
+/// A log may have one row in so many that is out of the order of time.
+const ONE_ASTRAY_IN: usize = 100;
 
-/// Rows that go back in time and are left out.
+/// Rows that are left out, as they are out of the order of time: the clock went back for a moment, or leapt ahead and came back.
 #[derive(Default)]
-pub(crate) struct Backwards {
-    count: usize,
+pub(crate) struct Astray {
+    back: usize,
+    ahead: usize,
     first: Option<Error>,
 }
 
-impl Backwards {
-    /// Leaves a row out; `error` is what is wrong with it.
-    pub(crate) fn leave_out(&mut self, error: impl FnOnce() -> Error) {
-        self.count += 1;
-        self.first.get_or_insert_with(error);
+impl Astray {
+    /// Of rows with their times those that are in order, as many as can be. `error` is what is wrong with the first row that is so many
+    /// nanoseconds before the one above.
+    pub(crate) fn leave_out<T>(
+        &mut self,
+        rows: Vec<(i64, T)>,
+        error: impl FnOnce(&T, i64) -> Error,
+    ) -> Vec<(i64, T)> {
+        let times: Vec<i64> = rows.iter().map(|(ns, _)| *ns).collect();
+        let Some(above) = times.windows(2).position(|pair| pair[1] < pair[0]) else {
+            return rows;
+        };
+        let back_ns = times[above].saturating_sub(times[above + 1]);
+        self.first = Some(error(&rows[above + 1].1, back_ns));
+        let mut latest = i64::MIN;
+        let mut kept = Vec::with_capacity(rows.len());
+        for (row, in_order) in rows.into_iter().zip(in_order(&times)) {
+            if in_order {
+                latest = row.0;
+                kept.push(row);
+            } else if row.0 < latest {
+                self.back += 1;
+            } else {
+                self.ahead += 1;
+            }
+        }
+        kept
     }
 
     /// What is said of them beside so many rows that are used.
     ///
     /// # Errors
-    /// That of the first, where more than one row in a hundred goes back: such a log is in no order.
-    pub(crate) fn note(self, used: usize) -> Result<Option<TableNote>> {
-        let (back, rows) = (self.count, self.count + used);
-        match self.first {
-            Some(error) if back * ONE_BACK_IN > rows => Err(error),
-            first => Ok(first.map(|_| TableNote::Backwards { back, rows })),
+    /// That of the first, where more than one row in a hundred is astray: such a log is in no order.
+    pub(crate) fn notes(self, used: usize) -> Result<Vec<TableNote>> {
+        let (back, ahead) = (self.back, self.ahead);
+        let rows = back + ahead + used;
+        if let Some(error) = self.first
+            && (back + ahead) * ONE_ASTRAY_IN > rows
+        {
+            return Err(error);
+        }
+        let backwards = (back > 0).then_some(TableNote::Backwards { back, rows });
+        let leaps = (ahead > 0).then_some(TableNote::Ahead { ahead, rows });
+        Ok(backwards.into_iter().chain(leaps).collect())
+    }
+}
+
+/// Which of these times to keep so that they never go back, and as many as can be: the longest non-decreasing subsequence, found by
+/// patience sorting (Fredman 1975). A clock that leaps ahead for a moment so loses that moment, and not what comes after it.
+fn in_order(times: &[i64]) -> Vec<bool> {
+    // Of all subsequences of one length, the place of the smallest last time; and of each time's own, the place of the time before it.
+    let mut ends: Vec<usize> = Vec::new();
+    let mut before: Vec<Option<usize>> = Vec::with_capacity(times.len());
+    for (place, time) in times.iter().enumerate() {
+        let shorter = ends.partition_point(|end| times[*end] <= *time);
+        before.push(shorter.checked_sub(1).map(|last| ends[last]));
+        if shorter == ends.len() {
+            ends.push(place);
+        } else {
+            ends[shorter] = place;
         }
     }
+    let mut kept = vec![false; times.len()];
+    let mut next = ends.last().copied();
+    while let Some(place) = next {
+        kept[place] = true;
+        next = before[place];
+    }
+    kept
 }
 
 /// An error where there are not two speeds.
@@ -76,5 +128,73 @@ pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
             problem: SpeedProblem::TooFewRows { rows },
         }),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::TableProblem;
+    use proptest::prelude::*;
+
+    /// The times that are kept, and what is said.
+    fn sorted_out(times: &[i64]) -> (Vec<i64>, Result<Vec<TableNote>>) {
+        let rows = times.iter().map(|ns| (*ns, ())).collect();
+        let mut astray = Astray::default();
+        let kept = astray.leave_out(rows, |(), back_ns| Error::Line {
+            path: "trip.csv".into(),
+            line: 1,
+            field: "any".into(),
+            problem: TableProblem::Backwards {
+                text: "x".into(),
+                back_s: back_ns as f64,
+            }
+            .into(),
+        });
+        let kept: Vec<i64> = kept.into_iter().map(|(ns, ())| ns).collect();
+        let notes = astray.notes(kept.len());
+        (kept, notes)
+    }
+
+    /// Wherever it leaps, the moment is lost and nothing else.
+    #[test]
+    fn a_leap_ahead_costs_no_row_after_it() {
+        let good: Vec<i64> = (0..400).collect();
+        for at in [0, 1, 200, 397, 398] {
+            let mut times = good.clone();
+            times[at] = 86_400;
+            let (kept, notes) = sorted_out(&times);
+            let expected: Vec<i64> = good.iter().copied().filter(|t| *t != at as i64).collect();
+            assert_eq!(kept, expected, "{at}");
+            let leap = TableNote::Ahead {
+                ahead: 1,
+                rows: 400,
+            };
+            assert_eq!(notes.unwrap(), [leap], "{at}");
+        }
+        // A step back that stays, of a clock that was set: what is before it or after it, whichever is more.
+        let mut times = good.clone();
+        times[398..].fill(7);
+        let (kept, notes) = sorted_out(&times);
+        assert_eq!(kept, good[..398]);
+        let back = TableNote::Backwards { back: 2, rows: 400 };
+        assert_eq!(notes.unwrap(), [back]);
+    }
+
+    #[test]
+    fn what_is_in_no_order_is_refused_by_its_first_row() {
+        let times: Vec<i64> = (0..100).chain(0..100).collect();
+        let error = sorted_out(&times).1.unwrap_err().to_string();
+        assert!(error.contains("99 s before the row above"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_kept_is_in_order_and_what_is_in_order_is_kept(times in prop::collection::vec(any::<i64>(), 0..60)) {
+            let (kept, _) = sorted_out(&times);
+            prop_assert!(kept.is_sorted());
+            prop_assert!(times.is_empty() || !kept.is_empty());
+            prop_assert_eq!(sorted_out(&kept).0, kept);
+        }
     }
 }

@@ -5,7 +5,7 @@ use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{DriveLog, Format, ReadOptions, Speed};
 use crate::note::{LogNote, TableNote};
 use crate::problem::SpeedProblem;
-use crate::rows::{Backwards, enough, left_out};
+use crate::rows::{Astray, enough, left_out};
 use crate::table::Table;
 use crate::units::SpeedUnit;
 use crate::wide_table::Times;
@@ -37,9 +37,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         name: name.clone(),
         unit: factor,
     })];
-    let (mut speeds, mut last, mut of_speed, mut absent, mut repeated) =
-        (Vec::<Speed>::new(), None, 0, 0, 0);
-    let mut back = Backwards::default();
+    let (mut rows, mut of_speed, mut absent) = (Vec::new(), 0, 0);
     for row in 0..table.len() {
         if table.word(row, quantity) != name {
             continue;
@@ -49,14 +47,15 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
             absent += 1;
             continue;
         };
-        let Some(ns) = times.ns(table, row, last, &mut back)? else {
-            continue;
-        };
-        if last == Some(ns) {
+        rows.push((row, number));
+    }
+    let (mut speeds, mut repeated) = (Vec::<Speed>::new(), 0);
+    let mut astray = Astray::default();
+    for (ns, (_, number)) in times.in_order(table, rows, &mut astray)? {
+        if speeds.last().is_some_and(|last| last.ns == ns) {
             repeated += 1;
             continue;
         }
-        last = Some(ns);
         speeds.push(Speed {
             ns,
             mps: number * factor.mps(),
@@ -64,7 +63,8 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         });
     }
     left_out(&mut notes, of_speed, absent, repeated);
-    notes.extend(back.note(speeds.len() + repeated)?.map(LogNote::from));
+    let of_order = astray.notes(speeds.len() + repeated)?;
+    notes.extend(of_order.into_iter().map(LogNote::from));
     enough(&table.path, &speeds)?;
     Ok(DriveLog {
         format: Format::TallTable,

@@ -6,7 +6,7 @@ use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{Clock, DriveLog, Format, ReadOptions, Speed, YawRate};
 use crate::note::{LogNote, TableNote};
 use crate::problem::{SpeedProblem, TableProblem};
-use crate::rows::{Backwards, enough, left_out};
+use crate::rows::{Astray, enough, left_out};
 use crate::table::{Table, short};
 use crate::track::{self, TimedFix};
 use crate::units::SpeedUnit;
@@ -62,32 +62,32 @@ impl<'a> Times<'a> {
         })
     }
 
-    /// The time of a row; `None`, and one more of `back`, where it is before `after`.
-    pub(crate) fn ns(
+    /// The times of these rows of the table, each with what was read of it; those that are out of order go `astray`.
+    pub(crate) fn in_order<T>(
         &self,
         table: &Table,
-        row: usize,
-        after: Option<i64>,
-        back: &mut Backwards,
-    ) -> Result<Option<i64>> {
-        let word = table.plain_word(row, self.column);
-        let ns = nanoseconds(&word, self.style, after).ok_or_else(|| {
-            let text = short(&word);
-            table.bad(row, self.column, TableProblem::NotATime { text })
-        })?;
-        match after {
-            Some(after) if ns < after => {
-                back.leave_out(|| {
-                    let problem = TableProblem::Backwards {
-                        text: short(&word),
-                        back_s: after.saturating_sub(ns) as f64 * 1e-9,
-                    };
-                    table.bad(row, self.column, problem)
-                });
-                Ok(None)
-            }
-            _ => Ok(Some(ns)),
+        rows: Vec<(usize, T)>,
+        astray: &mut Astray,
+    ) -> Result<Vec<(i64, (usize, T))>> {
+        // For clocks that pass midnight.
+        let mut latest = None;
+        let mut timed = Vec::with_capacity(rows.len());
+        for (row, read) in rows {
+            let word = table.plain_word(row, self.column);
+            let ns = nanoseconds(&word, self.style, latest).ok_or_else(|| {
+                let text = short(&word);
+                table.bad(row, self.column, TableProblem::NotATime { text })
+            })?;
+            latest = latest.max(Some(ns));
+            timed.push((ns, (row, read)));
         }
+        Ok(astray.leave_out(timed, |(row, _), back_ns| {
+            let problem = TableProblem::Backwards {
+                text: short(&table.plain_word(*row, self.column)),
+                back_s: back_ns as f64 * 1e-9,
+            };
+            table.bad(*row, self.column, problem)
+        }))
     }
 }
 
@@ -126,8 +126,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
     notes.insert(0, of_columns.into());
     let accuracy = table.named(&ACCURACY);
     let of_accuracy = accuracy.and_then(Column::speed_unit).unwrap_or(unit);
-    let (mut speeds, mut last, mut absent, mut repeated) = (Vec::<Speed>::new(), None, 0, 0);
-    let mut back = Backwards::default();
+    let (mut rows, mut absent) = (Vec::new(), 0);
     for row in 0..table.len() {
         let value = table.number(row, column)?;
         // A phone without a fix writes -1.
@@ -140,14 +139,15 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
             absent += 1;
             continue;
         }
-        let Some(ns) = times.ns(table, row, last, &mut back)? else {
-            continue;
-        };
-        if last == Some(ns) {
+        rows.push((row, value));
+    }
+    let (mut speeds, mut repeated) = (Vec::<Speed>::new(), 0);
+    let mut astray = Astray::default();
+    for (ns, (row, value)) in times.in_order(table, rows, &mut astray)? {
+        if speeds.last().is_some_and(|last| last.ns == ns) {
             repeated += 1;
             continue;
         }
-        last = Some(ns);
         let sigma = accuracy
             .map(|c| table.number(row, c))
             .transpose()?
@@ -159,7 +159,8 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         });
     }
     left_out(&mut notes, table.len(), absent, repeated);
-    notes.extend(back.note(speeds.len() + repeated)?.map(LogNote::from));
+    let of_order = astray.notes(speeds.len() + repeated)?;
+    notes.extend(of_order.into_iter().map(LogNote::from));
     enough(&table.path, &speeds)?;
     Ok(DriveLog {
         format: Format::Table,
@@ -200,29 +201,27 @@ fn yaw_rates(table: &Table, times: &Times, notes: &mut Vec<LogNote>) -> Result<V
         notes.push(of_unknown.into());
         return Ok(Vec::new());
     };
-    let mut found: Vec<YawRate> = Vec::new();
-    let (mut back, mut used) = (Backwards::default(), 0);
+    let mut rows = Vec::new();
     for row in 0..table.len() {
-        let Some(value) = table.number(row, column)? else {
-            continue;
-        };
-        if times_absent(table, times, row) {
-            continue;
-        }
-        let last = found.last().map(|turn| turn.ns);
-        let Some(ns) = times.ns(table, row, last, &mut back)? else {
-            continue;
-        };
-        used += 1;
-        if last != Some(ns) {
-            let radps = value * radps;
-            found.push(YawRate { ns, radps });
+        let value = table.number(row, column)?;
+        let value = value.filter(|_| !times_absent(table, times, row));
+        rows.extend(value.map(|value| (row, value)));
+    }
+    let mut astray = Astray::default();
+    let rows = times.in_order(table, rows, &mut astray)?;
+    // Of rows that have a speed, too, it is said already.
+    for note in astray.notes(rows.len())?.into_iter().map(LogNote::from) {
+        if !notes.contains(&note) {
+            notes.push(note);
         }
     }
-    // Of rows that have a speed, too, it is said already.
-    let of_back = back.note(used)?.map(LogNote::from);
-    let unsaid = of_back.filter(|note| !notes.contains(note));
-    notes.extend(unsaid);
+    let turns = rows.into_iter().map(|(ns, (_, value))| YawRate {
+        ns,
+        radps: value * radps,
+    });
+    let mut found: Vec<YawRate> = turns.collect();
+    // Of rows of one moment the first.
+    found.dedup_by_key(|turn| turn.ns);
     if !found.is_empty() {
         notes.push(TableNote::YawRate { column: header() }.into());
     }
@@ -265,8 +264,7 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
     let (Some(latitude), Some(longitude)) = degrees else {
         return Err(table.lacks(ColumnProblem::NoSpeed));
     };
-    let (mut fixes, mut last, mut beyond) = (Vec::new(), None, Vec::new());
-    let mut back = Backwards::default();
+    let (mut rows, mut beyond) = (Vec::new(), Vec::new());
     for row in 0..table.len() {
         let place = (table.number(row, latitude)?, table.number(row, longitude)?);
         let (Some(latitude_deg), Some(longitude_deg)) = place else {
@@ -281,18 +279,20 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
             beyond.push((row, latitude_deg, longitude_deg));
             continue;
         }
-        let Some(ns) = times.ns(table, row, last, &mut back)? else {
-            continue;
-        };
-        last = Some(ns);
         let fix = Fix {
             time_s: 0.0,
             latitude_deg,
             longitude_deg,
             speed_mps: None,
         };
-        fixes.push(TimedFix { ns, fix });
+        rows.push((row, fix));
     }
+    let mut astray = Astray::default();
+    let rows = times.in_order(table, rows, &mut astray)?;
+    let fixes = rows
+        .into_iter()
+        .map(|(ns, (_, fix))| TimedFix { ns, fix })
+        .collect::<Vec<_>>();
     if let (true, Some(&(row, north, east))) = (fixes.is_empty(), beyond.first()) {
         let problem = TableProblem::NoDegrees {
             latitude: north,
@@ -300,7 +300,8 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<LogNote>) -> Result<Dr
         };
         return Err(table.bad(row, latitude, problem));
     }
-    notes.extend(back.note(fixes.len())?.map(LogNote::from));
+    let of_order = astray.notes(fixes.len())?;
+    notes.extend(of_order.into_iter().map(LogNote::from));
     if !beyond.is_empty() {
         let (beyond, rows) = (beyond.len(), table.len());
         notes.push(TableNote::NoDegrees { beyond, rows }.into());

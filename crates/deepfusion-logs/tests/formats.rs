@@ -1,8 +1,8 @@
 //! One log of each kind, of one drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
 
 use deepfusion_logs::{
-    Clock, DriveLog, Format, GoproLens, LogNote, ReadOptions, SpeedUnit, TableNote, TurnSign,
-    TurnsNote, read,
+    Clock, ClockNote, DriveLog, Format, GoproLens, LogNote, ReadOptions, SpeedUnit, TableNote,
+    TurnSign, TurnsNote, read, read_all,
 };
 use std::path::{Path, PathBuf};
 
@@ -84,6 +84,29 @@ fn a_row_that_goes_back_is_left_out() {
     let error = read_with(&[50, 60, 70]).unwrap_err().to_string();
     assert!(error.contains("trip.csv:52: "), "{error}");
     assert!(error.contains("0.4 s before the row above"), "{error}");
+}
+
+/// A clock that leaps ahead for a row, among the last of the table: the row is left out, not those after it.
+#[test]
+fn a_row_that_leaps_ahead_costs_itself_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("trip.csv");
+    let row = |i: i32| {
+        let early = if i == 197 { 86_400 } else { 0 };
+        format!("{},{i},0.1\n", f64::from(i + early) / 10.0)
+    };
+    let rows: String = (0..200).map(row).collect();
+    std::fs::write(&file, format!("time_s,speed_mps,yaw_rate_radps\n{rows}")).unwrap();
+    let log = read(&file, &ReadOptions::default()).unwrap();
+    assert_eq!((log.speeds.len(), log.yaw_rates.len()), (199, 199));
+    assert!(log.speeds.iter().all(|speed| speed.mps != 197.0));
+    assert_eq!(log.speeds[198].mps, 199.0);
+    let said = LogNote::from(TableNote::Ahead {
+        ahead: 1,
+        rows: 200,
+    });
+    let times = log.notes.iter().filter(|note| **note == said);
+    assert_eq!(times.count(), 1, "{:?}", log.notes);
 }
 
 #[test]
@@ -240,6 +263,30 @@ fn a_table_of_anybodys_needs_to_be_told_its_columns() {
     options.speed = Some("Tempo".into());
     let error = read(&path, &options).unwrap_err().to_string();
     assert!(error.contains("no column 'Tempo'"), "{error}");
+}
+
+/// Speeds in UTC, and turns by a clock on the wall.
+#[test]
+fn turns_of_another_zone_are_not_taken_for_utc_without_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let turns = folder.path().join("turns.csv");
+    let row = |i: i32| format!("2026-05-01 14:00:{i:02},8,0.1\n");
+    let rows: String = (0..12).map(row).collect();
+    let text = format!("time,speed_mps,yaw_rate_radps\n{rows}");
+    std::fs::write(&turns, text).unwrap();
+    let logs = [fixture("phone.gpx"), turns];
+    let read = |zone_s| {
+        let read = read_all(&logs, &ReadOptions::default(), zone_s).unwrap();
+        read.unwrap().0
+    };
+    let said = LogNote::OfFile {
+        file: "turns.csv".into(),
+        note: Box::new(ClockNote::LocalDates.into()),
+    };
+    assert!(read(None).notes.contains(&said));
+    let in_zone = read(Some(7200));
+    assert!(!in_zone.notes.contains(&said));
+    assert_eq!(in_zone.yaw_rates[0].ns, NOON_NS);
 }
 
 #[test]

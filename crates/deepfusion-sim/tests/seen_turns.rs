@@ -67,10 +67,10 @@ fn images_show_how_the_vehicle_turned() {
         let truth = drive(&at.path().join("kitti"), scene);
         let folder = at.path().join("folder");
         std::fs::create_dir(&folder).unwrap();
-        let with_yaw = seen_turns(&truth);
+        let with_yaw = seen_turns(&truth).turns;
         let mut alone = with_speed_alone(&truth, &folder);
         assert!(alone.tilt_unknown() && !alone.yaw_known() && !truth.tilt_unknown());
-        let without_yaw = seen_turns(&alone);
+        let without_yaw = seen_turns(&alone).turns;
         for (turns, yaw_known) in [(&with_yaw, true), (&without_yaw, false)] {
             assert_eq!(turns.len(), 59, "{scene:?}");
             let ego = truth.ego().unwrap();
@@ -128,7 +128,9 @@ fn turns_that_nothing_shows_are_not_made_up() {
             _ => {}
         }
     }
-    let turns = seen_turns(&alone);
+    let found = seen_turns(&alone);
+    assert_eq!(found.unread, 1);
+    let turns = found.turns;
     assert!(!turns.is_empty() && turns.len() < 25, "{}", turns.len());
     alone.take_turns(&turns);
     assert!(!alone.yaw_known() && alone.tilt_unknown());

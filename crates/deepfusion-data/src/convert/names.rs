@@ -1,6 +1,6 @@
 //! What frames are called in array files and as pictures.
 
-use crate::{Dataset, FrameImage};
+use crate::Dataset;
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::path::PathBuf;
@@ -39,11 +39,7 @@ struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     fn of(dataset: &'a Dataset) -> Self {
-        let path = match dataset.frames().first().map(|frame| &frame.image) {
-            // A folder may hold several.
-            Some(FrameImage::Within { file, .. }) => file.as_path(),
-            _ => dataset.folder(),
-        };
+        let path = dataset.place();
         Self {
             path: fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()),
             split_name: dataset.split_name(),

@@ -5,7 +5,7 @@ mod motion;
 
 use super::camera::Camera;
 use super::ego::Receiver;
-use super::frame::Frame;
+use super::frame::{Frame, FrameImage};
 use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use super::options::OpenOptions;
@@ -136,6 +136,16 @@ impl Dataset {
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.recording.folder()
+    }
+
+    /// The file that all its images are in, as a video's or a bag's are; else [its folder](Self::folder). Recordings side by side share a folder,
+    /// and their files may differ in the endings of their names alone.
+    #[must_use]
+    pub fn place(&self) -> &Path {
+        match self.frames().first().map(|frame| &frame.image) {
+            Some(FrameImage::Within { file, .. }) => file.as_path(),
+            _ => self.folder(),
+        }
     }
 
     /// The kind of drive, such as `garage`, where the recording says it.

@@ -67,6 +67,14 @@ pub enum TopicProblem {
         /// Which.
         source: MessageError,
     },
+    /// The points' own times are none of the cloud's.
+    #[error("{topic}: the times in field {field} are more than a second from the message's")]
+    PointTimes {
+        /// The cloud's topic.
+        topic: String,
+        /// The field.
+        field: String,
+    },
     /// Points make no cloud.
     #[error("{0}")]
     Cloud(#[source] MessageError),
@@ -120,7 +128,10 @@ impl TopicProblem {
                 )
             }
             Self::Column { .. } => {
-                "lidar.velocity_field names the field of the radial velocity; x, y and z must be there".into()
+                "lidar.velocity_field names the field of the radial velocity, lidar.time_field that of the points' times; x, y and z must be there".into()
+            }
+            Self::PointTimes { .. } => {
+                "lidar.time_field names times in seconds or whole nanoseconds after the message's, or dates; without it all points count as measured then".into()
             }
             Self::Cloud(_) => "report this with the recording".into(),
         }

@@ -81,6 +81,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         (Error::NoCameraFile { .. }, Some(lens)) => no_pinhole(&file, lens),
         (other, _) => other,
     })?;
+    let model = lens.as_ref().map(|lens| lens.model.clone());
     let bent = lens.and_then(|lens| bent_warning(&lens, &calibration));
     warnings.extend(bent.map(DataWarning::from));
     let times = match (video.times_ns(), config.fps) {
@@ -98,8 +99,11 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let start_s = config.start_s.or_else(|| {
         let (created, log) = (video.created_ns()?, speeds.as_ref()?);
         let ns = &log.speeds_mps.ns;
-        let start_ns = begun(created, &times, (*ns.first()?, *ns.last()?))?;
+        let log = (*ns.first()?, *ns.last()?);
+        let start_ns = begun(created, &times, log)?;
         warnings.push(TimesWarning::VideoBegins { start_ns }.into());
+        let zone = zone_warning(created, &times, log, model);
+        warnings.extend(zone.map(DataWarning::from));
         Some(seconds(start_ns, 0))
     });
     let times = from_start(times, start_s);
@@ -185,22 +189,54 @@ fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
 /// its last; that is taken of which more lies within the log. `None` where the video's times are dates themselves, or the log's are
 /// none.
 fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64> {
-    let (first, last) = ((*times.first()?)?, (*times.last()?)?);
+    let first = (*times.first()?)?;
     let is_date = |ns: i64| TimeUnit::of_date(ns as f64).is_some();
     if is_date(first) || !is_date(log.0) {
         return None;
     }
-    let length = last.saturating_sub(first);
-    let within = |start: i64| {
-        let end = start.saturating_add(length).min(log.1);
-        end.saturating_sub(start.max(log.0)).max(0)
-    };
-    let from_end = created_ns.saturating_sub(length);
+    let length_ns = length_ns(times)?;
+    let within = |start: i64| within_ns(start, length_ns, log);
+    let from_end = created_ns.saturating_sub(length_ns);
     Some(if within(from_end) > within(created_ns) {
         from_end
     } else {
         created_ns
     })
+}
+
+/// From a video's first frame to its last; of a single one it is no time, but some.
+fn length_ns(times: &[Option<i64>]) -> Option<i64> {
+    let (first, last) = ((*times.first()?)?, (*times.last()?)?);
+    Some(last.saturating_sub(first).max(1))
+}
+
+/// How much lies within a log of a video that begins at `start_ns`.
+fn within_ns(start_ns: i64, length_ns: i64, log: (i64, i64)) -> i64 {
+    let end_ns = start_ns.saturating_add(length_ns).min(log.1);
+    end_ns.saturating_sub(start_ns.max(log.0)).max(0)
+}
+
+/// What is said of the zone of a recorder's date, which is taken for UTC: where nothing of the video is within the log by it, and of a
+/// GoPro, which writes what its clock on the back shows.
+fn zone_warning(
+    created_ns: i64,
+    times: &[Option<i64>],
+    log: (i64, i64),
+    gopro: Option<String>,
+) -> Option<TimesWarning> {
+    const HOUR_NS: i64 = 3_600_000_000_000;
+    let length_ns = length_ns(times)?;
+    let within = |start: &i64| within_ns(*start, length_ns, log);
+    let in_zone = |ahead_h: i64| {
+        let utc_ns = created_ns.saturating_sub(ahead_h * HOUR_NS);
+        begun(utc_ns, times, log).filter(|start| within(start) > 0)
+    };
+    if in_zone(0).is_some() {
+        return gopro.map(|model| TimesWarning::LocalRecorder { model });
+    }
+    // The zones of the earth, to the hour.
+    let moved_ns = (-12..=14).filter_map(in_zone).max_by_key(within);
+    Some(TimesWarning::VideoBesideLog { moved_ns })
 }
 
 /// The frames of a video, kept beside it or where `dataset.toml` says.
@@ -217,6 +253,28 @@ pub(crate) fn frames_of(file: &Path, config: &FolderConfig) -> Result<VideoFrame
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A minute of video whose recorder wrote what its clock on the wall says: summer time, and a log of half an hour in UTC.
+    #[test]
+    fn local_time_beside_a_log_in_utc_is_warned_of() {
+        const S: i64 = 1_000_000_000;
+        let day = 1_700_000_000 * S;
+        let log = (day, day + 1800 * S);
+        let times = [Some(0), Some(60 * S)];
+        let said = |created: i64, gopro: Option<&str>| {
+            zone_warning(created, &times, log, gopro.map(str::to_owned))
+        };
+        assert_eq!(said(day + 60 * S, None), None);
+        let local = day + 60 * S + 2 * 3600 * S;
+        let beside = |moved_ns| Some(TimesWarning::VideoBesideLog { moved_ns });
+        assert_eq!(said(local, None), beside(Some(day + 60 * S)));
+        assert_eq!(said(day - 86_400 * 9 * S, None), beside(None));
+        let model = "HERO11 Black".to_owned();
+        let recorder = TimesWarning::LocalRecorder { model };
+        assert_eq!(said(day + 60 * S, Some("HERO11 Black")), Some(recorder));
+        // A video of one picture lies within its log, too.
+        assert_eq!(zone_warning(day, &[Some(0)], log, None), None);
+    }
 
     /// A minute of video, made at the moment that both kinds of recorders write.
     #[test]

@@ -46,6 +46,11 @@ impl TimeUnit {
         }
     }
 
+    /// How many of it are a second.
+    pub(crate) fn per_second(self) -> f64 {
+        10_f64.powi(9 - self.digits() as i32)
+    }
+
     /// The unit in which this number is a date between 2000 and 2100.
     pub(crate) fn of_date(number: f64) -> Option<Self> {
         let units = [

@@ -49,7 +49,7 @@ pub(crate) fn timed_images(
         images = listed;
         ns
     } else if let Some(list) = list.iter().find(|l| l.is_file()) {
-        from_list(list, images.len(), config)?
+        from_list(list, images.len(), config, warnings)?
             .into_iter()
             .map(Some)
             .collect()
@@ -197,7 +197,12 @@ fn from_table(
 }
 
 /// A list's times, one a line, as many as there are images.
-fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i64>> {
+fn from_list(
+    path: &Path,
+    images: usize,
+    config: &FolderConfig,
+    warnings: &mut Vec<DataWarning>,
+) -> Result<Vec<i64>> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
     let lines = text
         .lines()
@@ -256,6 +261,11 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
             return Err(bad(*line, TimeStampProblem::NotAfter { text }));
         }
         times.push(ns);
+    }
+    if zoned == Some(false) {
+        let log = path.file_name().unwrap_or_default();
+        let log = log.to_string_lossy().into_owned();
+        warnings.push(TimesWarning::NoZone { log }.into());
     }
     Ok(times)
 }

@@ -117,6 +117,31 @@ fn dates_with_a_zone_are_read() {
     }
 }
 
+/// Hours off from a log in UTC where they are local.
+#[test]
+fn dates_without_a_zone_are_warned_of_once_a_list() {
+    let warned = |list: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("times.txt"), list).unwrap();
+        let mut warnings = Vec::new();
+        let config = FolderConfig::default();
+        timed_images(folder.path(), images(&["a", "b"]), &config, &mut warnings).unwrap();
+        warnings
+    };
+    let no_zone = TimesWarning::NoZone {
+        log: "times.txt".into(),
+    };
+    for list in [
+        "2011-09-26 13:04:32.3\n2011-09-26 13:04:32.4\n",
+        "26.09.2011 13:04:32.3\n26.09.2011 13:04:32.4\n",
+    ] {
+        assert_eq!(warned(list), [DataWarning::from(no_zone.clone())], "{list}");
+    }
+    for list in ["2024-05-01T10:00:00Z\n2024-05-01T10:00:01Z\n", "0.5\n0.6\n"] {
+        assert!(warned(list).is_empty(), "{list}");
+    }
+}
+
 #[test]
 fn what_is_wrong_is_named() {
     for (file, text, problem) in [

@@ -88,6 +88,19 @@ impl TinyBag {
         })
     }
 
+    /// The same with the point's own time in a field `time`, in seconds after the header's.
+    pub(crate) fn timed_scans(&mut self, topic: &str, after_s: f32) -> &mut Self {
+        self.stream(topic, |header| {
+            let columns: [(&str, &[f32]); 4] = [
+                ("x", &[10.0]),
+                ("y", &[0.0]),
+                ("z", &[0.0]),
+                ("time", &[after_s]),
+            ];
+            PointCloud2::from_columns(header, &columns).unwrap()
+        })
+    }
+
     /// Frames in frames: parent, child, the child's origin in the parent and its turn about an axis in radians; the `i`th of
     /// the messages by `at(i)`.
     pub(crate) fn transforms(

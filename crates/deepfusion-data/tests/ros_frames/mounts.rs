@@ -1,9 +1,9 @@
 //! Where the sensors are, by the frames of `/tf_static` and `/tf`, beside what a file or a profile says.
 
-use super::common::{Drive, OPTICAL, STILL, camera, is_near, says};
+use super::common::{Drive, OPTICAL, STILL, camera, is_near, open, says};
 use crate::common::bag::TinyBag;
 use crate::common::text_of;
-use deepfusion_data::{Dataset, GtKind};
+use deepfusion_data::{Dataset, Error, GtKind};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 use std::fs;
@@ -194,6 +194,33 @@ fn a_camera_that_pans_has_no_mount() {
         });
     });
     is_near(&camera(&still.opened()).0, [1.0, 0.0, 1.0]);
+}
+
+/// A scan whose point is measured 40 ms after the time in its header, at 10 m/s; its driver left the motion in it, as the file says.
+#[test]
+fn a_point_with_a_time_of_its_own_is_brought_to_the_frame_from_there() {
+    let depth = |sidecar: &str, after_s: f32| {
+        let drive = Drive::new(sidecar, |bag| {
+            bag.within("lidar").timed_scans("/points", after_s);
+            bag.transforms("/tf_static", |_| {
+                vec![
+                    ("base_link", "camera", [1.5, 0.0, 1.2], OPTICAL),
+                    ("base_link", "lidar", [1.5, 0.0, 1.5], STILL),
+                ]
+            });
+        });
+        let truth = open(&drive.bag)?.ground_truth(12, GtKind::Z)?;
+        let depths = truth.unwrap().data.into_iter();
+        Ok::<f32, Error>(depths.fold(0.0, f32::max))
+    };
+    let named = "[lidar]\ntime_field = \"time\"\n";
+    let (at_once, by_point) = (depth("", 0.04).unwrap(), depth(named, 0.04).unwrap());
+    assert!(
+        (by_point - at_once - 0.4).abs() < 1e-3,
+        "{at_once} {by_point}"
+    );
+    let text = depth(named, 5.0).unwrap_err().to_string();
+    says(&text, &["/points", "time", "more than a second"]);
 }
 
 #[test]

@@ -203,10 +203,11 @@ pub fn calibrate(
     }))
 }
 
-/// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder.
+/// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder, and two
+/// videos' names may differ in their endings alone.
 fn image(datasets: &[Dataset], ImageRef(set, frame): ImageRef) -> ((&Path, &str), u64) {
     let dataset = &datasets[set];
-    let drive = (dataset.folder(), dataset.split_name());
+    let drive = (dataset.place(), dataset.split_name());
     (drive, dataset.frames()[frame].number)
 }
 

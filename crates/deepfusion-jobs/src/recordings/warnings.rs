@@ -60,9 +60,7 @@ fn by_warning(warnings: impl Iterator<Item = (String, String)>) -> Vec<PlacedWar
 
 /// The warnings on a recording, each with its place.
 fn warnings(dataset: &Dataset) -> impl Iterator<Item = (String, String)> {
-    let image = dataset.frames().first().map(|frame| &frame.image);
-    let container = image.filter(|i| i.file().is_none()).map(|i| i.path());
-    let place = container.unwrap_or(dataset.folder()).display();
+    let place = dataset.place().display();
     let about_it = move |warning: &&DataWarning| dataset.passed_over() != Some(*warning);
     let warnings = dataset.warnings().iter().filter(about_it);
     warnings.map(move |warning| (place.to_string(), warning.to_string()))

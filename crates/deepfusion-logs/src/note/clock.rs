@@ -7,6 +7,9 @@ pub enum ClockNote {
     /// The log has dates without a zone.
     #[error("the log's dates have no zone and are taken for UTC, as the video's are")]
     NoZone,
+    /// The log has dates without a zone, and no video's beginning stands beside them.
+    #[error("the log's dates have no zone and are taken for UTC")]
+    LocalDates,
     /// The log counts from about its own beginning.
     #[error("the log counts from its own start, which is taken for the video's first frame")]
     OwnStart,
@@ -24,6 +27,10 @@ mod tests {
         assert_eq!(
             ClockNote::NoZone.to_string(),
             "the log's dates have no zone and are taken for UTC, as the video's are"
+        );
+        assert_eq!(
+            ClockNote::LocalDates.to_string(),
+            "the log's dates have no zone and are taken for UTC"
         );
         assert_eq!(
             ClockNote::OwnStart.to_string(),

@@ -79,6 +79,18 @@ pub enum TableNote {
         /// Of so many that could be used.
         rows: usize,
     },
+    /// Rows whose time is after that of the rows that follow.
+    #[error(
+        "{ahead} of {} {} left out",
+        count_of(*rows, "row"),
+        if *ahead == 1 { "leaps ahead in time and is" } else { "leap ahead in time and are" }
+    )]
+    Ahead {
+        /// How many.
+        ahead: usize,
+        /// Of so many that could be used.
+        rows: usize,
+    },
     /// Rows whose latitude or longitude is none.
     #[error(
         "left out, as their degrees are none: {beyond} of {}",
@@ -218,6 +230,20 @@ mod tests {
             (
                 TableNote::Backwards { back: 2, rows: 200 },
                 "2 of 200 rows go back in time and are left out",
+            ),
+            (
+                TableNote::Ahead {
+                    ahead: 1,
+                    rows: 200,
+                },
+                "1 of 200 rows leaps ahead in time and is left out",
+            ),
+            (
+                TableNote::Ahead {
+                    ahead: 2,
+                    rows: 200,
+                },
+                "2 of 200 rows leap ahead in time and are left out",
             ),
             (
                 TableNote::NoDegrees { beyond: 1, rows: 1 },

@@ -29,12 +29,21 @@ impl Dataset {
     /// Nothing happens where the mount is not [assumed](Self::mount_assumed). A bag's scans are still brought to the frames' times by the
     /// motion of the mount that was assumed: over milliseconds these differ by millimetres.
     pub fn aim(&mut self, heading: &Heading) {
+        if let Some(cam_from_vehicle) = self.parts.cam_from_vehicle {
+            self.aim_beside(heading, &cam_from_vehicle);
+        }
+    }
+
+    /// As [`Self::aim`], by what the images of another camera on the vehicle show, whose mount was `cam_from_vehicle` before that one was aimed:
+    /// where the two cameras are to each other stays as it is.
+    pub fn aim_beside(&mut self, heading: &Heading, cam_from_vehicle: &Se3) {
         if !self.mount_assumed {
             return;
         }
         let mount = self.parts.cam_from_vehicle.as_mut();
-        if let Some(cam_from_vehicle) = mount {
-            *cam_from_vehicle = heading.turn() * *cam_from_vehicle;
+        if let Some(own_from_vehicle) = mount {
+            let own_from_cam = *own_from_vehicle * cam_from_vehicle.inverse();
+            *own_from_vehicle = own_from_cam * heading.turn() * *cam_from_vehicle;
             self.mount_assumed = false;
             self.warnings.retain(|warning| {
                 !matches!(

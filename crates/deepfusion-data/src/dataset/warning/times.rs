@@ -44,12 +44,12 @@ pub enum TimesWarning {
         /// The line of the first, counted from 1.
         line: u64,
     },
-    /// The times of another program's log are dates without a zone.
+    /// The times of a log, or of a list of the frames' times, are dates without a zone.
     #[error(
         "{log}: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)"
     )]
     NoZone {
-        /// The log's name.
+        /// The name of the log or the list.
         log: String,
     },
     /// A video's frames have no times.
@@ -64,6 +64,20 @@ pub enum TimesWarning {
     VideoBegins {
         /// When it is taken to begin, nanoseconds since 1970.
         start_ns: i64,
+    },
+    /// Nothing of a video is within its log by what its recorder says.
+    #[error("by its recorder's date nothing of the video is within the log{}", moved(*moved_ns))]
+    VideoBesideLog {
+        /// When it began, where the date is one of a local clock and some zone's is within the log, nanoseconds since 1970.
+        moved_ns: Option<i64>,
+    },
+    /// The date of a video is of a recorder that writes local time.
+    #[error(
+        "a {model} writes the time of its own zone, which is taken for UTC: the video may begin hours off (start_s in dataset.toml moves it)"
+    )]
+    LocalRecorder {
+        /// The camera.
+        model: String,
     },
     /// Nothing says that a video and the tables beside it have one clock.
     #[error(
@@ -99,6 +113,18 @@ pub enum TimesWarning {
         /// How many of its messages.
         messages: usize,
     },
+}
+
+/// What follows where a video's date may be one of a local clock.
+fn moved(start_ns: Option<i64>) -> String {
+    match start_ns {
+        None => ": start_s in dataset.toml says when it begins".to_owned(),
+        Some(ns) => format!(
+            ": it may be local time, of which {} in UTC is within (start_s = {:.3} in dataset.toml)",
+            date(ns),
+            seconds(ns, 0)
+        ),
+    }
 }
 
 fn date(ns: i64) -> String {
@@ -158,6 +184,24 @@ mod tests {
                 },
                 "the video is taken to begin at 2023-11-14T22:13:20Z, as its recorder says (start_s = 1700000000.000 in dataset.toml; \
                  another moves it)",
+            ),
+            (
+                TimesWarning::VideoBesideLog { moved_ns: None },
+                "by its recorder's date nothing of the video is within the log: start_s in dataset.toml says when it begins",
+            ),
+            (
+                TimesWarning::VideoBesideLog {
+                    moved_ns: Some(1_700_000_000_000_000_000),
+                },
+                "by its recorder's date nothing of the video is within the log: it may be local time, of which \
+                 2023-11-14T22:13:20Z in UTC is within (start_s = 1700000000.000 in dataset.toml)",
+            ),
+            (
+                TimesWarning::LocalRecorder {
+                    model: "HERO11 Black".into(),
+                },
+                "a HERO11 Black writes the time of its own zone, which is taken for UTC: the video may begin hours off (start_s in \
+                 dataset.toml moves it)",
             ),
             (
                 TimesWarning::VideoOnTablesClock,

@@ -161,6 +161,8 @@ pub(super) struct VehicleConfig {
 pub(super) struct LidarConfig {
     /// The field of the radial velocity; without it the usual names are tried.
     pub(super) velocity_field: Option<String>,
+    /// The field of the points' own times, where the vehicle's motion is still in a scan.
+    pub(super) time_field: Option<String>,
     /// The sign of a point that recedes.
     pub(super) receding: Sign,
     /// Whether the sensor already took its own velocity out.
@@ -173,6 +175,7 @@ impl Default for LidarConfig {
     fn default() -> Self {
         Self {
             velocity_field: None,
+            time_field: None,
             receding: Sign::Positive,
             over_ground: false,
             moving_mps: 0.5,

@@ -23,6 +23,7 @@ mod mounts;
 mod odometry_poses;
 mod open;
 mod packet;
+mod point_times;
 mod profile;
 mod readings;
 mod recording;

@@ -2,11 +2,13 @@
 
 use super::config::{LidarConfig, Sign};
 use super::doppler::{ego_velocity, ground_radial};
+use super::point_times::seconds_after;
 use crate::{Error, Result, TopicProblem};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_rosbag::msg::PointCloud2;
-use deepfusion_rosbag::{Message, MessageSource};
+use deepfusion_rosbag::{Message, MessageError, MessageSource};
 use nalgebra::Vector3;
+use std::collections::HashMap;
 
 /// Names under which drivers publish the radial velocity.
 const VELOCITY_NAMES: [&str; 6] = [
@@ -19,6 +21,8 @@ const VELOCITY_NAMES: [&str; 6] = [
 ];
 /// Of a scan that agrees with one velocity in less than this share, the vehicle's is taken instead.
 pub(super) const LEAST_STATIC: f64 = 0.4;
+/// Points of so many seconds share a pose: at 50 m/s they are 5 mm off at most.
+const STEP_S: f64 = 1e-4;
 
 /// Points in the LiDAR's axes (x forward, y left, z up), metres.
 #[derive(Debug, Clone, Default)]
@@ -26,6 +30,8 @@ pub(super) struct Scan {
     pub(super) xyz: Vec<[f32; 3]>,
     /// m/s against the sensor, receding is positive.
     pub(super) radial: Option<Vec<f32>>,
+    /// When each point was measured, in seconds after the scan's time; without them all were then, or are where they would have been.
+    pub(super) after_s: Option<Vec<f32>>,
 }
 
 /// A scan as a frame's camera sees it. H×W, row by row.
@@ -68,21 +74,43 @@ fn column(
     cloud: &PointCloud2<'_>,
     name: &str,
 ) -> Result<Vec<f32>> {
-    let column = cloud.column(name).map_err(|e| Error::Topic {
-        path: bag.path().to_owned(),
-        problem: Box::new(TopicProblem::Column {
-            topic: message.topic().to_owned(),
-            source: e,
-        }),
-        choice: None,
-    })?;
+    let column = cloud.column(name);
+    let column = column.map_err(|source| of_column(bag, message, source))?;
     Ok(column.f32s().collect())
+}
+
+fn of_column(bag: &dyn MessageSource, message: &Message<'_>, source: MessageError) -> Error {
+    let topic = message.topic().to_owned();
+    of_cloud(bag, TopicProblem::Column { topic, source })
+}
+
+fn of_cloud(bag: &dyn MessageSource, problem: TopicProblem) -> Error {
+    Error::Topic {
+        path: bag.path().to_owned(),
+        problem: Box::new(problem),
+        choice: None,
+    }
+}
+
+/// The points' own times in the field of this name, in seconds after the message's.
+fn times(
+    bag: &dyn MessageSource,
+    message: &Message<'_>,
+    cloud: &PointCloud2<'_>,
+    name: &str,
+) -> Result<Vec<f32>> {
+    let column = cloud.column(name);
+    let column = column.map_err(|source| of_column(bag, message, source))?;
+    seconds_after(&column, cloud.header.stamp).ok_or_else(|| {
+        let (topic, field) = (message.topic().to_owned(), name.to_owned());
+        of_cloud(bag, TopicProblem::PointTimes { topic, field })
+    })
 }
 
 impl Scan {
     /// # Errors
-    /// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z, or without the field that
-    /// the settings name.
+    /// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z, or without a field that
+    /// the settings name, and for times that are none.
     pub(super) fn decode(
         bag: &dyn MessageSource,
         message: &Message<'_>,
@@ -98,6 +126,10 @@ impl Scan {
             Some(name) => Some(column(name)?),
             None => None,
         };
+        let after_s = match lidar.time_field.as_deref() {
+            Some(name) => Some(times(bag, message, &cloud, name)?),
+            None => None,
+        };
         let sign = match lidar.receding {
             Sign::Positive => 1.0,
             Sign::Negative => -1.0,
@@ -105,6 +137,7 @@ impl Scan {
         Ok(Self {
             xyz,
             radial: radial.map(|r| r.into_iter().map(|v| sign * v).collect()),
+            after_s,
         })
     }
 
@@ -127,15 +160,23 @@ impl Scan {
         Some(ground_radial(&self.xyz, radial, &velocity))
     }
 
-    /// The scan from a camera; the nearest point wins a pixel. `cam_from_lidar` is from the LiDAR at the scan's time
-    /// to the camera at the frame's.
-    pub(super) fn seen(&self, cam_from_lidar: &Se3, k: &Intrinsics) -> SeenScan {
+    /// The scan from a camera; the nearest point wins a pixel. `cam_from_lidar` is from the LiDAR, so many seconds after the scan's time, to
+    /// the camera at the frame's.
+    pub(super) fn seen(&self, cam_from_lidar: impl Fn(f64) -> Se3, k: &Intrinsics) -> SeenScan {
         let (width, height) = (k.width as usize, k.height as usize);
         let mut depth = DepthMap::empty(width, height);
         let mut nearest = vec![SeenScan::NONE; width * height];
+        let mut poses = HashMap::new();
+        let mut pose = |point: u32| -> Se3 {
+            let after_s = self.after_s.as_deref().unwrap_or_default();
+            let after_s = after_s.get(point as usize).copied().unwrap_or(0.0);
+            let steps = (f64::from(after_s) / STEP_S).round();
+            let pose = poses.entry(steps as i32);
+            *pose.or_insert_with(|| cam_from_lidar(steps * STEP_S))
+        };
         let points = (0_u32..).zip(&self.xyz);
         for (i, point) in points.filter(|(_, point)| usable(point)) {
-            let seen = cam_from_lidar.transform(&Vector3::from(point.map(f64::from)));
+            let seen = pose(i).transform(&Vector3::from(point.map(f64::from)));
             let Some(pixel) = k.project(&seen) else {
                 continue;
             };
@@ -172,10 +213,10 @@ mod tests {
     fn a_ray_without_an_echo_is_no_depth() {
         let scan = Scan {
             xyz: vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 8.0]],
-            radial: None,
+            ..Scan::default()
         };
         let ahead = Se3::from_axis_angle(Vector3::zeros(), Vector3::new(0.0, 0.5, 1.0));
-        let seen = scan.seen(&ahead, &Intrinsics::centred(100.0, (200, 100)));
+        let seen = scan.seen(|_| ahead, &Intrinsics::centred(100.0, (200, 100)));
         let known: Vec<f32> = seen
             .depth
             .data
@@ -184,5 +225,23 @@ mod tests {
             .filter(|d| *d > 0.0)
             .collect();
         assert_eq!(known, [9.0]);
+    }
+
+    /// A wall that a turning scanner measures 10 m ahead at its left before the frame and at its right after it, driving at 10 m/s.
+    #[test]
+    fn each_point_is_seen_from_where_it_was_measured() {
+        let scan = Scan {
+            xyz: vec![[-1.0, 0.0, 10.0], [1.0, 0.0, 10.0]],
+            after_s: Some(vec![-0.05, 0.05]),
+            ..Scan::default()
+        };
+        let moved = |after_s: f64| {
+            Se3::from_axis_angle(Vector3::zeros(), Vector3::new(0.0, 0.0, 10.0 * after_s))
+        };
+        let seen = scan.seen(moved, &Intrinsics::centred(100.0, (200, 100)));
+        let depth = seen.depth.data.iter().copied();
+        let mut known: Vec<f32> = depth.filter(|d| *d > 0.0).collect();
+        known.sort_by(f32::total_cmp);
+        assert_eq!(known, [9.5, 10.5]);
     }
 }

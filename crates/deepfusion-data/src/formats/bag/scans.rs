@@ -52,10 +52,11 @@ impl BagScans {
     }
 
     /// A scan as a frame's camera sees it: what stands still is brought to the frame's time by the vehicle's motion
-    /// meanwhile.
+    /// meanwhile, each point from its own time where it has one.
     fn seen(&self, scan: &Scan, frame_s: f64, scan_s: f64) -> SeenScan {
-        let cam_from_lidar = self.frame_from_scan(frame_s, scan_s) * self.cam_from_lidar;
-        scan.seen(&cam_from_lidar, &self.intrinsics)
+        let cam_from_lidar =
+            |after_s: f64| self.frame_from_scan(frame_s, scan_s + after_s) * self.cam_from_lidar;
+        scan.seen(cam_from_lidar, &self.intrinsics)
     }
 
     /// Each point's speed over ground along its ray, m/s; `None` without radial velocities.

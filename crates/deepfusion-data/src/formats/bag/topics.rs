@@ -232,10 +232,10 @@ impl Search<'_> {
     }
 
     /// Whether a quantity is read from CAN frames. No topic is looked for then: the values of two sources, each with its
-    /// own scale, would be read as one's.
+    /// own scale, would be read as one's. That none is to be read does not contradict a signal.
     fn on_can(&self, role: TopicRole, signal: bool, named: &Option<String>) -> Result<bool> {
         match named {
-            Some(name) if signal => Err(Error::Topic {
+            Some(name) if signal && name != NamedTopic::NONE => Err(Error::Topic {
                 path: self.config.to_owned(),
                 problem: Box::new(TopicProblem::AndSignal {
                     role,

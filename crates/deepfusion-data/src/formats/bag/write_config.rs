@@ -1,5 +1,6 @@
 //! The file beside a bag, written of what was found in the bag: a beginning to correct and to complete.
 
+use super::can_config::CanConfig;
 use super::commands::is_command;
 use super::config::{BagConfig, TopicNames};
 use super::index::Index;
@@ -81,7 +82,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
         own.remove(key);
     }
     if let Some(can) = own.get_mut("can").and_then(Value::as_table_mut) {
-        remove_named_signals(can, &topics, &config.topics);
+        remove_named_signals(can, config.can.as_ref());
     }
     let given = options.calibration.as_ref();
     let given = given.filter(|_| options.intrinsics.is_none() && options.hfov_deg.is_none());
@@ -147,10 +148,17 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
     Ok(text)
 }
 
-/// Takes the signals out of `[can]` that a named topic stands for now: both would contradict each other.
-fn remove_named_signals(can: &mut Table, topics: &Topics, names: &TopicNames) {
-    for role in [TopicRole::Speed, TopicRole::Steering] {
-        if topics.of(role).is_some() || names.is_none(role) {
+/// Takes the signals out of `[can]` that a caller's topic, or none of the caller's, stands for now: `read` has them no more.
+fn remove_named_signals(can: &mut Table, read: Option<&CanConfig>) {
+    let signals = [
+        (TopicRole::Speed, read.and_then(|can| can.speed.as_ref())),
+        (
+            TopicRole::Steering,
+            read.and_then(|can| can.steering.as_ref()),
+        ),
+    ];
+    for (role, signal) in signals {
+        if signal.is_none() {
             can.remove(role.name());
         }
     }
