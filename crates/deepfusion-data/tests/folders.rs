@@ -83,6 +83,27 @@ fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
     }
 }
 
+/// Dates of images without a zone matter beside a log, and where nothing says when the first image was taken.
+#[test]
+fn a_zone_is_asked_for_where_it_matters() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 3, 8.0, 0.4);
+    let at = |name: &str| root.path().join(name);
+    fs::remove_file(at("frames.csv")).unwrap();
+    let times = "2011-09-26 13:04:32.3\n2011-09-26 13:04:32.4\n2011-09-26 13:04:32.5\n";
+    fs::write(at("timestamps.txt"), times).unwrap();
+    let rows = "2011-09-26T13:04:32Z,8,0.1\n2011-09-26T13:04:33Z,8,0.1\n";
+    let table = format!("time,speed_mps,yaw_rate_radps\n{rows}");
+    fs::write(at("speed.csv"), table).unwrap();
+    let asks = || text_of(open(root.path()).warnings()).contains("timestamps.txt: its dates");
+    assert!(asks());
+    fs::write(at("dataset.toml"), "start_s = 1317042272.3\n").unwrap();
+    assert!(!asks(), "the images begin where it says");
+    fs::remove_file(at("dataset.toml")).unwrap();
+    fs::remove_file(at("speed.csv")).unwrap();
+    assert!(!asks(), "there is nothing beside the images");
+}
+
 /// KITTI's drive 0005 again as a folder with tables, made from its oxts: every pair's motion is the same but for the
 /// body's roll and pitch, which a table of speeds and yaw rates does not know.
 #[cfg(unix)]

@@ -47,8 +47,8 @@ pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Datase
 /// As [`open_aimed`], for what learns from the vehicle's motion: where its roll and pitch are not recorded, they are taken from the images
 /// ([`deepfusion_doctor::seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of
 /// such a drive, twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show. Turns that took
-/// more than ten seconds are kept in a hidden file of the recording's folder, where it can be written into, and are found anew once the images
-/// or what else they follow from have changed.
+/// more than ten seconds are kept in the user's cache folder, where there is one, and are found anew once the images or what else they follow
+/// from have changed.
 ///
 /// # Errors
 /// As [`open_recordings`].

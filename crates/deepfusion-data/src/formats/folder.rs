@@ -9,8 +9,8 @@ use crate::logs::speed_log::SpeedLog;
 use crate::truth::depth_images::DepthImages;
 use crate::truth::measured::MeasuredDepth;
 use crate::{
-    Camera, ColumnsProblem, Dataset, DatasetKind, Error, NoFramesReason, OpenOptions, Result,
-    image_size,
+    Camera, ColumnsProblem, DataWarning, Dataset, DatasetKind, Error, NoFramesReason, OpenOptions,
+    Result, TimesWarning, image_size,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -52,6 +52,10 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         .filter_map(|i| Some((i.path.file_stem()?, i.number)));
     let depth = depth_images(folder, &config, stems.collect())?;
     let speeds = SpeedLog::read(folder, &config)?;
+    // The images' zone is of no matter without a log, nor where it is said when the first was taken.
+    if speeds.is_none() || config.start_s.is_some() {
+        warnings.retain(|w| !matches!(w, DataWarning::Times(TimesWarning::NoZone { .. })));
+    }
     PlainParts {
         kind: DatasetKind::Folder,
         folder: folder.to_owned(),

@@ -217,26 +217,70 @@ fn within_ns(start_ns: i64, length_ns: i64, log: (i64, i64)) -> i64 {
 }
 
 /// What is said of the zone of a recorder's date, which is taken for UTC: where nothing of the video is within the log by it, and of a
-/// GoPro, which writes what its clock on the back shows.
+/// GoPro, which writes what its clock on the back shows, where by another zone's time as much is within the log.
 fn zone_warning(
     created_ns: i64,
     times: &[Option<i64>],
     log: (i64, i64),
     gopro: Option<String>,
 ) -> Option<TimesWarning> {
-    const HOUR_NS: i64 = 3_600_000_000_000;
     let length_ns = length_ns(times)?;
-    let within = |start: &i64| within_ns(*start, length_ns, log);
-    let in_zone = |ahead_h: i64| {
-        let utc_ns = created_ns.saturating_sub(ahead_h * HOUR_NS);
-        begun(utc_ns, times, log).filter(|start| within(start) > 0)
+    let in_zone = |ahead_min: i64| {
+        let utc_ns = created_ns.saturating_sub(ahead_min * MINUTE_NS);
+        let start_ns = begun(utc_ns, times, log)?;
+        let within_ns = within_ns(start_ns, length_ns, log);
+        (within_ns > 0).then_some(InZone {
+            ahead_min,
+            start_ns,
+            within_ns,
+        })
     };
-    if in_zone(0).is_some() {
-        return gopro.map(|model| TimesWarning::LocalRecorder { model });
-    }
-    // The zones of the earth, to the hour.
-    let moved_ns = (-12..=14).filter_map(in_zone).max_by_key(within);
-    Some(TimesWarning::VideoBesideLog { moved_ns })
+    let zones: Vec<InZone> = zones_min().filter_map(in_zone).collect();
+    let Some(utc) = zones.iter().find(|zone| zone.ahead_min == 0) else {
+        let moved_ns = likeliest(&zones);
+        return Some(TimesWarning::VideoBesideLog { moved_ns });
+    };
+    let fits_as_well = |zone: &&InZone| zone.within_ns >= utc.within_ns;
+    let may_be_another = zones.iter().filter(fits_as_well).count() > 1;
+    let model = gopro.filter(|_| may_be_another)?;
+    Some(TimesWarning::LocalRecorder { model })
+}
+
+/// A video whose recorder's clock shows the time of a zone.
+struct InZone {
+    /// How far that zone is ahead of UTC.
+    ahead_min: i64,
+    /// When the video then began.
+    start_ns: i64,
+    /// How much of it is then within the log.
+    within_ns: i64,
+}
+
+const MINUTE_NS: i64 = 60_000_000_000;
+
+/// How far the zones of the earth are ahead of UTC, in minutes.
+fn zones_min() -> impl Iterator<Item = i64> {
+    /// Those of parts of an hour, from the Marquesas to the Chatham Islands.
+    const UNEVEN: [i64; 13] = [
+        -570, -210, -150, 210, 270, 330, 345, 390, 525, 570, 630, 765, 825,
+    ];
+    (-12..=14).map(|hours| 60 * hours).chain(UNEVEN)
+}
+
+/// When a video began by the zone by which most of it is within the log. Of several alike the one of whole hours is taken, as most are;
+/// `None` where that is not a single one.
+fn likeliest(zones: &[InZone]) -> Option<i64> {
+    let most_ns = zones.iter().map(|zone| zone.within_ns).max()?;
+    let alike = zones.iter().filter(|zone| zone.within_ns == most_ns);
+    let whole = alike.clone().filter(|zone| zone.ahead_min % 60 == 0);
+    let zone = only(whole).or_else(|| only(alike))?;
+    Some(zone.start_ns)
+}
+
+/// What there is one of.
+fn only<T>(mut all: impl Iterator<Item = T>) -> Option<T> {
+    let first = all.next()?;
+    all.next().is_none().then_some(first)
 }
 
 /// The frames of a video, kept beside it or where `dataset.toml` says.
@@ -254,26 +298,45 @@ pub(crate) fn frames_of(file: &Path, config: &FolderConfig) -> Result<VideoFrame
 mod tests {
     use super::*;
 
-    /// A minute of video whose recorder wrote what its clock on the wall says: summer time, and a log of half an hour in UTC.
+    /// A minute of video whose recorder wrote what its clock on the wall says: summer time, and logs in UTC.
     #[test]
     fn local_time_beside_a_log_in_utc_is_warned_of() {
         const S: i64 = 1_000_000_000;
+        const H: i64 = 3600 * S;
         let day = 1_700_000_000 * S;
-        let log = (day, day + 1800 * S);
+        let (half_an_hour, five_hours) = ((day, day + H / 2), (day, day + 5 * H));
         let times = [Some(0), Some(60 * S)];
-        let said = |created: i64, gopro: Option<&str>| {
+        let said = |created: i64, log: (i64, i64), gopro: Option<&str>| {
             zone_warning(created, &times, log, gopro.map(str::to_owned))
         };
-        assert_eq!(said(day + 60 * S, None), None);
-        let local = day + 60 * S + 2 * 3600 * S;
+        let began = day + 60 * S;
         let beside = |moved_ns| Some(TimesWarning::VideoBesideLog { moved_ns });
-        assert_eq!(said(local, None), beside(Some(day + 60 * S)));
-        assert_eq!(said(day - 86_400 * 9 * S, None), beside(None));
+        assert_eq!(said(began, half_an_hour, None), None);
+        assert_eq!(said(began + 2 * H, half_an_hour, None), beside(Some(began)));
+        let in_india = began + 5 * H + H / 2;
+        assert_eq!(said(in_india, half_an_hour, None), beside(Some(began)));
+        assert_eq!(said(day - 9 * 24 * H, half_an_hour, None), beside(None));
+        // Several zones are within a long log, and none is likelier.
+        assert_eq!(said(began + 6 * H, five_hours, None), beside(None));
+        // A video of one picture lies within its log, too.
+        assert_eq!(zone_warning(day, &[Some(0)], half_an_hour, None), None);
+    }
+
+    /// A GoPro's clock may show UTC, and no zone may be ahead of it: where the log is short that shows.
+    #[test]
+    fn a_gopro_is_warned_of_where_its_clock_may_show_another_zone() {
+        const S: i64 = 1_000_000_000;
+        const H: i64 = 3600 * S;
+        let day = 1_700_000_000 * S;
+        let times = [Some(0), Some(60 * S)];
+        let said = |log| zone_warning(day + 60 * S, &times, log, Some("HERO11 Black".into()));
         let model = "HERO11 Black".to_owned();
         let recorder = TimesWarning::LocalRecorder { model };
-        assert_eq!(said(day + 60 * S, Some("HERO11 Black")), Some(recorder));
-        // A video of one picture lies within its log, too.
-        assert_eq!(zone_warning(day, &[Some(0)], log, None), None);
+        assert_eq!(said((day, day + H / 2)), None);
+        assert_eq!(said((day, day + 4 * H)), Some(recorder.clone()));
+        // An hour later more of it is within, and then less.
+        assert_eq!(said((day + 90 * S, day + 2 * H)), Some(recorder));
+        assert_eq!(said((day, day + H + 30 * S)), None);
     }
 
     /// A minute of video, made at the moment that both kinds of recorders write.

@@ -57,13 +57,15 @@ fn keep(file: &Path, turns: &[SeenTurn], origin: &Sum) -> io::Result<()> {
     deepfusion_fs::write(file, written(turns, origin))
 }
 
-/// Where a recording's turns are kept: a file for each recording, one before the camera is aimed and one after it.
+/// Where a recording's turns are kept: a file for each of its cameras, one before the camera is aimed and one after it. Two topics of a bag
+/// are told apart by their intrinsics: else the turns of either would take the place of the other's.
 fn file_of(dataset: &Dataset, folder: &Path) -> PathBuf {
     let recording = format!(
-        "{:?} {} {:?} {}",
+        "{:?} {} {:?} {:?} {}",
         deepfusion_fs::absolute(dataset.place()),
         dataset.split_name(),
         dataset.camera(),
+        dataset.intrinsics(0),
         dataset.mount_assumed()
     );
     folder.join(format!("{:x}", Sha256::digest(recording)))
@@ -157,10 +159,14 @@ fn read(file: &Path, origin: &Sum) -> Option<Vec<SeenTurn>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use deepfusion_data::{Heading, OpenOptions};
+    use deepfusion_data::{
+        DatasetParts, Frame, FrameImage, Heading, OpenOptions, Recording, Result, RgbImage,
+    };
+    use deepfusion_geometry::Intrinsics;
     use deepfusion_sim::{SimConfig, Simulation, write_kitti};
     use std::fs;
     use std::ops::ControlFlow;
+    use std::sync::Arc;
 
     /// A drive of nine images whose roll and pitch nobody measured.
     fn drive(at: &Path) -> PathBuf {
@@ -240,6 +246,40 @@ mod tests {
         let whole = fs::read(&file).unwrap();
         fs::write(&file, &whole[..whole.len() - 1]).unwrap();
         assert_eq!(kept(&dataset), found);
+    }
+
+    #[test]
+    fn two_topics_of_a_bag_have_a_file_each() {
+        #[derive(Debug)]
+        struct Bag;
+
+        impl Recording for Bag {
+            fn folder(&self) -> &Path {
+                Path::new("/drives")
+            }
+
+            fn load_image(&self, _: &Frame) -> Result<RgbImage> {
+                Ok(RgbImage::new(64, 48))
+            }
+        }
+
+        let topic = |focal: f64| {
+            let frame = Frame {
+                drive: "town".into(),
+                number: 0,
+                time_s: Some(0.0),
+                image: FrameImage::Within {
+                    file: "/drives/town.bag".into(),
+                    index: 0,
+                },
+                speed_mps: Some(8.0),
+            };
+            let camera = Intrinsics::from_numbers([focal, focal, 32.0, 24.0], (64, 48));
+            let parts = DatasetParts::of_frames("town", vec![frame], camera);
+            file_of(&Dataset::new(parts, Arc::new(Bag)), Path::new("cache"))
+        };
+        assert_eq!(topic(60.0), topic(60.0));
+        assert_ne!(topic(60.0), topic(61.0));
     }
 
     /// What a disk did not give once it may give the next time.

@@ -27,7 +27,8 @@ impl Dataset {
 
     /// Turns the camera on its vehicle to where its images show that it looks: motions between frames then have that direction.
     /// Nothing happens where the mount is not [assumed](Self::mount_assumed). A bag's scans are still brought to the frames' times by the
-    /// motion of the mount that was assumed: over milliseconds these differ by millimetres.
+    /// motion of the mount that was assumed: over milliseconds these differ by millimetres, over the tenth of a second that a scan's points
+    /// with times of their own may be apart by centimetres.
     pub fn aim(&mut self, heading: &Heading) {
         if let Some(cam_from_vehicle) = self.parts.cam_from_vehicle {
             self.aim_beside(heading, &cam_from_vehicle);

@@ -68,10 +68,10 @@ pub enum TimesWarning {
     /// Nothing of a video is within its log by what its recorder says.
     #[error("by its recorder's date nothing of the video is within the log{}", moved(*moved_ns))]
     VideoBesideLog {
-        /// When it began, where the date is one of a local clock and some zone's is within the log, nanoseconds since 1970.
+        /// When it began, where the date is one of a local clock and by a single zone's time it is within the log, nanoseconds since 1970.
         moved_ns: Option<i64>,
     },
-    /// The date of a video is of a recorder that writes local time.
+    /// The date of a video is of a recorder that writes local time, and the log does not show that this was UTC.
     #[error(
         "a {model} writes the time of its own zone, which is taken for UTC: the video may begin hours off (start_s in dataset.toml moves it)"
     )]

@@ -1,26 +1,38 @@
 //! When each point of a scan was measured, where the scan says it.
 
-use crate::logs::clock::TimeUnit;
-use deepfusion_rosbag::Time;
+use crate::logs::clock::{TimeUnit, seconds};
 use deepfusion_rosbag::msg::{Column, Datatype};
 
 /// Farther from its scan's time than this, in seconds, no point is.
 const FARTHEST_S: f64 = 1.0;
 
-/// The points' times in seconds after the scan's own, which is `stamp`: of dates in any unit, and else of numbers that count from it, whole
-/// ones in nanoseconds, as Ouster's `t`, others in seconds, as Velodyne's `time`. `None` where a point would be more than a second off.
-pub(super) fn seconds_after(column: &Column<'_>, stamp: Time) -> Option<Vec<f32>> {
-    let first = column.f64s().find(|number| number.is_finite());
+/// The points' times in seconds after the scan's own, which is `scan_ns` after 1970: of dates in any unit, and else of numbers that count
+/// from it, whole ones in nanoseconds, as Ouster's `t`, others in seconds, as Velodyne's `time`. What is no point by `is_point` has no time,
+/// whatever stands there. `None` where a point would be more than a second off.
+pub(super) fn seconds_after(
+    column: &Column<'_>,
+    scan_ns: i64,
+    is_point: impl Fn(usize) -> bool,
+) -> Option<Vec<f32>> {
+    let of_points = column.f64s().enumerate().filter(|(i, _)| is_point(*i));
+    let mut times = of_points.map(|(_, number)| number);
+    let first = times.find(|number| number.is_finite());
     let is_whole = !matches!(column.datatype(), Datatype::Float32 | Datatype::Float64);
     let (unit, start_s) = match first.and_then(TimeUnit::of_date) {
-        Some(unit) => (unit, stamp.seconds()),
+        Some(unit) => (unit, seconds(scan_ns, 0)),
         None if is_whole => (TimeUnit::Nanoseconds, 0.0),
         None => (TimeUnit::Seconds, 0.0),
     };
     let per_second = unit.per_second();
-    let after = column.f64s().map(|number| number / per_second - start_s);
-    // Rays without an echo may have no time either.
-    let after: Vec<f64> = after.map(|s| if s.is_nan() { 0.0 } else { s }).collect();
+    let after = column.f64s().enumerate().map(|(i, number)| {
+        // Without a time of its own a point is of the scan's.
+        if number.is_nan() || !is_point(i) {
+            0.0
+        } else {
+            number / per_second - start_s
+        }
+    });
+    let after: Vec<f64> = after.collect();
     let is_near = after.iter().all(|s| s.abs() <= FARTHEST_S);
     is_near.then(|| after.iter().map(|s| *s as f32).collect())
 }
@@ -31,13 +43,10 @@ mod tests {
     use deepfusion_rosbag::msg::{Header, PointCloud2, PointField};
     use std::borrow::Cow;
 
-    const STAMP: Time = Time {
-        sec: 1_700_000_000,
-        nsec: 500_000_000,
-    };
+    const SCAN_NS: i64 = 1_700_000_000_500_000_000;
 
-    /// Of a cloud whose only field has these bytes.
-    fn after(datatype: Datatype, numbers: &[Vec<u8>]) -> Option<Vec<f32>> {
+    /// Of a cloud whose only field has these bytes, and whose first numbers are of no points.
+    fn after(datatype: Datatype, numbers: &[Vec<u8>], no_points: usize) -> Option<Vec<f32>> {
         let size = datatype.size() as u32;
         let cloud = PointCloud2 {
             header: Header::default(),
@@ -55,7 +64,7 @@ mod tests {
             data: Cow::Owned(numbers.concat()),
             is_dense: true,
         };
-        seconds_after(&cloud.column("t").unwrap(), STAMP)
+        seconds_after(&cloud.column("t").unwrap(), SCAN_NS, |i| i >= no_points)
     }
 
     #[test]
@@ -67,15 +76,27 @@ mod tests {
         };
         let of_f64 = |numbers: [f64; 2]| {
             let bytes = numbers.map(|number| number.to_le_bytes().to_vec());
-            after(Datatype::Float64, &bytes)
+            after(Datatype::Float64, &bytes, 0)
         };
         let nanoseconds = [0_u32, 99_000_000].map(|t| t.to_le_bytes().to_vec());
-        near(after(Datatype::Uint32, &nanoseconds), [0.0, 0.099]);
+        near(after(Datatype::Uint32, &nanoseconds, 0), [0.0, 0.099]);
         let seconds = [-0.05_f32, f32::NAN].map(|t| t.to_le_bytes().to_vec());
-        near(after(Datatype::Float32, &seconds), [-0.05, 0.0]);
+        near(after(Datatype::Float32, &seconds, 0), [-0.05, 0.0]);
         near(of_f64([1_700_000_000.5, 1_700_000_000.55]), [0.0, 0.05]);
         near(of_f64([1.700_000_000_5e18, 1.700_000_000_6e18]), [0.0, 0.1]);
         assert_eq!(of_f64([1.0, 99.0]), None);
         assert_eq!(of_f64([1_600_000_000.0, 1_600_000_000.1]), None);
+    }
+
+    /// Many drivers fill them with zeros, beside dates as well.
+    #[test]
+    fn rays_without_an_echo_need_no_times() {
+        let numbers = [0.0, f64::INFINITY, 1_700_000_000.55, f64::NAN];
+        let bytes = numbers.map(|number: f64| number.to_le_bytes().to_vec());
+        let found = after(Datatype::Float64, &bytes, 2).unwrap();
+        assert!((found[2] - 0.05).abs() < 1e-6, "{found:?}");
+        assert_eq!([found[0], found[1], found[3]], [0.0; 3]);
+        assert_eq!(after(Datatype::Float64, &bytes, 0), None);
+        assert_eq!(after(Datatype::Float64, &bytes[..2], 2), Some(vec![0.0; 2]));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::config::{LidarConfig, Sign};
 use super::doppler::{ego_velocity, ground_radial};
+use super::index::stamp;
 use super::point_times::seconds_after;
 use crate::{Error, Result, TopicProblem};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -97,11 +98,13 @@ fn times(
     bag: &dyn MessageSource,
     message: &Message<'_>,
     cloud: &PointCloud2<'_>,
+    xyz: &[[f32; 3]],
     name: &str,
 ) -> Result<Vec<f32>> {
     let column = cloud.column(name);
     let column = column.map_err(|source| of_column(bag, message, source))?;
-    seconds_after(&column, cloud.header.stamp).ok_or_else(|| {
+    let is_point = |i: usize| xyz.get(i).is_some_and(usable);
+    seconds_after(&column, stamp(message), is_point).ok_or_else(|| {
         let (topic, field) = (message.topic().to_owned(), name.to_owned());
         of_cloud(bag, TopicProblem::PointTimes { topic, field })
     })
@@ -127,7 +130,7 @@ impl Scan {
             None => None,
         };
         let after_s = match lidar.time_field.as_deref() {
-            Some(name) => Some(times(bag, message, &cloud, name)?),
+            Some(name) => Some(times(bag, message, &cloud, &xyz, name)?),
             None => None,
         };
         let sign = match lidar.receding {
