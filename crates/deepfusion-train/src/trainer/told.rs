@@ -15,8 +15,8 @@ pub(super) struct ReadInterval {
     pub(super) alone: usize,
     /// So many steps together at most, and no more than [`MOST_UNDECIDED`].
     pub(super) together: usize,
-    /// No longer than this after the last ones, nor more steps than take as long: where steps are slow, someone waits for each, and to stop a
-    /// run is to answer its event. A device is told of a step in less time than it takes to make it, so the clock alone would come late.
+    /// No longer than this after the last ones, nor more steps than take as long: where steps are slow, someone waits for each, and to
+    /// stop a run is to answer its event. The clock alone would come late, since a step is queued sooner than a device has made it.
     pub(super) time: Duration,
 }
 
