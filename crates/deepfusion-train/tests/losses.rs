@@ -453,6 +453,59 @@ fn the_likelihood_of_the_error_of_depth_equals_pytorchs() {
     reference.check("uncertainty", loss(), &inputs);
 }
 
+/// A batch's loss is the mean of its images', though of one more pixels count than of the other. So workers can share a batch out.
+#[test]
+fn a_batchs_loss_is_the_mean_of_its_images() {
+    type Cut<'a> = &'a dyn Fn(Tensor<4>) -> Tensor<4>;
+    let check = |what: &str, loss: &dyn Fn(Cut<'_>) -> Tensor<1>| {
+        let whole = loss(&|batch| batch).into_scalar::<f32>();
+        let image = |index: usize| loss(&|batch| batch.narrow(0, index, 1)).into_scalar::<f32>();
+        let mean = (image(0) + image(1)) / 2.0;
+        assert!(
+            (whole - mean).abs() <= 1e-5 * whole.abs(),
+            "{what}: {whole} and {mean}"
+        );
+    };
+    let reference = Reference::read();
+    check("flow", &|cut| {
+        let names = ["first", "second", "forward", "backward"];
+        let [first, second, forward, backward] =
+            names.map(|name| cut(reference.tensor(&format!("flow/{name}"))));
+        let view = flow_view(&first, &second, &forward, &backward, SSIM_WEIGHT);
+        flow(&[view], &[forward], &[first], &settings())
+    });
+    let valid = |cut: Cut<'_>| cut(reference.tensor("affine/valid")).greater_elem(0.5);
+    check("agreement", &|cut| {
+        let [rigid, seen] =
+            ["rigid", "flow"].map(|name| cut(reference.tensor(&format!("agreement/{name}"))));
+        agreement(rigid, seen, &valid(cut))
+    });
+    check("affine", &|cut| {
+        let [x, y] = ["x", "y"].map(|name| cut(reference.tensor(&format!("affine/{name}"))));
+        affine_invariant(x, y, &valid(cut))
+    });
+    let reference = Reference::of("depth.safetensors");
+    let depth = |cut: Cut<'_>, name: &str| cut(reference.tensor(&format!("depth/{name}")));
+    let truth = |cut: Cut<'_>| DepthTruth {
+        log_depth: depth(cut, "log_depth"),
+        known: depth(cut, "known"),
+        far: depth(cut, "far"),
+    };
+    check("depth", &|cut| {
+        let scales = ["inverse0", "inverse1", "inverse2", "inverse3"];
+        let config = DepthLossConfig {
+            weight: 1.0,
+            gradient: 0.5,
+        };
+        let inverse = scales.map(|name| depth(cut, name));
+        deepfusion_train::losses::depth(&inverse, &truth(cut), &config).loss
+    });
+    check("uncertainty", &|cut| {
+        let log_scale = cut(reference.tensor("uncertainty/log_scale"));
+        deepfusion_train::losses::uncertainty(depth(cut, "inverse0"), log_scale, &truth(cut))
+    });
+}
+
 #[test]
 fn sources_count_as_far_as_their_masks_say() {
     let reference = Reference::of("explainability.safetensors");

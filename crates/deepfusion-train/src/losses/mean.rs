@@ -61,4 +61,18 @@ mod tests {
         let mean = mean_where(values, &mask.greater_elem(0.5)).into_scalar::<f32>();
         assert!((mean - 4.0).abs() < 1e-6, "{mean}");
     }
+
+    /// It adds neither to the mean nor to its gradient, and the other image's is not larger for it.
+    #[test]
+    fn an_image_that_shows_nothing_counts_as_zero() {
+        let device = Device::flex().autodiff();
+        let values = Tensor::<4>::from_data([[[[2.0, 4.0]]], [[[f32::NAN, 5.0]]]], &device);
+        let values = values.require_grad();
+        let mask = Tensor::<4>::from_data([[[[1.0, 1.0]]], [[[0.0, 0.0]]]], &device);
+        let mean = mean_where(values.clone(), &mask.greater_elem(0.5));
+        assert!((mean.clone().into_scalar::<f32>() - 1.5).abs() < 1e-6);
+        let gradient = values.grad(&mean.backward()).unwrap().into_data();
+        let gradient: Vec<f32> = gradient.iter().collect();
+        assert_eq!(gradient, [0.25, 0.25, 0.0, 0.0]);
+    }
 }

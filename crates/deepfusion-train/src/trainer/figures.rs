@@ -146,3 +146,62 @@ impl ReadStep {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::tensor::Device;
+
+    /// A step of a batch of video, one of known depth, which does not say the scale, and another one of video.
+    fn step(at: f32, made: bool) -> UnreadStep {
+        let device = Device::flex().autodiff();
+        let value = |number: f32| Tensor::<1>::from_data([number], &device);
+        let video = |measured: f32| {
+            let mut numbers = Unread::default();
+            numbers.note(|terms| &mut terms.valid_share, value(0.5));
+            numbers.note(|terms| &mut terms.total, value(at));
+            numbers.note_displacements([value(measured), value(2.0)]);
+            numbers
+        };
+        let mut depth = Unread::default();
+        depth.note(|terms| &mut terms.depth, value(4.0 * at));
+        depth.note_bias(value(0.25));
+        let batches = [(video(8.0), true), (depth, false), (video(12.0), true)];
+        let mut batches = batches.map(|(numbers, is_video)| UnreadBatch {
+            numbers,
+            names: Vec::new(),
+            is_video,
+            says_scale: is_video,
+        });
+        let terms = batches.iter_mut().flat_map(|b| b.numbers.take_terms());
+        let losses = Tensor::cat(terms.collect(), 0);
+        let squares = value(at * at).inner();
+        let is_made = value(f32::from(u8::from(made))).inner().greater_elem(0.5);
+        UnreadStep::new(batches.into(), [losses, squares], is_made)
+    }
+
+    /// Two steps that are read together: each batch of each has its own numbers.
+    #[test]
+    fn the_numbers_of_steps_go_where_they_belong() {
+        let steps = [step(3.0, true), step(f32::INFINITY, false), step(5.0, true)];
+        let read = UnreadStep::read(&[&steps[0], &steps[1], &steps[2]]);
+        for (index, at) in [(0, 3.0), (2, 5.0)] {
+            let figures = steps[index].figures(&read[index], 0.25, 1).unwrap();
+            assert_eq!((figures.losses.total, figures.losses.depth), (at / 2.0, at));
+            assert_eq!(figures.monitors.valid, [0.5, 0.5]);
+            assert_eq!(figures.monitors.ratio, [4.0, 6.0]);
+            let gradient_norm = at;
+            assert_eq!(read[index].outcome(), StepOutcome::Done { gradient_norm });
+        }
+        assert_eq!(read[1].outcome(), StepOutcome::Skipped);
+        let failed = steps[1].figures(&read[1], 0.25, 7);
+        assert!(matches!(
+            failed.map(|_| ()),
+            Err(Error::NotFinite {
+                step: 7,
+                term: "total",
+                ..
+            })
+        ));
+    }
+}

@@ -64,6 +64,12 @@ impl Pace {
         self.images = images as f64;
     }
 
+    /// The shortest of the last steps; 0 before the first.
+    pub(super) fn least_seconds_per_step(&self) -> f64 {
+        let seconds = self.seconds.iter().copied();
+        seconds.reduce(f64::min).unwrap_or_default()
+    }
+
     pub(super) fn seconds_per_step(&self) -> f64 {
         self.seconds.iter().sum::<f64>() / self.seconds.len() as f64
     }
@@ -96,6 +102,7 @@ mod tests {
         }
         assert_eq!(pace.seconds_per_step(), 5.0);
         assert_eq!(pace.images_per_second(), 8.0 / 5.0);
+        assert_eq!(pace.least_seconds_per_step(), 3.0);
         for _ in 0..SMOOTHING {
             pace.step(8, 2.0);
         }

@@ -406,6 +406,33 @@ fn a_run_stops_with_the_steps_that_were_made() {
     );
 }
 
+/// A run that was stopped goes on with Adam's moments and its count of steps, and ends where one ends that was not.
+#[test]
+fn a_run_resumes_with_the_steps_that_were_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(folder.path());
+    let mut whole = run_of(6, &drive, &folder.path().join("whole"), Some(4));
+    whole.run(&mut |_| Control::Continue).unwrap();
+
+    let at = folder.path().join("stopped");
+    let mut stopped = run_of(6, &drive, &at, Some(4));
+    let summary = stopped.run(&mut |event| match event {
+        TrainEvent::Step { step: 1, .. } => Control::Stop,
+        _ => Control::Continue,
+    });
+    assert_eq!(summary.unwrap().step, 4);
+    let sets = (stopped.train.clone(), stopped.validation.clone());
+    let mut config = stopped.config.clone();
+    config.validation_share = 0.0;
+    let (run, _) = RunFolder::open(&at).unwrap();
+    let mut resumed = Trainer::resume(config, run, sets, &Device::flex()).unwrap();
+    assert_eq!((resumed.step(), resumed.adam.steps()), (4, 4));
+    (resumed.reads_late, resumed.read_interval) = (true, every(4));
+    resumed.run(&mut |_| Control::Continue).unwrap();
+    assert_eq!((resumed.step(), resumed.adam.steps()), (6, 6));
+    assert_close(weights(&whole), weights(&resumed));
+}
+
 /// The first steps are heard of one by one; later ones at the latest after a while.
 #[test]
 fn steps_are_read_when_it_is_time() {

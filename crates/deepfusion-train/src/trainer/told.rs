@@ -15,7 +15,8 @@ pub(super) struct ReadInterval {
     pub(super) alone: usize,
     /// So many steps together at most, and no more than [`MOST_UNDECIDED`].
     pub(super) together: usize,
-    /// No longer than this after the last ones: where steps are slow, someone waits for each, and to stop a run is to answer its event.
+    /// No longer than this after the last ones, nor more steps than take as long: where steps are slow, someone waits for each, and to
+    /// stop a run is to answer its event. The clock alone would come late, since a step is queued sooner than a device has made it.
     pub(super) time: Duration,
 }
 
@@ -25,6 +26,14 @@ impl ReadInterval {
         together: MOST_UNDECIDED,
         time: Duration::from_secs(1),
     };
+
+    /// Whether steps that wait are read now, in a call that has said what `told` steps were.
+    fn is_due(self, told: usize, waiting: usize, pace: &Pace) -> bool {
+        told < self.alone
+            || waiting >= self.together.min(MOST_UNDECIDED)
+            || pace.since_lap() >= self.time
+            || pace.least_seconds_per_step() * waiting as f64 >= self.time.as_secs_f64()
+    }
 }
 
 /// A step of the run, made or skipped.
@@ -82,9 +91,7 @@ impl Told {
     }
 
     fn reading_is_due(&self, interval: ReadInterval) -> bool {
-        self.told < interval.alone
-            || self.waiting.len() >= interval.together.min(MOST_UNDECIDED)
-            || self.pace.since_lap() >= interval.time
+        interval.is_due(self.told, self.waiting.len(), &self.pace)
     }
 }
 
@@ -218,5 +225,23 @@ impl Trainer {
             scale_ratio: told.ratio.value(),
             gradient_norm,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The device is asked for ten steps in no time: how long it takes to make them is known from those before.
+    #[test]
+    fn steps_that_wait_are_made_within_a_second() {
+        for (seconds, together) in [(0.01, MOST_UNDECIDED), (0.3, 4), (1.5, 1)] {
+            let mut pace = Pace::new();
+            // In the first one kernels are compiled.
+            pace.step(1, 30.0);
+            pace.step(1, seconds);
+            let is_due = |waiting: &usize| ReadInterval::USUAL.is_due(10, *waiting, &pace);
+            assert_eq!((1..).find(is_due), Some(together), "{seconds}");
+        }
     }
 }
