@@ -353,8 +353,8 @@ fn a_loss_that_is_not_finite_is_found_late() {
 fn nothing_is_saved_after_a_loss_that_is_not_finite() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
-    let models: [(&str, fn(Model) -> Model); 2] = [("good", |model| model), ("damaged", damaged)];
-    for (name, init) in models {
+    let undamaged: fn(Model) -> Model = |model| model;
+    for (name, init) in [("good", undamaged), ("damaged", damaged)] {
         let mut trainer = started(&drive, &folder.path().join(name), true, init);
         trainer.read_interval = every(5);
         (trainer.config.steps, trainer.config.validate_every) = (Some(3), 1000);
