@@ -136,9 +136,9 @@ pub enum Error {
         problem: CameraProblem,
     },
     /// Nothing says what the camera of images in files is.
-    #[error("{}: missing, it holds the camera's fx, fy, cx, cy", path.display())]
+    #[error("{}: nothing says what its camera is", path.display())]
     NoCameraFile {
-        /// Where a calibration is looked for first.
+        /// The folder in which a calibration is looked for first.
         path: PathBuf,
         /// The layout.
         layout: DatasetKind,

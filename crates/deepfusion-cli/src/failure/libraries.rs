@@ -164,6 +164,9 @@ impl Reportable for deepfusion_video::Error {
     }
 }
 
+/// The commands that a camera can be given to; the others know it from files alone.
+const TAKE_CAMERA: &str = "predict, perceive, eval, doctor and data inspect also take";
+
 impl Reportable for deepfusion_data::Error {
     fn message(&self) -> String {
         match self {
@@ -197,15 +200,12 @@ impl Reportable for deepfusion_data::Error {
             Self::NoCameraFile {
                 layout: DatasetKind::RgbD,
                 ..
-            } => or("--intrinsics 585,585,320,240"),
-            Self::NoCameraFile { .. } => or(
-                "--hfov DEGREES; `deepfusion calibrate` measures a camera from pictures of a checkerboard; the last resort is `train \
-                 --intrinsics learn`, on drives with bends",
-            ),
-            Self::NoBagCamera { .. } => or(
-                "--intrinsics fx,fy,cx,cy, or --hfov DEGREES; `deepfusion calibrate` measures a camera from a checkerboard; the last resort is \
-                 `train --intrinsics learn`, on drives with bends",
-            ),
+            } => hint.map(|hint| format!("{hint}; {TAKE_CAMERA} --intrinsics 585,585,320,240")),
+            Self::NoCameraFile { .. } | Self::NoBagCamera { .. } => hint.map(|hint| {
+                format!(
+                    "{hint}; `deepfusion calibrate` makes one; {TAKE_CAMERA} --hfov 70, and train, as a last resort, --intrinsics learn"
+                )
+            }),
             Self::OwnCalibration { .. } => {
                 Some("leave --intrinsics, --hfov and --calib out".into())
             }

@@ -59,13 +59,12 @@ impl Hint for Error {
                  intrinsics = [910, 910, 582, 437] in dataset.toml"
             }
             Self::NoCameraFile { .. } => {
-                "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) there, or set \
-                 intrinsics = [fx, fy, cx, cy] or hfov_deg = DEGREES (from left to right) in dataset.toml; photographs \
-                 with EXIF's focal length in 35 mm need none of these"
+                "write hfov_deg = 70 (the degrees it sees from left to right) or intrinsics = [fx, fy, cx, cy] into dataset.toml there, or \
+                 put its calibration file beside it (calibration.yaml, intrinsics.txt)"
             }
             Self::NoBagCamera { config, .. } => {
                 return Some(format!(
-                    "[camera] fx, fy, cx, cy, width, height or calibration = \"camera.yaml\" in {}",
+                    "write [camera] with fx, fy, cx, cy, width, height, or with calibration = \"camera.yaml\", into {}",
                     config.display()
                 ));
             }
