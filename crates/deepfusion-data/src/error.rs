@@ -143,6 +143,17 @@ pub enum Error {
         /// The layout.
         layout: DatasetKind,
     },
+    /// There is no folder into which a video's frames can be decoded.
+    #[error(
+        "{}: its frames cannot be decoded: neither its folder nor the user's cache folder can be written",
+        video.display()
+    )]
+    NoPlaceForFrames {
+        /// The video.
+        video: PathBuf,
+        /// What the system said of its folder.
+        source: std::io::Error,
+    },
     /// Neither a bag nor the file beside it says what the camera is.
     #[error("{}: nothing says what the camera is: no CameraInfo with a K", path.display())]
     NoBagCamera {

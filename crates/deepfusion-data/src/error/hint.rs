@@ -62,6 +62,13 @@ impl Hint for Error {
                 "write hfov_deg = 70 (the degrees it sees from left to right) or intrinsics = [fx, fy, cx, cy] into dataset.toml there, or \
                  put its calibration file beside it (calibration.yaml, intrinsics.txt)"
             }
+            Self::NoPlaceForFrames { video, .. } => {
+                return Some(format!(
+                    "give, in place of it, a folder of your own whose dataset.toml has video = \"{}\" and cache = \"FOLDER\", one that can be \
+                     written",
+                    video.display()
+                ));
+            }
             Self::NoBagCamera { config, .. } => {
                 return Some(format!(
                     "write [camera] with fx, fy, cx, cy, width, height, or with calibration = \"camera.yaml\", into {}",
