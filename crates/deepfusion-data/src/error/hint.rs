@@ -18,9 +18,12 @@ impl Hint for Error {
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }
-            Self::FolderOfRecordings { such_as, .. } => {
-                let one = such_as.display();
-                return Some(format!("give them by themselves, one or several: {one}"));
+            Self::FolderOfRecordings { path, such_as, .. } => {
+                let (all, one) = (path.display(), such_as.display());
+                return Some(format!(
+                    "give one of them by itself: {one}; where several are taken, all of them: {all}/*, or with for_folders = true in \
+                     {all}/dataset.toml the folder"
+                ));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
             Self::Unfinished(error) => return error.hint(),
