@@ -103,7 +103,7 @@ impl DriveFolder<'_> {
 
     /// Has `measure` find how far the camera's clock is ahead of the log's, in seconds, and writes the folder with that. What it measures on is a
     /// folder beside it under another name: stopped, whenever it may be, nothing looks finished. Frames that were decoded meanwhile lie where the
-    /// folder will be, for it or the next try.
+    /// folder will be; where it was not there before and nothing was measured, they are removed with it.
     ///
     /// # Errors
     /// As [`Self::write`], and those of `measure`.
@@ -121,7 +121,12 @@ impl DriveFolder<'_> {
         std::fs::create_dir(&folder).map_err(|e| Error::file(&folder, e))?;
         link_files(out, &folder)?;
         self.write_into(&folder, out)?;
-        self.camera_ahead_s = measure(&folder)?;
+        let was_there = out.exists();
+        self.camera_ahead_s = measure(&folder).inspect_err(|_| {
+            if !was_there {
+                remove_frames(out);
+            }
+        })?;
         drop(trial);
         Ok(self.write(out)?)
     }
@@ -200,6 +205,18 @@ fn link_files(from: &Path, to: &Path) -> Result<()> {
         copied.map_err(|e| Error::file(&file, e))?;
     }
     Ok(())
+}
+
+/// Removes a folder that holds decoded frames alone, as far as that goes.
+fn remove_frames(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|ending| ending == "frames") {
+            let _ = std::fs::remove_dir_all(path);
+        }
+    }
+    // Not where there is anything else.
+    let _ = std::fs::remove_dir(folder);
 }
 
 /// The table of speeds; with their standard deviations where every one has one.
@@ -344,6 +361,20 @@ mod tests {
         let config = std::fs::read_to_string(out.join("dataset.toml")).unwrap();
         assert!(config.contains("camera_ahead_s = 0.25"), "{config}");
         assert_eq!(left(), 1);
+    }
+
+    #[test]
+    fn what_is_not_measured_leaves_no_folder() {
+        let at = tempfile::tempdir().unwrap();
+        let out = at.path().join("drive");
+        let log = log(Clock::Date, 1_777_636_800_000_000_000);
+        let refused: Result<Vec<LogNote>> = folder(&log, None).write_measured(&out, |_| {
+            std::fs::create_dir_all(out.join("a.mp4-0.frames")).unwrap();
+            std::fs::write(out.join("a.mp4-0.frames/0000000000.jpg"), "").unwrap();
+            Err(Error::NoStart { first_ns: 0 })
+        });
+        refused.unwrap_err();
+        assert_eq!(std::fs::read_dir(at.path()).unwrap().count(), 0);
     }
 
     #[test]
