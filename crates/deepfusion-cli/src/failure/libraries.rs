@@ -3,7 +3,9 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::{CalibrationSource, DatasetKind, FileError, NamedTopic, TopicRole};
+use deepfusion_data::{
+    CalibrationSource, DatasetKind, FileError, NamedTopic, TopicProblem, TopicRole,
+};
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 use deepfusion_runtime::EngineProblem;
@@ -221,6 +223,15 @@ impl Reportable for deepfusion_data::Error {
                 choice: Some(topic),
                 ..
             } => or(&format!("--topic {topic}")),
+            Self::Topic { problem, .. }
+                if matches!(
+                    **problem,
+                    TopicProblem::NoTopic { config: None, .. }
+                        | TopicProblem::OtherType { config: None, .. }
+                ) =>
+            {
+                hint.map(|hint| format!("--topic: {hint}"))
+            }
             Self::InertialUnit { .. } => {
                 or(&format!("--topic {}={}", TopicRole::Imu, NamedTopic::NONE))
             }
