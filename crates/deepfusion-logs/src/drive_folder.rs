@@ -144,9 +144,10 @@ impl DriveFolder<'_> {
             (Clock::Free, Media::Video(_)) if (0..NEAR_START_NS).contains(&first) => {
                 Ok((None, vec![ClockNote::OwnStart.into()]))
             }
-            (Clock::Free | Clock::TimeOfDay, Media::Video(_)) => {
-                Err(Error::NoStart { first_ns: first })
-            }
+            (Clock::Free | Clock::TimeOfDay, Media::Video(_)) => Err(Error::NoStart {
+                first_ns: first,
+                time_of_day: self.log.clock == Clock::TimeOfDay,
+            }),
         }
     }
 
@@ -313,6 +314,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_time_of_day_is_said_as_one() {
+        let target = Path::new("nowhere");
+        let log = log(Clock::TimeOfDay, 36_061_500_000_000);
+        let error = folder(&log, None).check(target).unwrap_err().to_string();
+        assert!(error.contains("begin at 10:01:01, and"), "{error}");
+    }
+
     /// The table that is written says nothing of a zone any more.
     #[test]
     fn dates_without_a_zone_are_said_to_be_taken_for_utc() {
@@ -351,7 +360,10 @@ mod tests {
             let there = |name: &str| trial.join(name).is_file();
             assert!(there("frames.csv") && there("speed.csv") && there("dataset.toml"));
             assert!(!out.join("dataset.toml").exists(), "it looks finished");
-            Err(Error::NoStart { first_ns: 0 })
+            Err(Error::NoStart {
+                first_ns: 0,
+                time_of_day: false,
+            })
         });
         assert!(stopped.is_err());
         let left = || std::fs::read_dir(at.path()).unwrap().count();
@@ -371,7 +383,10 @@ mod tests {
         let refused: Result<Vec<LogNote>> = folder(&log, None).write_measured(&out, |_| {
             std::fs::create_dir_all(out.join("a.mp4-0.frames")).unwrap();
             std::fs::write(out.join("a.mp4-0.frames/0000000000.jpg"), "").unwrap();
-            Err(Error::NoStart { first_ns: 0 })
+            Err(Error::NoStart {
+                first_ns: 0,
+                time_of_day: false,
+            })
         });
         refused.unwrap_err();
         assert_eq!(std::fs::read_dir(at.path()).unwrap().count(), 0);

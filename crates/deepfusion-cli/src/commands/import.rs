@@ -163,9 +163,11 @@ fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<LogNot
 fn of_its_own_video(args: &ImportArgs) -> Result<()> {
     let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
     match (&args.video, args.logs.first()) {
-        (Some(video), Some(log)) if !same(video, log) => {
-            Err(deepfusion_logs::Error::NoStart { first_ns: 0 }.into())
+        (Some(video), Some(log)) if !same(video, log) => Err(deepfusion_logs::Error::NoStart {
+            first_ns: 0,
+            time_of_day: false,
         }
+        .into()),
         _ => Ok(()),
     }
 }
