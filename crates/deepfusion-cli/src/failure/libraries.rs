@@ -269,7 +269,9 @@ impl Reportable for deepfusion_eval::Error {
                  they are left out and counted as missing_rate"
             )),
             Self::NothingToEvaluate { skipped: 0, .. } => Some(
-                "no frame has ground truth of the kind asked for (--gt-depth); drives with speeds are judged without it".into(),
+                "no scans or depth images of the kind asked for (--gt-depth) lie there; give --gt FILE, or the drive's speeds: with them it is \
+                 judged without ground truth (deepfusion data import LOG --video FILE)"
+                    .into(),
             ),
             Self::NothingToEvaluate { .. } => Some(
                 "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
