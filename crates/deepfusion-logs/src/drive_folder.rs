@@ -153,8 +153,11 @@ impl DriveFolder<'_> {
 
     fn config(&self, out: &Path, start_ns: Option<i64>) -> Result<String> {
         let whole = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-        let mut text =
-            String::from("# Written from a log; every key is in docs/reference/dataset-toml.md.\n");
+        let mut text = String::from(concat!(
+            "# Written from a log. Every key: ",
+            env!("CARGO_PKG_REPOSITORY"),
+            "/blob/main/docs/reference/dataset-toml.md\n"
+        ));
         match &self.media {
             Media::Video(video) => {
                 let _ = writeln!(text, "video = {}", quoted(&whole(video)?));

@@ -16,7 +16,11 @@ impl Hint for Error {
                 ..
             } => return Some(format!("give the drive: {}", drive.display())),
             Self::UnknownLayout { .. } => {
-                "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
+                concat!(
+                    "give the folder or the video file itself; each layout is shown in ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/guides/train-on-your-own-video.md"
+                )
             }
             Self::FolderOfRecordings { path, such_as, .. } => {
                 let (all, one) = (path.display(), such_as.display());
@@ -43,7 +47,11 @@ impl Hint for Error {
                 ));
             }
             Self::NotABag { .. } => {
-                "only bags have such a file; folders and videos have dataset.toml: docs/reference/dataset-toml.md"
+                concat!(
+                    "only bags have such a file; folders and videos have dataset.toml: ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/reference/dataset-toml.md"
+                )
             }
             Self::NoTopics { .. } => "name topics for bags alone",
             Self::OneCamera { .. } => "ask for camera 2",
@@ -86,7 +94,13 @@ impl Hint for Error {
             Self::NoTrack { reason, .. } => reason.hint(),
             Self::NoFrames { reason, .. } => reason.hint(),
             Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
-            Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
+            Self::Config { .. } => {
+                concat!(
+                    "every key of dataset.toml and bag.toml is in ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/tree/main/docs/reference"
+                )
+            }
             Self::Table { .. } => "correct the row or delete it",
             Self::Clocks { .. } => {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
@@ -155,5 +169,25 @@ impl Hint for Error {
             Self::Size { .. } => return None,
         };
         Some(text.to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page of the repository is of no use by its path there: who has the program alone does not have it.
+    #[test]
+    fn pages_are_named_by_their_address() {
+        let path = "x".into();
+        let unknown = Error::UnknownLayout {
+            path,
+            found: FoundInstead::Empty,
+        };
+        let hint = unknown.hint().unwrap();
+        assert!(
+            hint.contains("https://") && !hint.contains(" docs/"),
+            "{hint}"
+        );
     }
 }
