@@ -205,7 +205,7 @@ impl Reportable for deepfusion_data::Error {
             } => hint.map(|hint| format!("{hint}; {TAKE_CAMERA} --intrinsics 585,585,320,240")),
             Self::NoCameraFile { .. } | Self::NoBagCamera { .. } => hint.map(|hint| {
                 format!(
-                    "{hint}; `deepfusion calibrate` makes one; {TAKE_CAMERA} --hfov 70, and train, as a last resort, --intrinsics learn"
+                    "{hint}; `deepfusion calibrate` measures a camera; {TAKE_CAMERA} --hfov 70, and train, as a last resort, --intrinsics learn"
                 )
             }),
             Self::OwnCalibration { .. } => {
