@@ -1,5 +1,6 @@
 //! The failures that only the command line knows.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use deepfusion_hint::count_of;
@@ -373,14 +374,32 @@ fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
     if interrupted {
         text += " before the run was stopped";
     }
-    for failure in failures.iter().take(SHOWN) {
-        text += &format!("\n  {failure}");
+    let different = counted(failures);
+    for (failure, images) in different.iter().take(SHOWN) {
+        text += &match images {
+            1 => format!("\n  {failure}"),
+            n => format!("\n  {failure} ({n} times)"),
+        };
     }
-    if failures.len() > SHOWN {
-        let more = failures.len() - SHOWN;
+    let more: usize = different.iter().skip(SHOWN).map(|(_, images)| images).sum();
+    if more > 0 {
         text += &format!("\n  and {more} more, in the manifest");
     }
     text
+}
+
+/// Different texts in their order, each with how often it is there: what is wrong with a video is so for each of its frames.
+fn counted(texts: &[String]) -> Vec<(&str, usize)> {
+    let mut different = Vec::new();
+    let mut places = HashMap::new();
+    for text in texts {
+        let place = *places.entry(text.as_str()).or_insert(different.len());
+        if place == different.len() {
+            different.push((text.as_str(), 0));
+        }
+        different[place].1 += 1;
+    }
+    different
 }
 
 /// How a bulk run is gone on with.
@@ -395,6 +414,22 @@ fn again(resumes: bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::CliError;
+
+    #[test]
+    fn what_many_images_failed_for_is_said_once() {
+        let failures: Vec<String> = ["a.mp4.frames: refused", "b.png: no image"]
+            .into_iter()
+            .chain(["a.mp4.frames: refused"; 30])
+            .map(str::to_owned)
+            .collect();
+        let said = super::some_failed(&failures, 40, false);
+        let expected =
+            "32 of 40 images failed\n  a.mp4.frames: refused (31 times)\n  b.png: no image";
+        assert_eq!(said, expected);
+        let different: Vec<String> = (0..22).map(|i| format!("{i}.png: no image")).collect();
+        let said = super::some_failed(&different, 40, false);
+        assert!(said.ends_with("and 2 more, in the manifest"), "{said}");
+    }
 
     #[test]
     fn one_image_is_no_plural() {

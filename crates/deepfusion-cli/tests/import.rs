@@ -62,6 +62,11 @@ fn a_log_beside_its_images_is_a_drive() {
         "{}",
         said.stderr
     );
+    assert!(!said.stderr.contains("still to do"), "{}", said.stderr);
+    let no_camera = "data import torque.csv --zone +01:00 --images images --out no-camera";
+    let said = ok(at, no_camera).stderr;
+    assert!(said.contains("nothing says what its camera is"), "{said}");
+    assert!(said.contains("hfov_deg = 70"), "{said}");
     fs::copy(at.join("frames.csv"), at.join("drive/frames.csv")).unwrap();
     let imported = json(at, "data inspect drive --json");
     let mean = |inspection: &Value| inspection["speed_mps"]["mean"].as_f64().unwrap();

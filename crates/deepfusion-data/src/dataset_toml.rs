@@ -178,6 +178,16 @@ pub fn has_settings(folder: &Path) -> bool {
         || std::path::absolute(folder).is_ok_and(|folder| is_above(&folder))
 }
 
+/// Whether a line of TOML sets the key `for_folders`, or one that was meant to be it: `for_folder`, `for-folders`.
+fn is_for_folders(line: &str) -> bool {
+    let Some((key, _)) = line.split_once('=') else {
+        return false;
+    };
+    let letters = key.chars().filter(|c| c.is_ascii_alphabetic() || *c == '#');
+    let key = letters.collect::<String>().to_ascii_lowercase();
+    key.starts_with("for") && key.contains("fold")
+}
+
 impl FolderConfig {
     pub(crate) const NAME: &str = "dataset.toml";
 
@@ -195,9 +205,13 @@ impl FolderConfig {
     }
 
     /// The settings of a folder for the folders in it. A file that has no such key may be another program's, or of a recording: it is not looked at.
-    fn read_for_folders(folder: &Path) -> Result<Option<Self>> {
+    /// One with a key that is nearly this is: the key is then an error, as an unknown one of a recording's own file is.
+    ///
+    /// # Errors
+    /// [`Error::Config`], [`Error::File`].
+    pub(crate) fn read_for_folders(folder: &Path) -> Result<Option<Self>> {
         let text = std::fs::read_to_string(folder.join(Self::NAME));
-        if !text.is_ok_and(|text| text.contains("for_folders")) {
+        if !text.is_ok_and(|text| text.lines().any(is_for_folders)) {
             return Ok(None);
         }
         let config = Self::read_alone(folder)?;

@@ -107,6 +107,11 @@ fn a_file_above_that_is_a_recordings_says_nothing() {
             "{above}"
         );
     }
+    // A key that was to be this one does not pass silently.
+    for above in ["for_folder = true\n", "fps = 20\nFor-Folders = true\n"] {
+        let error = read_below(above, "").unwrap_err().to_string();
+        assert!(error.contains("unknown field"), "{error}");
+    }
     // One that is for the folders is named where it is wrong.
     let error = read_below("for_folders = true\nfps = 0\n", "").unwrap_err();
     let error = error.to_string();

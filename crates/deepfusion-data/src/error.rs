@@ -136,12 +136,23 @@ pub enum Error {
         problem: CameraProblem,
     },
     /// Nothing says what the camera of images in files is.
-    #[error("{}: missing, it holds the camera's fx, fy, cx, cy", path.display())]
+    #[error("{}: nothing says what its camera is", path.display())]
     NoCameraFile {
-        /// Where a calibration is looked for first.
+        /// The folder in which a calibration is looked for first.
         path: PathBuf,
         /// The layout.
         layout: DatasetKind,
+    },
+    /// There is no folder into which a video's frames can be decoded.
+    #[error(
+        "{}: its frames cannot be decoded: neither its folder nor the user's cache folder can be written",
+        video.display()
+    )]
+    NoPlaceForFrames {
+        /// The video.
+        video: PathBuf,
+        /// What the system said of its folder.
+        source: std::io::Error,
     },
     /// Neither a bag nor the file beside it says what the camera is.
     #[error("{}: nothing says what the camera is: no CameraInfo with a K", path.display())]

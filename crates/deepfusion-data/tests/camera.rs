@@ -107,6 +107,40 @@ fn a_field_of_view_is_a_camera() {
     assert_eq!(open(folder, &both).unwrap().intrinsics(0).fx, 70.0);
 }
 
+/// A folder with settings for the recordings in it is all of them, each with its own settings.
+#[test]
+fn a_fleet_is_opened_as_a_whole() {
+    let fleet = tempfile::tempdir().unwrap();
+    for (drive, photos) in [("monday", 2), ("tuesday", 3)] {
+        let blocks: Vec<Vec<Field>> = (0..photos).map(|_| vec![]).collect();
+        photographs(&fleet.path().join(drive), &blocks);
+    }
+    fs::create_dir(fleet.path().join("notes")).unwrap();
+    let opened = || Dataset::open(fleet.path(), &OpenOptions::default());
+    let above = fleet.path().join("dataset.toml");
+    let error = opened().unwrap_err();
+    assert!(matches!(error, Error::FolderOfRecordings { .. }), "{error}");
+    fs::write(
+        &above,
+        "for_folders = true\nintrinsics = [70, 70, 30, 20]\n",
+    )
+    .unwrap();
+    let own = fleet.path().join("tuesday/dataset.toml");
+    fs::write(&own, "intrinsics = [80, 80, 30, 20]\n").unwrap();
+    let found: Vec<(usize, f64)> = opened()
+        .unwrap()
+        .iter()
+        .map(|dataset| (dataset.frames().len(), dataset.intrinsics(0).fx))
+        .collect();
+    assert_eq!(found, [(2, 70.0), (3, 80.0)]);
+    let seen = deepfusion_data::inspect(fleet.path()).unwrap();
+    assert_eq!((seen.drives.len(), seen.frames), (2, 5));
+    assert!(!Dataset::all_simulated_at(fleet.path()));
+    // None is left out because it is broken.
+    fs::write(&own, "no TOML").unwrap();
+    assert!(matches!(opened().unwrap_err(), Error::Config { .. }));
+}
+
 /// Settings for all folders of a fleet; a calibration of the drive's own goes before them.
 #[test]
 fn the_camera_may_stand_once_for_many_recordings() {
@@ -260,7 +294,9 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
             "{name}: {error}"
         );
         let hint = error.hint().unwrap();
-        assert!(hint.contains("hfov_deg") && hint.contains("EXIF"), "{hint}");
+        assert!(hint.contains("hfov_deg = ") && hint.len() < 250, "{hint}");
+        let said = format!("{name}: nothing says what its camera is");
+        assert!(error.to_string().ends_with(&said), "{error}");
     }
     // A zoom that moved, or a second phone, in one folder.
     let folder = root.path().join("mixed");

@@ -185,9 +185,10 @@ fn what_is_there_instead_is_said() {
     );
     let first = at("monday");
     assert!(
-        text.ends_with(&format!("several: {}", first.display())),
+        text.contains(&format!("by itself: {};", first.display())),
         "{text}"
     );
+    assert!(text.contains("for_folders = true"), "{text}");
 }
 
 #[test]

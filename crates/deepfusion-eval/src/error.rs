@@ -62,10 +62,7 @@ pub enum Error {
         expected: ExpectedProtocolSetting,
     },
     /// No image had a single pixel to compare.
-    #[error(
-        "no image has a ground-truth depth inside the mask{}",
-        if names.is_empty() { String::new() } else { format!(" ({skipped} skipped: {names})") }
-    )]
+    #[error("{}", nothing_compared(*skipped, names))]
     NothingToEvaluate {
         /// How many images were skipped.
         skipped: usize,
@@ -142,6 +139,15 @@ pub enum ExpectedProtocolSetting {
     /// A factor of all depths.
     #[error("a factor above 0")]
     Factor,
+}
+
+/// Whether there is no ground truth at all, or none that counts.
+fn nothing_compared(skipped: usize, names: &str) -> String {
+    if names.is_empty() {
+        "nothing to compare with: no image has ground truth".into()
+    } else {
+        format!("no image has a ground-truth depth inside the mask ({skipped} skipped: {names})")
+    }
 }
 
 impl Hint for Error {

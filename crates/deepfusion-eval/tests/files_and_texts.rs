@@ -225,3 +225,10 @@ fn the_table_with_drawn_points() {
     let table = text.find("3 points drawn").unwrap();
     insta::assert_snapshot!(&text[table..]);
 }
+
+#[test]
+fn images_without_any_ground_truth_are_told_from_masked_ones() {
+    let evaluator = Evaluator::new(Protocol::default()).unwrap();
+    let error = evaluator.report().unwrap_err().to_string();
+    assert_eq!(error, "nothing to compare with: no image has ground truth");
+}

@@ -41,7 +41,7 @@ pub enum Error {
     #[error("the intrinsics do not fit the image: {0}")]
     Camera(UnfitCamera),
     /// The same of one image among others.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     CameraOf {
         /// The image.
         path: PathBuf,

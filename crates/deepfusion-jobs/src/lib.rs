@@ -92,7 +92,7 @@ mod target_finder;
 pub mod training;
 pub mod verdict;
 
-pub use error::{Error, NoMean, OtherJob, Result, StaleReason};
+pub use error::{Error, NoMean, OtherJob, Result, StaleReason, UnfitCamera};
 pub use inputs::{Input, find_inputs};
 pub use model_facts::{ModelFacts, name_of};
 pub use perception_settings::perception_settings;

@@ -103,7 +103,7 @@ impl DriveFolder<'_> {
 
     /// Has `measure` find how far the camera's clock is ahead of the log's, in seconds, and writes the folder with that. What it measures on is a
     /// folder beside it under another name: stopped, whenever it may be, nothing looks finished. Frames that were decoded meanwhile lie where the
-    /// folder will be, for it or the next try.
+    /// folder will be; where it was not there before and nothing was measured, they are removed with it.
     ///
     /// # Errors
     /// As [`Self::write`], and those of `measure`.
@@ -121,7 +121,12 @@ impl DriveFolder<'_> {
         std::fs::create_dir(&folder).map_err(|e| Error::file(&folder, e))?;
         link_files(out, &folder)?;
         self.write_into(&folder, out)?;
-        self.camera_ahead_s = measure(&folder)?;
+        let was_there = out.exists();
+        self.camera_ahead_s = measure(&folder).inspect_err(|_| {
+            if !was_there {
+                remove_frames(out);
+            }
+        })?;
         drop(trial);
         Ok(self.write(out)?)
     }
@@ -139,16 +144,20 @@ impl DriveFolder<'_> {
             (Clock::Free, Media::Video(_)) if (0..NEAR_START_NS).contains(&first) => {
                 Ok((None, vec![ClockNote::OwnStart.into()]))
             }
-            (Clock::Free | Clock::TimeOfDay, Media::Video(_)) => {
-                Err(Error::NoStart { first_ns: first })
-            }
+            (Clock::Free | Clock::TimeOfDay, Media::Video(_)) => Err(Error::NoStart {
+                first_ns: first,
+                time_of_day: self.log.clock == Clock::TimeOfDay,
+            }),
         }
     }
 
     fn config(&self, out: &Path, start_ns: Option<i64>) -> Result<String> {
         let whole = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-        let mut text =
-            String::from("# Written from a log; every key is in docs/reference/dataset-toml.md.\n");
+        let mut text = String::from(concat!(
+            "# Written from a log. Every key: ",
+            env!("CARGO_PKG_REPOSITORY"),
+            "/blob/main/docs/reference/dataset-toml.md\n"
+        ));
         match &self.media {
             Media::Video(video) => {
                 let _ = writeln!(text, "video = {}", quoted(&whole(video)?));
@@ -200,6 +209,18 @@ fn link_files(from: &Path, to: &Path) -> Result<()> {
         copied.map_err(|e| Error::file(&file, e))?;
     }
     Ok(())
+}
+
+/// Removes a folder that holds decoded frames alone, as far as that goes.
+fn remove_frames(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|ending| ending == "frames") {
+            let _ = std::fs::remove_dir_all(path);
+        }
+    }
+    // Not where there is anything else.
+    let _ = std::fs::remove_dir(folder);
 }
 
 /// The table of speeds; with their standard deviations where every one has one.
@@ -296,6 +317,14 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_time_of_day_is_said_as_one() {
+        let target = Path::new("nowhere");
+        let log = log(Clock::TimeOfDay, 36_061_500_000_000);
+        let error = folder(&log, None).check(target).unwrap_err().to_string();
+        assert!(error.contains("begin at 10:01:01, and"), "{error}");
+    }
+
     /// The table that is written says nothing of a zone any more.
     #[test]
     fn dates_without_a_zone_are_said_to_be_taken_for_utc() {
@@ -334,7 +363,10 @@ mod tests {
             let there = |name: &str| trial.join(name).is_file();
             assert!(there("frames.csv") && there("speed.csv") && there("dataset.toml"));
             assert!(!out.join("dataset.toml").exists(), "it looks finished");
-            Err(Error::NoStart { first_ns: 0 })
+            Err(Error::NoStart {
+                first_ns: 0,
+                time_of_day: false,
+            })
         });
         assert!(stopped.is_err());
         let left = || std::fs::read_dir(at.path()).unwrap().count();
@@ -344,6 +376,23 @@ mod tests {
         let config = std::fs::read_to_string(out.join("dataset.toml")).unwrap();
         assert!(config.contains("camera_ahead_s = 0.25"), "{config}");
         assert_eq!(left(), 1);
+    }
+
+    #[test]
+    fn what_is_not_measured_leaves_no_folder() {
+        let at = tempfile::tempdir().unwrap();
+        let out = at.path().join("drive");
+        let log = log(Clock::Date, 1_777_636_800_000_000_000);
+        let refused: Result<Vec<LogNote>> = folder(&log, None).write_measured(&out, |_| {
+            std::fs::create_dir_all(out.join("a.mp4-0.frames")).unwrap();
+            std::fs::write(out.join("a.mp4-0.frames/0000000000.jpg"), "").unwrap();
+            Err(Error::NoStart {
+                first_ns: 0,
+                time_of_day: false,
+            })
+        });
+        refused.unwrap_err();
+        assert_eq!(std::fs::read_dir(at.path()).unwrap().count(), 0);
     }
 
     #[test]

@@ -73,13 +73,12 @@ pub enum Error {
         problem: SignalProblem,
     },
     /// Nothing connects the log's clock with the video's.
-    #[error(
-        "the log's times begin at {} s of a clock of their own, and nothing says when on it the video began",
-        *first_ns as f64 * 1e-9
-    )]
+    #[error("the log's times begin at {}, and nothing says when on that clock the video began", begun(*first_ns, *time_of_day))]
     NoStart {
         /// The log's first time.
         first_ns: i64,
+        /// Whether it counts from a midnight.
+        time_of_day: bool,
     },
     /// A file would be written over.
     #[error("{}: already exists", path.display())]
@@ -172,6 +171,16 @@ impl Hint for ColumnProblem {
         };
         Some(text.to_owned())
     }
+}
+
+/// A log's first time, as its clock shows it.
+fn begun(first_ns: i64, time_of_day: bool) -> String {
+    if !time_of_day {
+        return format!("{} s of a clock of their own", first_ns as f64 * 1e-9);
+    }
+    let s = first_ns.div_euclid(1_000_000_000);
+    let (hours, minutes) = (s.div_euclid(3600), s.rem_euclid(3600) / 60);
+    format!("{hours:02}:{minutes:02}:{:02}", s.rem_euclid(60))
 }
 
 /// What the crate's functions give back.

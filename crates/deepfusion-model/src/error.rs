@@ -165,10 +165,20 @@ impl Hint for Error {
             ),
             Self::Config { field, .. } => Some(format!("set `{field}` so in the configuration")),
             Self::Setting { .. } | Self::PresetAsKey { .. } => Some(
-                "docs/reference/configuration.md lists every key and what it means".into(),
+                concat!(
+                    "every key and what it means is in ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/reference/configuration.md"
+                )
+                .into(),
             ),
             Self::ConfigFile { .. } => Some(
-                "name a preset and the keys in which it differs; docs/reference/configuration.md lists them all".into(),
+                concat!(
+                    "name a preset and the keys in which it differs; all are in ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/reference/configuration.md"
+                )
+                .into(),
             ),
             Self::Io { source, action, .. } => match source.kind() {
                 std::io::ErrorKind::StorageFull => {

@@ -52,6 +52,12 @@ pub(super) fn seconds_of(
     seconds(asked, &[path.to_owned()], options)
 }
 
+/// How far a clock is from another, in milliseconds, and to which side.
+fn apart(ahead_ms: f64, error_ms: f64) -> String {
+    let side = if ahead_ms < 0.0 { "behind" } else { "ahead of" };
+    format!("{:.0} ± {error_ms:.0} ms {side}", ahead_ms.abs())
+}
+
 /// Measures the offset of open recordings, and says it.
 pub(super) fn measured<'a>(datasets: impl IntoIterator<Item = &'a Dataset>) -> Result<f64> {
     let common = common_camera_ahead(datasets)?;
@@ -61,9 +67,19 @@ pub(super) fn measured<'a>(datasets: impl IntoIterator<Item = &'a Dataset>) -> R
     let found = common.ahead;
     let (ahead_ms, error_ms) = (1e3 * found.ahead_s, 1e3 * found.std_error_s);
     say(&format!(
-        "the camera's clock is {ahead_ms:+.0} ± {error_ms:.0} ms ahead of the vehicle's by how the pictures turn (correlation {:.2}); \
-         --clock-offset {ahead_ms:.0} says so without measuring",
+        "the camera's clock is {} the vehicle's by how the pictures turn (correlation {:.2}); --clock-offset {ahead_ms:.0} says so without \
+         measuring",
+        apart(ahead_ms, error_ms),
         found.correlation
     ));
     Ok(found.ahead_s)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_clock_is_ahead_or_behind() {
+        assert_eq!(super::apart(35.2, 8.9), "35 ± 9 ms ahead of");
+        assert_eq!(super::apart(-35.2, 8.9), "35 ± 9 ms behind");
+    }
 }

@@ -60,7 +60,9 @@ pub(super) fn run(args: &ExportArgs) -> Result<()> {
     }
     if let Some(focal) = report.canonical_fy_px {
         say(&format!(
-            "learned many cameras: multiply its depth by f_y / {focal} for each, f_y in pixels of the resized picture"
+            "the network learned many cameras, and its depth is that of one with a focal length of {focal} pixels: multiply it by f_y / {focal}, \
+             with your camera's vertical focal length f_y in pixels of the picture as it is resized to {}x{}",
+            model.width, model.height
         ));
     }
     for check in &report.checks {

@@ -1,7 +1,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::OpenOptions;
+use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_hint::count_of;
 use deepfusion_logs::{
     Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, Speed, read_all, time_on_clock,
@@ -10,7 +10,7 @@ use deepfusion_logs::{
 use super::clocks;
 use crate::cli::{CameraIntrinsics, ClockOffset, ImportArgs};
 use crate::error::CliError;
-use crate::failure::Result;
+use crate::failure::{Reportable, Result};
 use crate::progress::say;
 use crate::{interrupt, output};
 
@@ -78,6 +78,11 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
     } else {
         folder.write(&args.out)?
     };
+    let no_camera = if folder.camera.is_none() {
+        missing_camera(&args.out)
+    } else {
+        None
+    };
     let (first, last) = (log.speeds.first(), log.speeds.last());
     let duration_s = first
         .zip(last)
@@ -95,6 +100,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
                 .iter()
                 .chain(&notes)
                 .map(LogNote::to_string)
+                .chain(no_camera)
                 .collect(),
             written: &args.out,
         });
@@ -113,11 +119,33 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         say(&format!("note: {note}"));
     }
     output::print(&format!("{}\n", args.out.display()))?;
+    let then = match no_camera {
+        Some(missing) => {
+            say(&format!("still to do: {missing}"));
+            "then "
+        }
+        None => "",
+    };
     say(&format!(
-        "look at it: deepfusion data inspect {}",
+        "{then}look at it: deepfusion data inspect {}",
         args.out.display()
     ));
     Ok(())
+}
+
+/// How to give the camera of a folder that was written, where nothing says it.
+fn missing_camera(out: &Path) -> Option<String> {
+    use deepfusion_data::Error;
+    match Dataset::open(out, &OpenOptions::default()) {
+        Err(error @ (Error::NoCameraFile { .. } | Error::CameraFile { .. })) => {
+            Some(match error.hint_in_options() {
+                Some(hint) => format!("{error}; {hint}"),
+                None => error.to_string(),
+            })
+        }
+        // What else is wrong is not the camera's, and said when it is looked at.
+        _ => None,
+    }
 }
 
 /// Writes the folder with the offset of the clocks that its pictures show. Ctrl-C leaves nothing that looks finished.
@@ -135,9 +163,11 @@ fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<LogNot
 fn of_its_own_video(args: &ImportArgs) -> Result<()> {
     let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
     match (&args.video, args.logs.first()) {
-        (Some(video), Some(log)) if !same(video, log) => {
-            Err(deepfusion_logs::Error::NoStart { first_ns: 0 }.into())
+        (Some(video), Some(log)) if !same(video, log) => Err(deepfusion_logs::Error::NoStart {
+            first_ns: 0,
+            time_of_day: false,
         }
+        .into()),
         _ => Ok(()),
     }
 }

@@ -94,7 +94,10 @@ impl Reportable for Error {
             Self::Incomplete { .. } => Some(
                 "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
             ),
-            Self::CameraOf { source, .. } => source.hint_in_options(),
+            Self::CameraOf { source, .. } => match **source {
+                Self::Camera(_) => self.hint(),
+                _ => source.hint_in_options(),
+            },
             Self::NoTopic { problem, .. } => {
                 Some(problem.hint().unwrap_or_else(|| set_in_file("data.topics")))
             }
@@ -259,6 +262,26 @@ mod tests {
             error.to_string(),
             "`--intrinsics`: learn contradicts the run, which has it off"
         );
+    }
+
+    #[test]
+    fn a_camera_of_another_size_is_said_at_once() {
+        let other_size = deepfusion_jobs::UnfitCamera::OtherSize {
+            file: None,
+            made_for: (640, 480),
+            image: (96, 64),
+        };
+        let photo = Failure::from(Error::CameraOf {
+            path: "street.jpg".into(),
+            source: Box::new(Error::Camera(other_size.clone())),
+        });
+        let said = "street.jpg: the intrinsics do not fit the image: the calibration is for 640x480, the image has 96x64";
+        assert_eq!(photo.to_string(), said);
+        assert_eq!(photo.one_line(), said);
+        // Only a live camera can be asked for another size.
+        assert!(!photo.hint().unwrap().contains("?size="));
+        let live = Failure::from(Error::Camera(other_size));
+        assert!(live.hint().unwrap().contains("?size="));
     }
 
     #[test]

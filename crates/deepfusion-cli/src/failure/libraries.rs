@@ -3,7 +3,9 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use deepfusion_data::{CalibrationSource, DatasetKind, FileError, NamedTopic, TopicRole};
+use deepfusion_data::{
+    CalibrationSource, DatasetKind, FileError, NamedTopic, TopicProblem, TopicRole,
+};
 use deepfusion_hint::{Hint, system_hint};
 use deepfusion_model::ExpectedSetting;
 use deepfusion_runtime::EngineProblem;
@@ -164,6 +166,9 @@ impl Reportable for deepfusion_video::Error {
     }
 }
 
+/// The commands that a camera can be given to; the others know it from files alone.
+const TAKE_CAMERA: &str = "predict, perceive, eval, doctor and data inspect also take";
+
 impl Reportable for deepfusion_data::Error {
     fn message(&self) -> String {
         match self {
@@ -197,15 +202,12 @@ impl Reportable for deepfusion_data::Error {
             Self::NoCameraFile {
                 layout: DatasetKind::RgbD,
                 ..
-            } => or("--intrinsics 585,585,320,240"),
-            Self::NoCameraFile { .. } => or(
-                "--hfov DEGREES; `deepfusion calibrate` measures a camera from pictures of a checkerboard; the last resort is `train \
-                 --intrinsics learn`, on drives with bends",
-            ),
-            Self::NoBagCamera { .. } => or(
-                "--intrinsics fx,fy,cx,cy, or --hfov DEGREES; `deepfusion calibrate` measures a camera from a checkerboard; the last resort is \
-                 `train --intrinsics learn`, on drives with bends",
-            ),
+            } => hint.map(|hint| format!("{hint}; {TAKE_CAMERA} --intrinsics 585,585,320,240")),
+            Self::NoCameraFile { .. } | Self::NoBagCamera { .. } => hint.map(|hint| {
+                format!(
+                    "{hint}; `deepfusion calibrate` measures a camera; {TAKE_CAMERA} --hfov 70, and train, as a last resort, --intrinsics learn"
+                )
+            }),
             Self::OwnCalibration { .. } => {
                 Some("leave --intrinsics, --hfov and --calib out".into())
             }
@@ -221,6 +223,15 @@ impl Reportable for deepfusion_data::Error {
                 choice: Some(topic),
                 ..
             } => or(&format!("--topic {topic}")),
+            Self::Topic { problem, .. }
+                if matches!(
+                    **problem,
+                    TopicProblem::NoTopic { config: None, .. }
+                        | TopicProblem::OtherType { config: None, .. }
+                ) =>
+            {
+                hint.map(|hint| format!("--topic: {hint}"))
+            }
             Self::InertialUnit { .. } => {
                 or(&format!("--topic {}={}", TopicRole::Imu, NamedTopic::NONE))
             }
@@ -258,7 +269,9 @@ impl Reportable for deepfusion_eval::Error {
                  they are left out and counted as missing_rate"
             )),
             Self::NothingToEvaluate { skipped: 0, .. } => Some(
-                "no frame has ground truth of the kind asked for (--gt-depth); drives with speeds are judged without it".into(),
+                "no scans or depth images of the kind asked for (--gt-depth) lie there; give --gt FILE, or the drive's speeds: with them it is \
+                 judged without ground truth (deepfusion data import LOG --video FILE)"
+                    .into(),
             ),
             Self::NothingToEvaluate { .. } => Some(
                 "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"

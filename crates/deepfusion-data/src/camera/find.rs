@@ -107,7 +107,7 @@ pub(crate) fn find_camera(
             })
         }
         None => Err(Error::NoCameraFile {
-            path: folder.join(NAMES[0]),
+            path: folder.to_owned(),
             layout,
         }),
     }

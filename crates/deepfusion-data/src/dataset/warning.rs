@@ -1,6 +1,7 @@
 //! What of a recording was taken for granted, looks odd or cannot be read, though it was opened.
 
 use std::borrow::Cow;
+use std::path::PathBuf;
 
 mod camera;
 mod incomplete;
@@ -33,6 +34,15 @@ pub enum DataWarning {
     /// What is left out, is not there or cannot be read.
     #[error(transparent)]
     Incomplete(#[from] IncompleteWarning),
+    /// A video's frames are decoded into the user's cache folder.
+    #[error(
+        "nothing can be written beside the video: its decoded frames are kept in {} (cache in dataset.toml names another folder)",
+        folder.display()
+    )]
+    FramesElsewhere {
+        /// Where they are kept.
+        folder: PathBuf,
+    },
     /// What the layout of another crate says, in a sentence ([`crate::Recording`] is open).
     #[error("{0}")]
     Other(Cow<'static, str>),
@@ -47,12 +57,15 @@ mod tests {
     #[test]
     fn a_warning_says_what_its_kind_says() {
         let ends_early = SourceDamage::new(std::io::Error::other("it ends early"));
-        let warnings: [DataWarning; 6] = [
+        let warnings: [DataWarning; 7] = [
             CameraWarning::LensCorrected.into(),
             MountWarning::LidarUnknown.into(),
             TimesWarning::VideoUntimed.into(),
             MotionWarning::NoCourseRates.into(),
             IncompleteWarning::Damaged(ends_early).into(),
+            DataWarning::FramesElsewhere {
+                folder: "frames".into(),
+            },
             DataWarning::Other("its gyroscope was warm".into()),
         ];
         let said = [
@@ -61,6 +74,7 @@ mod tests {
             "the video has no time stamps: set fps in dataset.toml",
             "course.csv: not read, as it has no column course_rate_radps",
             "the bag is damaged: it ends early",
+            "nothing can be written beside the video: its decoded frames are kept in frames (cache in dataset.toml names another folder)",
             "its gyroscope was warm",
         ];
         assert_eq!(warnings.map(|warning| warning.to_string()), said);

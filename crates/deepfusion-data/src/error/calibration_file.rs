@@ -80,8 +80,11 @@ impl CalibrationFileProblem {
                  Kalibr pinhole-equi), or undistort the images first"
             }
             _ => {
-                "OpenCV's and ROS's calibration YAML, Kalibr's camchain and four numbers \
-                 fx, fy, cx, cy are read: docs/guides/train-on-your-own-video.md"
+                concat!(
+                    "OpenCV's and ROS's calibration YAML, Kalibr's camchain and four numbers fx, fy, cx, cy are read: ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/guides/train-on-your-own-video.md"
+                )
             }
         }
     }

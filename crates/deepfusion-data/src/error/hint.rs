@@ -16,11 +16,18 @@ impl Hint for Error {
                 ..
             } => return Some(format!("give the drive: {}", drive.display())),
             Self::UnknownLayout { .. } => {
-                "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
+                concat!(
+                    "give the folder or the video file itself; each layout is shown in ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/guides/train-on-your-own-video.md"
+                )
             }
-            Self::FolderOfRecordings { such_as, .. } => {
-                let one = such_as.display();
-                return Some(format!("give them by themselves, one or several: {one}"));
+            Self::FolderOfRecordings { path, such_as, .. } => {
+                let (all, one) = (path.display(), such_as.display());
+                return Some(format!(
+                    "give one of them by itself: {one}; where several are taken, all of them: {all}/*, or with for_folders = true in \
+                     {all}/dataset.toml the folder"
+                ));
             }
             Self::Exists { .. } => "choose another place, or remove it first",
             Self::Unfinished(error) => return error.hint(),
@@ -40,7 +47,11 @@ impl Hint for Error {
                 ));
             }
             Self::NotABag { .. } => {
-                "only bags have such a file; folders and videos have dataset.toml: docs/reference/dataset-toml.md"
+                concat!(
+                    "only bags have such a file; folders and videos have dataset.toml: ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/blob/main/docs/reference/dataset-toml.md"
+                )
             }
             Self::NoTopics { .. } => "name topics for bags alone",
             Self::OneCamera { .. } => "ask for camera 2",
@@ -59,13 +70,19 @@ impl Hint for Error {
                  intrinsics = [910, 910, 582, 437] in dataset.toml"
             }
             Self::NoCameraFile { .. } => {
-                "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) there, or set \
-                 intrinsics = [fx, fy, cx, cy] or hfov_deg = DEGREES (from left to right) in dataset.toml; photographs \
-                 with EXIF's focal length in 35 mm need none of these"
+                "write hfov_deg = 70 (the degrees it sees from left to right) or intrinsics = [fx, fy, cx, cy] into dataset.toml there, or \
+                 put its calibration file beside it (calibration.yaml, intrinsics.txt)"
+            }
+            Self::NoPlaceForFrames { video, .. } => {
+                return Some(format!(
+                    "give, in place of it, a folder of your own whose dataset.toml has video = \"{}\" and cache = \"FOLDER\", one that can be \
+                     written",
+                    video.display()
+                ));
             }
             Self::NoBagCamera { config, .. } => {
                 return Some(format!(
-                    "[camera] fx, fy, cx, cy, width, height or calibration = \"camera.yaml\" in {}",
+                    "write [camera] with fx, fy, cx, cy, width, height, or with calibration = \"camera.yaml\", into {}",
                     config.display()
                 ));
             }
@@ -77,7 +94,13 @@ impl Hint for Error {
             Self::NoTrack { reason, .. } => reason.hint(),
             Self::NoFrames { reason, .. } => reason.hint(),
             Self::NoSegmentVideo { .. } => "fetch video.hevc of the segment",
-            Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
+            Self::Config { .. } => {
+                concat!(
+                    "every key of dataset.toml and bag.toml is in ",
+                    env!("CARGO_PKG_REPOSITORY"),
+                    "/tree/main/docs/reference"
+                )
+            }
             Self::Table { .. } => "correct the row or delete it",
             Self::Clocks { .. } => {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
@@ -146,5 +169,25 @@ impl Hint for Error {
             Self::Size { .. } => return None,
         };
         Some(text.to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page of the repository is of no use by its path there: who has the program alone does not have it.
+    #[test]
+    fn pages_are_named_by_their_address() {
+        let path = "x".into();
+        let unknown = Error::UnknownLayout {
+            path,
+            found: FoundInstead::Empty,
+        };
+        let hint = unknown.hint().unwrap();
+        assert!(
+            hint.contains("https://") && !hint.contains(" docs/"),
+            "{hint}"
+        );
     }
 }

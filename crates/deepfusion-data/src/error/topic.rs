@@ -3,7 +3,7 @@
 use crate::{NamedTopic, TopicRole};
 use deepfusion_rosbag::msg::Frame;
 use deepfusion_rosbag::{MessageError, RosMessage};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a bag's topics are not what is needed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -18,8 +18,8 @@ pub enum TopicProblem {
         name: String,
         /// The topics that there are.
         there: Vec<String>,
-        /// The file beside the bag.
-        config: PathBuf,
+        /// The file beside the bag, where that named it, and not the caller.
+        config: Option<PathBuf>,
     },
     /// A topic was named whose messages are of another type.
     #[error("{name} holds {found}")]
@@ -32,8 +32,8 @@ pub enum TopicProblem {
         found: String,
         /// The types that can be read for it.
         expected: Vec<String>,
-        /// The file beside the bag.
-        config: PathBuf,
+        /// The file beside the bag, where that named it, and not the caller.
+        config: Option<PathBuf>,
     },
     /// Several topics could be meant.
     #[error("{} topics could be the {role}: {}", topics.len(), topics.join(", "))]
@@ -80,6 +80,14 @@ pub enum TopicProblem {
     Cloud(#[source] MessageError),
 }
 
+/// What a topic's name must be, in the file that says it, or as the caller does.
+fn named_in(config: Option<&Path>, role: TopicRole, must: &str) -> String {
+    match config {
+        Some(config) => format!("topics.{role} {must} (in {})", config.display()),
+        None => format!("{role} {must}"),
+    }
+}
+
 impl TopicProblem {
     /// What to do about it.
     pub(super) fn hint(&self) -> String {
@@ -89,21 +97,19 @@ impl TopicProblem {
                 there,
                 config,
                 ..
-            } => format!(
-                "topics.{role} must be one of: {} (in {})",
-                there.join(", "),
-                config.display()
-            ),
+            } => {
+                let of = there.join(", ");
+                named_in(config.as_deref(), *role, &format!("must be one of: {of}"))
+            }
             Self::OtherType {
                 role,
                 expected,
                 config,
                 ..
-            } => format!(
-                "topics.{role} must be a topic of {} (in {})",
-                expected.join(" or "),
-                config.display()
-            ),
+            } => {
+                let of = expected.join(" or ");
+                named_in(config.as_deref(), *role, &format!("must be a topic of {of}"))
+            }
             Self::Several {
                 role,
                 topics,

@@ -49,8 +49,8 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         });
     }
     let config = FolderConfig::read(folder)?;
-    let video = frames_of(&folder.join(VIDEO), &config)?;
     let mut warnings = Vec::new();
+    let video = frames_of(&folder.join(VIDEO), &config, &mut warnings)?;
     let calibration = find_camera(
         folder,
         &config,

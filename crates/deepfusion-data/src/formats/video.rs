@@ -1,5 +1,6 @@
 //! A video file with tables and a calibration beside it.
 
+use super::shared::frames_place::folder_for_frames;
 use super::shared::plain::PlainParts;
 use crate::camera::{CameraCalibration, Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
@@ -63,8 +64,8 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         (place.to_owned(), folder.to_owned())
     };
     let config = FolderConfig::read(&folder)?;
-    let video = frames_of(&file, &config)?;
     let mut warnings = Vec::new();
+    let video = frames_of(&file, &config, &mut warnings)?;
     // Whether the video itself is whole, ffmpeg has said.
     let lens = may_hold_log(&file).then(|| GoproLens::read(&file).ok().flatten());
     let lens = lens.flatten();
@@ -283,15 +284,26 @@ fn only<T>(mut all: impl Iterator<Item = T>) -> Option<T> {
     all.next().is_none().then_some(first)
 }
 
-/// The frames of a video, kept beside it or where `dataset.toml` says.
+/// The frames of a video, kept where `dataset.toml` says, else beside it or, where nothing can be written there, in the user's cache folder,
+/// which becomes one of the `warnings`.
 ///
 /// # Errors
-/// [`Error::Video`].
-pub(crate) fn frames_of(file: &Path, config: &FolderConfig) -> Result<VideoFrames> {
-    let folder = file.parent().unwrap_or(Path::new("."));
-    let cache = config.cache.as_ref();
-    let cache = cache.map_or(folder.to_owned(), |c| folder.join(c));
-    Ok(VideoFrames::open(file, &cache)?)
+/// [`Error::Video`], [`Error::NoPlaceForFrames`].
+pub(crate) fn frames_of(
+    file: &Path,
+    config: &FolderConfig,
+    warnings: &mut Vec<DataWarning>,
+) -> Result<VideoFrames> {
+    let beside = file.parent().unwrap_or(Path::new("."));
+    let folder = match &config.cache {
+        Some(named) => beside.join(named),
+        None => folder_for_frames(file, dirs::cache_dir())?,
+    };
+    if config.cache.is_none() && folder != beside {
+        let folder = folder.clone();
+        warnings.push(DataWarning::FramesElsewhere { folder });
+    }
+    Ok(VideoFrames::open(file, &folder)?)
 }
 
 #[cfg(test)]

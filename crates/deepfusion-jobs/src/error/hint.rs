@@ -14,6 +14,12 @@ impl Hint for Error {
             Self::Camera(_) => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
             }
+            // A file has the size that it has.
+            Self::CameraOf { source, .. }
+                if matches!(**source, Self::Camera(UnfitCamera::OtherSize { .. })) =>
+            {
+                Some("give the calibration of images of this size, or the camera's field of view, which is the same at any size".into())
+            }
             Self::CameraOf { source, .. } => source.hint(),
             Self::NoTopic { problem, .. } => {
                 Some(problem.hint().unwrap_or("set `data.topics` so in the configuration".into()))

@@ -143,16 +143,21 @@ impl Evaluated {
     pub(crate) fn add_key_figures(&self, page: HtmlReport, more: (&str, &str)) -> HtmlReport {
         let report = &self.report;
         let number = |v: f64| format!("{v:.3}");
-        let baseline = report.mean_depth_baseline.as_ref();
-        let baseline = baseline.map_or("–".into(), |b| number(b.unscaled.abs_rel));
+        let (own, scale) = (number(report.unscaled.abs_rel), number(report.scale.median));
         let within = format!("{:.1} %", 100.0 * report.unscaled.a1);
-        page.facts(&[
-            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
-            ("Abs Rel, mean-depth baseline", &baseline),
-            ("scale (1 is metric)", &number(report.scale.median)),
-            ("within 25 %", &within),
+        let baseline = report.mean_depth_baseline.as_ref();
+        let baseline = baseline.map(|b| number(b.unscaled.abs_rel));
+        let mut facts = vec![("Abs Rel, unscaled", own.as_str())];
+        // Without the scans of training there is none.
+        if let Some(baseline) = &baseline {
+            facts.push(("Abs Rel, mean-depth baseline", baseline.as_str()));
+        }
+        facts.extend([
+            ("scale (1 is metric)", scale.as_str()),
+            ("within 25 %", within.as_str()),
             more,
-        ])
+        ]);
+        page.facts(&facts)
     }
 
     /// Adds its tables and charts to a page.

@@ -6,7 +6,7 @@ export function metresFact(meta) {
   if (meta?.camera_known === false) return ['camera not known', 'warn'];
   if (scale?.verdict === 'wrong') return [`wrong${factor(scale)}`, 'bad'];
   if (scale?.verdict === 'trusted') return [`trusted${factor(scale)}`, 'good', 'less'];
-  if (scale?.verdict === 'open') return [Number.isFinite(scale.bias) ? `open${factor(scale)}` : 'not measured', '', 'less'];
+  if (scale?.verdict === 'open') return [Number.isFinite(scale.bias) ? `open${factor(scale)}` : 'scale not verified', '', 'less'];
   // From versions that recorded no more than whether the camera was known.
   if (meta?.scale_trusted === false) return ['not to be trusted', 'warn'];
   return null;

@@ -55,6 +55,9 @@ pub(super) struct BagConfig {
     /// The profile's mounts that the file does not have: they go behind the bag's own frames.
     #[serde(skip)]
     pub(super) profile_mounts: MountConfig,
+    /// The roles whose topics the caller named.
+    #[serde(skip)]
+    pub(super) given_topics: Vec<TopicRole>,
     /// Where it was read from; the path it would have where there is none.
     #[serde(skip)]
     pub(super) path: PathBuf,
@@ -224,6 +227,7 @@ impl BagConfig {
     pub(super) fn of(bag: &Path, options: &OpenOptions) -> Result<Self> {
         let mut config = Self::beside(bag)?;
         options.topics.iter().for_each(|topic| config.name(topic));
+        config.given_topics = options.topics.iter().map(|topic| topic.role).collect();
         Ok(config)
     }
 

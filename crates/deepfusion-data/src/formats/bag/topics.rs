@@ -9,7 +9,7 @@ use deepfusion_rosbag::msg::{
     TwistWithCovarianceStamped,
 };
 use deepfusion_rosbag::{MessageSource, RosMessage, TopicInfo};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The topics that are read, and what for.
 #[derive(Debug, Clone)]
@@ -43,6 +43,7 @@ impl Topics {
             all: &all,
             bag: bag.path(),
             config: &config.path,
+            given: &config.given_topics,
         };
         let names = &config.topics;
         let pictures = [Image::<'_>::TYPE, CompressedImage::<'_>::TYPE];
@@ -180,9 +181,16 @@ struct Search<'a> {
     all: &'a [TopicInfo],
     bag: &'a Path,
     config: &'a Path,
+    /// Roles whose topics the caller named, and not the file.
+    given: &'a [TopicRole],
 }
 
 impl Search<'_> {
+    /// The file beside the bag, where that names a role's topic.
+    fn named_in(&self, role: TopicRole) -> Option<PathBuf> {
+        (!self.given.contains(&role)).then(|| self.config.to_owned())
+    }
+
     /// The topic that the file names, or the only one of these types; none where it names none.
     fn one(
         &self,
@@ -200,7 +208,7 @@ impl Search<'_> {
                     role,
                     name: name.clone(),
                     there: self.all.iter().map(|t| t.name.clone()).collect(),
-                    config: self.config.to_owned(),
+                    config: self.named_in(role),
                 }));
             };
             if !types.contains(&topic.type_name.as_str()) {
@@ -209,7 +217,7 @@ impl Search<'_> {
                     name: name.clone(),
                     found: topic.type_name.clone(),
                     expected: types.iter().map(|&name| name.to_owned()).collect(),
-                    config: self.config.to_owned(),
+                    config: self.named_in(role),
                 }));
             }
             return Ok(Some(name.clone()));

@@ -17,8 +17,12 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// What stands above every such file.
-const HEAD: &str = "# What is read of the bag beside this file, as it was found there. What stands here goes before what the\n\
-    # bag itself says. Every key: docs/reference/bag-toml.md.\n";
+const HEAD: &str = concat!(
+    "# What is read of the bag beside this file, as it was found there. What stands here goes before what the\n",
+    "# bag itself says. Every key: ",
+    env!("CARGO_PKG_REPOSITORY"),
+    "/blob/main/docs/reference/bag-toml.md\n"
+);
 /// What the tables of the file that was there already are followed by, where they have no such thing.
 const VEHICLE: &str = "\n# [vehicle]\n# wheelbase_m = 2.7        # without it steering angles are not used\n\
     # speed_scale = 1.0        # true speed over the vehicle's\n";

@@ -5,6 +5,7 @@ mod neighbours;
 
 use super::kitti::{self, Drive, drive_around, find_drives};
 use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
+use crate::dataset::selection::Selection;
 use crate::dataset_toml::FolderConfig;
 use crate::formats::shared::files::folders;
 use crate::{
@@ -20,8 +21,8 @@ use std::sync::Arc;
 impl Dataset {
     /// Opens a recording of any known layout, recognised by what is there. A KITTI raw drive, date or root gives one data set for
     /// each drive and camera, in order of names; KITTI odometry one for each sequence, KITTI-360 one for each drive, nuScenes one for
-    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. Drives without images of the camera, or without a
-    /// selected frame, are left out.
+    /// each scene. A bag, a folder of images, a video file, a comma2k19 segment and a folder of RGB-D frames give one. A folder of such recordings whose
+    /// `dataset.toml` says `for_folders = true` gives those of each. Drives without images of the camera, or without a selected frame, are left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be absent
     /// (evaluation needs neither); where they are there, they must be readable. What looks like another recording in the folder and is not
@@ -36,12 +37,7 @@ impl Dataset {
     /// [`Error::Frames`], [`Error::NoTopics`], [`Error::Pose`], [`Error::Json`],
     /// [`Error::SeveralVersions`].
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
-        let layout = Layout::of(path)?;
-        let mut datasets = layout.open(path, options)?;
-        if let (Some(first), Some(warning)) = (datasets.first_mut(), layout.passed_over(path)) {
-            first.warn(warning);
-        }
-        Ok(datasets)
+        Layout::of(path)?.open_warning(path, options)
     }
 
     /// The layout in which [`Self::open`] reads what is at a path, found without opening it.
@@ -82,6 +78,8 @@ pub(crate) enum Layout {
     Bags(Vec<PathBuf>),
     Folder(PathBuf),
     Video(PathBuf),
+    /// Those of the folders in a folder whose settings are for them.
+    Several(Vec<(PathBuf, Layout)>),
 }
 
 impl Layout {
@@ -94,6 +92,16 @@ impl Layout {
             return Ok(layout);
         }
         let mut recordings = folders(path)?;
+        if FolderConfig::read_for_folders(path)?.is_some() {
+            let mut found = Vec::new();
+            for folder in &recordings {
+                // One that is broken is not left out silently.
+                found.extend(Self::known(folder)?.map(|layout| (folder.clone(), layout)));
+            }
+            if !found.is_empty() {
+                return Ok(Self::Several(found));
+            }
+        }
         recordings.retain(|inner| matches!(Self::known(inner), Ok(Some(_))));
         let path = path.to_owned();
         Err(match recordings.first() {
@@ -186,6 +194,15 @@ impl Layout {
             Self::Bags(_) => DatasetKind::Bag,
             Self::Folder(_) => DatasetKind::Folder,
             Self::Video(_) => DatasetKind::Video,
+            Self::Several(all) => {
+                let mut kinds = all.iter().map(|(_, layout)| layout.kind());
+                let first = kinds.next().unwrap_or(DatasetKind::Other);
+                if kinds.all(|kind| kind == first) {
+                    first
+                } else {
+                    DatasetKind::Other
+                }
+            }
         }
     }
 
@@ -199,6 +216,7 @@ impl Layout {
             Self::Comma(folder) | Self::Folder(folder) => says(folder),
             Self::Video(place) if place.is_dir() => says(place),
             Self::Video(file) => file.parent().is_some_and(says),
+            Self::Several(all) => all.iter().all(|(_, layout)| layout.says_simulated()),
             Self::KittiOdometry(_) | Self::Kitti360(_) | Self::NuScenes(_) => false,
         }
     }
@@ -208,6 +226,10 @@ impl Layout {
     /// # Errors
     /// [`Error::NoTopics`], [`Error::OwnCalibration`].
     pub(crate) fn check_options(&self, path: &Path, options: &OpenOptions) -> Result<()> {
+        if let Self::Several(all) = self {
+            let check = |(folder, layout): &(PathBuf, Self)| layout.check_options(folder, options);
+            return all.iter().try_for_each(check);
+        }
         if let (false, Some(topic)) = (matches!(self, Self::Bags(_)), options.topics.first()) {
             return Err(Error::NoTopics {
                 path: path.to_owned(),
@@ -284,8 +306,21 @@ impl Layout {
             Self::Kitti360(drives) => each(drives, |drive| drive.folder.clone(), Self::Kitti360),
             Self::RgbD(sequences) => each(sequences, PathBuf::clone, Self::RgbD),
             Self::Bags(bags) => each(bags, PathBuf::clone, Self::Bags),
+            Self::Several(all) => {
+                let apart = |(folder, layout): (PathBuf, Self)| layout.apart(&folder);
+                all.into_iter().flat_map(apart).collect()
+            }
             whole => vec![(path.to_owned(), whole)],
         }
+    }
+
+    /// Opens what was found; the first is warned of what else looks like a recording there.
+    fn open_warning(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
+        let mut datasets = self.open(path, options)?;
+        if let (Some(first), Some(warning)) = (datasets.first_mut(), self.passed_over(path)) {
+            first.warn(warning);
+        }
+        Ok(datasets)
     }
 
     /// Opens what was found.
@@ -302,7 +337,28 @@ impl Layout {
             Self::Bags(bags) => bag::open(path, bags, options),
             Self::Folder(folder) => one(folder::open(folder, options)),
             Self::Video(place) => one(video::open(place, options)),
+            Self::Several(all) => open_several(path, all, options),
         }
+    }
+}
+
+/// Opens each of several recordings; those without a selected frame are left out.
+fn open_several(
+    path: &Path,
+    all: &[(PathBuf, Layout)],
+    options: &OpenOptions,
+) -> Result<Vec<Dataset>> {
+    let mut datasets = Vec::new();
+    for (folder, layout) in all {
+        match layout.open_warning(folder, options) {
+            Ok(found) => datasets.extend(found),
+            Err(Error::SplitSelectsNothing { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    match Selection::new(options).nothing(path) {
+        Some(error) if datasets.is_empty() => Err(error),
+        _ => Ok(datasets),
     }
 }
 

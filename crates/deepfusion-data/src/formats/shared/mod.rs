@@ -2,6 +2,7 @@
 //! make.
 
 pub(super) mod files;
+pub(super) mod frames_place;
 pub(super) mod plain;
 pub(super) mod pose_track;
 pub(super) mod poses;
