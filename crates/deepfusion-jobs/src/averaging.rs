@@ -174,11 +174,15 @@ fn mean(networks: &[(&Weights, f64)]) -> Weights {
     mean.tensors
         .retain(|name, _| networks.iter().all(|(w, _)| w.tensors.contains_key(name)));
     for (name, tensor) in &mut mean.tensors {
-        let of = |(weights, share): &(&Weights, f64)| (&weights.tensors[name].values, *share);
-        let parts: Vec<_> = networks.iter().map(of).collect();
+        let parts: Vec<(&[f32], f64)> = networks
+            .iter()
+            .map(|(weights, share)| (weights.tensors[name].values.as_slice(), *share))
+            .collect();
         for (i, value) in tensor.values.iter_mut().enumerate() {
-            let of = |(values, share): &(&Vec<f32>, f64)| share * f64::from(values[i]);
-            *value = parts.iter().map(of).sum::<f64>() as f32;
+            let weighted = parts
+                .iter()
+                .map(|(values, share)| share * f64::from(values[i]));
+            *value = weighted.sum::<f64>() as f32;
         }
     }
     mean
