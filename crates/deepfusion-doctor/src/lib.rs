@@ -39,6 +39,7 @@ mod summary;
 mod survey;
 mod timing;
 mod turn;
+mod turning;
 
 pub use camera_ahead::{
     CameraAhead, CommonCameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S,

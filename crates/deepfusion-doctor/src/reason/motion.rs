@@ -10,6 +10,15 @@ pub enum MotionReason {
     /// The speeds contradict the road in the images.
     #[error("{0}")]
     Road(SpeedWarning),
+    /// Neither road nor poses say whether the speeds are right.
+    #[error(
+        "neither road nor poses show whether the speeds are right: by them the vehicle drives up to {fastest_mps:.1} m/s ({:.0} km/h)",
+        3.6 * fastest_mps
+    )]
+    Unchecked {
+        /// The highest speed, m/s.
+        fastest_mps: f64,
+    },
     /// The recording's own poses contradict its speeds.
     #[error(
         "the poses go {by_poses_m:.0} m, the speeds {by_speeds_m:.0} m: depths would come out {depth_factor:.2} times as large"
@@ -133,6 +142,9 @@ impl MotionReason {
                 }
                 None => "see the speed signal's unit and factor, and the camera's focal length",
             },
+            Self::Unchecked { .. } => {
+                "was it as fast? With a wrong unit (km/h taken for m/s) every depth would be wrong by the same factor"
+            }
             Self::Poses { .. } => {
                 "see the speed signal's unit and factor (km/h is 3.6, a worn tyre 1.02)"
             }
@@ -192,6 +204,10 @@ mod tests {
         };
         assert_eq!(MotionReason::Road(road).to_string(), road.to_string());
         for (reason, said) in [
+            (
+                MotionReason::Unchecked { fastest_mps: 50.04 },
+                "neither road nor poses show whether the speeds are right: by them the vehicle drives up to 50.0 m/s (180 km/h)",
+            ),
             (
                 MotionReason::Poses {
                     by_poses_m: 100.2,
