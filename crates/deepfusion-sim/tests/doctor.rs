@@ -2,7 +2,9 @@
 
 use crate::doctor_faults::{Drive, oxts};
 use deepfusion_data::OpenOptions;
-use deepfusion_doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
+use deepfusion_doctor::{
+    Diagnosis, Finding, Outcome, Severity, camera_finding, doctor, turn_finding,
+};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use nalgebra::{Rotation3, Vector3};
 use std::ops::ControlFlow;
@@ -259,6 +261,26 @@ fn mirrored_images_turn_the_other_way() {
     assert_eq!(finding.severity, Severity::Error);
     assert!(value(finding) < -0.8, "{finding:?}");
     assert!(finding.hint.contains("mirror"), "{finding:?}");
+}
+
+/// What training checks by itself.
+#[test]
+fn a_wrong_camera_and_wrong_turns_are_found_before_training() {
+    let drive = Drive::clean();
+    let clean = drive.open();
+    assert_eq!((camera_finding(&clean), turn_finding(&clean)), (None, None));
+    drive.images(|_, image| image::imageops::flip_horizontal_in_place(image));
+    let finding = turn_finding(&drive.open()).unwrap();
+    assert_eq!(finding.severity, Severity::Error);
+    assert!(finding.hint.contains("negate the yaw rate"), "{finding:?}");
+    drive.camera(|k| {
+        for i in [0, 2, 4, 5] {
+            k[i] *= 0.5;
+        }
+    });
+    let finding = camera_finding(&drive.open()).unwrap();
+    assert_eq!(finding.severity, Severity::Error);
+    assert!(finding.hint.contains("the images' own size"), "{finding:?}");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use deepfusion_data::Dataset;
+use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::recordings::{placed_warnings, warning_line};
 
 /// Those that were printed: both cameras of a drive, and a recording that is opened again, have the same warnings.
@@ -31,6 +32,15 @@ pub(super) fn print(datasets: &[Dataset]) {
             tracing::warn!("{line}");
         }
     }
+}
+
+/// That a camera's numbers look like those of images of another size.
+pub(super) fn of_another_size(k: &Intrinsics) -> String {
+    format!(
+        "the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
+         Metres are then wrong by the ratio of the two sizes",
+        k.cx, k.cy, k.width, k.height
+    )
 }
 
 /// Whether that text was not printed before; from now on it was.
