@@ -15,6 +15,7 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion data inspect`.
 pub(super) fn run(args: &InspectArgs) -> Result<()> {
+    warnings::warn_of_hfov(args.hfov);
     let mut options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,
