@@ -561,6 +561,20 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
     );
 }
 
+/// A recorder that drops nothing: its log merely ends before the images do.
+#[test]
+fn a_log_that_ends_early_is_told_from_one_with_gaps() {
+    let drive = Drive::clean();
+    let images = drive.open().frames().len();
+    drive.remove_oxts(images - 8..images);
+    let diagnosis = drive.diagnose();
+    let finding = found(&diagnosis, "timing", "time without a motion");
+    let said = finding.what.to_string();
+    assert!(said.contains("before the last image"), "{said}");
+    assert!(!said.contains("after the first"), "{said}");
+    assert!(finding.hint.contains("start_s"), "{finding:?}");
+}
+
 #[test]
 fn a_wrong_wheelbase_is_found_by_the_gyro() {
     let folder = tempfile::tempdir().unwrap();

@@ -171,7 +171,7 @@ impl MotionReason {
             }
             Self::ClockOffset { camera_ahead_s, .. } => {
                 return format!(
-                    "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one \
+                    "clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or a clock offset of {:.0} ms given. Better: one \
                      clock for all (PTP, trigger)",
                     1e3 * camera_ahead_s
                 );
@@ -338,7 +338,7 @@ mod tests {
             ),
             (
                 clock,
-                "clock.camera_ahead_s = 0.120 in the file beside the recording, or a clock offset of 120 ms given. Better: one clock for all \
+                "clock.camera_ahead_s = 0.120 in dataset.toml or the TOML file beside a bag, or a clock offset of 120 ms given. Better: one clock for all \
                  (PTP, trigger)",
             ),
         ] {
