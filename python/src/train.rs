@@ -478,6 +478,7 @@ fn as_dict(py: Python<'_>, event: TrainEvent) -> PyResult<Bound<'_, PyDict>> {
             samples,
             validation_samples,
             mean_displacement_m,
+            ..
         } => {
             dict.set_item("from_step", from_step)?;
             dict.set_item("steps", steps)?;

@@ -72,11 +72,13 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
     // What cannot be opened could not be checked either.
     fs::create_dir(at.join("empty")).unwrap();
     let text = run(at, "doctor empty").stdout;
-    assert_eq!(lines(&text).len(), CHECKS.len(), "{text}");
-    assert!(
-        text.contains("not checked: the recording cannot be opened"),
-        "{text}"
-    );
+    let names: Vec<&str> = lines(&text).iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, ["opening"], "{text}");
+    let others = "all others      not checked: the recording cannot be opened";
+    assert_eq!(text.matches(others).count(), 1, "{text}");
+    let report = run(at, "doctor empty --json").stdout;
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["checks"].as_array().unwrap().len(), CHECKS.len());
 }
 
 /// The processor beside itself: every operation is there, and right to the last bit.
@@ -207,6 +209,56 @@ fn a_drive_that_cannot_train_does_not_fail_its_folder() {
         &format!("train --data all/2026_01_01/{single}"),
         &[single],
     );
+}
+
+/// The camera's numbers are those of images half as large: whoever takes them says so, without being asked.
+#[cfg(feature = "train")]
+#[test]
+fn a_camera_of_another_size_is_warned_of_by_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 12 --seed 3 --scan-every 0 --size 160x96",
+    );
+    let train = "train --data sim --size 96x64 --batch 2 --steps 1 --init none --out";
+    let right = ok(at, &format!("{train} right")).stderr;
+    assert!(!right.contains("makes no sense"), "{right}");
+    let calibration = at.join("sim/2026_01_01/calib_cam_to_cam.txt");
+    let text = fs::read_to_string(&calibration).unwrap();
+    let halved = text.lines().map(|line| {
+        let Some(numbers) = line.strip_prefix("P_rect_02: ") else {
+            return format!("{line}\n");
+        };
+        let numbers = numbers
+            .split_whitespace()
+            .map(|n| n.parse::<f64>().unwrap());
+        // The last row has no pixels.
+        let numbers = numbers
+            .enumerate()
+            .map(|(i, n)| if i < 8 { 0.5 * n } else { n });
+        let numbers: Vec<String> = numbers.map(|n| n.to_string()).collect();
+        format!("P_rect_02: {}\n", numbers.join(" "))
+    });
+    fs::write(&calibration, halved.collect::<String>()).unwrap();
+    for (command, expected) in [
+        (
+            &*format!("{train} half"),
+            ["training on it makes no sense: cx", "hint: give the matrix"],
+        ),
+        (
+            "predict sim --model right --out depth",
+            ["is far from the middle of 160x96", "another size"],
+        ),
+        (
+            "data inspect sim",
+            ["is far from the middle of 160x96", "another size"],
+        ),
+    ] {
+        let said = ok(at, command).stderr;
+        let about = |line: &&str| expected.iter().all(|part| line.contains(part));
+        assert_eq!(said.lines().filter(about).count(), 1, "{command}: {said}");
+    }
 }
 
 /// What `doctor` says of a log by itself: its findings' checks, texts and hints.

@@ -97,8 +97,11 @@ fn a_log_beside_its_images_is_a_drive() {
     assert!(config.contains("hfov_deg = 90.0\n"), "{config}");
     let printed = ok(at, "data inspect seen").stdout;
     assert!(printed.contains("fx 80.0"), "{printed}");
-    let printed = ok(at, "data inspect beside --hfov 120").stdout;
-    assert!(printed.contains("fx 46.19"), "{printed}");
+    let printed = ok(at, "data inspect beside --hfov 120");
+    assert!(printed.stdout.contains("fx 46.19"), "{}", printed.stdout);
+    assert!(!printed.stderr.contains("radians"), "{}", printed.stderr);
+    let in_radians = ok(at, "data inspect beside --hfov 1.2").stderr;
+    assert!(in_radians.contains("--hfov 69, if"), "{in_radians}");
 
     fails(at, &format!("{import} --out drive"), &["speed.csv"]);
     fails(

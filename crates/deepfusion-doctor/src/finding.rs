@@ -118,13 +118,17 @@ impl Figure {
 }
 
 impl Outcome {
-    /// How it came out. A check that measured one thing of two counts as one that looked.
+    /// How it came out. A check that measured one thing of two counts as one that looked, and one that merely notes what follows from not
+    /// having looked as one that did not.
     #[must_use]
     pub fn status(&self) -> Status {
-        match (self.findings.is_empty(), &self.skipped) {
-            (false, _) => Status::Found,
-            (true, Some(_)) if self.measured.is_empty() => Status::NotChecked,
-            (true, _) => Status::Ok,
+        let complains = self.findings.iter().any(|f| f.severity > Severity::Note);
+        if self.skipped.is_some() && self.measured.is_empty() && !complains {
+            Status::NotChecked
+        } else if self.findings.is_empty() {
+            Status::Ok
+        } else {
+            Status::Found
         }
     }
 
@@ -263,6 +267,7 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{MotionReason, MotionSkip};
 
     #[test]
     fn a_figure_is_printed_with_its_limit() {
@@ -272,6 +277,20 @@ mod tests {
         let share = Figure::new("share", 25.0, "%", Limit::AtMost(30.0));
         assert!(share.holds());
         assert_eq!(share.to_string(), "share 25 % (at most 30)");
+    }
+
+    #[test]
+    fn who_notes_that_he_could_not_look_did_not_look() {
+        let mut outcome = Outcome::skipped("speed", MotionSkip::NoRoad);
+        let unchecked = MotionReason::Unchecked { fastest_mps: 50.0 };
+        outcome.find(Severity::Note, None, unchecked);
+        assert_eq!(outcome.status(), Status::NotChecked);
+        outcome.find(Severity::Warning, None, MotionReason::TurnsUnrelated);
+        assert_eq!(outcome.status(), Status::Found);
+        outcome.findings.clear();
+        assert_eq!(outcome.status(), Status::NotChecked);
+        outcome.skipped = None;
+        assert_eq!(outcome.status(), Status::Ok);
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them. What is wrong ([`FindingReason`], which
 //! knows what to do about it) and why a check could not look ([`SkipReason`]) are types, and sentences as text and in JSON.
 
+mod before_training;
 mod blur;
 mod camera_ahead;
 mod clock;
@@ -39,7 +40,9 @@ mod summary;
 mod survey;
 mod timing;
 mod turn;
+mod turning;
 
+pub use before_training::{camera_finding, turn_finding};
 pub use camera_ahead::{
     CameraAhead, CommonCameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S,
     NoCameraAhead, camera_ahead, common_camera_ahead,

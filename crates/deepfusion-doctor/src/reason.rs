@@ -6,6 +6,7 @@ mod log;
 mod motion;
 mod opening;
 mod pictures;
+mod taken;
 
 pub use self::camera::{CameraReason, CentreCoordinate, HeadingAngle, RoadAngle};
 pub use self::frames::FramesReason;

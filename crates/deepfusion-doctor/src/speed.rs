@@ -4,6 +4,7 @@ use super::finding::{Figure, Limit, Outcome, Severity};
 use super::reason::MotionReason;
 use super::shared_error::SharedError;
 use super::skip::MotionSkip;
+use super::turning::turning_as_seen;
 use deepfusion_data::{
     CameraPath, Dataset, DatasetKind, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
 };
@@ -18,12 +19,26 @@ const STRETCH_M: f64 = 5.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let mut outcome = Outcome::new("speed");
-    by_road(dataset, &mut outcome);
+    // Without turns nobody knows how the road should move.
+    let turning = turning_as_seen(dataset);
+    by_road(turning.as_ref().unwrap_or(dataset), &mut outcome);
     by_poses(dataset, &mut outcome);
     if outcome.measured.is_empty() && outcome.skipped.is_none() {
         outcome.skipped = Some(MotionSkip::NoRoad.into());
+        if let Some(fastest_mps) = fastest_mps(dataset) {
+            let unchecked = MotionReason::Unchecked { fastest_mps };
+            outcome.find(Severity::Note, None, unchecked);
+        }
     }
     outcome
+}
+
+/// The highest speed at the time of a frame.
+fn fastest_mps(dataset: &Dataset) -> Option<f64> {
+    let track = dataset.track()?;
+    let times = dataset.frames().iter().filter_map(|frame| frame.time_s);
+    let speeds = times.filter_map(|time_s| Some(track.speed_at(time_s)?.abs()));
+    speeds.max_by(f64::total_cmp)
 }
 
 fn by_road(dataset: &Dataset, outcome: &mut Outcome) {

@@ -65,28 +65,28 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
 /// Where the speed has gaps, no pair can train: nothing is made up across them.
 fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
     let Some(track) = dataset.track() else { return };
-    let (mut unknown, mut all, mut stretches, mut first) = (0.0, 0.0, 0, None);
-    let mut known = true;
-    for pair in dataset.frames().windows(2) {
-        let (Some(from_s), Some(to_s)) = (pair[0].time_s, pair[1].time_s) else {
-            continue;
-        };
-        if to_s <= from_s {
-            continue;
-        }
-        all += to_s - from_s;
-        let is_known = track.motion(from_s, to_s).is_some();
-        if !is_known {
-            unknown += to_s - from_s;
-            stretches += usize::from(known);
-            first = first.or(Some(pair[0].number));
-        }
-        known = is_known;
-    }
+    // Of each pair its first frame's number, how long it is, and whether the motion is known.
+    let pairs = dataset.frames().windows(2).filter_map(|pair| {
+        let times = pair[0].time_s.zip(pair[1].time_s);
+        let (from_s, to_s) = times.filter(|(from_s, to_s)| to_s > from_s)?;
+        let known = track.motion(from_s, to_s).is_some();
+        Some((pair[0].number, to_s - from_s, known))
+    });
+    let pairs: Vec<(u64, f64, bool)> = pairs.collect();
+    let all: f64 = pairs.iter().map(|(_, seconds, _)| seconds).sum();
     if all <= 0.0 {
         return;
     }
-    let share = 100.0 * unknown / all;
+    let is_unknown = |(_, _, known): &&(u64, f64, bool)| !known;
+    let seconds = |(_, seconds, _): &(u64, f64, bool)| *seconds;
+    let unknown_s: f64 = pairs.iter().filter(is_unknown).map(seconds).sum();
+    let first = pairs.iter().find(is_unknown).map(|(number, _, _)| *number);
+    let gaps = pairs.chunk_by(|a, b| a.2 == b.2).filter(|run| !run[0].2);
+    let stretches = gaps.count();
+    let before_s: f64 = pairs.iter().take_while(is_unknown).map(seconds).sum();
+    let after_s: f64 = pairs.iter().rev().take_while(is_unknown).map(seconds).sum();
+    let is_beside = stretches == usize::from(before_s > 0.0) + usize::from(after_s > 0.0);
+    let share = 100.0 * unknown_s / all;
     let figure = Figure::new(
         "time without a motion",
         share,
@@ -94,10 +94,14 @@ fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
         Limit::AtMost(MOST_UNKNOWN),
     );
     outcome.judge_at(Severity::Warning, first, figure, || {
-        FramesReason::UnknownMotion {
-            unknown_s: unknown,
-            stretches,
-            first: first.unwrap_or(0),
+        if is_beside {
+            FramesReason::BesideLog { before_s, after_s }
+        } else {
+            FramesReason::UnknownMotion {
+                unknown_s,
+                stretches,
+                first: first.unwrap_or(0),
+            }
         }
     });
 }

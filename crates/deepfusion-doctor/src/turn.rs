@@ -10,7 +10,7 @@ use super::skip::MotionSkip;
 use nalgebra::Vector3;
 
 /// Least standard deviation of the vehicle's yaw rate that can be compared, rad/s.
-const LEAST_TURN: f64 = 0.015;
+pub(super) const LEAST_TURN: f64 = 0.015;
 const LEAST_PAIRS: usize = 15;
 /// Correlation from which the slope is taken for the focal length's ratio: below, something else is wrong.
 const SURE: f64 = 0.9;
@@ -34,7 +34,7 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
         xy += x * y;
         yy += y * y;
     }
-    let spread = (xx / n).sqrt();
+    let spread = spread(&seen.iter().map(|s| s.0).collect::<Vec<_>>());
     if spread < LEAST_TURN {
         let why = MotionSkip::HardlyTurns {
             spread_radps: spread,
@@ -71,6 +71,14 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
         });
     }
     outcome
+}
+
+/// The standard deviation of yaw rates; 0 without any.
+pub(super) fn spread(rates: &[f64]) -> f64 {
+    let n = rates.len().max(1) as f64;
+    let mean = rates.iter().sum::<f64>() / n;
+    let squares = rates.iter().map(|rate| (rate - mean).powi(2));
+    (squares.sum::<f64>() / n).sqrt()
 }
 
 /// The yaw rate by the vehicle and by the picture, rad/s, positive to the left.

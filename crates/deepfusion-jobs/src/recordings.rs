@@ -249,10 +249,15 @@ fn open_sets(
 /// Whether a set's drives are to turn as their images show: not where nothing reads how they turned, nor where turns are to tell the
 /// focal length, as those of the images follow from it.
 fn takes_turns(config: &TrainConfig, set: usize) -> bool {
+    let wanted = !config.data.measured_turns_only && config.learned_camera().is_none();
+    wanted && reads_turns(config, set)
+}
+
+/// Whether something that is learned from a set depends on how its vehicles turned.
+pub(crate) fn reads_turns(config: &TrainConfig, set: usize) -> bool {
     let reads = matches!(config.view_motion, ViewMotion::Vehicle | ViewMotion::Auto)
         || config.reads_rotation();
-    let wanted = !config.data.measured_turns_only && config.learned_camera().is_none();
-    reads && wanted && config.learn(set).from_motion()
+    reads && config.learn(set).from_motion()
 }
 
 /// Paths and the split file that selects their frames.

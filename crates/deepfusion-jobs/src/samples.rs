@@ -10,10 +10,17 @@ use deepfusion_train::{SampleSet, SharedFrames, shared_frames};
 use crate::Result;
 use crate::recordings::{RecordingRole, open_for, validates};
 
+mod faults;
+
+pub use self::faults::Fault;
+use self::faults::faults;
+
 /// Something that training goes on with, and that may not be meant.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum SampleWarning {
+    /// Drives whose camera or turns are wrong.
+    Fault(Fault),
     /// The speeds of a drive, by its name, do not fit its images.
     Speed(String, SpeedWarning),
     /// A drive that gives no samples, and why.
@@ -25,6 +32,7 @@ pub enum SampleWarning {
 impl fmt::Display for SampleWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Fault(fault) => write!(f, "{fault}"),
             Self::Speed(drive, warning) => write!(f, "{drive}: {warning}"),
             Self::Skipped(reason) => write!(f, "skipped: {reason}"),
             Self::Neighbours(SharedFrames {
@@ -53,12 +61,18 @@ pub fn open_samples(
     warn: &mut dyn FnMut(SampleWarning),
 ) -> Result<(SampleSet, SampleSet)> {
     let train = open_for(config, RecordingRole::Training, opened)?;
-    let mut checked = HashSet::new();
-    for (_, dataset) in &train {
-        // Both cameras of a drive have one speed.
-        if checked.insert((dataset.place().to_owned(), dataset.name().to_owned()))
-            && let Some(warning) = speed_warning(dataset)
-        {
+    let mut known = HashSet::new();
+    // Both cameras of a drive have one speed.
+    let is_new = |(_, dataset): &&(usize, Dataset)| {
+        known.insert((dataset.place().to_owned(), dataset.name().to_owned()))
+    };
+    let drives: Vec<&(usize, Dataset)> = train.iter().filter(is_new).collect();
+    faults(config, &drives)
+        .into_iter()
+        .map(SampleWarning::Fault)
+        .for_each(&mut *warn);
+    for (_, dataset) in drives {
+        if let Some(warning) = speed_warning(dataset) {
             warn(SampleWarning::Speed(dataset.name().to_owned(), warning));
         }
     }

@@ -271,17 +271,28 @@ pub enum SettingProblem {
         key: String,
     },
     /// Nothing has this name.
-    #[error("there is no key `{key}`")]
+    #[error("there is no key `{key}`{}", did_you_mean(nearest))]
     NoSuchKey {
         /// The name.
         key: String,
+        /// Those that may have been meant.
+        nearest: Vec<String>,
     },
-    /// The key is unknown, or cannot have this value: what the parser says.
+    /// The key cannot have this value: what the parser says.
     #[error("{}", .0.to_string().trim().replace('\n', " "))]
     Value(Box<toml::de::Error>),
     /// Something else decides it; what, in its caller's words.
     #[error("{0}")]
     DecidedElsewhere(&'static str),
+}
+
+fn did_you_mean(keys: &[String]) -> String {
+    let quoted: Vec<String> = keys.iter().map(|key| format!("`{key}`")).collect();
+    if quoted.is_empty() {
+        String::new()
+    } else {
+        format!(": did you mean {}?", quoted.join(" or "))
+    }
 }
 
 /// Why a folder is no run's.

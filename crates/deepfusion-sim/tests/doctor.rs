@@ -2,7 +2,9 @@
 
 use crate::doctor_faults::{Drive, oxts};
 use deepfusion_data::OpenOptions;
-use deepfusion_doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
+use deepfusion_doctor::{
+    Diagnosis, Finding, Outcome, Severity, camera_finding, doctor, turn_finding,
+};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use nalgebra::{Rotation3, Vector3};
 use std::ops::ControlFlow;
@@ -259,6 +261,26 @@ fn mirrored_images_turn_the_other_way() {
     assert_eq!(finding.severity, Severity::Error);
     assert!(value(finding) < -0.8, "{finding:?}");
     assert!(finding.hint.contains("mirror"), "{finding:?}");
+}
+
+/// What training checks by itself.
+#[test]
+fn a_wrong_camera_and_wrong_turns_are_found_before_training() {
+    let drive = Drive::clean();
+    let clean = drive.open();
+    assert_eq!((camera_finding(&clean), turn_finding(&clean)), (None, None));
+    drive.images(|_, image| image::imageops::flip_horizontal_in_place(image));
+    let finding = turn_finding(&drive.open()).unwrap();
+    assert_eq!(finding.severity, Severity::Error);
+    assert!(finding.hint.contains("negate the yaw rate"), "{finding:?}");
+    drive.camera(|k| {
+        for i in [0, 2, 4, 5] {
+            k[i] *= 0.5;
+        }
+    });
+    let finding = camera_finding(&drive.open()).unwrap();
+    assert_eq!(finding.severity, Severity::Error);
+    assert!(finding.hint.contains("the images' own size"), "{finding:?}");
 }
 
 #[test]
@@ -537,6 +559,20 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
         finding.frame.is_some_and(|f| (39..=41).contains(&f)),
         "{finding:?}"
     );
+}
+
+/// A recorder that drops nothing: its log merely ends before the images do.
+#[test]
+fn a_log_that_ends_early_is_told_from_one_with_gaps() {
+    let drive = Drive::clean();
+    let images = drive.open().frames().len();
+    drive.remove_oxts(images - 8..images);
+    let diagnosis = drive.diagnose();
+    let finding = found(&diagnosis, "timing", "time without a motion");
+    let said = finding.what.to_string();
+    assert!(said.contains("before the last image"), "{said}");
+    assert!(!said.contains("after the first"), "{said}");
+    assert!(finding.hint.contains("start_s"), "{finding:?}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use deepfusion_data::{Dataset, OpenOptions};
-use deepfusion_doctor::seen_turns;
+use deepfusion_doctor::{Severity, doctor, seen_turns};
 use deepfusion_sim::{Scene, SimConfig, Simulation, write_kitti};
 
 /// A drive of 60 frames with traffic, whose oxts know every turn.
@@ -134,4 +134,57 @@ fn turns_that_nothing_shows_are_not_made_up() {
     assert!(!turns.is_empty() && turns.len() < 25, "{}", turns.len());
     alone.take_turns(&turns);
     assert!(!alone.yaw_known() && alone.tilt_unknown());
+}
+
+/// A speed without a yaw rate, as GPS and OBD give it: the images show the turns, and the road then shows a wrong unit.
+#[test]
+fn a_wrong_unit_is_found_without_a_yaw_rate() {
+    let at = tempfile::tempdir().unwrap();
+    let truth = drive(&at.path().join("kitti"), Scene::Urban);
+    let folder = at.path().join("folder");
+    std::fs::create_dir(&folder).unwrap();
+    let alone = with_speed_alone(&truth, &folder);
+    assert!(!alone.yaw_known());
+    let found = |severity| {
+        let diagnosis = doctor(&folder, None);
+        let found = diagnosis.findings().into_iter();
+        let of_speed = found.filter(|(_, f)| f.check == "speed" && f.severity >= severity);
+        of_speed.map(|(_, f)| f.hint.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(found(Severity::Note), Vec::<String>::new());
+    let file = folder.join("speed.csv");
+    let speeds = std::fs::read_to_string(&file).unwrap();
+    let in_kmh = speeds.lines().map(|line| {
+        let (time, speed) = line.split_once(',').unwrap();
+        let speed = speed.parse::<f64>();
+        speed.map_or(format!("{line}\n"), |mps| format!("{time},{}\n", 3.6 * mps))
+    });
+    std::fs::write(&file, in_kmh.collect::<String>()).unwrap();
+    let hints = found(Severity::Error);
+    assert!(
+        matches!(&hints[..], [hint] if hint.contains("km/h")),
+        "{hints:?}"
+    );
+    // Where the images show nothing, that it was not checked is said.
+    let grey = image::RgbImage::from_pixel(320, 96, image::Rgb([90; 3]));
+    for frame in alone.frames() {
+        grey.save(frame.image.path()).unwrap();
+    }
+    let diagnosis = doctor(&folder, None);
+    let found = diagnosis.findings();
+    let note = found.iter().find(|(_, f)| f.check == "speed").unwrap().1;
+    assert_eq!(note.severity, Severity::Note);
+    assert!(note.what.to_string().contains("km/h"), "{note:?}");
+}
+
+/// A stretch of a drive has the images and the motion of its frames, and no others.
+#[test]
+fn a_part_of_a_drive_is_one() {
+    let at = tempfile::tempdir().unwrap();
+    let whole = drive(at.path(), Scene::Urban);
+    let part = whole.with_frames(10..20);
+    assert_eq!(part.frames(), &whole.frames()[10..20]);
+    assert_eq!(part.selected(), (0..10).collect::<Vec<_>>());
+    assert_eq!(part.load_image(3).unwrap(), whole.load_image(13).unwrap());
+    assert_eq!(part.camera_motion(2, 3), whole.camera_motion(12, 13));
 }

@@ -148,6 +148,12 @@ impl DepthSet {
         self.frames.len() + self.simulated.iter().map(|s| s.views).sum::<usize>()
     }
 
+    /// Those that were recorded and not simulated.
+    #[must_use]
+    pub fn recorded(&self) -> usize {
+        self.frames.len()
+    }
+
     /// Whether there is nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -14,6 +14,10 @@ pub enum TrainEvent {
         steps: usize,
         /// Training samples.
         samples: usize,
+        /// Of these, images with known depth that were recorded.
+        known_depth: usize,
+        /// And those that are simulated.
+        simulated: usize,
         /// Held-out samples.
         validation_samples: usize,
         /// The data's mean displacement per pair, in metres.

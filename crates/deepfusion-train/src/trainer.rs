@@ -261,6 +261,8 @@ impl Trainer {
             from_step: self.state.step,
             steps,
             samples: self.train.samples.len() + self.train.depth.len(),
+            known_depth: self.train.depth.recorded(),
+            simulated: self.train.depth.len() - self.train.depth.recorded(),
             validation_samples: self.validation.samples.len() + self.validation.depth.len(),
             mean_displacement_m: self.train.mean_displacement_m(),
         });

@@ -92,7 +92,7 @@ pub(crate) enum Command {
     /// Train on drives, without depth labels.
     #[cfg(feature = "train")]
     Train(Box<TrainArgs>),
-    /// Fine-tune an existing network on new drives; the result is kept only if no check gets worse.
+    /// Fine-tune an existing network on new drives; the result is kept only if no check gets clearly worse.
     #[cfg(feature = "train")]
     Adapt(Box<AdaptArgs>),
     /// What can be configured.

@@ -24,6 +24,7 @@ struct Made<'a> {
 
 /// `deepfusion data convert`.
 pub(super) fn run(args: &ConvertArgs) -> Result<()> {
+    warnings::warn_of_hfov(args.hfov);
     let ends_in = |ending: &str| has_ending(&args.out, ending);
     // It would become a folder of that name, and nobody who names a bag wants one.
     if ends_in("mcap") || ends_in("db3") {

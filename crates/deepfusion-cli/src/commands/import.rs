@@ -7,7 +7,7 @@ use deepfusion_logs::{
     Camera, Clock, DriveFolder, LogNote, Media, ReadOptions, Speed, read_all, time_on_clock,
 };
 
-use super::clocks;
+use super::{clocks, warnings};
 use crate::cli::{CameraIntrinsics, ClockOffset, ImportArgs};
 use crate::error::CliError;
 use crate::failure::{Reportable, Result};
@@ -28,6 +28,7 @@ struct Imported<'a> {
 
 /// `deepfusion data import`.
 pub(super) fn run(args: &ImportArgs) -> Result<()> {
+    warnings::warn_of_hfov(args.hfov);
     let named = [&args.video, &args.images, &args.calibration];
     if let Some(path) = named.into_iter().flatten().find(|path| !path.exists()) {
         return Err(deepfusion_data::Error::file(path, ErrorKind::NotFound.into()).into());

@@ -2,10 +2,12 @@ use std::path::PathBuf;
 
 use deepfusion_data::{Inspection, OpenOptions, write_bag_config, write_overlays};
 use deepfusion_doctor::inspect;
+use deepfusion_geometry::Intrinsics;
 use deepfusion_hint::count_of;
+use deepfusion_jobs::bulk::looks_of_another_size;
 
 use crate::cli::{CameraIntrinsics, InspectArgs};
-use crate::commands::clocks;
+use crate::commands::{clocks, warnings};
 use crate::error::CliError;
 use crate::failure::{Reportable, Result};
 use crate::output;
@@ -13,6 +15,7 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion data inspect`.
 pub(super) fn run(args: &InspectArgs) -> Result<()> {
+    warnings::warn_of_hfov(args.hfov);
     let mut options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,
@@ -39,6 +42,10 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
         Vec::new()
     };
     print(&inspection, args.json)?;
+    if let Some(camera) = camera(&inspection).filter(looks_of_another_size) {
+        let path = args.path.display();
+        tracing::warn!("{path}: {}", warnings::of_another_size(&camera));
+    }
     for file in written {
         say(&format!("{} written", file.display()));
     }
@@ -55,6 +62,13 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// The camera of the images, where there are any.
+fn camera(inspection: &Inspection) -> Option<Intrinsics> {
+    let (k, [width, height]) = inspection.intrinsics.zip(inspection.size)?;
+    let numbers = [k.fx, k.fy, k.cx, k.cy];
+    Some(Intrinsics::from_numbers(numbers, (width, height)))
 }
 
 fn print(inspection: &Inspection, json: bool) -> Result<()> {

@@ -18,6 +18,7 @@ use crate::{Error, MotionModel, Result, image_size};
 use deepfusion_geometry::{Intrinsics, Se3};
 use image::RgbImage;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -86,6 +87,19 @@ impl Dataset {
     pub(crate) fn with_selected(mut self, selected: Vec<(usize, Option<usize>)>) -> Self {
         (self.selected, self.split_places) = selected.into_iter().unzip();
         self
+    }
+
+    /// The same drive with some of its frames alone, by index, all of them selected.
+    ///
+    /// # Panics
+    /// If the range ends beyond the frames.
+    #[must_use]
+    pub fn with_frames(&self, range: Range<usize>) -> Self {
+        let mut part = self.clone();
+        part.parts.frames = self.frames()[range].to_vec();
+        part.selected = (0..part.frames().len()).collect();
+        part.split_places = vec![None; part.frames().len()];
+        part
     }
 
     /// With what the options select; for layouts of one drive and one camera.

@@ -151,7 +151,7 @@ impl Hint for Error {
             Self::Offsets { .. } => "use [1] for pairs or [-1, 1] for three frames",
             Self::OneFrame { .. } => "evaluate on it, but train on a longer drive",
             Self::Standing { .. } => {
-                "a standing camera shows no parallax: leave the drive out, or lower the smallest speed"
+                "a standing camera shows no parallax: leave the drive out, or lower min_speed_mps of the training's configuration"
             }
             Self::NoPairs {
                 frame_distance_m, ..

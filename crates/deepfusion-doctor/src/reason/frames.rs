@@ -39,6 +39,14 @@ pub enum FramesReason {
         /// The number of the frame from which the first is.
         first: u64,
     },
+    /// The log of speeds does not cover all images.
+    #[error("the speeds {}: frames beyond them cannot train", beside(*before_s, *after_s))]
+    BesideLog {
+        /// For how long the images are without it at their beginning, seconds.
+        before_s: f64,
+        /// And at their end.
+        after_s: f64,
+    },
     /// Frames are the frame before once more.
     #[error(
         "{repeated} of {} {} the frame before once more while the vehicle moves, the first of them frame {first}: {} teaches that everything is infinitely far",
@@ -81,6 +89,10 @@ impl FramesReason {
             Self::UnknownMotion { .. } => {
                 "find out where the recorder drops messages of the speed, or cut the recording there"
             }
+            Self::BesideLog { .. } => {
+                "start the log before the camera and stop it after; if it was so, the clocks differ: start_s in dataset.toml, or clock.camera_ahead_s, \
+                 moves the images"
+            }
             Self::Repeated { .. } => {
                 "record at the camera's own rate, and remove the repeated frames (time stamps and all)"
             }
@@ -88,6 +100,17 @@ impl FramesReason {
                 "cut the standing parts out, or see whether the speed signal drops out"
             }
         }
+    }
+}
+
+/// Where speeds begin and end within the images.
+fn beside(before_s: f64, after_s: f64) -> String {
+    let begin = format!("begin {before_s:.1} s after the first image");
+    let end = format!("end {after_s:.1} s before the last");
+    match (before_s > 0.0, after_s > 0.0) {
+        (true, true) => format!("{begin} and {end}"),
+        (true, false) => begin,
+        _ => format!("{end} image"),
     }
 }
 
@@ -121,6 +144,20 @@ mod tests {
                 lost(12),
                 "12 frames are missing at 10.0 frames a second, the first before frame 31: pairs across a gap are left out or move further \
                  than others",
+            ),
+            (
+                FramesReason::BesideLog {
+                    before_s: 0.0,
+                    after_s: 0.8,
+                },
+                "the speeds end 0.8 s before the last image: frames beyond them cannot train",
+            ),
+            (
+                FramesReason::BesideLog {
+                    before_s: 0.5,
+                    after_s: 0.8,
+                },
+                "the speeds begin 0.5 s after the first image and end 0.8 s before the last: frames beyond them cannot train",
             ),
             (
                 unknown(1),

@@ -10,6 +10,15 @@ pub enum MotionReason {
     /// The speeds contradict the road in the images.
     #[error("{0}")]
     Road(SpeedWarning),
+    /// Neither road nor poses say whether the speeds are right.
+    #[error(
+        "neither road nor poses show whether the speeds are right: by them the vehicle drives up to {fastest_mps:.1} m/s ({:.0} km/h)",
+        3.6 * fastest_mps
+    )]
+    Unchecked {
+        /// The highest speed, m/s.
+        fastest_mps: f64,
+    },
     /// The recording's own poses contradict its speeds.
     #[error(
         "the poses go {by_poses_m:.0} m, the speeds {by_speeds_m:.0} m: depths would come out {depth_factor:.2} times as large"
@@ -133,6 +142,9 @@ impl MotionReason {
                 }
                 None => "see the speed signal's unit and factor, and the camera's focal length",
             },
+            Self::Unchecked { .. } => {
+                "was it as fast? With a wrong unit (km/h taken for m/s) every depth would be wrong by the same factor"
+            }
             Self::Poses { .. } => {
                 "see the speed signal's unit and factor (km/h is 3.6, a worn tyre 1.02)"
             }
@@ -159,7 +171,7 @@ impl MotionReason {
             }
             Self::ClockOffset { camera_ahead_s, .. } => {
                 return format!(
-                    "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one \
+                    "clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or a clock offset of {:.0} ms given. Better: one \
                      clock for all (PTP, trigger)",
                     1e3 * camera_ahead_s
                 );
@@ -192,6 +204,10 @@ mod tests {
         };
         assert_eq!(MotionReason::Road(road).to_string(), road.to_string());
         for (reason, said) in [
+            (
+                MotionReason::Unchecked { fastest_mps: 50.04 },
+                "neither road nor poses show whether the speeds are right: by them the vehicle drives up to 50.0 m/s (180 km/h)",
+            ),
             (
                 MotionReason::Poses {
                     by_poses_m: 100.2,
@@ -322,7 +338,7 @@ mod tests {
             ),
             (
                 clock,
-                "clock.camera_ahead_s = 0.120 in the file beside the recording, or a clock offset of 120 ms given. Better: one clock for all \
+                "clock.camera_ahead_s = 0.120 in dataset.toml or the TOML file beside a bag, or a clock offset of 120 ms given. Better: one clock for all \
                  (PTP, trigger)",
             ),
         ] {

@@ -1,7 +1,7 @@
 //! What of a recording cannot be read, or is taken for granted.
 
 use crate::shared_error::SharedError;
-use deepfusion_data::{DataWarning, Error, IncompleteWarning};
+use deepfusion_data::{DataWarning, Error};
 use deepfusion_hint::Hint;
 
 /// What of a recording cannot be read, or is taken for granted.
@@ -53,17 +53,7 @@ impl OpeningReason {
                 return problem.hint().unwrap_or_else(|| known.to_owned());
             }
             Self::NoTurns | Self::CourseAlone => "record an inertial unit or the steering angle",
-            Self::Warning(DataWarning::Incomplete(
-                IncompleteWarning::Damaged(_) | IncompleteWarning::Unreadable { .. },
-            )) => {
-                "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
-            }
-            Self::Warning(DataWarning::Incomplete(IncompleteWarning::PassedOver { .. })) => {
-                "give what is to be read as well by its own path"
-            }
-            Self::Warning(_) => {
-                "see that it is so, or say otherwise in the file beside the recording"
-            }
+            Self::Warning(warning) => super::taken::hint(warning),
         };
         text.to_owned()
     }

@@ -7,7 +7,7 @@ use deepfusion_hint::count_of;
 #[non_exhaustive]
 pub enum MotionSkip {
     /// Neither road nor poses tell of the speeds.
-    #[error("no road to see (too dark, too plain, or no yaw rate), and no poses")]
+    #[error("no road to see (too dark, too plain, or turns that nothing shows), and no poses")]
     NoRoad,
     /// No LiDAR tells of the speeds.
     #[error("no LiDAR with radial velocities, or no scans of it while the vehicle moves")]
@@ -75,7 +75,7 @@ mod tests {
         for (reason, said) in [
             (
                 MotionSkip::NoRoad,
-                "no road to see (too dark, too plain, or no yaw rate), and no poses",
+                "no road to see (too dark, too plain, or turns that nothing shows), and no poses",
             ),
             (
                 MotionSkip::NoDynamicPoints,

@@ -112,8 +112,9 @@ impl Check {
         }
     }
 
-    /// The most that is not worse than `before`.
-    fn most(self, before: f64) -> f64 {
+    /// The most that does not count as worse than `before`: the same network gives as much on other frames of the same drive.
+    #[must_use]
+    pub fn most(self, before: f64) -> f64 {
         match self {
             Self::Reprojection => before * (1.0 + REPROJECTION),
             Self::Consistency | Self::Flip => {

@@ -21,7 +21,7 @@ pub enum ImageWarning {
     },
     /// Nobody gave the camera: the one that the network's run learned is taken.
     LearnedCamera,
-    /// The camera that was given looks like that of images of another size.
+    /// The camera that was given, or that the recording says, looks like that of images of another size.
     OtherSize {
         /// The image.
         image: PathBuf,
@@ -73,12 +73,14 @@ impl<'a> Warnings<'a> {
                 let warn = || (self.warn)(ImageWarning::LearnedCamera);
                 self.camera.call_once(warn);
             }
-            CameraFrom::Given => self.of_given(&input.path, loaded.camera),
-            CameraFrom::Recording | CameraFrom::Exif | CameraFrom::Unknown => {}
+            CameraFrom::Given | CameraFrom::Recording => {
+                self.of_known(&input.path, loaded.camera);
+            }
+            CameraFrom::Exif | CameraFrom::Unknown => {}
         }
     }
 
-    fn of_given(&self, image: &Path, camera: Option<Intrinsics>) {
+    fn of_known(&self, image: &Path, camera: Option<Intrinsics>) {
         if let Some(camera) = camera.filter(looks_of_another_size) {
             self.size.call_once(|| {
                 let image = image.to_owned();
@@ -144,10 +146,10 @@ mod tests {
         };
         let (own, twice) = ([56.0, 56.0, 47.0, 31.0], [112.0, 112.0, 95.0, 63.0]);
         seen("a", own, CameraFrom::Given);
-        seen("b", twice, CameraFrom::Recording);
+        seen("b", own, CameraFrom::Recording);
         assert!(given.lock().unwrap().is_empty());
-        for name in ["c", "d"] {
-            seen(name, twice, CameraFrom::Given);
+        for (name, from) in [("c", CameraFrom::Recording), ("d", CameraFrom::Given)] {
+            seen(name, twice, from);
             seen(name, own, CameraFrom::Learned);
         }
         let other_size = ImageWarning::OtherSize {

@@ -14,6 +14,8 @@ pub fn event_line(event: &TrainEvent) -> Option<String> {
             from_step,
             steps,
             samples,
+            known_depth,
+            simulated,
             validation_samples,
             mean_displacement_m,
         } => {
@@ -29,8 +31,9 @@ pub fn event_line(event: &TrainEvent) -> Option<String> {
                 String::new()
             };
             format!(
-                "{}, {validation_samples} held out{moved}; {}{going_on}",
+                "{}{}, {validation_samples} held out{moved}; {}{going_on}",
                 count_of(*samples, "training sample"),
+                kinds_of(*samples, *known_depth, *simulated),
                 count_of(*steps, "step")
             )
         }
@@ -74,6 +77,26 @@ pub fn event_line(event: &TrainEvent) -> Option<String> {
             return None;
         }
     })
+}
+
+/// What samples are, where they are not all of video.
+fn kinds_of(samples: usize, known_depth: usize, simulated: usize) -> String {
+    let of_video = samples - known_depth - simulated;
+    let kinds = [
+        (of_video, "of video"),
+        (known_depth, "of known depth"),
+        (simulated, "simulated"),
+    ];
+    let there: Vec<String> = kinds
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, kind)| format!("{count} {kind}"))
+        .collect();
+    if of_video == samples {
+        String::new()
+    } else {
+        format!(" ({})", there.join(", "))
+    }
 }
 
 /// The terms of what a step learned from.
@@ -142,6 +165,32 @@ mod tests {
         losses.speed = 0.0;
         assert_eq!(held_out_terms(&losses), "reprojection 0.1250");
         assert_eq!(scale_text(f64::NAN), "");
+    }
+
+    #[test]
+    fn samples_of_several_kinds_are_counted_apart() {
+        let started = |known_depth, simulated| {
+            let event = TrainEvent::Started {
+                from_step: 0,
+                steps: 240,
+                samples: 105 + known_depth + simulated,
+                known_depth,
+                simulated,
+                validation_samples: 39,
+                mean_displacement_m: 0.5,
+            };
+            let line = event_line(&event).unwrap();
+            line.split_once(", 39 held out").unwrap().0.to_owned()
+        };
+        assert_eq!(started(0, 0), "105 training samples");
+        assert_eq!(
+            started(0, 2000),
+            "2105 training samples (105 of video, 2000 simulated)"
+        );
+        assert_eq!(
+            started(7, 0),
+            "112 training samples (105 of video, 7 of known depth)"
+        );
     }
 
     #[test]

@@ -68,7 +68,7 @@ impl TrainConfig {
         let mut config = Value::Table(table_of(self)?);
         setting_key::put(&mut config, key, value).map_err(wrong)?;
         let changed = config.try_into::<Self>();
-        *self = changed.map_err(|e| wrong(SettingProblem::Value(e.into())))?;
+        *self = changed.map_err(|e| wrong(setting_key::problem(key, e)))?;
         Ok(())
     }
 }
@@ -151,6 +151,29 @@ mod tests {
         // Values are checked as in a whole file.
         let error = read("preset = \"light\"\nclip_norm = -1.0\n").unwrap_err();
         assert!(error.to_string().contains("`clip_norm`"), "{error}");
+    }
+
+    #[test]
+    fn a_key_that_is_misspelt_is_named_with_what_was_meant() {
+        let said = |assignment: &str| {
+            let mut config = Preset::Light.config();
+            config.set(assignment).unwrap_err().to_string()
+        };
+        for (assignment, expected) in [
+            (
+                "bacth=3",
+                "bacth=3: there is no key `bacth`: did you mean `batch`?",
+            ),
+            (
+                "loss.smothness=0.1",
+                "loss.smothness=0.1: there is no key `loss.smothness`: did you mean `loss.smoothness`?",
+            ),
+            ("hope=1", "hope=1: there is no key `hope`"),
+        ] {
+            assert_eq!(said(assignment), expected);
+        }
+        // The key is right, and the value is not.
+        assert!(!said("batch=many").contains("there is no key"));
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod config_keys;
 mod data_set;
 mod findings;
 mod loss_config;
+mod nearest_key;
 mod preset;
 mod sample_factors;
 mod setting_key;

@@ -1,5 +1,6 @@
 //! The way to one value of a configuration: names with dots between tables, places in lists, as in `data.sets[0].learn`.
 
+use super::nearest_key::nearest_keys;
 use crate::SettingProblem;
 use toml::{Table, Value};
 
@@ -22,10 +23,8 @@ pub(super) fn put(
     key: &str,
     value: Option<Value>,
 ) -> Result<(), SettingProblem> {
-    let no_such_key = || SettingProblem::NoSuchKey {
-        key: key.to_owned(),
-    };
     let steps = steps(key)?;
+    let no_such_key = || no_such_key(&steps);
     let mut at = config;
     for (done, step) in steps.iter().enumerate() {
         let (way, next) = (&steps[..done], steps.get(done + 1));
@@ -82,6 +81,35 @@ pub(super) fn put(
         };
     }
     Ok(())
+}
+
+/// What is wrong with a value that was put where `key` says, by the error of whoever read the whole: that there is no such key, or the value.
+pub(super) fn problem(key: &str, error: toml::de::Error) -> SettingProblem {
+    // serde's words.
+    let is_unknown = error.message().starts_with("unknown field");
+    match steps(key) {
+        Ok(steps) if is_unknown && known(&steps).is_none() => no_such_key(&steps),
+        _ => SettingProblem::Value(error.into()),
+    }
+}
+
+/// That nothing has this name, and what may have been meant.
+fn no_such_key(way: &[Step<'_>]) -> SettingProblem {
+    let any_place = text(way, |_| "[]".to_owned());
+    let nearest = nearest_keys(&any_place, &crate::config_keys());
+    let nearest = nearest.into_iter().map(|key| with_places(key, way));
+    SettingProblem::NoSuchKey {
+        key: written(way),
+        nearest: nearest.collect(),
+    }
+}
+
+/// A key with the places of a way in its lists.
+fn with_places(key: String, way: &[Step<'_>]) -> String {
+    way.iter().fold(key, |key, step| match step {
+        Step::Place(place) => key.replacen("[]", &format!("[{place}]"), 1),
+        Step::Name(_) => key,
+    })
 }
 
 fn steps(key: &str) -> Result<Vec<Step<'_>>, SettingProblem> {
@@ -224,7 +252,7 @@ mod tests {
         }
         assert_eq!(
             said("assumed_camera.hfov", None),
-            "there is no key `assumed_camera.hfov`"
+            "there is no key `assumed_camera.hfov`: did you mean `assumed_camera.hfov_deg`?"
         );
     }
 
@@ -246,7 +274,7 @@ mod tests {
         );
         assert_eq!(
             said("augmentation.seizes[0].width", value()),
-            "there is no key `augmentation.seizes[0].width`"
+            "there is no key `augmentation.seizes[0].width`: did you mean `augmentation.sizes[0].width`?"
         );
     }
 

@@ -1,5 +1,6 @@
 //! A clean simulated drive in KITTI's layout, and faults planted into copies of it.
 
+use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_doctor::{Diagnosis, doctor};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use image::RgbImage;
@@ -46,6 +47,13 @@ impl Drive {
 
     pub(crate) fn diagnose(&self) -> Diagnosis {
         doctor(&self.folder.path().join("kitti"), None)
+    }
+
+    pub(crate) fn open(&self) -> Dataset {
+        let root = self.folder.path().join("kitti");
+        Dataset::open(&root, &OpenOptions::default())
+            .unwrap()
+            .remove(0)
     }
 
     fn date(&self) -> PathBuf {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use deepfusion_doctor::{CheckSummary, Diagnosis, Outcome, Severity, Status};
+use deepfusion_doctor::{CheckSummary, Diagnosis, Outcome, Severity, SkipReason, Status};
 use deepfusion_hint::count_of;
 
 /// The checks as lines of text.
@@ -14,10 +14,25 @@ pub(super) fn of(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// The checks by name, in the order in which they come, each with how it came out in all drives.
+/// The checks by name, in the order in which they come, each with how it came out in all drives. Those that had nothing to look at, because
+/// the recording cannot be opened, are one row.
 pub(super) fn rows(diagnosis: &Diagnosis) -> Vec<(&'static str, String)> {
-    let checks = diagnosis.checks().into_iter();
-    checks.map(|check| (check.check, summary(&check))).collect()
+    let (unopened, checks): (Vec<_>, Vec<_>) =
+        diagnosis.checks().into_iter().partition(had_nothing);
+    let mut rows: Vec<_> = checks
+        .iter()
+        .map(|check| (check.check, summary(check)))
+        .collect();
+    if let Some(first) = unopened.first() {
+        rows.push(("all others", summary(first)));
+    }
+    rows
+}
+
+/// Whether the recording could not be opened for a check.
+fn had_nothing(check: &CheckSummary<'_>) -> bool {
+    let mut outcomes = check.outcomes.iter();
+    outcomes.all(|(_, outcome)| outcome.skipped == Some(SkipReason::NotOpened))
 }
 
 /// How one check came out.

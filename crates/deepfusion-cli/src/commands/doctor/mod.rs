@@ -15,7 +15,7 @@ use deepfusion_hint::count_of;
 use deepfusion_logs::ReadOptions;
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
-use crate::commands::clocks;
+use crate::commands::{clocks, warnings};
 use crate::devices::ComputeDevice;
 use crate::error::CliError;
 use crate::failure::{Reportable, Result, in_options};
@@ -42,6 +42,7 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     if is_log {
         return log(path, args);
     }
+    warnings::warn_of_hfov(args.hfov);
     if let Some(file) = &args.report {
         output::require_new(file, args.overwrite)?;
     }

@@ -58,6 +58,7 @@ pub(super) fn outcome(args: &EvalArgs) -> Result<EvaluationOutcome> {
 
 /// Opens the network and the recordings; what cannot be kept afterwards is refused before anything is measured.
 fn open(args: &EvalArgs) -> Result<EvalInputs> {
+    warnings::warn_of_hfov(args.hfov);
     let model = model::chosen(args.model.as_deref())?;
     if args.calibrate_confidence && model.folder().is_none() {
         let (option, model) = ("--calibrate-confidence", model.name());

@@ -211,6 +211,7 @@ pub(super) fn job<'a>(
     model: &'a ModelSource,
     estimator: &DepthEstimator,
 ) -> Result<DepthJob<'a>> {
+    recordings::warn_of_hfov(args.hfov);
     let (settings, out) = (settings(args), &args.out);
     // What shows the layers is a second network: it is not opened for a job that is refused.
     if outputs.need_uncertainty() && !estimator.knows_uncertainty() {

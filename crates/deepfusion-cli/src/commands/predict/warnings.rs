@@ -2,6 +2,8 @@
 
 use deepfusion_jobs::bulk::ImageWarning;
 
+use crate::commands::warnings::of_another_size;
+
 /// Warns on stderr.
 pub(super) fn print(warning: ImageWarning) {
     match warning {
@@ -19,15 +21,9 @@ pub(super) fn print(warning: ImageWarning) {
             "no intrinsics given: the camera that the run learned is taken, so the metres are only as right as that is \
              (camera_known: false; give --intrinsics, --hfov or --calib)"
         ),
-        ImageWarning::OtherSize { image, camera: k } => tracing::warn!(
-            "{}: the principal point {:.1}, {:.1} is far from the middle of {}x{}: are the numbers those of images of another size? \
-             Metres are then wrong by the ratio of the two sizes",
-            image.display(),
-            k.cx,
-            k.cy,
-            k.width,
-            k.height
-        ),
+        ImageWarning::OtherSize { image, camera } => {
+            tracing::warn!("{}: {}", image.display(), of_another_size(&camera));
+        }
         ImageWarning::PoorFit { image, fit } => {
             tracing::warn!("{}: {fit} (others like it are not named)", image.display());
         }

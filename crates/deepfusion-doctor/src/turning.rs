@@ -1,0 +1,74 @@
+//! A drive that turns as its images show, where nothing else says how it turned.
+
+use super::heading::heading;
+use super::seen_turns::seen_turns;
+use deepfusion_data::{Dataset, Heading};
+use std::ops::Range;
+
+/// Frames in a row that are read: training reads all, which takes minutes of a long drive, and a part shows as well whether the speeds are right.
+const STRETCH: usize = 300;
+
+/// A stretch of the drive that turns as its images show, its camera aimed where no mount is given, as training takes it; `None` where its
+/// turns are recorded, where its speeds are not, and where the images do not show them.
+pub(crate) fn turning_as_seen(dataset: &Dataset) -> Option<Dataset> {
+    if dataset.yaw_known() || !dataset.tilt_unknown() {
+        return None;
+    }
+    let stretch = dataset.with_frames(longest_way(dataset)?);
+    let mut turning = turned(&stretch);
+    if stretch.mount_assumed() {
+        // Where it heads shows once its turns are known, and these are surer once it is known where it heads.
+        let sure = heading(&turning).ok().filter(Heading::is_sure);
+        if let Some(heading) = sure {
+            let mut aimed = stretch;
+            aimed.aim(&heading);
+            turning = turned(&aimed);
+        }
+    }
+    turning.yaw_known().then_some(turning)
+}
+
+fn turned(dataset: &Dataset) -> Dataset {
+    let mut turning = dataset.clone();
+    turning.take_turns(&seen_turns(dataset).turns);
+    turning
+}
+
+/// The frames of [`STRETCH`] in a row between which the vehicle goes the longest way: where it stands, no road moves. `None` without speeds.
+fn longest_way(dataset: &Dataset) -> Option<Range<usize>> {
+    let ego = dataset.ego().ok()?;
+    let frames = dataset.frames();
+    let way = |pair: usize| {
+        let times = frames[pair].time_s.zip(frames[pair + 1].time_s);
+        let motion = times.and_then(|(from_s, to_s)| ego.vehicle_motion(from_s, to_s));
+        motion.map_or(0.0, |motion| motion.distance_m.abs())
+    };
+    let ways: Vec<f64> = (0..frames.len().saturating_sub(1)).map(way).collect();
+    Some(longest(&ways, STRETCH))
+}
+
+/// Of so many frames in a row those with the longest way, by the way from each frame to the next; all where there are no more.
+fn longest(ways: &[f64], most: usize) -> Range<usize> {
+    let frames = ways.len() + 1;
+    let length = most.min(frames);
+    let last = frames - length;
+    let starts = (0..last).step_by((most / 2).max(1)).chain([last]);
+    let way = |start: &usize| ways[*start..start + length - 1].iter().sum::<f64>();
+    let start = starts.max_by(|a, b| way(a).total_cmp(&way(b))).unwrap_or(0);
+    start..start + length
+}
+
+#[cfg(test)]
+mod tests {
+    use super::longest;
+
+    #[test]
+    fn the_stretch_with_the_longest_way_is_read() {
+        assert_eq!(longest(&[], 4), 0..1);
+        assert_eq!(longest(&[1.0; 3], 4), 0..4);
+        assert_eq!(longest(&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0], 4), 3..7);
+        let mut ways = [0.0; 20];
+        ways[7..12].fill(1.0);
+        assert_eq!(longest(&ways, 6), 6..12);
+    }
+}

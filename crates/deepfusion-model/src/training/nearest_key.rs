@@ -1,0 +1,45 @@
+//! Which keys may have been meant by one that no configuration has.
+
+use super::ConfigKey;
+use strsim::osa_distance;
+
+/// Most keys that are named.
+const MOST: usize = 3;
+
+/// Those with the fewest letters to change, in their order; none where that is more than a third of them. A name alone may be meant in any table.
+pub(super) fn nearest_keys(key: &str, known: &[ConfigKey]) -> Vec<String> {
+    let changes = |known: &ConfigKey| {
+        let of_all = osa_distance(key, &known.key);
+        if key.contains('.') {
+            of_all
+        } else {
+            of_all.min(osa_distance(key, known.name()))
+        }
+    };
+    let most = (key.chars().count() / 3).max(1);
+    let Some(least) = known.iter().map(changes).min().filter(|n| *n <= most) else {
+        return Vec::new();
+    };
+    let nearest = known.iter().filter(|known| changes(known) == least);
+    nearest.take(MOST).map(|known| known.key.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config_keys;
+
+    #[test]
+    fn a_slip_is_understood() {
+        let keys = config_keys();
+        for (key, meant) in [
+            ("bacth", &["batch"][..]),
+            ("loss.smothness", &["loss.smoothness"]),
+            ("smoothness", &["loss.smoothness"]),
+            ("data.sets[].lern", &["data.sets[].learn"]),
+            ("hope", &[]),
+        ] {
+            assert_eq!(nearest_keys(key, &keys), meant, "{key}");
+        }
+    }
+}
