@@ -393,15 +393,16 @@ fn a_run_shows_its_curve_and_panels() {
         .save(run.path().join("panels/000034.png"))
         .unwrap();
     // The last line is being written.
-    let log =
-        "step,split,total,speed\n1,train,0.5,1\n2,train,0.4,NaN\n2,validation,0.45,\n3,train,0.3";
+    let log = "step,split,total,speed,flow\n1,train,0.5,1,0\n2,train,0.4,NaN,0\n2,validation,0.45,,\n3,train,0.3";
     std::fs::write(run.path().join("log.csv"), log).unwrap();
     let server = Running::start(run.path(), None);
     let answer = server.json("/api/runs/0/training");
     assert_eq!(
         answer["train"],
-        json!({"step": [1.0, 2.0], "total": [0.5, 0.4], "speed": [1.0, null]})
+        json!({"step": [1.0, 2.0], "total": [0.5, 0.4], "speed": [1.0, null], "flow": [0.0, 0.0]})
     );
+    // What is zero throughout is not drawn.
+    assert_eq!(answer["columns"], json!(["step", "total", "speed"]));
     assert_eq!(answer["validation"]["total"], json!([0.45]));
     assert_eq!(answer["panels"], json!(["000034.png"]));
     assert_eq!(server.get("/api/runs/0/panel/000034.png").0, 200);
