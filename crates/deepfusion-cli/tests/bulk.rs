@@ -322,7 +322,7 @@ fn what_is_there_is_kept_only_where_nothing_changed() {
     fails(
         at,
         &predict("--save npy --intrinsics 60,120,47,31"),
-        &["another camera"],
+        &["another camera (--hfov, --intrinsics, --calib)"],
     );
     fails(at, &predict("--save npy --stretch"), &["--stretch"]);
     ok(at, "train --out run --resume --steps 2");
