@@ -52,6 +52,40 @@ fn depth_arrives_as_it_lies_in_the_file() {
     assert_eq!(body[16..], expected);
 }
 
+/// What a sidecar does not name was made before it, perhaps by another camera.
+#[test]
+fn only_outputs_that_the_sidecar_names_are_shown() {
+    let folder = results(2);
+    let earlier = ndarray::Array2::<f32>::ones((48, 96));
+    for i in 0..2 {
+        for what in ["depth", "sigma"] {
+            let file = format!("{i:06}_{what}.npy");
+            ndarray_npy::write_npy(folder.path().join(file), &earlier).unwrap();
+        }
+    }
+    write_sidecar(
+        folder.path(),
+        "000000",
+        &json!({"files": ["000000_depth.png"]}),
+    );
+    let server = Running::start(folder.path(), None);
+    let index = server.json("/api/runs/0/index");
+    assert_eq!(index["has_depth"], json!([1, 1]));
+    assert_eq!(index["has_sigma"], json!([0, 1]));
+    let depth_of = |frame: &str| {
+        let details = server.json(&format!("/api/runs/0/frame/{frame}"));
+        let (status, body) = server.get(&format!("/api/runs/0/depth/{frame}"));
+        assert_eq!(status, 200);
+        // 0 are steps of a PNG, 1 metres.
+        (details["depth"].clone(), body[12])
+    };
+    assert_eq!(depth_of("000000"), (json!("000000_depth.png"), 0));
+    assert_eq!(server.get("/api/runs/0/sigma/000000").0, 404);
+    // One of another program names none: all is shown.
+    assert_eq!(depth_of("000001"), (json!("000001_depth.npy"), 1));
+    assert_eq!(server.get("/api/runs/0/sigma/000001").0, 200);
+}
+
 #[test]
 fn a_frame_has_its_camera_targets_and_picture() {
     let folder = results(2);
