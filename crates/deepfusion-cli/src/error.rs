@@ -321,7 +321,7 @@ impl Reportable for CliError {
                 hint.as_deref().unwrap_or("mend them"),
                 if unreadable < recordings { ", or give the others by themselves" } else { "" }
             )),
-            Self::OutputsAlone { .. } => Some("give the images themselves, or another folder for the outputs".into()),
+            Self::OutputsAlone { .. } => Some("give the images that they were made of".into()),
             Self::TablesInPicture { .. } => Some("give --out another ending, as .html or .txt".into()),
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),

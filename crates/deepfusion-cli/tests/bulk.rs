@@ -116,6 +116,9 @@ fn shards_started_at_once_make_what_one_run_makes() {
         &format!("{predict} more/0000000000_depth.png --out more"),
         &["0000000000_depth.png: no image", "hint: give the images"],
     );
+    // Nor are they where other outputs go.
+    ok(at, &format!("{predict} more --out apart"));
+    assert_eq!(outputs(&at.join("apart")).len(), 4 * 4);
 }
 
 #[test]

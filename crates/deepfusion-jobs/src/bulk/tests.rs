@@ -12,7 +12,7 @@ use deepfusion_perception::PerceptionConfig;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::*;
-use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs};
+use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs, without_outputs};
 use crate::scene::MotionTracker;
 use crate::{Error, Input, Result, TargetFinder, TargetSettings};
 
@@ -118,6 +118,41 @@ fn depth_is_made_once_and_warned_of_once() {
     assert_eq!((again.done, again.sidecars.len()), (2, 2));
     assert!(warned.is_empty(), "{warned:?}");
     assert_eq!(made_at(), before);
+}
+
+/// Depth of a picture of depth means nothing, but an image that was kept is one.
+#[test]
+fn outputs_are_no_inputs_wherever_they_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (model, mut estimator) = network();
+    let out = folder_for_outputs(at);
+    let forms = [DepthOutput::DepthPng, DepthOutput::Image];
+    let save = DepthOutputs::of(forms, true, outputs().limits);
+    let job = DepthJob::new(
+        settings(None),
+        &out,
+        save,
+        &model,
+        &estimator,
+        None,
+        &|_| (),
+    );
+    let job = job.unwrap();
+    let all = inputs(at, &["a"]);
+    let (loaded, prepared) = job.load(&all[0]).unwrap();
+    let seen = job.see(&mut estimator, &prepared).unwrap();
+    job.writer.write(&all[0], &loaded, &seen).unwrap();
+    let input = |file: &str| Input {
+        path: out.join(file),
+        name: file.to_owned(),
+        frame: None,
+    };
+    let written = ["a_depth.png", "a_image.jpg"].map(input);
+    assert!(written.iter().all(|input| input.path.exists()));
+    let left = |folder: &Path| without_outputs(written.to_vec(), folder);
+    assert_eq!(left(&at.join("other")), written[1..]);
+    assert!(left(&out).is_empty());
 }
 
 /// Another camera's depth beside a new sidecar would pass for that of the new one.
