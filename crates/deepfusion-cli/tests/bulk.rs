@@ -121,6 +121,33 @@ fn shards_started_at_once_make_what_one_run_makes() {
     assert_eq!(outputs(&at.join("apart")).len(), 4 * 4);
 }
 
+/// A look at the beginning, and the rest afterwards.
+#[test]
+fn the_first_of_each_recording_are_done_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 4 --seed 3 --scan-every 0 --size 96x64",
+    );
+    fs::create_dir(at.join("more")).unwrap();
+    for i in 0..3 {
+        let name = format!("000000000{i}.png");
+        fs::copy(at.join(DRIVE).join(&name), at.join("more").join(&name)).unwrap();
+    }
+    let predict = "predict sim more --model tiny --save npy --out out";
+    let said = ok(at, &format!("{predict} --frames 2")).stderr;
+    assert!(said.contains("4 images written"), "{said}");
+    // Their names are those of the whole.
+    let said = ok(at, predict).stderr;
+    assert!(said.contains("3 images written"), "{said}");
+    let line = ok(
+        at,
+        "perceive sim --model tiny --frames 1 --save depth-png --out seen --json",
+    );
+    assert_eq!(line.stdout.lines().count(), 1);
+}
+
 #[test]
 fn a_camera_that_may_be_wrong_is_warned_of() {
     let folder = tempfile::tempdir().unwrap();
