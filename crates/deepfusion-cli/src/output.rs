@@ -79,6 +79,24 @@ pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf>
     Ok(folder)
 }
 
+/// Fails where a run could not be written to the folder asked for: an error before long work, not after it. Where there was no such folder there is none
+/// afterwards.
+#[cfg(feature = "train")]
+pub(crate) fn require_run_folder(asked: &Path) -> Result<()> {
+    let made = !asked.exists();
+    let folder = run_folder(Some(asked), "")?;
+    let probe = deepfusion_fs::Partial::beside(&folder.join("config.toml"));
+    let written = probe.create();
+    // Before the folder, which is then empty again.
+    drop(probe);
+    if made {
+        // The run makes it anew, and whatever prevents that is said then.
+        let _ = std::fs::remove_dir(&folder);
+    }
+    written.map_err(|e| deepfusion_data::Error::file(&folder, e))?;
+    Ok(())
+}
+
 /// A new folder by the command and the time, which of two commands that start at once each has for itself.
 fn new_run_folder(runs: &Path, command: &str) -> Result<PathBuf> {
     make_folder(runs)?;
@@ -126,6 +144,38 @@ mod tests {
         );
         std::fs::write(run.join("file"), "x").unwrap();
         assert!(run_folder(Some(&run), "demo").is_err());
+    }
+
+    #[cfg(feature = "train")]
+    #[test]
+    fn a_run_is_refused_before_it_begins() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = folder.path().join("runs/run");
+        require_run_folder(&run).unwrap();
+        assert!(!run.exists());
+        std::fs::create_dir(&run).unwrap();
+        require_run_folder(&run).unwrap();
+        assert_eq!(std::fs::read_dir(&run).unwrap().count(), 0);
+        std::fs::write(run.join("file"), "x").unwrap();
+        assert!(require_run_folder(&run).is_err());
+    }
+
+    /// Whoever may write everywhere sees nothing of it.
+    #[cfg(all(unix, feature = "train"))]
+    #[test]
+    fn a_folder_that_cannot_be_written_to_is_refused() {
+        use std::os::unix::fs::PermissionsExt;
+
+        let folder = tempfile::tempdir().unwrap();
+        let run = folder.path().join("run");
+        std::fs::create_dir(&run).unwrap();
+        std::fs::set_permissions(&run, std::fs::Permissions::from_mode(0o555)).unwrap();
+        let refused = require_run_folder(&run).map_err(|error| error.to_string());
+        if std::fs::write(run.join("file"), "x").is_ok() {
+            eprintln!("skipped: this user may write everywhere");
+            return;
+        }
+        assert!(refused.unwrap_err().contains("run"));
     }
 
     #[test]

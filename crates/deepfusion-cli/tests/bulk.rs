@@ -116,6 +116,36 @@ fn shards_started_at_once_make_what_one_run_makes() {
         &format!("{predict} more/0000000000_depth.png --out more"),
         &["0000000000_depth.png: no image", "hint: give the images"],
     );
+    // Nor are they where other outputs go.
+    ok(at, &format!("{predict} more --out apart"));
+    assert_eq!(outputs(&at.join("apart")).len(), 4 * 4);
+}
+
+/// A look at the beginning, and the rest afterwards.
+#[test]
+fn the_first_of_each_recording_are_done_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 4 --seed 3 --scan-every 0 --size 96x64",
+    );
+    fs::create_dir(at.join("more")).unwrap();
+    for i in 0..3 {
+        let name = format!("000000000{i}.png");
+        fs::copy(at.join(DRIVE).join(&name), at.join("more").join(&name)).unwrap();
+    }
+    let predict = "predict sim more --model tiny --save npy --out out";
+    let said = ok(at, &format!("{predict} --frames 2")).stderr;
+    assert!(said.contains("4 images written"), "{said}");
+    // Their names are those of the whole.
+    let said = ok(at, predict).stderr;
+    assert!(said.contains("3 images written"), "{said}");
+    let line = ok(
+        at,
+        "perceive sim --model tiny --frames 1 --save depth-png --out seen --json",
+    );
+    assert_eq!(line.stdout.lines().count(), 1);
 }
 
 #[test]
@@ -322,7 +352,7 @@ fn what_is_there_is_kept_only_where_nothing_changed() {
     fails(
         at,
         &predict("--save npy --intrinsics 60,120,47,31"),
-        &["another camera"],
+        &["another camera (--hfov, --intrinsics, --calib)"],
     );
     fails(at, &predict("--save npy --stretch"), &["--stretch"]);
     ok(at, "train --out run --resume --steps 2");

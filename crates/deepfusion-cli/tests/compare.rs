@@ -115,10 +115,12 @@ fn runs_are_reported_kept_and_compared() {
     assert!(ok(at, "compare a --format latex").contains("\\toprule"));
     let csv = ok(at, "compare a b --published --format csv");
     assert!(csv.starts_with("table,run,abs_rel") && csv.contains("Monodepth2"));
-    ok(
+    let written = support::ok(
         at,
         "compare a b --format html --pictures sim --picture-count 2 --out c.html",
     );
+    let said = &written.stderr;
+    assert!(said.contains("c.png") && said.contains("c.html"), "{said}");
     assert!(page(&at.join("c.html")).contains("<div class=\"grid\""));
     let sheet = fs::read(at.join("c.png")).unwrap();
     assert!(sheet.starts_with(b"\x89PNG"));

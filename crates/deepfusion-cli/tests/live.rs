@@ -263,8 +263,8 @@ fn what_cannot_be_opened_is_an_error() {
             "shard",
         ),
         (
-            format!("predict --model run {image} --frames 3 --out a"),
-            "--frames",
+            format!("predict --model run {image} --duration 3 --out a"),
+            "--duration",
         ),
         (
             format!("perceive --model run {image} --speed 0 --out a"),

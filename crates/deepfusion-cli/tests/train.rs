@@ -35,6 +35,14 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         .map(|l| &l[..1])
         .collect();
     assert_eq!(steps, ["1", "2", "3"]);
+    // It cannot become shorter than it is, and stays as it was set.
+    fails(
+        at,
+        "train --out run --resume --steps 2",
+        &["made 3 steps already", "more than 3 steps"],
+    );
+    let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
+    assert!(config.contains("\nsteps = 3\n"), "{config}");
     fails(
         at,
         &format!("train --data sim {SMALL} --steps 1 --out run"),
@@ -192,6 +200,32 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         "train --out run --resume --steps 4",
         &["last.safetensors"],
     );
+    // A run that ended before its first checkpoint.
+    fs::remove_file(at.join("run/last.safetensors")).unwrap();
+    fails(
+        at,
+        "train --out run --resume",
+        &["run: this run has no checkpoint yet", "without --resume"],
+    );
+}
+
+/// Recordings may take long to look at: there are none here, and what comes first is said first.
+#[test]
+fn what_is_wrong_with_start_or_folder_is_said_before_the_recordings_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("taken")).unwrap();
+    fs::write(at.join("taken/file"), "x").unwrap();
+    let train = "train --data no-drive";
+    fails(at, &format!("{train} --init no-weights"), &["no-weights"]);
+    fails(
+        at,
+        &format!("{train} --out taken"),
+        &["taken: already exists"],
+    );
+    fails(at, &format!("{train} --out new"), &["no-drive"]);
+    assert!(!at.join("new").exists());
+    assert!(!at.join("runs").exists());
 }
 
 /// As a scheduler and a closed terminal stop it: saved, never done, and gone on with.

@@ -51,7 +51,7 @@ impl ImageProblem {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Truncated => {
-                "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
+                "the file was cut off while copying or unpacking: fetch it again, or delete it, with its line where times are listed (frames.csv, timestamps.txt), to leave the frame out"
             }
             _ => "PNG and JPEG are read",
         }

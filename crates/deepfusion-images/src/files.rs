@@ -4,11 +4,14 @@ use super::jpeg;
 use crate::{Error, ImageProblem, Result};
 use image::{DynamicImage, ImageError, ImageFormat, ImageReader, ImageResult, RgbImage};
 use std::fs::File;
-use std::io::{BufRead, BufWriter, Cursor, Seek};
+use std::io::{BufRead, BufWriter, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Endings of the files that are taken for images, in small letters.
 pub const IMAGE_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// The chunk that ends every PNG.
+const PNG_END: [u8; 12] = *b"\0\0\0\0IEND\xAE\x42\x60\x82";
 
 /// Whether a file is named like an image.
 #[must_use]
@@ -79,6 +82,29 @@ pub fn image_size(path: &Path) -> Result<(u32, u32)> {
         Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Err(truncated(path)),
         Err(e) => Err(Error::file(path, e)),
     }
+}
+
+/// That an image was not cut off. One that begins and ends as its format does is taken for whole; any other is decoded, as some programs leave out the end or
+/// add to it.
+///
+/// # Errors
+/// As [`load_rgb`].
+pub fn check_whole(path: &Path) -> Result<()> {
+    if has_both_ends(path).unwrap_or(false) {
+        return Ok(());
+    }
+    decode(path).map(drop)
+}
+
+/// Whether a file begins and ends as a PNG or a JPEG.
+fn has_both_ends(path: &Path) -> std::io::Result<bool> {
+    let mut file = File::open(path)?;
+    let (mut begin, mut end) = ([0; 4], [0; 12]);
+    file.read_exact(&mut begin)?;
+    file.seek(SeekFrom::End(-12))?;
+    file.read_exact(&mut end)?;
+    let is_png = begin == *b"\x89PNG" && end == PNG_END;
+    Ok(is_png || (jpeg::is_jpeg(&begin) && end.ends_with(&[0xFF, 0xD9])))
 }
 
 fn reader<R: BufRead + Seek>(input: R, path: &Path) -> Result<ImageReader<R>> {
@@ -159,5 +185,35 @@ mod tests {
         ] {
             assert_eq!(is_image(Path::new(name)), image, "{name}");
         }
+    }
+
+    #[test]
+    fn a_file_that_was_cut_off_is_noticed_by_its_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let noisy = RgbImage::from_fn(64, 48, |x, y| {
+            image::Rgb([
+                (x * y % 251) as u8,
+                (x * 7 % 256) as u8,
+                (y * 13 % 256) as u8,
+            ])
+        });
+        for name in ["a.png", "a.jpg"] {
+            let path = folder.path().join(name);
+            noisy.save(&path).unwrap();
+            assert!(has_both_ends(&path).unwrap(), "{name}");
+            check_whole(&path).unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+            let error = check_whole(&path).unwrap_err().to_string();
+            assert!(
+                error.contains(name) && error.contains("truncated"),
+                "{error}"
+            );
+            // What stands behind the end is no damage.
+            std::fs::write(&path, [&bytes[..], b"more"].concat()).unwrap();
+            assert!(!has_both_ends(&path).unwrap(), "{name}");
+            check_whole(&path).unwrap();
+        }
+        assert!(check_whole(&folder.path().join("none.png")).is_err());
     }
 }

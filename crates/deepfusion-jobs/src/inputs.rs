@@ -1,6 +1,6 @@
 //! The images that the arguments mean, each with the name of its outputs.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -84,6 +84,19 @@ pub fn find_inputs(
     let images: Vec<String> = inputs.iter().map(|i| i.name.to_lowercase()).collect();
     inputs.extend(frames_of(recordings, &images));
     Ok(inputs)
+}
+
+/// The first inputs of each recording, at most so many, and of the images that are of none.
+#[must_use]
+pub fn first_of_each(mut inputs: Vec<Input>, most: usize) -> Vec<Input> {
+    let mut seen: HashMap<Option<*const Dataset>, usize> = HashMap::new();
+    inputs.retain(|input| {
+        let recording = input.frame.as_ref().map(|(of, _)| Arc::as_ptr(of));
+        let count = seen.entry(recording).or_default();
+        *count += 1;
+        *count <= most
+    });
+    inputs
 }
 
 /// Whether a folder has images that are not its frames alone: colour beside depth, or the picture for an overview of a comma2k19 segment.

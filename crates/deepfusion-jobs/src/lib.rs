@@ -93,7 +93,7 @@ pub mod training;
 pub mod verdict;
 
 pub use error::{Error, NoMean, OtherJob, Result, StaleReason, UnfitCamera};
-pub use inputs::{Input, find_inputs};
+pub use inputs::{Input, find_inputs, first_of_each};
 pub use model_facts::{ModelFacts, name_of};
 pub use perception_settings::perception_settings;
 pub use run_history::RunHistory;

@@ -102,6 +102,12 @@ pub enum Error {
         /// What it lacks.
         key: String,
     },
+    /// A run that ended before its first checkpoint.
+    #[error("{path}: this run has no checkpoint yet: it ended before it saved its first")]
+    NoCheckpoint {
+        /// The run's folder.
+        path: PathBuf,
+    },
     /// A checkpoint that training cannot go on from; its weights are whole.
     #[error("{path}: {reason}")]
     NotResumable {
@@ -196,6 +202,9 @@ impl Hint for Error {
                 Some("weights of other programs are imported: deepfusion-nn".into())
             }
             Self::EncodersOnly { .. } => Some("train from it first".into()),
+            Self::NoCheckpoint { .. } => {
+                Some("begin it anew in another folder, or empty this one first".into())
+            }
             Self::NotResumable { .. } => Some("start a new run from these weights".into()),
             Self::RunExists { .. } => Some("resume it, or choose another folder".into()),
             Self::Network(error) => error.hint(),

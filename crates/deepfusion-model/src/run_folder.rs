@@ -144,6 +144,19 @@ impl RunFolder {
         }
     }
 
+    /// That a checkpoint is there.
+    ///
+    /// # Errors
+    /// [`Error::NoCheckpoint`].
+    pub fn require_checkpoint(&self, kind: CheckpointKind) -> Result<(), Error> {
+        if self.checkpoint_path(kind).exists() {
+            return Ok(());
+        }
+        Err(Error::NoCheckpoint {
+            path: self.path.clone(),
+        })
+    }
+
     /// Writes the configuration, and what the run found out from its data.
     ///
     /// # Errors

@@ -1,10 +1,11 @@
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use std::path::PathBuf;
 
 mod samples;
 mod stopped;
 
 pub(crate) use self::samples::MOST_SIGMA_SHARE;
+use self::samples::named;
 pub use self::samples::{NoStereo, SampleProblem, SharedFrames, Skipped};
 pub use self::stopped::{LoaderProblem, ThreadsProblem, WorkersProblem};
 
@@ -47,6 +48,18 @@ pub enum Error {
     NoDepth {
         /// The drive.
         drive: String,
+    },
+    /// A drive of which many images cannot be read, or all.
+    #[error("{drive}: {broken} of {} cannot be read: {}", count_of(*of, "image"), named(images, *broken))]
+    BrokenImages {
+        /// The drive.
+        drive: String,
+        /// How many of its images cannot be read.
+        broken: usize,
+        /// How many images it has.
+        of: usize,
+        /// The first of them, each with what is wrong with it.
+        images: Vec<String>,
     },
     /// Validation frames that are learned from: their loss would say how well they are known by heart.
     #[error("validation frames are training frames: {}", frames_by_drive(shared))]
@@ -167,6 +180,10 @@ impl Hint for Error {
             Self::NoDepth { .. } => Some(
                 "learn = \"self\" needs no depth but a speed; RGB-D folders, drives with LiDAR scans and simulated drives \
                  have depth"
+                    .into(),
+            ),
+            Self::BrokenImages { .. } => Some(
+                "fetch the recording again, or leave it out; a few such images would be done without"
                     .into(),
             ),
             Self::SharedFrames { .. } => Some(

@@ -7,6 +7,7 @@
 mod adam;
 mod augment;
 mod batch;
+mod broken_images;
 mod checkpoint;
 mod depth_batch;
 mod depth_set;

@@ -1,8 +1,12 @@
+use crate::broken_images::BrokenImages;
 use crate::error::MOST_SIGMA_SHARE;
 use crate::shared_frames::Files;
 use crate::stereo::{OtherCameras, StereoSource};
 use crate::window::Window;
-use crate::{DepthSet, Error, Learn, NoStereo, SampleProblem, Skipped, TrainConfig, shared_frames};
+use crate::{
+    DepthFrame, DepthSet, Error, Learn, NoStereo, SampleProblem, Skipped, TrainConfig,
+    shared_frames,
+};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
 use std::collections::HashSet;
@@ -44,6 +48,11 @@ impl Sample {
         let own = self.snippet.sources.iter().map(|s| (self.dataset, s.frame));
         own.chain(self.stereo.iter().map(|s| (s.dataset, s.frame)))
     }
+
+    /// The same with its target.
+    fn shown(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.sources().chain([(self.dataset, self.snippet.target)])
+    }
 }
 
 /// Leaves out of training what the other way of learning holds out: depth of frames whose views are held out, and views of frames whose depth is.
@@ -60,10 +69,7 @@ fn keep_apart(
     // By their files: a drive may be in two data sets, or its depth in another than its views.
     let mut place =
         |(dataset, frame): (usize, usize)| files.place(&datasets[dataset].frames()[frame].image);
-    let mut shown = |sample: &Sample| -> Vec<_> {
-        let target = (sample.dataset, sample.snippet.target);
-        sample.sources().chain([target]).map(&mut place).collect()
-    };
+    let mut shown = |sample: &Sample| -> Vec<_> { sample.shown().map(&mut place).collect() };
     let views: HashSet<_> = held_out.iter().flat_map(&mut shown).collect();
     let shown: Vec<_> = samples.iter().map(&mut shown).collect();
     let known: HashSet<_> = held_depth.frames.iter().map(|f| place(f.place())).collect();
@@ -88,6 +94,23 @@ fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample], datasets
     };
     let shown: Vec<bool> = samples.iter().map(&mut shows).collect();
     retain_where_some_stay(samples, |sample| sample.dataset, |i| !shown[i]);
+}
+
+/// Leaves out frames with depth whose image cannot be read, and notes it.
+fn leave_out_broken(
+    [train, held]: [&mut DepthSet; 2],
+    skipped: &mut Vec<Skipped>,
+) -> Result<(), Error> {
+    let frames = train.frames.iter().chain(&held.frames);
+    let used = frames.map(DepthFrame::place).collect();
+    let broken = BrokenImages::among(&train.datasets, &used)?;
+    for depth in [train, held] {
+        depth.frames.retain(|frame| broken.is_whole(frame.place()));
+    }
+    for reason in broken.reasons {
+        noted(skipped, reason);
+    }
+    Ok(())
 }
 
 /// Keeps what `keep` says, by place, and all of each data set of which it would leave nothing.
@@ -164,12 +187,14 @@ impl SampleSet {
             });
         }
         let (mut depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
+        leave_out_broken([&mut depth, &mut held_depth], &mut skipped)?;
         let validation = match validation {
             Some(datasets) => {
                 let (set_of, datasets) = shared(datasets);
                 let both: (&[Dataset], &[usize]) = (&datasets, &set_of);
                 let (samples, _) = Self::gather(config, both, 0.0, &mut skipped)?;
-                let (all, _) = DepthSet::split(config, &datasets, &set_of, 0.0)?;
+                let (mut all, mut none) = DepthSet::split(config, &datasets, &set_of, 0.0)?;
+                leave_out_broken([&mut all, &mut none], &mut skipped)?;
                 held_depth = DepthSet {
                     // Those of training's worlds are not for validation.
                     simulated: held_depth.simulated,
@@ -281,6 +306,14 @@ impl SampleSet {
                 }
                 Err(error) => last = Some(noted(skipped, Skipped::Drive(error.into()))),
             }
+        }
+        let used = train.iter().chain(&held).flat_map(Sample::shown).collect();
+        let broken = BrokenImages::among(datasets, &used)?;
+        let is_whole = |sample: &Sample| sample.shown().all(|frame| broken.is_whole(frame));
+        train.retain(is_whole);
+        held.retain(is_whole);
+        for reason in broken.reasons {
+            last = Some(noted(skipped, reason));
         }
         let depth_alone =
             (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());

@@ -144,7 +144,7 @@ impl Trainer {
     /// Resumes from the folder's last checkpoint: weights, optimiser, schedule and samples.
     ///
     /// # Errors
-    /// As [`RunFolder::load`]; [`Error::NoSamples`], [`Error::NoValidation`].
+    /// [`ModelError::NoCheckpoint`]; as [`RunFolder::load`]; [`Error::NoSamples`], [`Error::NoValidation`].
     pub fn resume(
         config: TrainConfig,
         folder: RunFolder,
@@ -165,6 +165,7 @@ impl Trainer {
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
+        folder.require_checkpoint(CheckpointKind::Last)?;
         let config = folder.read_findings()?.complete_for_training(config);
         check_precision(&config, device)?;
         check_samples(&config, &train, &validation)?;

@@ -8,6 +8,7 @@
 
 mod affine;
 mod auto_turns;
+mod broken_images;
 mod checkpoints;
 mod configuration_page;
 mod depth;

@@ -64,6 +64,12 @@ pub enum Error {
         /// What to do about it.
         hint: Option<String>,
     },
+    /// Nothing says which camera is meant.
+    #[error("{address} names no camera")]
+    NoCameraName {
+        /// What was given.
+        address: String,
+    },
     /// What a camera is to give is not understood.
     #[error("{address}: {problem}")]
     CameraMode {
@@ -109,6 +115,9 @@ impl Hint for Error {
             Self::NotDecoded { hint, .. } => return hint.clone(),
             Self::Codec { .. } => {
                 "h264, h265 (hevc), vp9 and av1 are read: encode the stream as one of them, or record images"
+            }
+            Self::NoCameraName { .. } => {
+                "the camera's number or name stands behind it: camera:0 is the first"
             }
             Self::CameraMode { .. } => {
                 "any of size=1920x1080, fps=30 and format=mjpeg may stand behind the camera's `?`, with & between them"

@@ -18,7 +18,7 @@ use deepfusion_hint::Hint;
 use deepfusion_render::{ColourMap, DepthScale};
 use serde::Serialize;
 
-use crate::folder::{FrameFile, Track, details_of, picture_of, targets_of};
+use crate::folder::{FrameFile, SmallFiles, Track, details_of, picture_of, targets_of};
 use crate::http::{Request, Response};
 use crate::{DepthFile, Error, Folder, FolderKind, assets, training};
 
@@ -172,12 +172,12 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
                     "frame" => Response::json(&details_of(path, &entry)),
                     "depth" => map(
                         path,
-                        entry.depth.as_ref(),
+                        SmallFiles::read(path, &entry).depth(&entry),
                         "no depth was saved for this frame",
                     ),
                     "sigma" => map(
                         path,
-                        entry.sigma.as_ref(),
+                        SmallFiles::read(path, &entry).sigma(&entry),
                         "no sigma was saved for this frame",
                     ),
                     _ => match picture_of(path, &entry) {

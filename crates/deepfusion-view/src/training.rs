@@ -21,7 +21,7 @@ type Columns = BTreeMap<String, Vec<Option<f64>>>;
 /// A run as the page gets it.
 #[derive(Debug, Serialize)]
 pub(crate) struct TrainingRun {
-    /// The columns' names, in the log's order.
+    /// The columns' names, in the log's order; without those that are zero, or nothing, throughout.
     columns: Vec<String>,
     /// The panels' file names.
     panels: Vec<String>,
@@ -81,12 +81,20 @@ pub(crate) fn read(folder: &Path) -> Result<TrainingRun> {
             .map(|(i, name)| (name.clone(), column(i)))
             .collect()
     };
+    let (train, validation) = (table(&train), table(&validation.iter().collect::<Vec<_>>()));
+    // As in the report: a term that is off has no curve.
+    let has_curve = |name: &String| {
+        let parts = [&train, &validation].into_iter();
+        let numbers = parts.filter_map(|part| part.get(name)).flatten();
+        numbers.flatten().any(|number| *number != 0.0)
+    };
+    let names = columns().map(|(_, name)| name);
     Ok(TrainingRun {
-        columns: columns().map(|(_, name)| name.clone()).collect(),
+        columns: names.filter(|name| has_curve(name)).cloned().collect(),
         panels: panels(folder),
         step_column: header[step].clone(),
-        train: table(&train),
-        validation: table(&validation.iter().collect::<Vec<_>>()),
+        train,
+        validation,
     })
 }
 

@@ -52,6 +52,40 @@ fn depth_arrives_as_it_lies_in_the_file() {
     assert_eq!(body[16..], expected);
 }
 
+/// What a sidecar does not name was made before it, perhaps by another camera.
+#[test]
+fn only_outputs_that_the_sidecar_names_are_shown() {
+    let folder = results(2);
+    let earlier = ndarray::Array2::<f32>::ones((48, 96));
+    for i in 0..2 {
+        for what in ["depth", "sigma"] {
+            let file = format!("{i:06}_{what}.npy");
+            ndarray_npy::write_npy(folder.path().join(file), &earlier).unwrap();
+        }
+    }
+    write_sidecar(
+        folder.path(),
+        "000000",
+        &json!({"files": ["000000_depth.png"]}),
+    );
+    let server = Running::start(folder.path(), None);
+    let index = server.json("/api/runs/0/index");
+    assert_eq!(index["has_depth"], json!([1, 1]));
+    assert_eq!(index["has_sigma"], json!([0, 1]));
+    let depth_of = |frame: &str| {
+        let details = server.json(&format!("/api/runs/0/frame/{frame}"));
+        let (status, body) = server.get(&format!("/api/runs/0/depth/{frame}"));
+        assert_eq!(status, 200);
+        // 0 are steps of a PNG, 1 metres.
+        (details["depth"].clone(), body[12])
+    };
+    assert_eq!(depth_of("000000"), (json!("000000_depth.png"), 0));
+    assert_eq!(server.get("/api/runs/0/sigma/000000").0, 404);
+    // One of another program names none: all is shown.
+    assert_eq!(depth_of("000001"), (json!("000001_depth.npy"), 1));
+    assert_eq!(server.get("/api/runs/0/sigma/000001").0, 200);
+}
+
 #[test]
 fn a_frame_has_its_camera_targets_and_picture() {
     let folder = results(2);
@@ -393,15 +427,16 @@ fn a_run_shows_its_curve_and_panels() {
         .save(run.path().join("panels/000034.png"))
         .unwrap();
     // The last line is being written.
-    let log =
-        "step,split,total,speed\n1,train,0.5,1\n2,train,0.4,NaN\n2,validation,0.45,\n3,train,0.3";
+    let log = "step,split,total,speed,flow\n1,train,0.5,1,0\n2,train,0.4,NaN,0\n2,validation,0.45,,\n3,train,0.3";
     std::fs::write(run.path().join("log.csv"), log).unwrap();
     let server = Running::start(run.path(), None);
     let answer = server.json("/api/runs/0/training");
     assert_eq!(
         answer["train"],
-        json!({"step": [1.0, 2.0], "total": [0.5, 0.4], "speed": [1.0, null]})
+        json!({"step": [1.0, 2.0], "total": [0.5, 0.4], "speed": [1.0, null], "flow": [0.0, 0.0]})
     );
+    // What is zero throughout is not drawn.
+    assert_eq!(answer["columns"], json!(["step", "total", "speed"]));
     assert_eq!(answer["validation"]["total"], json!([0.45]));
     assert_eq!(answer["panels"], json!(["000034.png"]));
     assert_eq!(server.get("/api/runs/0/panel/000034.png").0, 200);

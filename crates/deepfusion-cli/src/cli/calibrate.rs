@@ -23,7 +23,7 @@ pub(crate) struct CalibrateArgs {
     /// Inner corners of the board, where four squares meet: a board of 10x7 squares has 9x6.
     #[arg(long, value_name = "WxH")]
     pub board: Size,
-    /// Side of a square in metres. The boards' distances depend on it, the camera does not; without it none are given.
+    /// Side of a square in metres (25 mm: 0.025). The boards' distances depend on it, the camera does not; without it none are given.
     #[arg(long, value_name = "M", value_parser = positive)]
     pub square: Option<f64>,
     /// A fisheye lens after Kannala and Brandt (k1 to k4), instead of Brown and Conrady's (k1, k2, p1, p2, k3).

@@ -5,9 +5,6 @@ use super::values::positive;
 /// What only live sources (cameras, streams, standard input) have.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct LiveArgs {
-    /// Stop after this many frames; skipped ones do not count.
-    #[arg(long, value_name = "N", help_heading = HEADING, value_parser = clap::value_parser!(u64).range(1..))]
-    pub frames: Option<u64>,
     /// Stop this many seconds after the first frame.
     #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
     pub duration: Option<f64>,
@@ -23,7 +20,6 @@ impl LiveArgs {
     /// The first option that was given.
     pub(crate) fn given(&self) -> Option<&'static str> {
         [
-            (self.frames.is_some(), "--frames"),
             (self.duration.is_some(), "--duration"),
             (self.timeout.is_some(), "--timeout"),
         ]

@@ -63,6 +63,10 @@ pub(crate) struct PredictionArgs {
     /// Replace existing outputs, even those made with other options or from an image that has changed.
     #[arg(long)]
     pub overwrite: bool,
+    /// Take only the first N images: of each recording, and of those that belong to none. A live source is left after N frames; skipped ones do not
+    /// count.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
     /// Of a live source.
     #[command(flatten)]
     pub live: LiveArgs,

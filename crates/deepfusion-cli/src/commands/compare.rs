@@ -43,7 +43,11 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         TableFormat::Html => html(args, &tables, &rows)?,
     };
     match &args.out {
-        Some(path) => output::write(path, text),
+        Some(path) => {
+            output::write(path, text)?;
+            say(&format!("tables    {}", path.display()));
+            Ok(())
+        }
         None => output::print(&text),
     }
 }

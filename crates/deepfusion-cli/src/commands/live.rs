@@ -6,7 +6,7 @@ use deepfusion_jobs::bulk::CameraSource;
 use deepfusion_jobs::live::{Feed, LiveEnd, LiveLimits};
 use deepfusion_video::Address;
 
-use crate::cli::LiveArgs;
+use crate::cli::{LiveArgs, PredictionArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::interrupt;
@@ -33,15 +33,19 @@ pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Addres
 
 /// Begins to read a source, until Ctrl-C or what the options say. A camera is asked for images of its calibration's size, unless its address asks
 /// for others: a driver's own choice is often the smallest.
-pub(super) fn open(address: &Address, camera: &CameraSource, args: &LiveArgs) -> Result<Feed> {
+pub(super) fn open(
+    address: &Address,
+    camera: &CameraSource,
+    args: &PredictionArgs,
+) -> Result<Feed> {
     let address = match camera.image_size() {
         Some(size) => address.clone().or_of_size(size),
         None => address.clone(),
     };
     let until = LiveLimits {
         frames: args.frames,
-        duration_s: args.duration,
-        timeout_s: args.timeout_s(),
+        duration_s: args.live.duration,
+        timeout_s: args.live.timeout_s(),
         stop: interrupt::asked,
     };
     Ok(Feed::open(&address, &until)?)

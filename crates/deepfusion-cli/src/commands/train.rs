@@ -5,8 +5,8 @@ use deepfusion_jobs::training::{
     AskedRecordings, Pace, RunLock, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
     leaves_turns_unused,
 };
-use deepfusion_model::{RunFolder, TrainConfig};
-use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
+use deepfusion_model::{CheckpointKind, RunFolder, TrainConfig};
+use deepfusion_train::{Device, TrainSummary, Trainer, peak_device_bytes};
 
 use super::recorder::Recorder;
 use super::recordings::open_samples;
@@ -21,52 +21,9 @@ use crate::{devices, interrupt, output};
 /// `deepfusion train`.
 pub(super) fn run(args: &TrainArgs) -> Result<()> {
     let device = devices::open(args.device)?;
-    let resumed = match (&args.out, args.resume) {
-        (Some(out), true) => {
-            let (folder, _) = RunFolder::open(out)?;
-            let lock = RunLock::take(folder.path())?;
-            Some((folder, lock))
-        }
-        _ => None,
-    };
-    let mut config = match &resumed {
-        Some((folder, _)) => resume::with_options(&folder.read_settings()?, args)?,
-        None => request(args)?.config(|datasets| clocks::measured(datasets.iter()))?,
-    };
-    config.validate()?;
-    let sets = open_samples(&config).map_err(|error| match &resumed {
-        Some((folder, _)) => resume::where_recordings_are(error, &config, folder.path()),
-        None => error,
-    })?;
-    let (mut trainer, _lock) = match resumed {
-        Some((folder, lock)) => {
-            let settings = config.clone();
-            let trainer = Trainer::resume(config, folder.clone(), sets, &device)?;
-            // Only settings with which the run goes on.
-            folder.write_config(&settings, &folder.read_findings()?)?;
-            (trainer, lock)
-        }
-        None => {
-            // A file says what its run starts from, if anything.
-            let start = Start::of(args.init.as_deref(), &config, args.config.is_none())?;
-            if args.init.is_none()
-                && matches!(start, Start::Nothing)
-                && let Start::Packed { network, .. } = Start::embedded_for(&config)?
-            {
-                let name = &network.card.name;
-                say(&format!(
-                    "starts from nothing, as the configuration names no init (--init {name} starts from the embedded network)"
-                ));
-            }
-            start.record_in(&mut config)?;
-            let folder = output::run_folder(args.out.as_deref(), "train")?;
-            let folder = RunFolder::create(&folder)?;
-            let lock = RunLock::take(folder.path())?;
-            let trainer = Trainer::create(config, folder, sets, &device, |model| {
-                start.initialise(model, &device, &mut print_default_start)
-            })?;
-            (trainer, lock)
-        }
+    let (mut trainer, _lock) = match &args.out {
+        Some(out) if args.resume => gone_on_with(out, args, &device)?,
+        _ => begun(args, &device)?,
     };
     say(&TrainingPlan::of(&trainer).to_string());
     if let Some(advice) = unused_turns(&trainer, args) {
@@ -88,6 +45,57 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
         .into());
     }
     output::print(&format!("{}\n", trainer.folder().display()))
+}
+
+/// A new run. What is wrong with its start or its folder is said before the recordings are looked at, which may take long.
+fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
+    if let Some(out) = &args.out {
+        output::require_run_folder(out)?;
+    }
+    let mut config = request(args)?.config(|datasets| clocks::measured(datasets.iter()))?;
+    config.validate()?;
+    // A file says what its run starts from, if anything.
+    let start = Start::of(args.init.as_deref(), &config, args.config.is_none())?;
+    if args.init.is_none()
+        && matches!(start, Start::Nothing)
+        && let Start::Packed { network, .. } = Start::embedded_for(&config)?
+    {
+        let name = &network.card.name;
+        say(&format!(
+            "starts from nothing, as the configuration names no init (--init {name} starts from the embedded network)"
+        ));
+    }
+    start.record_in(&mut config)?;
+    let sets = open_samples(&config)?;
+    let folder = output::run_folder(args.out.as_deref(), "train")?;
+    let folder = RunFolder::create(&folder)?;
+    let lock = RunLock::take(folder.path())?;
+    let trainer = Trainer::create(config, folder, sets, device, |model| {
+        start.initialise(model, device, &mut print_default_start)
+    })?;
+    Ok((trainer, lock))
+}
+
+/// The run in a folder, as it goes on. What is wrong with it is said before the recordings are looked at, too.
+fn gone_on_with(out: &Path, args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
+    let (folder, _) = RunFolder::open(out)?;
+    let lock = RunLock::take(folder.path())?;
+    let config = resume::with_options(&folder.read_settings()?, args)?;
+    config.validate()?;
+    folder.require_checkpoint(CheckpointKind::Last)?;
+    if let Some(steps) = config.steps {
+        let done = folder.read_state(CheckpointKind::Last)?.step;
+        resume::require_no_fewer_steps(done, steps)?;
+    }
+    let sets = open_samples(&config)
+        .map_err(|error| resume::where_recordings_are(error, &config, folder.path()))?;
+    let settings = config.clone();
+    let trainer = Trainer::resume(config, folder.clone(), sets, device)?;
+    // How many epochs are is known now.
+    resume::require_no_fewer_steps(trainer.step(), trainer.steps())?;
+    // Only settings with which the run goes on.
+    folder.write_config(&settings, &folder.read_findings()?)?;
+    Ok((trainer, lock))
 }
 
 /// Prints what a run starts from, and warns of what may not be meant.

@@ -191,7 +191,7 @@ fn options_of(what: Difference) -> &'static str {
         Difference::Set => "another --data-set",
         Difference::MaxDepth => "another --max-depth",
         Difference::MaxSigma => "another --max-sigma",
-        Difference::Camera => "another camera (--intrinsics, --calib)",
+        Difference::Camera => "another camera (--hfov, --intrinsics, --calib)",
         Difference::FocalCorrection => "another --no-focal-correction",
         Difference::Stretch => "another --stretch",
         Difference::CorrectScale => "another --correct-scale or --camera-height",

@@ -347,6 +347,9 @@ impl Reportable for deepfusion_model::Error {
                 "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
             ),
             Self::Config { field, .. } => Some(set_in_file(field)),
+            Self::NoCheckpoint { .. } => {
+                Some("begin it anew, without --resume, in another folder (--out), or empty this one first".into())
+            }
             Self::NotResumable { .. } => {
                 Some("start a new run from these weights with --init".into())
             }

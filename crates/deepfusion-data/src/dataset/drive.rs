@@ -253,6 +253,21 @@ impl Dataset {
         Ok(image)
     }
 
+    /// That a frame's image can be read, where it is a file of its own; as [`deepfusion_images::check_whole`], which hardly takes longer than to open
+    /// the file.
+    ///
+    /// # Errors
+    /// As [`crate::load_rgb`].
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn check_image(&self, frame: usize) -> Result<()> {
+        match self.frames()[frame].image.file() {
+            Some(file) => Ok(deepfusion_images::check_whole(file)?),
+            None => Ok(()),
+        }
+    }
+
     /// Whether [`Self::load_image`] undoes a distortion, so that its picture is not that of the frame's file.
     #[must_use]
     pub fn corrects_lens(&self) -> bool {

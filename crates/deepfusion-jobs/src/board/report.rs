@@ -56,9 +56,11 @@ impl BoardViews {
         (found, lens): (&'a Calibration, &'a Distortion),
         written: &'a Path,
     ) -> CalibrationReport<'a> {
+        let mut warnings = self.warnings(found, lens);
+        warnings.extend(BoardWarning::of_squares(board));
         CalibrationReport {
             calibration: found,
-            warnings: self.warnings(found, lens),
+            warnings,
             coefficient_names: found.model.coefficients(),
             board: *board,
             looked_at: self.looked_at,

@@ -1,7 +1,10 @@
 //! What makes a camera by a board's pictures less sure, or of other images than one may think.
 
-use deepfusion_calibrate::CalibrationWarning;
+use deepfusion_calibrate::{Board, CalibrationWarning};
 use deepfusion_data::NoLens;
+
+/// The longest side of a board's squares, in metres, that is taken without a word.
+const LARGEST_SQUARE_M: f64 = 0.5;
 
 /// What makes a camera by a board's pictures less sure, or of other images than one may think.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -21,11 +24,25 @@ pub enum BoardWarning {
         /// Width and height of the upright ones.
         size: (u32, u32),
     },
+    /// The squares are said to be larger than anybody prints them.
+    #[error("squares of {square_m} m: their side is in metres, not millimetres; 25 mm are 0.025 m")]
+    LargeSquares {
+        /// The side of a square, metres.
+        square_m: f64,
+    },
     /// Images cannot be corrected with the lens.
     #[error(
         "images cannot be corrected with this lens: {0}; show the board nearer to the image's border"
     )]
     NotCorrectable(#[source] NoLens),
+}
+
+impl BoardWarning {
+    /// Where a board's squares are so large that their side was hardly meant in metres.
+    pub(super) fn of_squares(board: &Board) -> Option<Self> {
+        let square_m = board.square_m.filter(|side| *side > LARGEST_SQUARE_M)?;
+        Some(Self::LargeSquares { square_m })
+    }
 }
 
 /// What EXIF's orientation does to a picture.
@@ -60,11 +77,25 @@ mod tests {
                 "EXIF turns the pictures by 90 degrees: the calibration is of the upright ones, 480x640, which a network sees where it is given the pictures alone; a recording's images are used as they are stored",
             ),
             (
+                BoardWarning::LargeSquares { square_m: 25.0 },
+                "squares of 25 m: their side is in metres, not millimetres; 25 mm are 0.025 m",
+            ),
+            (
                 BoardWarning::NotCorrectable(NoLens::FoldsOver),
                 "images cannot be corrected with this lens: the distortion folds over within the image: it does not fit this camera matrix; show the board nearer to the image's border",
             ),
         ] {
             assert_eq!(warning.to_string(), said);
         }
+    }
+
+    #[test]
+    fn only_squares_that_nobody_prints_are_warned_of() {
+        let warned = |side: Option<f64>| {
+            let board = Board::new(9, 6, side).unwrap();
+            BoardWarning::of_squares(&board).is_some()
+        };
+        assert!(warned(Some(25.0)) && warned(Some(0.6)));
+        assert!(!warned(Some(0.5)) && !warned(Some(0.025)) && !warned(None));
     }
 }

@@ -12,7 +12,7 @@ use deepfusion_perception::PerceptionConfig;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::*;
-use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs};
+use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs, without_outputs};
 use crate::scene::MotionTracker;
 use crate::{Error, Input, Result, TargetFinder, TargetSettings};
 
@@ -118,6 +118,83 @@ fn depth_is_made_once_and_warned_of_once() {
     assert_eq!((again.done, again.sidecars.len()), (2, 2));
     assert!(warned.is_empty(), "{warned:?}");
     assert_eq!(made_at(), before);
+}
+
+/// Depth of a picture of depth means nothing, but an image that was kept is one.
+#[test]
+fn outputs_are_no_inputs_wherever_they_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (model, mut estimator) = network();
+    let out = folder_for_outputs(at);
+    let forms = [DepthOutput::DepthPng, DepthOutput::Image];
+    let save = DepthOutputs::of(forms, true, outputs().limits);
+    let job = DepthJob::new(
+        settings(None),
+        &out,
+        save,
+        &model,
+        &estimator,
+        None,
+        &|_| (),
+    );
+    let job = job.unwrap();
+    let all = inputs(at, &["a"]);
+    let (loaded, prepared) = job.load(&all[0]).unwrap();
+    let seen = job.see(&mut estimator, &prepared).unwrap();
+    job.writer.write(&all[0], &loaded, &seen).unwrap();
+    let input = |file: &str| Input {
+        path: out.join(file),
+        name: file.to_owned(),
+        frame: None,
+    };
+    let written = ["a_depth.png", "a_image.jpg"].map(input);
+    assert!(written.iter().all(|input| input.path.exists()));
+    let left = |folder: &Path| without_outputs(written.to_vec(), folder);
+    assert_eq!(left(&at.join("other")), written[1..]);
+    assert!(left(&out).is_empty());
+}
+
+/// Another camera's depth beside a new sidecar would pass for that of the new one.
+#[test]
+fn what_is_overwritten_leaves_nothing_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    depth_of(at, &["a", "b"]);
+    let out = at.join("out");
+    // Targets found in that depth, and files of somebody else.
+    std::fs::write(out.join("a_targets.json"), r#"{"frame": "a"}"#).unwrap();
+    for file in ["a_overlay.png", "a_depth.txt", "c_depth.npy"] {
+        std::fs::write(out.join(file), "x").unwrap();
+    }
+    let (model, mut estimator) = network();
+    let save = DepthOutputs::of([DepthOutput::DepthPng], true, outputs().limits);
+    let settings = settings(Some(GivenCamera::Numbers(CAMERA)));
+    let job = DepthJob::new(settings, &out, save, &model, &estimator, None, &|_| ()).unwrap();
+    // Of `b` the earlier run's stays: it is not made again.
+    let all = inputs(at, &["a"]);
+    let mine: Vec<&Input> = all.iter().collect();
+    let begun = job.bulk(Shard::WHOLE, true, false).begin(&all, &mine, true);
+    let StartedJob {
+        manifest,
+        sidecars,
+        todo,
+    } = begun.unwrap();
+    let why = |error: &Error| error.to_string();
+    let progress = BulkProgress::new(&out, manifest, sidecars, why, |_, _| ());
+    predict(&job, &mut estimator, &mine, &todo, &progress, &|| false);
+    assert_eq!(progress.finish().done, 1);
+    for (file, stays) in [
+        ("a_depth.png", true),
+        ("a_depth.npy", false),
+        ("a_targets.json", false),
+        ("a_overlay.png", false),
+        ("a_depth.txt", true),
+        ("c_depth.npy", true),
+        ("b_depth.npy", true),
+    ] {
+        assert_eq!(out.join(file).exists(), stays, "{file}");
+    }
 }
 
 /// Names of files are bytes there, and JSON is text.
@@ -326,6 +403,21 @@ fn targets_are_written_and_reported_in_order() {
     for file in ["a.json", "a_depth.npy", "a_targets.json", "b.json"] {
         assert!(out.join(file).is_file(), "{file}");
     }
+}
+
+/// Pictures of another run's targets would pass for those of the new ones.
+#[test]
+fn targets_that_are_overwritten_leave_no_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    targets_of(at, |_| Ok(()));
+    let out = at.join("out");
+    for file in ["a_overlay.png", "c_overlay.png"] {
+        std::fs::write(out.join(file), "x").unwrap();
+    }
+    targets_of(at, |_| Ok(()));
+    assert!(out.join("a_targets.json").exists() && !out.join("a_overlay.png").exists());
+    assert!(out.join("c_overlay.png").exists());
 }
 
 #[test]

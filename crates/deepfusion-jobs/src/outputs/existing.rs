@@ -8,14 +8,12 @@ use super::{DepthOutput, DepthWriter, TargetOutput};
 use crate::bulk::{record_lines_path, record_path, sidecar_path};
 use crate::{Error, Input, Result};
 
-/// The inputs without the pictures in the folder of the outputs that are outputs themselves: the sidecar of an image lists them, or targets
-/// were written beside them. Depth of a picture of depth means nothing.
+/// The inputs without the pictures that are outputs themselves: the sidecar of an image beside them lists them, or targets were written beside them. Depth of a
+/// picture of depth means nothing. Images that were kept ([`DepthOutput::Image`]) are left out in the folder of the outputs alone.
 #[must_use]
 pub fn without_outputs(mut inputs: Vec<Input>, folder: &Path) -> Vec<Input> {
-    // A folder that is not there holds none.
-    if let Ok(folder) = folder.canonicalize() {
-        inputs.retain(|input| input.frame.is_some() || !is_output(&folder, &input.path));
-    }
+    let folder = folder.canonicalize().ok();
+    inputs.retain(|input| input.frame.is_some() || !is_output(&input.path, folder.as_deref()));
     inputs
 }
 
@@ -47,33 +45,32 @@ pub fn require_unwritten(
     }
 }
 
-/// Whether a picture lies in the folder of the outputs, given without links, and is one of them.
-fn is_output(folder: &Path, picture: &Path) -> bool {
-    let name = picture.file_name().and_then(|name| name.to_str());
-    let parent = picture.parent().map(|parent| {
+/// Whether a picture is an output; `folder` is that of the outputs to come, without links.
+fn is_output(picture: &Path, folder: Option<&Path>) -> bool {
+    let parent = match picture.parent() {
         // A bare name lies in the current folder.
-        if parent == Path::new("") {
-            Path::new(".")
-        } else {
-            parent
-        }
-    });
-    let parent = parent.and_then(|parent| parent.canonicalize().ok());
-    let Some(name) = name.filter(|_| parent.as_deref() == Some(folder)) else {
+        Some(parent) if parent == Path::new("") => Path::new("."),
+        Some(parent) => parent,
+        None => return false,
+    };
+    let Some(name) = picture.file_name().and_then(|name| name.to_str()) else {
         return false;
     };
     let of_an_image = |output: &DepthOutput| {
         let image = name.strip_suffix(output.ending());
         let listed = |sidecar: Sidecar| sidecar.files.iter().any(|file| file == name);
         image.is_some_and(|image| {
-            let text = std::fs::read(sidecar_path(folder, image)).unwrap_or_default();
+            let text = std::fs::read(sidecar_path(parent, image)).unwrap_or_default();
             serde_json::from_slice(&text).is_ok_and(listed)
         })
     };
     let of_targets = |output: &TargetOutput| {
         let image = name.strip_suffix(output.ending());
-        image.is_some_and(|image| record_path(folder, image).exists())
+        image.is_some_and(|image| record_path(parent, image).exists())
     };
+    if of_an_image(&DepthOutput::Image) {
+        return folder.is_some() && parent.canonicalize().ok().as_deref() == folder;
+    }
     DepthOutput::ALL.iter().any(of_an_image) || TargetOutput::PICTURES.iter().any(of_targets)
 }
 
@@ -97,6 +94,7 @@ mod tests {
         }
         let left = without_outputs(images.to_vec(), folder.path());
         assert_eq!(left, images[..2]);
-        assert_eq!(without_outputs(images.to_vec(), &at("none")), images);
+        // Whatever folder the next outputs go to.
+        assert_eq!(without_outputs(images.to_vec(), &at("none")), images[..2]);
     }
 }

@@ -4,6 +4,7 @@
 //! the disk ([`crate::bulk`] does, many at a time); [`draw`] makes the pictures and clouds of a frame's targets, [`TargetWriter`] writes them.
 
 mod depth;
+mod earlier;
 mod existing;
 mod features;
 mod target_writer;

@@ -1,6 +1,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::DepthWriter;
+use super::earlier::remove_targets;
 use crate::bulk::{RecordLines, record_line, record_lines_path, record_path, write_record};
 use crate::{PerceivedFrame, Result};
 
@@ -29,6 +30,8 @@ impl<'a> TargetWriter<'a> {
     /// As [`DepthWriter::write`].
     pub fn write(&self, found: &PerceivedFrame) -> Result<String> {
         let (folder, input) = (self.depth.folder, &found.input);
+        // Of an earlier run, which may have drawn others.
+        remove_targets(folder, &input.name)?;
         for (form, picture) in &found.pictures {
             picture.save(&form.path(folder, &input.name))?;
         }

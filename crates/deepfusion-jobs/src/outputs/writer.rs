@@ -6,6 +6,7 @@ use deepfusion_records::{MadeWith, PredictionRecord, ScaleRecord, Sidecar};
 use deepfusion_runtime::{LayerMaps, ModelSource, Prediction};
 
 use super::depth::{Maps, write};
+use super::earlier::{NewDepth, remove_earlier};
 use super::{DepthOutput, DepthOutputs};
 use crate::bulk::{LoadedImage, add_output, sidecar_path, write_unsynced};
 use crate::{Input, Result, intervals};
@@ -62,10 +63,11 @@ impl DepthWriter<'_> {
         Ok(sidecar)
     }
 
-    /// Writes an image's outputs without waiting for the disk, and gives the sidecar that is to be written once they are on it.
+    /// Writes an image's outputs without waiting for the disk, and gives the sidecar that is to be written once they are on it. Outputs that the
+    /// sidecar of an earlier run names, and that are not written again, are removed first.
     ///
     /// # Errors
-    /// A file that cannot be written; [`crate::Error::NoCamera`], [`crate::Error::NoUncertainty`] and [`crate::Error::NoLayers`] where an
+    /// A file that cannot be written or removed; [`crate::Error::NoCamera`], [`crate::Error::NoUncertainty`] and [`crate::Error::NoLayers`] where an
     /// output needs what is not known.
     pub fn write_outputs(
         &self,
@@ -87,12 +89,19 @@ impl DepthWriter<'_> {
             sigma: sigma.as_ref(),
         };
         let is_file = loaded.live.is_none() && has_file(input) && !loaded.undistorted;
-        let mut files = Vec::new();
-        for save in self.outputs.of_image(is_file) {
-            let file = file_of(input, save);
-            let (path, camera) = (self.folder.join(&file), loaded.camera.as_ref());
+        let saves = self.outputs.of_image(is_file);
+        let files: Vec<String> = saves.iter().map(|save| file_of(input, *save)).collect();
+        let new = NewDepth {
+            name: &input.name,
+            mark: loaded.mark,
+            intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
+            made_with: &self.made_with,
+            files: &files,
+        };
+        remove_earlier(self.folder, &new)?;
+        for (save, file) in saves.into_iter().zip(&files) {
+            let (path, camera) = (self.folder.join(file), loaded.camera.as_ref());
             write(save, self.outputs.limits, image, camera, &maps, &path)?;
-            files.push(file);
         }
         let mut sidecar = Sidecar {
             prediction: self.record(input, loaded, seen, &depth.data),

@@ -43,6 +43,23 @@ pub enum Skipped {
         /// Samples that it has.
         of: usize,
     },
+    /// Images that cannot be read, and are done without.
+    #[error(
+        "{drive}: {broken} of {} cannot be read and {} left out: {}",
+        count_of(*of, "image"),
+        if *broken == 1 { "is" } else { "are" },
+        named(images, *broken)
+    )]
+    BrokenImages {
+        /// The drive.
+        drive: String,
+        /// How many of its images cannot be read.
+        broken: usize,
+        /// How many images it has.
+        of: usize,
+        /// The first of them, each with what is wrong with it.
+        images: Vec<String>,
+    },
     /// No sample of the drive can be made.
     #[error(transparent)]
     Drive(Arc<deepfusion_data::Error>),
@@ -83,5 +100,41 @@ impl std::fmt::Display for NoStereo {
                 "its two cameras are not rectified: their images have other intrinsics, or are turned"
             }
         })
+    }
+}
+
+/// The first of so many broken images, each with what is wrong with it.
+pub(super) fn named(images: &[String], broken: usize) -> String {
+    let mut text = images.join("; ");
+    let more = broken.saturating_sub(images.len());
+    if more > 0 {
+        text += &format!("; and {more} more");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn broken_images_are_named_or_counted() {
+        let said = |broken, images: &[&str]| {
+            let reason = Skipped::BrokenImages {
+                drive: "monday".into(),
+                broken,
+                of: 40,
+                images: images.iter().map(|image| (*image).to_owned()).collect(),
+            };
+            reason.to_string()
+        };
+        assert_eq!(
+            said(1, &["a.png: cut"]),
+            "monday: 1 of 40 images cannot be read and is left out: a.png: cut"
+        );
+        assert_eq!(
+            said(5, &["a.png: cut", "b.png: cut"]),
+            "monday: 5 of 40 images cannot be read and are left out: a.png: cut; b.png: cut; and 3 more"
+        );
     }
 }

@@ -46,10 +46,10 @@ impl Address {
         Self { size, ..self }
     }
 
-    /// That it is understood what a camera is to give, before it is opened.
+    /// That it is said which camera is meant, and understood what it is to give, before it is opened.
     ///
     /// # Errors
-    /// [`Error::CameraMode`].
+    /// [`Error::NoCameraName`], [`Error::CameraMode`].
     pub fn check(&self) -> Result<()> {
         if self.is_camera() {
             self.camera()?;
@@ -61,6 +61,10 @@ impl Address {
     fn camera(&self) -> Result<(&str, CameraMode)> {
         let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
         let (name, asked) = name.split_once('?').unwrap_or((name, ""));
+        if name.is_empty() {
+            let address = self.to_string();
+            return Err(Error::NoCameraName { address });
+        }
         let mut mode = CameraMode::parse(asked).map_err(|problem| Error::CameraMode {
             address: self.to_string(),
             problem,
@@ -113,7 +117,7 @@ impl Address {
     /// ffmpeg's arguments up to and with `-i`, on this system (as [`std::env::consts::OS`] names it).
     ///
     /// # Errors
-    /// [`Error::Program`] where a camera is not named as this system does, [`Error::CameraMode`].
+    /// [`Error::Program`] where a camera is not named as this system does; as [`Self::check`].
     pub(super) fn input(&self, system: &str) -> Result<Vec<String>> {
         let words = |words: &[&str]| -> Vec<String> {
             words.iter().map(|word| (*word).to_owned()).collect()
@@ -252,6 +256,13 @@ mod tests {
         );
         assert!(error.hint().unwrap().contains("size="), "{error:?}");
         assert!(wrong.input("linux").is_err());
+        for nameless in ["camera:", "camera:?fps=5"] {
+            let address = Address::parse(nameless).unwrap();
+            let error = address.check().unwrap_err();
+            assert_eq!(error.to_string(), format!("{nameless} names no camera"));
+            assert!(error.hint().unwrap().contains("camera:0"), "{error:?}");
+            assert!(address.input("linux").is_err());
+        }
         for right in ["camera:0?fps=5", "udp://@:5000?sise=1", "-"] {
             Address::parse(right).unwrap().check().unwrap();
         }

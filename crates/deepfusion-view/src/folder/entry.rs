@@ -11,8 +11,10 @@ use super::summary::Summary;
 pub(crate) enum FileKind {
     /// `NAME.json`.
     Sidecar,
-    /// `NAME_depth.png` or `.npy`.
-    Depth,
+    /// `NAME_depth.npy`.
+    DepthArray,
+    /// `NAME_depth.png`.
+    DepthPng,
     /// `NAME_sigma.npy`.
     Sigma,
     /// `NAME_image.jpg` or `.png`.
@@ -23,8 +25,8 @@ pub(crate) enum FileKind {
 
 /// File name endings, and the kind each means. The plain `.json` is last: it ends others, too.
 const ENDINGS: [(&str, FileKind); 8] = [
-    ("_depth.png", FileKind::Depth),
-    ("_depth.npy", FileKind::Depth),
+    ("_depth.png", FileKind::DepthPng),
+    ("_depth.npy", FileKind::DepthArray),
     ("_sigma.npy", FileKind::Sigma),
     ("_image.jpg", FileKind::Image),
     ("_image.jpeg", FileKind::Image),
@@ -74,7 +76,8 @@ pub(crate) struct Entry {
     /// What its files' names begin with.
     pub name: String,
     pub sidecar: Option<FrameFile>,
-    pub depth: Option<FrameFile>,
+    pub depth_array: Option<FrameFile>,
+    pub depth_png: Option<FrameFile>,
     pub sigma: Option<FrameFile>,
     pub image: Option<FrameFile>,
     pub targets: Option<FrameFile>,
@@ -90,11 +93,22 @@ impl Entry {
         }
     }
 
-    /// Takes in a file. Of two of a kind the first in the order of names stays (`.npy`, whose metres are exact, before `.png`).
+    /// What may be its depth, the best first: an array's metres are exact.
+    pub(crate) fn depths(&self) -> impl Iterator<Item = &FrameFile> {
+        [&self.depth_array, &self.depth_png].into_iter().flatten()
+    }
+
+    /// Whether any file may be its depth.
+    pub(crate) fn may_have_depth(&self) -> bool {
+        self.depths().next().is_some()
+    }
+
+    /// Takes in a file. Of two of a kind the first in the order of names stays.
     pub(crate) fn add(&mut self, kind: FileKind, file: FrameFile) {
         let place = match kind {
             FileKind::Sidecar => &mut self.sidecar,
-            FileKind::Depth => &mut self.depth,
+            FileKind::DepthArray => &mut self.depth_array,
+            FileKind::DepthPng => &mut self.depth_png,
             FileKind::Sigma => &mut self.sigma,
             FileKind::Image => &mut self.image,
             FileKind::Targets => &mut self.targets,
@@ -109,7 +123,8 @@ impl Entry {
         let mut hash = DefaultHasher::new();
         let files = [
             &self.sidecar,
-            &self.depth,
+            &self.depth_array,
+            &self.depth_png,
             &self.sigma,
             &self.image,
             &self.targets,
@@ -132,8 +147,8 @@ mod tests {
                 "0000000005_targets.json",
                 Some(("0000000005", FileKind::Targets)),
             ),
-            ("a_b_depth.npy", Some(("a_b", FileKind::Depth))),
-            ("a_depth.png", Some(("a", FileKind::Depth))),
+            ("a_b_depth.npy", Some(("a_b", FileKind::DepthArray))),
+            ("a_depth.png", Some(("a", FileKind::DepthPng))),
             ("a_sigma.npy", Some(("a", FileKind::Sigma))),
             ("a_image.jpeg", Some(("a", FileKind::Image))),
             ("predict-1-of-1.manifest.json", None),

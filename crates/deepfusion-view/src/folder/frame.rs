@@ -68,12 +68,14 @@ fn as_sentences<S: Serializer>(problems: &[FrameProblem], out: S) -> Result<S::O
 
 /// What there is of a frame.
 pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
+    let files = SmallFiles::read(folder, entry);
+    let depth = files.depth(entry);
     let SmallFiles {
         sidecar,
         targets,
         mut problems,
         ..
-    } = SmallFiles::read(folder, entry);
+    } = files;
     let record = sidecar.as_ref().map(|s| &s.record);
     let said_size = record.and_then(|r| r.size).map(|[w, h]| (w, h));
     let (mut intrinsics, mut shown) = (None, None);
@@ -110,7 +112,7 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
         }
         Err(none) => problems.push(none),
     }
-    match entry.depth.as_ref().map(|d| folder.join(&d.file)) {
+    match depth.map(|d| folder.join(&d.file)) {
         // An array's header is read with its numbers; the page compares the sizes once more.
         Some(path) if path.extension().is_some_and(|e| e == "png") => match image_size(&path) {
             Ok(found) => {
@@ -128,7 +130,7 @@ pub(crate) fn details_of(folder: &Path, entry: &Entry) -> FrameDetails {
         .into_iter()
         .filter_map(|field| Some((field, said(field)?)));
     FrameDetails {
-        depth: entry.depth.as_ref().map(|d| d.file.clone()),
+        depth: depth.map(|d| d.file.clone()),
         intrinsics,
         name: entry.name.clone(),
         picture: shown,

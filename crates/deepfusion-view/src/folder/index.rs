@@ -67,8 +67,15 @@ impl Index {
         };
         Self::New(Box::new(Columns {
             failure,
-            has_depth: flags(|e| e.depth.is_some()),
-            has_sigma: flags(|e| e.sigma.is_some()),
+            // Until the sidecar has been read, which may not stand for a file.
+            has_depth: flags(|e| {
+                let summary = e.summary.as_ref();
+                summary.map_or(e.may_have_depth(), |s| s.has_depth)
+            }),
+            has_sigma: flags(|e| {
+                let summary = e.summary.as_ref();
+                summary.map_or(e.sigma.is_some(), |s| s.has_sigma)
+            }),
             names: entries.iter().map(|e| e.name.clone()).collect(),
             pending: entries.iter().filter(|e| e.summary.is_none()).count(),
             revisions: entries.iter().map(Entry::revision).collect(),

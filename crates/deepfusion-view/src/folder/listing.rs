@@ -130,7 +130,7 @@ impl Listing {
                 .filter(|known| known.revision() == entry.revision());
             entry.summary = known.and_then(|known| known.summary.clone());
             // A frame has depth or targets, or a sidecar that says so: other JSON files may lie there, too.
-            if entry.depth.is_none() && entry.targets.is_none() && entry.summary.is_none() {
+            if !entry.may_have_depth() && entry.targets.is_none() && entry.summary.is_none() {
                 entry.summary = Some(Summary::read(&self.folder, entry));
             }
         }

@@ -15,7 +15,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) use entry::{Entry, FrameFile};
 pub(crate) use frame::{Track, details_of, picture_of, targets_of};
 pub use problem::FrameProblem;
-#[cfg(feature = "rerun")]
 pub(crate) use small_files::SmallFiles;
 #[cfg(feature = "rerun")]
 pub(crate) use summary::Summary;

@@ -46,6 +46,27 @@ impl SmallFiles {
         files
     }
 
+    /// The file of a frame's depth.
+    pub(crate) fn depth<'a>(&self, entry: &'a Entry) -> Option<&'a FrameFile> {
+        entry.depths().find(|file| self.stand_for(file))
+    }
+
+    /// The file of its depth's standard deviation.
+    pub(crate) fn sigma<'a>(&self, entry: &'a Entry) -> Option<&'a FrameFile> {
+        entry.sigma.as_ref().filter(|file| self.stand_for(file))
+    }
+
+    /// Whether the sidecar, where there is one, stands for an output: what it does not name was made before it, by another camera perhaps. Sidecars of other
+    /// programs name no outputs.
+    fn stand_for(&self, file: &FrameFile) -> bool {
+        let sidecar = self.sidecar.as_ref();
+        let named = sidecar.and_then(|s| s.json.get("files")?.as_array());
+        named.is_none_or(|named| {
+            let is_it = |name: &Value| name.as_str() == Some(file.file.as_str());
+            named.iter().any(is_it)
+        })
+    }
+
     fn json(&mut self, folder: &Path, file: Option<&FrameFile>) -> Option<Value> {
         let outcome = read_json(&folder.join(&file?.file));
         outcome

@@ -13,6 +13,8 @@ use super::small_files::SmallFiles;
 pub(crate) struct Summary {
     /// Whether this is a frame at all: other JSON files may lie in the folder.
     pub is_frame: bool,
+    pub has_depth: bool,
+    pub has_sigma: bool,
     /// The problem with a small file, if any.
     pub problem: Option<String>,
     pub time_s: Option<f64>,
@@ -32,7 +34,9 @@ impl Summary {
         let files = SmallFiles::read(folder, entry);
         let mut summary = Self {
             // A sidecar that is being written is a frame that comes.
-            is_frame: entry.depth.is_some() || entry.targets.is_some() || files.unfinished,
+            is_frame: entry.may_have_depth() || entry.targets.is_some() || files.unfinished,
+            has_depth: files.depth(entry).is_some(),
+            has_sigma: files.sigma(entry).is_some(),
             ..Self::default()
         };
         if let Some(sidecar) = &files.sidecar {

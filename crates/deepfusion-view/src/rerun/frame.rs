@@ -142,7 +142,8 @@ fn depth(
     size: Option<(u32, u32)>,
     problems: &mut Vec<FrameProblem>,
 ) -> Option<DepthImage> {
-    let path = folder.join(&entry.depth.as_ref()?.file);
+    let depth = SmallFiles::read(folder, entry).depth(entry)?;
+    let path = folder.join(&depth.file);
     let file = match DepthFile::read(&path) {
         Ok(file) => file,
         Err(e) => {

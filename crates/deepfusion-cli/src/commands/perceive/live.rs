@@ -20,7 +20,7 @@ pub(super) fn run(
     finder: TargetFinder<'_>,
     address: &Address,
 ) -> Result<()> {
-    let mut feed = open(address, &job.loader.camera, &args.prediction.live)?;
+    let mut feed = open(address, &job.loader.camera, &args.prediction)?;
     let found = |record: &FrameRecord| -> Result<()> {
         if args.json {
             output::print(&record_line(record)?)?;

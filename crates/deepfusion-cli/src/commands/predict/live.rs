@@ -35,7 +35,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     let _lock = Lock::take_whole(out)?;
     live::make_room(out, prediction.overwrite)?;
     interrupt::catch("stopping after the frames at work");
-    let mut feed = open(address, &job.loader.camera, &prediction.live)?;
+    let mut feed = open(address, &job.loader.camera, prediction)?;
     let written = |sidecar: &Sidecar| -> Result<()> {
         if args.json {
             output::print(&(serde_json::to_string(sidecar)? + "\n"))

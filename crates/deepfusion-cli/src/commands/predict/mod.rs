@@ -15,7 +15,7 @@ use deepfusion_jobs::bulk::{
 };
 use deepfusion_jobs::outputs::{DepthOutput, DepthOutputs, without_outputs};
 use deepfusion_jobs::scene::unwatched;
-use deepfusion_jobs::{Error, Input};
+use deepfusion_jobs::{Error, Input, first_of_each};
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 use deepfusion_video::{Address, can_write_video};
 
@@ -148,7 +148,11 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
         let input = args.inputs.join(" ");
         return Err(CliError::OutputsAlone { input }.into());
     }
-    Ok(found)
+    // After their names, which are the same without it.
+    Ok(match args.frames {
+        Some(most) => first_of_each(found, usize::try_from(most).unwrap_or(usize::MAX)),
+        None => found,
+    })
 }
 
 /// That the scale monitor's options are not given where it would never look: they would change nothing, silently.
