@@ -1,5 +1,6 @@
 //! Safetensors files: reading and writing.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fs;
 use std::io::{Read, Seek, SeekFrom};
@@ -154,13 +155,10 @@ pub fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) ->
 /// # Errors
 /// [`NetworkError::Io`] naming the file; what was written of it is removed.
 pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkError> {
-    let bytes: Vec<(&String, &WeightTensor, Vec<u8>)> = weights
+    let bytes: Vec<(&String, &WeightTensor, Cow<'_, [u8]>)> = weights
         .tensors
         .iter()
-        .map(|(name, tensor)| {
-            let bytes = tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect();
-            (name, tensor, bytes)
-        })
+        .map(|(name, tensor)| (name, tensor, little_endian(&tensor.values)))
         .collect();
     let mut views = Vec::with_capacity(bytes.len());
     for (name, tensor, bytes) in &bytes {
@@ -185,6 +183,16 @@ pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkEr
             part.publish()
                 .map_err(|source| io_error(path, "write", source))
         })
+}
+
+/// The numbers as a file has them, which on most machines is how they are in memory: a checkpoint is written without a copy of it.
+fn little_endian(values: &[f32]) -> Cow<'_, [u8]> {
+    if cfg!(target_endian = "little") {
+        bytemuck::cast_slice(values).into()
+    } else {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        bytes.into()
+    }
 }
 
 fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> NetworkError {
