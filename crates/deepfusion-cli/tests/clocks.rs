@@ -64,7 +64,7 @@ fn folder(at: &Path, name: &str, readings: &[Reading], ahead_s: f64) {
     fs::write(at.join(name).join("dataset.toml"), config).unwrap();
 }
 
-/// The offset and its standard error as they are printed, milliseconds.
+/// How far the camera's clock is said to be ahead, and the standard error, milliseconds.
 fn found(printed: &str) -> (f64, f64) {
     let line = printed
         .lines()
@@ -72,10 +72,9 @@ fn found(printed: &str) -> (f64, f64) {
         .unwrap();
     let words: Vec<&str> = line.split_whitespace().collect();
     let at = words.iter().position(|word| *word == "±").unwrap();
-    (
-        words[at - 1].parse().unwrap(),
-        words[at + 1].parse().unwrap(),
-    )
+    let number = |at: usize| -> f64 { words[at].parse().unwrap() };
+    let sign = if words[at + 3] == "behind" { -1.0 } else { 1.0 };
+    (sign * number(at - 1), number(at + 1))
 }
 
 #[track_caller]
@@ -92,7 +91,7 @@ fn is_within(printed: &str, ahead_ms: f64) {
 fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     let temporary = tempfile::tempdir().unwrap();
     let at = temporary.path();
-    let readings = drive(at, 900);
+    let readings = drive(at, 500);
     let mut table = String::from("time_s,speed_mps,yaw_rate_radps\n");
     let mut track = String::from("<gpx version=\"1.1\"><trk><trkseg>\n");
     for (i, reading) in readings.iter().enumerate() {

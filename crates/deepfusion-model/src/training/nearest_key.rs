@@ -35,7 +35,7 @@ mod tests {
         for (key, meant) in [
             ("bacth", &["batch"][..]),
             ("loss.smothness", &["loss.smoothness"]),
-            ("smoothness", &["loss.smoothness"]),
+            ("smoothnes", &["loss.smoothness", "loss.flow.smoothness"]),
             ("data.sets[].lern", &["data.sets[].learn"]),
             ("hope", &[]),
         ] {
