@@ -78,7 +78,7 @@ pub(crate) struct AblateArgs {
     /// Pose used for warping [default: posenet; with --config the file's].
     #[arg(long, value_parser = names::view_motion(), value_name = "MOTION", conflicts_with = "resume")]
     pub view_motion: Option<ViewMotion>,
-    /// Set any key of the configuration, such as `loss.smoothness=0.01` (`deepfusion config show` lists them all); may be repeated.
+    /// Set a key of the configuration, such as `loss.smoothness=0.01` (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "resume")]
     pub set: Vec<String>,
     /// Which cameras to use.

@@ -80,8 +80,9 @@ pub(crate) struct AdaptArgs {
     /// Random seed.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub seed: u64,
-    /// Set any key of the configuration, such as `loss.smoothness=0.01` or `data.sets[0].learn=depth` (`deepfusion config show` lists them
-    /// all); may be repeated.
+    /// Set a key of the configuration; may be repeated.
+    ///
+    /// For example `loss.smoothness=0.01` or `data.sets[0].learn=depth`; `deepfusion config show` prints all keys.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Device to compute on; with several GPUs add an index, such as cuda:1.

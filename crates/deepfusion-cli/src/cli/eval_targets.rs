@@ -9,8 +9,8 @@ use super::{EngineArgs, names};
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("source").args(["model", "depth"]).required(true)),
-    after_help = "Boxes come from a drive's tracklet_labels.xml, KITTI raw's or the simulator's. A box counts if enough of it is visible; trees, \
-    poles, buildings and fences count as neither right nor wrong.\n\n\
+    after_help = "Boxes come from a drive's tracklet_labels.xml (KITTI raw's or the simulator's) or from KITTI's object labels. A box counts if \
+    enough of it is visible; trees, poles, buildings and fences count as neither right nor wrong.\n\n\
     Examples:\n  deepfusion eval-targets --data street --depth truth\n  \
     deepfusion eval-targets --data kitti/2011_09_26/2011_09_26_drive_0005_sync --model runs/train-1"
 )]

@@ -23,8 +23,9 @@ use crate::devices::ComputeDevice;
     deepfusion train --out runs/light --resume"
 )]
 pub(crate) struct TrainArgs {
-    /// Recordings to train on: KITTI (raw, odometry, 360) drives or roots, nuScenes, image folders, videos [default: those of the config
-    /// file].
+    /// Recordings to train on [default: those of the config file].
+    ///
+    /// KITTI (raw, odometry, 360) drives or roots, nuScenes, image folders, videos.
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present_any = ["resume", "config"])]
     pub data: Vec<PathBuf>,
     /// Preset to start from [default: tiny].
@@ -100,8 +101,9 @@ pub(crate) struct TrainArgs {
         allow_negative_numbers = true
     )]
     pub clock_offset: Option<ClockOffset>,
-    /// Weights to start from: a run, a checkpoint, a ResNet file, the name of an embedded network (`weights list`), or none [default: the
-    /// embedded network with the preset's layers, if any; with --config what the file says].
+    /// Weights to start from [default: the embedded network with the preset's layers, if any; with --config what the file says].
+    ///
+    /// A run, a checkpoint, a ResNet file, the name of an embedded network (`weights list`), or none.
     #[arg(long, value_name = "WEIGHTS")]
     pub init: Option<PathBuf>,
     /// Pose used for warping [default: the preset's].
@@ -113,8 +115,9 @@ pub(crate) struct TrainArgs {
     /// Parts of the network and loss terms to leave out.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
     pub without: Vec<String>,
-    /// Set any key of the configuration, such as `loss.smoothness=0.01` or `data.sets[0].learn=depth` (`deepfusion config show` lists them
-    /// all); may be repeated.
+    /// Set a key of the configuration; may be repeated.
+    ///
+    /// For example `loss.smoothness=0.01` or `data.sets[0].learn=depth`; `deepfusion config show` prints all keys.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

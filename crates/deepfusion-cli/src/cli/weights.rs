@@ -76,8 +76,9 @@ pub(crate) struct CalibrateWeightsArgs {
     deepfusion weights average runs/own street --shares 2,1 --out runs/careful      # less of what one drive taught"
 )]
 pub(crate) struct AverageArgs {
-    /// Run folder (its best checkpoint, if there is one) or checkpoint in it; after the first also packed networks, and embedded ones by
-    /// name.
+    /// Run folder or checkpoint in it; after the first also packed networks, and embedded ones by name.
+    ///
+    /// Of a run folder, the best checkpoint is taken, if there is one.
     #[arg(required = true, num_args = 2.., value_name = "RUN|NAME")]
     pub models: Vec<PathBuf>,
     /// How much each network counts: one positive number each, in the order given [default: all the same].
