@@ -1,11 +1,11 @@
 """Metric depth from one camera and a speed signal.
 
 Arrays are NumPy's. Depth is camera z in metres, 0 where there is none; images are H x W x 3, uint8, RGB. A camera's axes are x right,
-y down, z ahead, in metres. Intrinsics are fx, fy, cx, cy in pixels of the image they are given with, (0, 0) the centre of the first one.
-A transform is named `target_from_source`.
+y down, z forward, in metres. Intrinsics are fx, fy, cx, cy in pixels of the image that they belong to, with (0, 0) at the centre of
+its first pixel. Transforms are named `target_from_source`.
 
-What the library cannot do raises `DeepFusionError`, whose `hint` says what to do about it. Long calls release the interpreter, and
-Ctrl-C ends them with KeyboardInterrupt.
+The library's errors are raised as `DeepFusionError`, whose `hint` says what to do. Long calls release the GIL, and Ctrl-C ends them
+with KeyboardInterrupt.
 """
 
 from __future__ import annotations
@@ -79,27 +79,28 @@ __all__ = [
 def load(
     model: str | PathLike[str] = "street", *, precision: Precision = "f32", data_set: str | None = None, device: str = "cpu"
 ) -> Model:
-    """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
+    """Loads a trained network: a run folder, a checkpoint in it, a packed file, or an embedded network by its name (`networks()`).
 
-    `precision` is "f32", "bf16" on processors with AMX or AVX512-BF16, or "int8" on those with AVX512-VNNI, for networks that
-    `deepfusion weights calibrate` has seen. `data_set` names one of the data sets that a run
-    learned from, where it learned several: its metres are meant (`--data-set` on the command line).
+    `precision` is "f32", "bf16" on processors with AMX or AVX512-BF16, or "int8" on those with AVX512-VNNI, for networks calibrated
+    by `deepfusion weights calibrate`. For a run that was trained on several data sets, `data_set` names the one whose metric scale to
+    use (`--data-set` on the command line).
 
-    `device` is "cpu", a GPU by its backend ("cuda", "vulkan", "wgpu", "metal"; "cuda:1" is the second one), or "auto": a GPU where package
-    and machine have one, else the processor. A GPU computes in f32. `devices()` are the backends that the package was built with.
+    `device` is "cpu", a GPU by its backend ("cuda", "vulkan", "wgpu", "metal"; "cuda:1" is the second one), or "auto": a GPU if the
+    package supports one and the machine has one, else the processor. A GPU computes in f32. `devices()` lists the backends that the
+    package was built with.
     """
     return _native.load(model, precision, data_set, device)
 
 
 def networks() -> list[str]:
-    """The names of the networks inside the package."""
+    """Names of the embedded networks."""
     return _native.networks()
 
 
 def devices() -> list[str]:
-    """The backends that this package was built with, as `device` names them: "cpu", and those of GPUs that were asked for.
+    """Backends that this package was built with, as `device` names them: "cpu", and those for GPUs that were asked for.
 
-    `pip install ./python --config-settings=build-args="--features cuda"` in a checkout builds it with CUDA.
+    In a checkout, `pip install ./python --config-settings=build-args="--features cuda"` builds it with CUDA.
     """
     return _native.devices()
 
@@ -119,16 +120,17 @@ def evaluate(
     points_seed: int = 0,
     names: Iterable[str] | None = None,
 ) -> dict[str, Any]:
-    """The field's seven metrics, unscaled and median-scaled: what `deepfusion eval --json` prints.
+    """Computes the field's seven metrics, unscaled and median-scaled: the report that `deepfusion eval --json` prints.
 
-    `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size, or what `Model.predict` gave, of
-    which the one or the other is taken; `ground_truth` are H x W arrays of metres, 0 where nothing was measured. Where one is None, the image
-    is left out. Both are taken pair by pair: generators will do. `crop` is "none" or "garg"; what is measured lies between `min_depth` and `cap`
-    metres.
+    `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size, or results of
+    `Model.predict`, from which `kind` takes one or the other. `ground_truth` are H x W arrays of metres, 0 where nothing was
+    measured; None leaves the image out. Both are consumed pair by pair, so generators work. `crop` is "none" or "garg"; only depths
+    between `min_depth` and `cap` metres are measured.
 
-    With `allow_holes` predicted values that are NaN, infinite or not above 0 mean that there is none: they are left out, and counted as
-    `missing_rate`. `gt_depth` says in the report which depth the truth is: "z", "velodyne" or "annotated". `scale` is a fixed factor of a further
-    row; `points` draws so many pixels for the statistics of points, `points_seed` says which. `names` are the images', for messages.
+    With `allow_holes`, predicted values that are NaN, infinite or not above 0 mean that there is none: they are left out, and counted
+    as `missing_rate`. `gt_depth` states in the report which depth the ground truth is: "z", "velodyne" or "annotated". `scale` adds a
+    row with a fixed factor. `points` is the number of pixels to sample for the statistics of points, and `points_seed` decides which.
+    `names` are the images' names in messages.
     """
     if isinstance(predictions, Sized) and isinstance(ground_truth, Sized) and len(predictions) != len(ground_truth):
         raise ValueError(f"{len(predictions)} predictions for {len(ground_truth)} images of ground truth")
@@ -149,7 +151,7 @@ def evaluate(
 
 
 _ENDED = object()
-"""Stands for what an iterable has no more of."""
+"""Stands for the values that an iterable no longer has."""
 
 
 def _plane(values: ArrayLike, what: str) -> NDArray[np.float64]:
@@ -172,12 +174,14 @@ def simulate(
     size: tuple[int, int] = (640, 192),
     scan_every: int = 1,
 ) -> Path:
-    """Writes a simulated drive with exact depth in KITTI's layout into `out`, new or empty, and gives the drive's folder.
+    """Writes a simulated drive with exact depth, in KITTI's layout, into `out` (new or empty), and returns the drive's folder.
 
-    `moving_cars` drive along or towards the camera; `riders` are people who ride bicycles, walk and cross the road (streets, parks and country roads only),
-    fewer where there is no room. `varied=True` draws the camera (lens, height, pitch, roll, softness, noise, exposure, JPEG), the light, the weather and what
-    the street looks like from the seed, once for the drive: `varied.json` in the drive's folder says what was drawn, `scene` may be "motorway" or "country",
-    too, and only those cars drive that nothing on the street stops. `size` is width and height in pixels; `scan_every` says which frames have a LiDAR scan, 0 none. Ctrl-C leaves `out` as it was, unless all frames are done.
+    `moving_cars` drive in the camera's direction or towards it. `riders` are people who ride bicycles, walk and cross the road (only
+    on streets, in parks and on country roads), fewer if there is no room. `varied=True` draws the camera (lens, height, pitch, roll,
+    softness, noise, exposure, JPEG), the light, the weather and the look of the street from the seed, once per drive: `varied.json`
+    in the drive's folder records what was drawn, `scene` may also be "motorway" or "country", and cars whose way is blocked are left
+    out. `size` is width and height in pixels. Every `scan_every`-th frame has a LiDAR scan; 0 writes none. Ctrl-C leaves `out` as it
+    was, unless all frames are done.
     """
     width, height = size
     return _native.simulate(out, frames, seed, scene, moving_cars, riders, varied, width, height, scan_every)
@@ -191,6 +195,6 @@ def doctor(
     topics: Mapping[str, str] | None = None,
     clock_offset_ms: float | None = None,
 ) -> dict[str, Any]:
-    """Every reason why training on a recording would fail or give a wrong scale: what `deepfusion doctor PATH --json` prints, of a log of speeds
-    by itself as well. What the recording does not say can be said as for `Dataset`."""
+    """Lists every reason why training on a recording would fail or give a wrong scale: the report that `deepfusion doctor PATH --json`
+    prints, also for a speed log by itself. What the recording does not say can be passed as to `Dataset`."""
     return json.loads(_native.doctor(path, intrinsics, hfov_deg, topics, clock_offset_ms))

@@ -18,31 +18,31 @@ from ._train import _paths, _settings
 
 @dataclass(frozen=True)
 class Adaptation:
-    """What an adaptation came to. `load()` gives the adapted network, kept or not."""
+    """The result of an adaptation. `load()` loads the adapted network, whether it was kept or not."""
 
     kept: bool
-    """Whether no check became worse. What is not kept is laid aside, and the given network is the better one on these drives."""
+    """Whether no check got worse. A result that is not kept is moved aside, and the given network is the better one on these drives."""
     path: Path
-    """The run: the `out` that was asked for, or where it was laid aside (`out` + ".refused")."""
+    """The run folder: the `out` that was asked for, or where the result was moved (`out` + ".refused")."""
     source: str
-    """The network that was given."""
+    """The given network."""
     steps: int
-    """Steps of learning."""
+    """Training steps."""
     worse: list[dict[str, Any]]
-    """The checks that became worse: check, before, after."""
+    """The checks that got worse: check, before, after."""
     before: dict[str, Any]
-    """The given network on the held-out frames, without ground truth: scale_certificate, without_truth (as `deepfusion eval --json`)."""
+    """The given network on the held-out frames, without ground truth: scale_certificate, without_truth (as in `deepfusion eval --json`)."""
     after: dict[str, Any]
-    """The adapted one on the same frames."""
+    """The adapted network on the same frames."""
 
     def load(self, **options: Any) -> Model:
-        """The adapted network; options as `deepfusion.load`."""
+        """Loads the adapted network; options as in `deepfusion.load`."""
         from . import load
 
         return load(self.path, **options)
 
     def undo(self) -> None:
-        """Makes the run in `path` predict as the network that was given; what was learned stays in it."""
+        """Makes the run in `path` predict like the given network; what was learned stays in it."""
         _native.undo_adaptation(self.path)
 
 
@@ -66,19 +66,21 @@ def adapt(
     config: Mapping[str, Any] | None = None,
     device: str = "cpu",
 ) -> Adaptation:
-    """Learns on drives with a speed from a network that is there, and keeps the result only if it is no worse.
+    """Fine-tunes an existing network on drives with a speed, and keeps the result only if it is no worse.
 
-    The end of each drive (`held_out`, a share) is never learned from. The network is judged there before and after, without ground truth:
-    how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the bias of the metre.
+    The end of each drive (the share `held_out`) is never trained on. There, the network is judged before and after, without ground
+    truth: how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the scale
+    bias.
 
-    `model` is a run, a checkpoint, or the name of an embedded network; `data_set` names one of those that a run learned. Each step has
-    `batch` samples of the drives and `simulated` ones of simulated depth, which keep what the network knows: seen by the drives' own cameras,
-    at their height above the road in the images (`simulated_camera="own"`), or by any (`"any"`). `clock_offset_ms` is how far the camera's clock
-    is ahead of the vehicle's, where the recordings do not say. `speed_error` is one standard error of the speed, as a share of it. `config`
-    changes any key of the configuration, as in `train`. `device` is where it learns and is judged, as in `load`.
+    `model` is a run, a checkpoint, or the name of an embedded network; `data_set` names one of the data sets that a run was trained
+    on. Each step has `batch` samples of the drives and `simulated` samples of simulated depth, which preserve what the network knows.
+    The simulated streets are seen by the drives' own cameras, at the height above the road that their images show
+    (`simulated_camera="own"`), or by any camera (`"any"`). `clock_offset_ms` is how far the camera's clock is ahead of the vehicle's,
+    if the recordings do not say. `speed_error` is one standard error of the speed, as a share of it. `config` sets any key of the
+    configuration, as in `train`. `device` is where the network is trained and judged, as in `load`.
 
-    The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, on another thread than the caller's, as in `train`; where it returns False or raises, or at Ctrl-C, what
-    was learned is saved, and the same call goes on.
+    The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, on another thread than the caller's, as in `train`. If it
+    returns False or raises, or at Ctrl-C, what was learned is saved, and the same call continues it.
     """
     asked = {
         "model": os.fspath(model),

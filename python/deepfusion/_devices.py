@@ -1,4 +1,4 @@
-"""Which GPU is whose."""
+"""Which GPU belongs to which worker."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _LOCAL_RANKS = ("LOCAL_RANK", "OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "
 
 
 def own_gpu(device: str, workers: Workers | None) -> str:
-    """The device of one of several workers: "cuda", and "auto" where that is CUDA, is then the GPU of its own number on its machine, of those
-    that it sees."""
+    """The device of one of several workers: "cuda", and "auto" if that is CUDA, become the GPU with the worker's own number on its
+    machine, among those that it sees."""
     if workers is not None and device == "auto":
         fastest = _native.fastest()
         # Another backend's number is of a card, not of a process.

@@ -1,4 +1,4 @@
-"""What the trainer reports."""
+"""Events that the trainer reports."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class StartedEvent(TypedDict):
     samples: int
     validation_samples: int
     mean_displacement_m: float
-    """Of a pair of frames, metres."""
+    """Between the frames of a pair, in metres."""
 
 
 class StepEvent(TypedDict):
@@ -26,26 +26,26 @@ class StepEvent(TypedDict):
 
     event: Literal["step"]
     step: int
-    """From 1."""
+    """Counted from 1."""
     steps: int
     losses: dict[str, float]
-    """By name, as in log.csv: the mean of the step's samples."""
+    """By name, as in log.csv: means over the step's samples."""
     learning_rate: float
     images_per_second: float
     remaining_s: float
     scale_ratio: float
-    """1 where the scale is metric, NaN where nothing says it."""
+    """1 if the scale is metric, NaN if nothing determines it."""
     gradient_norm: float
 
 
 class ValidatedEvent(TypedDict):
-    """After the held-out samples were looked at."""
+    """After validation on the held-out samples."""
 
     event: Literal["validated"]
     step: int
     losses: dict[str, float]
     selection: float
-    """What `best` is chosen by."""
+    """The value that `best` is chosen by."""
     scale_ratio: float
     best: bool
     """Whether this is the best so far."""
@@ -81,7 +81,7 @@ class CameraEvent(TypedDict):
     focal_px: list[float]
     """fx and fy."""
     sigma_px: list[float] | None
-    """One standard deviation of each, where the drives determine it."""
+    """One standard deviation of each, if the drives determine it."""
 
 
 class WarningEvent(TypedDict):
@@ -93,5 +93,5 @@ class WarningEvent(TypedDict):
 
 
 TrainEvent: TypeAlias = Union[StartedEvent, StepEvent, ValidatedEvent, SavedEvent, PanelEvent, CameraEvent, WarningEvent]
-"""What the trainer reports: a dict, whose `event["event"]` says which it is: "started", "step", "validated", "saved", "panel", "camera" or
-"warning"."""
+"""An event of the trainer: a dict whose `event["event"]` says which one it is: "started", "step", "validated", "saved", "panel",
+"camera" or "warning"."""

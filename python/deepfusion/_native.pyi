@@ -45,37 +45,38 @@ class DeepFusionError(Exception):
 
 @final
 class Prediction:
-    """The metric depth of an image."""
+    """Metric depth of an image."""
 
     @property
     def depth(self) -> NDArray[np.float32]:
-        """H x W metres at the image's size; 0 outside of what the network looked at. One array, made once."""
+        """H x W metres at the image's size; 0 outside the part that the network looked at. Computed once; always the same array."""
     @property
     def sigma(self) -> NDArray[np.float32] | None:
-        """Standard deviation of `depth` in metres, H x W, stretched by what was found for the network, as `deepfusion predict` writes it; None of
-        a network that does not say. One array, made once."""
+        """Standard deviation of `depth` in metres, H x W, scaled by what was found for the network, as `deepfusion predict` writes it;
+        None for a network that does not predict it. Computed once; always the same array."""
     @property
     def confidence(self) -> NDArray[np.float32] | None:
-        """How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
-        None of a network that does not say. Stretched as `sigma`. One array, made once."""
+        """How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-expected error of ln depth), 0.9 for 10 %; None for a
+        network that does not predict it. Scaled like `sigma`. Computed once; always the same array."""
     @property
     def disparity(self) -> NDArray[np.float32]:
-        """1/m, at the network's size. One array, made once."""
+        """Disparity in 1/m, at the network's size. Computed once; always the same array."""
     @property
     def intrinsics(self) -> _Intrinsics | None:
-        """fx, fy, cx, cy of the image, where they are known."""
+        """fx, fy, cx, cy of the image, if they are known."""
     def __dlpack__(self, **options: Any) -> Any:
-        """`depth`'s: `torch.from_dlpack(prediction)` shares its memory."""
+        """Exports `depth`: `torch.from_dlpack(prediction)` shares its memory."""
     def __dlpack_device__(self) -> tuple[int, int]: ...
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        """`depth`: `np.asarray(prediction)` is that very array."""
+        """`depth` itself: `np.asarray(prediction)` is this very array."""
     def __reduce__(self) -> NoReturn: ...
     def cloud(self, max_depth: float = 80.0) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3, of `depth` as it stands there; needs `intrinsics`."""
+        """Points, N x 3 in metres (x right, y down, z forward), and their colours, N x 3, from `depth` as it is now; needs
+        `intrinsics`."""
 
 @final
 class Model:
-    """A trained network. Calls on several threads wait for each other; `another()` is for a second thread."""
+    """A trained network. Calls from several threads wait for each other; use `another()` for a second thread."""
 
     def predict(
         self,
@@ -87,15 +88,16 @@ class Model:
         stretch: bool = False,
         post_process: _PostProcess | None = None,
     ) -> Prediction:
-        """Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, a file, or a frame of a
-        recording. The camera is `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix), or the one that sees `hfov_deg` degrees from left to right;
-        without either a frame has its own, and EXIF is asked, of a file or of what PIL opened from one. Then the lens of the training camera is
-        assumed, of which Python is warned once, and the metres are as right as that.
+        """Predicts the depth of an H x W x 3 array (uint8, RGB; NumPy's, or another library's on the CPU by DLPack), a PIL image, a
+        file, or a frame of a recording. The camera is `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix), or is given by
+        `hfov_deg`, the horizontal field of view in degrees. Without either, a frame has its own camera, and a file, or what PIL
+        opened from one, its EXIF data. If there is none, the training camera's lens is assumed, Python warns once, and the metres
+        are only as right as that assumption.
 
-        `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
-        image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two predictions of the image or of four
-        (the image and the mirrored one; a smaller input and a larger one; both): it usually errs less on real streets, and takes two to
-        five times as long. Several sizes are for networks that learned at several, as `street` did."""
+        `focal_correction` corrects depth for a focal length other than the training camera's; `stretch` shows the network the whole
+        image where it would be cropped to the training images' aspect ratio. `post_process` averages two or four predictions of the
+        image (the image and the mirrored one; a smaller input and a larger one; both): this usually lowers the error on real
+        streets, and takes two to five times as long. Several sizes are for networks trained at several sizes, such as `street`."""
     def predict_many(
         self,
         images: Iterable[Image],
@@ -107,30 +109,30 @@ class Model:
         post_process: _PostProcess | None = None,
         ahead: int | None = None,
     ) -> Predictions:
-        """The predictions of images of one camera, or of frames, in their order, as `predict` gives them. While the network looks at one, the next
-        are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
-        going on with `next` gives those behind it. `ahead` is how many may be on their way at once, by default some for each thread; one thread
-        takes them at a time."""
+        """Predicts images of one camera, or frames, in their order, as `predict` does. While the network works on one image, the next
+        ones are read and prepared on other threads, as in `deepfusion predict`. What is wrong with an image is raised when its turn
+        comes; calling `next` again continues with the images after it. `ahead` is how many may be on their way at once, by default
+        a few per thread; one thread at a time takes the predictions."""
     def another(self) -> Model:
-        """The same network for another thread: it shares the weights."""
+        """The same network for another thread; it shares the weights."""
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height trained with."""
+        """Width and height that it was trained with."""
     @property
     def step(self) -> int:
-        """Steps it was trained for."""
+        """Steps that it was trained for."""
     @property
     def engine(self) -> str:
-        """What runs it: "fused" on a processor ("fused-bf16", "fused-int8"), "burn" on a GPU."""
+        """The engine that runs it: "fused" on a processor ("fused-bf16", "fused-int8"), "burn" on a GPU."""
     @property
     def device(self) -> str:
-        """Where it runs: "cpu", "cuda:1"."""
+        """The device that it runs on, such as "cpu" or "cuda:1"."""
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, it is loaded again: the weights stay where they are."""
+        """Unpickling loads it again: the weights stay where they are."""
 
 @final
 class Predictions(Iterator[Prediction]):
-    """Of `Model.predict_many`."""
+    """The iterator that `Model.predict_many` returns."""
 
     def __iter__(self) -> Predictions: ...
     def __next__(self) -> Prediction: ...
@@ -141,20 +143,20 @@ class Frame:
 
     @property
     def image(self) -> NDArray[np.uint8]:
-        """H x W x 3, RGB, free of the lens's distortion. Read when asked for."""
+        """H x W x 3, RGB, without lens distortion. Read on each access."""
     @property
     def number(self) -> int:
-        """Its number in the recording's files."""
+        """Number of the frame in the recording's files."""
     @property
     def time_s(self) -> float | None:
-        """When it was taken, seconds from the recording's first stamp."""
+        """When it was taken, in seconds from the recording's first time stamp."""
     @property
     def speed_mps(self) -> float | None:
-        """The vehicle's."""
+        """Speed of the vehicle."""
     @property
     def yaw_rate_radps(self) -> float | None:
-        """How fast the vehicle turned since the frame before, radians a second, positive to the left; None where that is not known, and of the
-        first frame."""
+        """How fast the vehicle turned since the previous frame, in radians per second, positive to the left; None if that is not
+        known, and for the first frame."""
     @property
     def intrinsics(self) -> _Intrinsics:
         """fx, fy, cx, cy in pixels of `image`."""
@@ -162,16 +164,16 @@ class Frame:
     def K(self) -> NDArray[np.float64]:
         """`intrinsics` as the 3 x 3 matrix fx 0 cx, 0 fy cy, 0 0 1, float64."""
     def ground_truth(self, kind: DepthKind = "z") -> NDArray[np.float32] | None:
-        """H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z", "velodyne" or
-        "annotated" (KITTI's `proj_depth`)."""
+        """H x W metres, 0 where nothing was measured; None if the frame has no ground truth. `kind`: "z", "velodyne" or "annotated"
+        (KITTI's `proj_depth`)."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled, it is the same frame of the recording, which is opened again."""
+        """Unpickling opens the recording again and gives the same frame."""
 
 @final
 class Dataset:
-    """A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known of the frame."""
+    """A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known about the frame."""
 
     def __new__(
         cls,
@@ -186,12 +188,12 @@ class Dataset:
         clock_offset_ms: float | None = None,
         split: str | PathLike[str] | None = None,
     ) -> Dataset:
-        """`camera` is "2" (left) or "3" (right) where there are two; `drive` says which of several below `path`, from 0.
+        """`camera` is "2" (left) or "3" (right) if there are two; `drive` selects one of several below `path`, counted from 0.
 
-        What a recording does not say: `intrinsics` (fx, fy, cx, cy in pixels of its images, or the 3 x 3 matrix), `hfov_deg` (its view from left
-        to right) or `calibration` (a file) is its camera; `topics` are those of a bag by role (`{"image": "/camera/front"}`; roles: image,
-        camera_info, lidar, dynamic, imu, speed, steering, can, truth); `clock_offset_ms` is how far the camera's clock is ahead of the vehicle's.
-        `split` is a file whose frames alone are meant."""
+        Pass what the recording does not say: its camera as `intrinsics` (fx, fy, cx, cy in pixels of its images, or the 3 x 3
+        matrix), `hfov_deg` (horizontal field of view) or `calibration` (a file); a bag's topics by role as `topics` (`{"image":
+        "/camera/front"}`; roles: image, camera_info, lidar, dynamic, imu, speed, steering, can, truth); as `clock_offset_ms`, how
+        far the camera's clock is ahead of the vehicle's. `split` is a file that selects frames."""
     def __len__(self) -> int: ...
     @overload
     def __getitem__(self, index: int, /) -> Frame: ...
@@ -200,31 +202,32 @@ class Dataset:
     def __iter__(self) -> Iterator[Frame]: ...
     @property
     def name(self) -> str:
-        """The drive's."""
+        """Name of the drive."""
     @property
     def layout(self) -> str:
-        """Such as "KITTI raw"."""
+        """The recording's layout, such as "KITTI raw"."""
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """When each frame was taken, seconds from the recording's first stamp; NaN where that is not known."""
+        """When each frame was taken, in seconds from the recording's first time stamp; NaN if that is not known."""
     @property
     def speeds_mps(self) -> NDArray[np.float64]:
-        """The vehicle's speed at each frame; NaN where that is not known."""
+        """The vehicle's speed at each frame; NaN if that is not known."""
     @property
     def numbers(self) -> NDArray[np.int64]:
-        """Each frame's number in the recording's files."""
+        """Number of each frame in the recording's files."""
     @property
     def camera_yaw_rad(self) -> float | None:
-        """By how much the camera looks to the left of the way straight ahead, radians; 0 where nothing says its mount, None for one that
-        looks to the side or back (more than 60 degrees)."""
+        """How far the camera looks to the left of straight ahead, in radians; 0 if nothing says how it is mounted, None for a camera
+        that looks to the side or back (more than 60 degrees)."""
     @property
     def warnings(self) -> list[str]:
-        """What was taken for granted, looks odd or cannot be read, though it was opened: a line each. `Dataset(...)` warns of them (UserWarning)."""
+        """What was assumed, looks odd or could not be read although the recording was opened, one line each. `Dataset(...)` issues
+        them as warnings (UserWarning)."""
     def motion(self, source: int, target: int) -> NDArray[np.float64] | None:
-        """4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
-        the vehicle's motion is not known. Below 0 frames are counted from the end, as in `recording[-1]`."""
+        """4 x 4, target_from_source: transforms a point from the camera at frame `source` to the camera at frame `target`; None if the
+        vehicle's motion is not known. Negative numbers count frames from the end, as in `recording[-1]`."""
     def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
-        """Pickled, it is opened again: the recording itself stays where it is."""
+        """Unpickling opens it again: the recording itself stays where it is."""
 
 def drives(
     path: str | PathLike[str],
@@ -237,7 +240,7 @@ def drives(
     clock_offset_ms: float | None = None,
     split: str | PathLike[str] | None = None,
 ) -> list[Dataset]:
-    """Every drive below `path`, as `Dataset` opens one; what is said is said of all of them."""
+    """Every drive below `path`, each opened as a `Dataset`; the options apply to all of them."""
 
 def load(model: Any, precision: str, data_set: str | None, device: str) -> Model: ...
 def networks() -> list[str]: ...

@@ -16,47 +16,47 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Target:
-    """Something that stands on the ground: a box in the camera's axes (x right, y down, z ahead), metres, seconds, radians."""
+    """An object that stands on the ground: a box in the camera's axes (x right, y down, z forward), in metres, seconds, radians."""
 
     id: int
-    """The track it belongs to; the same from frame to frame."""
+    """The track that it belongs to; the same from frame to frame."""
     center_m: Vector
     """Centre of the box."""
     size_m: Vector
     """Length, width and height."""
     yaw_rad: float
-    """KITTI's rotation_y: the length points along (cos, 0, -sin) of it. Without a velocity it is known up to half a turn."""
+    """KITTI's rotation_y: the length points along (cos, 0, -sin) of it. Without a velocity, it is only known up to half a turn."""
     distance_m: float
     """From the camera to the centre."""
     sigma_m: float | None
-    """Standard deviation of that, where the depth came with one."""
+    """Standard deviation of `distance_m`, if the depth came with one."""
     velocity_mps: Vector | None
-    """Over ground, in the camera's axes; None before it could be measured."""
+    """Over ground, in the camera's axes; None until it could be measured."""
     moving: bool | None
-    """Whether it moves over ground; None before that is known."""
+    """Whether it moves over ground; None until that is known."""
     confidence: float
-    """How sure it is that something of this kind is there, 0 to 1."""
+    """How certain it is that there is something of this kind, 0 to 1."""
     pixels: int
-    """How many pixels see it, of a depth image at most 640 wide; 0 where the track goes on without being seen."""
+    """Number of pixels that see it, in a depth image at most 640 wide; 0 if the track continues without being seen."""
     bounds: tuple[int, int, int, int] | None
-    """Left, top, right, bottom of those pixels, in pixels of the image."""
+    """Left, top, right and bottom of those pixels, in pixels of the image."""
     corners_m: NDArray[np.float64] = field(compare=False, repr=False)
     """8 x 3, the lower four corners first."""
 
 
 @dataclass(frozen=True)
 class Ground:
-    """The road: points p of the camera's axes with normal · p + offset_m = 0."""
+    """The road: all points p in the camera's axes with normal · p + offset_m = 0."""
 
     normal: Vector
-    """Upwards, of length 1."""
+    """Points upwards; has length 1."""
     offset_m: float
-    """The camera's height above it, metres."""
+    """Height of the camera above the road, in metres."""
 
 
 @dataclass(frozen=True)
 class Collision:
-    """A meeting that is to come, if all goes on as it does."""
+    """A collision to come, if everything goes on as it does."""
 
     id: int
     """The target."""
@@ -66,14 +66,14 @@ class Collision:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What stands before the camera."""
+    """What is in front of the camera."""
 
     targets: list[Target]
-    """In order of distance."""
+    """Sorted by distance."""
     ground: Ground | None
-    """None where none was found, and then there are no targets."""
+    """None if none was found; then there are no targets."""
     collision: Collision | None
-    """The first target that the vehicle's front would touch within 10 s, where its speed is given and the camera looks ahead."""
+    """The first target that the vehicle's front would touch within 10 s, if its speed is given and the camera looks ahead."""
 
 
 def _surroundings(text: str) -> Surroundings:
@@ -113,10 +113,10 @@ def _plain(value: Any) -> Any:
 
 
 class Perception:
-    """Follows targets over the frames of a recording; `perceive` is for single images.
+    """Tracks targets over the frames of a recording; for single images, use `perceive`.
 
-    `exact=True` is for measured or simulated depth, else the settings are those for a network's. Further settings by name, as in
-    `deepfusion perceive --config`: `max_depth_m`, `min_confidence`, `min_pixels`, …
+    `exact=True` is for measured or simulated depth; otherwise the settings are those for a network's depth. Further settings are
+    passed by name, as in `deepfusion perceive --config`: `max_depth_m`, `min_confidence`, `min_pixels`, …
     """
 
     def __init__(self, *, exact: bool = False, **settings: Any) -> None:
@@ -134,14 +134,14 @@ class Perception:
         yaw_rate_radps: float = 0.0,
         camera_yaw_rad: float | None = 0.0,
     ) -> Surroundings:
-        """The targets in a depth image: H x W metres, 0 where there is none; `intrinsics` (fx, fy, cx, cy, or the 3 x 3
-        matrix) of that size, `sigma` its standard deviation.
+        """Finds the targets in a depth image: H x W metres, 0 where there is none. `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix)
+        are for that size; `sigma` is the depth's standard deviation.
 
-        With `time_s` (seconds, on any clock) and `world_from_cam` (4 x 4, the camera to a frame that stays where it is) targets are
-        followed: they keep their id, are reported once they were seen twice, and get a velocity. `speed_mps` and `yaw_rate_radps` (positive
-        to the left) are the vehicle's, for `Surroundings.collision`, and `camera_yaw_rad` is by how much the camera looks to the left of the way
-        straight ahead (`Dataset.camera_yaw_rad`): of one that looks to the side, more than 60 degrees or None, nothing is said. Where the
-        motion from the last frame is not known, call `reset`, and begin anew with a pose.
+        With `time_s` (in seconds, on any clock) and `world_from_cam` (4 x 4, from the camera to a fixed frame), targets are tracked:
+        they keep their id, are reported once they have been seen twice, and get a velocity. `speed_mps` and `yaw_rate_radps`
+        (positive to the left) are the vehicle's, for `Surroundings.collision`. `camera_yaw_rad` is how far the camera looks to the
+        left of straight ahead (`Dataset.camera_yaw_rad`); for a camera that looks to the side (more than 60 degrees, or None), no
+        collision is reported. If the motion since the last frame is not known, call `reset`, and start again with a new pose.
         """
         as_f32 = lambda a: np.ascontiguousarray(a, dtype=np.float32)  # noqa: E731
         pose = None if world_from_cam is None else np.ascontiguousarray(world_from_cam, dtype=np.float64)
@@ -153,7 +153,7 @@ class Perception:
         )
 
     def reset(self) -> None:
-        """What comes next does not go on from what was."""
+        """Forgets the past: the next frame does not continue the ones before."""
         self._native.reset()
 
 
@@ -165,5 +165,5 @@ def perceive(
     exact: bool = False,
     **settings: Any,
 ) -> Surroundings:
-    """The targets in one depth image: what `deepfusion perceive` finds in a single picture. As `Perception.detect`, without a past."""
+    """Finds the targets in one depth image, as `deepfusion perceive` does in a single picture. Like `Perception.detect`, without a past."""
     return Perception(exact=exact, **settings).detect(depth, intrinsics, sigma=sigma)

@@ -1,4 +1,4 @@
-"""Samples to learn from, as arrays."""
+"""Training samples, as arrays."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ._types import Camera, DepthKind
 
 
 class Snippets:
-    """A recording's frames, each with its neighbours in time and how the camera came there.
+    """A recording's frames, each with its neighbours in time and the camera's motion between them.
 
     A sample is a dict: `image` H x W x 3 (uint8), `sources` N x H x W x 3 (uint8), `source_from_target` N x 4 x 4 (float64, metres:
-    takes a point of the camera at the image to the camera at the source), `intrinsics` 3 x 3 (float32, pixels), `depth` H x W (float32,
-    metres, 0 where nothing was measured), `speed_mps` (NaN where it is not known), `number` of the frame.
+    transforms a point from the camera at the image to the camera at the source), `intrinsics` 3 x 3 (float32, pixels), `depth` H x W
+    (float32, metres, 0 where nothing was measured), `speed_mps` (NaN if it is not known), `number` of the frame.
 
-    `offsets` say which neighbours, in frames. Frames without all of them, or whose motion is not known, are left out.
-    `depth_kind` is "z" or "velodyne".
+    `offsets` select the neighbours, in frames. Frames that lack one of them, or whose motion is not known, are left out. `depth_kind`
+    is "z" or "velodyne".
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Snippets:
         depth_kind: DepthKind = "z",
     ) -> None:
         self.recording = Dataset(path, camera=camera, drive=drive)
-        """Opened again in another process."""
+        """Reopened in another process."""
         self.offsets = tuple(offsets)
         self.depth_kind = depth_kind
         recording = self.recording

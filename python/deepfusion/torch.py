@@ -1,4 +1,4 @@
-"""For PyTorch, which the package does not need: `pip install torch`."""
+"""For PyTorch, which the package itself does not need: `pip install torch`."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class KittiLikeDataset(_TorchDataset):
     """A recording's frames with their neighbours in time, as tensors: `deepfusion.Snippets` for a `torch.utils.data.DataLoader`.
 
     A sample is a dict: `image` 3 x H x W and `sources` N x 3 x H x W (float32, 0 to 1, RGB), `source_from_target` N x 4 x 4 (float32,
-    metres), `intrinsics` 3 x 3 (pixels), `depth` 1 x H x W (metres, 0 where nothing was measured), `speed_mps`, `number`.
-    Arguments as `deepfusion.Snippets`.
+    metres), `intrinsics` 3 x 3 (pixels), `depth` 1 x H x W (metres, 0 where nothing was measured), `speed_mps`, `number`. Arguments
+    are those of `deepfusion.Snippets`.
     """
 
     def __init__(self, path: Any, **options: Any) -> None:

@@ -25,7 +25,7 @@ use crate::opening::{Opening, absolute};
 /// What pickle calls, and with what.
 type Reduced<'py, A> = (Bound<'py, PyAny>, A);
 
-/// A recording of any known layout: one drive, one camera.
+/// A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known about the frame.
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Dataset {
     inner: Arc<data::Dataset>,
@@ -39,7 +39,7 @@ pub(crate) struct Dataset {
     warnings: Vec<String>,
 }
 
-/// Every drive below `path`, as `Dataset` opens one; what is said is said of all of them.
+/// Every drive below `path`, each opened as a `Dataset`; the options apply to all of them.
 #[pyfunction]
 #[pyo3(signature = (path, *, camera="2", intrinsics=None, hfov_deg=None, calibration=None, topics=None, clock_offset_ms=None, split=None))]
 #[expect(clippy::too_many_arguments, reason = "by name in Python")]
@@ -185,8 +185,8 @@ impl Dataset {
         Ok(PyList::new(py, frames)?.into_any())
     }
 
-    /// By how much the camera looks to the left of the way straight ahead, radians; 0 where nothing says its mount, None for one that
-    /// looks to the side or back (more than 60 degrees).
+    /// How far the camera looks to the left of straight ahead, in radians; 0 if nothing says how it is mounted, None for a camera
+    /// that looks to the side or back (more than 60 degrees).
     #[getter]
     fn camera_yaw_rad(&self) -> Option<f64> {
         let mount = self.inner.cam_from_vehicle();
@@ -204,31 +204,31 @@ impl Dataset {
         }
     }
 
-    /// The drive's.
+    /// Name of the drive.
     #[getter]
     fn name(&self) -> &str {
         self.inner.name()
     }
 
-    /// Such as "KITTI raw".
+    /// The recording's layout, such as "KITTI raw".
     #[getter]
     fn layout(&self) -> &'static str {
         self.inner.kind().label()
     }
 
-    /// When each frame was taken, seconds from the recording's first stamp; NaN where that is not known.
+    /// When each frame was taken, in seconds from the recording's first time stamp; NaN if that is not known.
     #[getter]
     fn times_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.column(py, |frame| frame.time_s)
     }
 
-    /// The vehicle's speed at each frame; NaN where that is not known.
+    /// The vehicle's speed at each frame; NaN if that is not known.
     #[getter]
     fn speeds_mps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.column(py, |frame| frame.speed_mps)
     }
 
-    /// Each frame's number in the recording's files.
+    /// Number of each frame in the recording's files.
     #[getter]
     fn numbers<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let numbers = self
@@ -237,14 +237,15 @@ impl Dataset {
         numbers.collect::<Vec<i64>>().into_pyarray(py)
     }
 
-    /// What was taken for granted, looks odd or cannot be read, though it was opened: a line each. `Dataset(...)` warns of them (UserWarning).
+    /// What was assumed, looks odd or could not be read although the recording was opened, one line each. `Dataset(...)` issues
+    /// them as warnings (UserWarning).
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
-    /// 4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
-    /// the vehicle's motion is not known. Below 0 frames are counted from the end, as in `recording[-1]`.
+    /// 4 x 4, target_from_source: transforms a point from the camera at frame `source` to the camera at frame `target`; None if the
+    /// vehicle's motion is not known. Negative numbers count frames from the end, as in `recording[-1]`.
     fn motion<'py>(
         &self,
         py: Python<'py>,
@@ -260,7 +261,7 @@ impl Dataset {
         }))
     }
 
-    /// Pickled, it is opened again: the recording itself stays where it is.
+    /// Unpickling opens it again: the recording itself stays where it is.
     fn __getnewargs_ex__<'py>(
         &self,
         py: Python<'py>,
@@ -334,7 +335,7 @@ impl Frame {
 
 #[pymethods]
 impl Frame {
-    /// H x W x 3, RGB, free of the lens's distortion. Read when asked for.
+    /// H x W x 3, RGB, without lens distortion. Read on each access.
     #[getter]
     fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let image = py
@@ -347,26 +348,26 @@ impl Frame {
         Ok(array.into_pyarray(py))
     }
 
-    /// Its number in the recording's files.
+    /// Number of the frame in the recording's files.
     #[getter]
     fn number(&self) -> u64 {
         self.facts().number
     }
 
-    /// When it was taken, seconds from the recording's first stamp.
+    /// When it was taken, in seconds from the recording's first time stamp.
     #[getter]
     fn time_s(&self) -> Option<f64> {
         self.facts().time_s
     }
 
-    /// The vehicle's.
+    /// Speed of the vehicle.
     #[getter]
     fn speed_mps(&self) -> Option<f64> {
         self.facts().speed_mps
     }
 
-    /// How fast the vehicle turned since the frame before, radians a second, positive to the left; None where that is not known, and of the
-    /// first frame.
+    /// How fast the vehicle turned since the previous frame, in radians per second, positive to the left; None if that is not
+    /// known, and for the first frame.
     #[getter]
     fn yaw_rate_radps(&self) -> Option<f64> {
         let (dataset, index) = (self.data(), self.index());
@@ -394,8 +395,8 @@ impl Frame {
         Array2::from_shape_fn((3, 3), |(row, column)| k[row][column]).into_pyarray(py)
     }
 
-    /// H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z", "velodyne" or
-    /// "annotated" (KITTI's `proj_depth`).
+    /// H x W metres, 0 where nothing was measured; None if the frame has no ground truth. `kind`: "z", "velodyne" or "annotated"
+    /// (KITTI's `proj_depth`).
     #[pyo3(signature = (kind="z"))]
     fn ground_truth(&self, py: Python<'_>, kind: &str) -> PyResult<Option<Py<PyArray2<f32>>>> {
         let kind = match kind {
@@ -435,7 +436,7 @@ impl Frame {
         hasher.finish()
     }
 
-    /// Pickled, it is the same frame of the recording, which is opened again.
+    /// Unpickling opens the recording again and gives the same frame.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, (Py<Dataset>, usize)>> {
         let of = py.import("operator")?.getattr("getitem")?;
         Ok((of, (self.dataset.clone_ref(py), self.place)))

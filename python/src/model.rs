@@ -127,15 +127,16 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, a file, or a frame of a
-    /// recording. The camera is `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix), or the one that sees `hfov_deg` degrees from left to right;
-    /// without either a frame has its own, and EXIF is asked, of a file or of what PIL opened from one. Then the lens of the training camera is
-    /// assumed, of which Python is warned once, and the metres are as right as that.
+    /// Predicts the depth of an H x W x 3 array (uint8, RGB; NumPy's, or another library's on the CPU by DLPack), a PIL image, a
+    /// file, or a frame of a recording. The camera is `intrinsics` (fx, fy, cx, cy, or the 3 x 3 matrix), or is given by
+    /// `hfov_deg`, the horizontal field of view in degrees. Without either, a frame has its own camera, and a file, or what PIL
+    /// opened from one, its EXIF data. If there is none, the training camera's lens is assumed, Python warns once, and the metres
+    /// are only as right as that assumption.
     ///
-    /// `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
-    /// image where it would be cut to the aspect ratio trained with. `post_process` takes the mean of two predictions of the image or of four
-    /// (the image and the mirrored one; a smaller input and a larger one; both): it usually errs less on real streets, and takes two to
-    /// five times as long. Several sizes are for networks that learned at several, as `street` did.
+    /// `focal_correction` corrects depth for a focal length other than the training camera's; `stretch` shows the network the whole
+    /// image where it would be cropped to the training images' aspect ratio. `post_process` averages two or four predictions of the
+    /// image (the image and the mirrored one; a smaller input and a larger one; both): this usually lowers the error on real
+    /// streets, and takes two to five times as long. Several sizes are for networks trained at several sizes, such as `street`.
     #[expect(clippy::too_many_arguments, reason = "by name in Python")]
     #[pyo3(signature = (image, intrinsics=None, *, hfov_deg=None, focal_correction=true, stretch=false, post_process=None))]
     fn predict(
@@ -174,10 +175,10 @@ impl Model {
         Ok(Prediction::new(prediction, image, camera, factors))
     }
 
-    /// The predictions of images of one camera, or of frames, in their order, as `predict` gives them. While the network looks at one, the next
-    /// are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
-    /// going on with `next` gives those behind it. `ahead` is how many may be on their way at once, by default some for each thread; one thread
-    /// takes them at a time.
+    /// Predicts images of one camera, or frames, in their order, as `predict` does. While the network works on one image, the next
+    /// ones are read and prepared on other threads, as in `deepfusion predict`. What is wrong with an image is raised when its turn
+    /// comes; calling `next` again continues with the images after it. `ahead` is how many may be on their way at once, by default
+    /// a few per thread; one thread at a time takes the predictions.
     #[pyo3(signature = (images, intrinsics=None, *, hfov_deg=None, focal_correction=true, stretch=false, post_process=None, ahead=None))]
     #[expect(clippy::too_many_arguments, reason = "by name in Python")]
     fn predict_many(
@@ -208,7 +209,7 @@ impl Model {
         Predictions::begin(request, own.map_err(raise)?)
     }
 
-    /// The same network for another thread: it shares the weights.
+    /// The same network for another thread; it shares the weights.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
         let another = py.detach(|| self.with(|estimator| estimator.another()));
         let (factors, loaded) = (Arc::clone(&self.factors), self.loaded.clone());
@@ -219,32 +220,32 @@ impl Model {
         })
     }
 
-    /// Width and height trained with.
+    /// Width and height that it was trained with.
     #[getter]
     fn size(&self, py: Python<'_>) -> (usize, usize) {
         let size = py.detach(|| self.with(|estimator| estimator.config().size));
         (size.width, size.height)
     }
 
-    /// Steps it was trained for.
+    /// Steps that it was trained for.
     #[getter]
     fn step(&self, py: Python<'_>) -> usize {
         py.detach(|| self.with(|estimator| estimator.step))
     }
 
-    /// What runs it: "fused" on a processor ("fused-bf16", "fused-int8"), "burn" on a GPU.
+    /// The engine that runs it: "fused" on a processor ("fused-bf16", "fused-int8"), "burn" on a GPU.
     #[getter]
     fn engine(&self, py: Python<'_>) -> &'static str {
         py.detach(|| self.with(|estimator| estimator.engine()))
     }
 
-    /// Where it runs: "cpu", "cuda:1".
+    /// The device that it runs on, such as "cpu" or "cuda:1".
     #[getter]
     fn device(&self) -> String {
         self.device.to_string()
     }
 
-    /// Pickled, it is loaded again: the weights stay where they are.
+    /// Unpickling loads it again: the weights stay where they are.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let again = py.import("deepfusion._native")?.getattr("load")?;
         let LoadArguments {

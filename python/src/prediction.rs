@@ -20,7 +20,7 @@ use crate::perceive::depth_map;
 /// Positions and colours, N×3 each.
 type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 
-/// The metric depth of an image.
+/// Metric depth of an image.
 #[pyclass(frozen, module = "deepfusion")]
 pub(crate) struct Prediction {
     /// Where it was made ahead of whoever asks.
@@ -83,7 +83,7 @@ impl Prediction {
 
 #[pymethods]
 impl Prediction {
-    /// H x W metres at the image's size; 0 outside of what the network looked at. One array, made once.
+    /// H x W metres at the image's size; 0 outside the part that the network looked at. Computed once; always the same array.
     #[getter]
     pub(crate) fn depth(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.depth.get_or_try_init(py, || {
@@ -98,8 +98,8 @@ impl Prediction {
         Ok(array.clone_ref(py))
     }
 
-    /// Standard deviation of `depth` in metres, H x W, stretched by what was found for the network, as `deepfusion predict` writes it; None of
-    /// a network that does not say. One array, made once.
+    /// Standard deviation of `depth` in metres, H x W, scaled by what was found for the network, as `deepfusion predict` writes it;
+    /// None for a network that does not predict it. Computed once; always the same array.
     #[getter]
     fn sigma(&self, py: Python<'_>) -> PyResult<Option<Plane>> {
         once(py, &self.sigma, || {
@@ -107,8 +107,8 @@ impl Prediction {
         })
     }
 
-    /// How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
-    /// None of a network that does not say. Stretched as `sigma`. One array, made once.
+    /// How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-expected error of ln depth), 0.9 for 10 %; None for a
+    /// network that does not predict it. Scaled like `sigma`. Computed once; always the same array.
     #[getter]
     fn confidence(&self, py: Python<'_>) -> PyResult<Option<Plane>> {
         once(py, &self.confidence, || {
@@ -117,7 +117,7 @@ impl Prediction {
         })
     }
 
-    /// 1/m, at the network's size. One array, made once.
+    /// Disparity in 1/m, at the network's size. Computed once; always the same array.
     #[getter]
     pub(crate) fn disparity(&self, py: Python<'_>) -> PyResult<Plane> {
         let array = self.disparity.get_or_try_init(py, || {
@@ -127,13 +127,13 @@ impl Prediction {
         Ok(array.clone_ref(py))
     }
 
-    /// fx, fy, cx, cy of the image, where they are known.
+    /// fx, fy, cx, cy of the image, if they are known.
     #[getter]
     fn intrinsics(&self) -> Option<(f64, f64, f64, f64)> {
         self.camera.map(|k| (k.fx, k.fy, k.cx, k.cy))
     }
 
-    /// `depth`'s: `torch.from_dlpack(prediction)` shares its memory.
+    /// Exports `depth`: `torch.from_dlpack(prediction)` shares its memory.
     #[pyo3(signature = (**options))]
     fn __dlpack__<'py>(
         &self,
@@ -149,7 +149,7 @@ impl Prediction {
         self.depth(py)?.bind(py).call_method0("__dlpack_device__")
     }
 
-    /// `depth`: `np.asarray(prediction)` is that very array.
+    /// `depth` itself: `np.asarray(prediction)` is this very array.
     #[pyo3(signature = (dtype=None, copy=None))]
     fn __array__<'py>(
         &self,
@@ -191,7 +191,8 @@ impl Prediction {
         format!("Prediction({height} x {width}, camera {camera})")
     }
 
-    /// Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3, of `depth` as it stands there; needs `intrinsics`.
+    /// Points, N x 3 in metres (x right, y down, z forward), and their colours, N x 3, from `depth` as it is now; needs
+    /// `intrinsics`.
     #[pyo3(signature = (max_depth=80.0))]
     fn cloud<'py>(&self, py: Python<'py>, max_depth: f32) -> PyResult<Points<'py>> {
         let Some(camera) = self.camera else {

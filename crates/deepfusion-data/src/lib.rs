@@ -1,13 +1,12 @@
 //! Recordings of vehicles as frames, snippets and ground-truth depth.
 //!
-//! [`Dataset::open`] takes a recording of any layout: KITTI raw, odometry and 360, nuScenes, a folder of images or a video with tables
-//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag. A ROS 2 bag needs the feature `ros2` (on by default) as MCAP, and
-//! `ros2-sqlite` as SQLite. [`Dataset::snippets`] gives the training samples with
-//! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
-//! [`Recording`]. Nothing here knows of tensors.
+//! [`Dataset::open`] opens a recording of any layout: KITTI raw, odometry and 360, nuScenes, a folder of images or a video with tables
+//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag. ROS 2 bags need the feature `ros2` (on by default) as MCAP, and
+//! `ros2-sqlite` as SQLite. [`Dataset::snippets`] gives training samples with the camera's motion, [`Dataset::ground_truth`] the
+//! measured depth. To add a layout, implement [`Recording`]. Nothing here depends on tensors.
 //!
-//! Inside, `formats` reads each layout with the help of `camera` (calibrations, lenses), `logs` (tables of times and speeds),
-//! and `truth` (measured depth), and makes a `dataset` of it; `convert` writes data sets in other layouts.
+//! Inside, `formats` reads each layout with the help of `camera` (calibrations, lenses), `logs` (tables of times and speeds) and
+//! `truth` (measured depth), and makes a `dataset` of it; `convert` writes data sets in other layouts.
 
 mod camera;
 mod convert;

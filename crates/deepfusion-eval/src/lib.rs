@@ -1,15 +1,14 @@
 //! Depth metrics and the field's evaluation protocol, on plain arrays.
 //!
-//! The way of an image: a [`Prediction`] (depth or disparity, any size) and a ground truth [`Grid`] go into
-//! [`Evaluator::add`]; [`Evaluator::report`] gives the [`Report`], whose JSON is the one scripts rely on and whose
-//! `Display` is the table for people. [`MeanDepthBaseline`] makes the row that any useful network must beat: the mean
-//! depth of each pixel over the training scans. Where truth is dense, [`Sharpness`] says how sharp boundaries are. Paths of
-//! the camera are compared in [`odometry`]; what a drive says without any truth is in [`verdict`]; [`compare`] puts evaluations side by side, and beside the field's published tables.
+//! For each image, pass a [`Prediction`] (depth or disparity, of any size) and a ground-truth [`Grid`] to [`Evaluator::add`].
+//! [`Evaluator::report`] then gives the [`Report`]: its JSON is for scripts, its `Display` is a table for people. [`MeanDepthBaseline`]
+//! makes the row that any useful network must beat: the mean depth of each pixel over the training scans. Where the ground truth is dense,
+//! [`Sharpness`] measures how sharp boundaries are. [`odometry`] compares the camera's trajectories, [`verdict`] evaluates what a drive shows
+//! without ground truth, and [`compare`] puts evaluations side by side, and next to the field's published tables.
 //!
 //! # Conventions
-//! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none, infinity what is
-//! beyond every range. Disparity is 1/depth in 1/m. Arrays are
-//! H×W, row by row. All arithmetic is in `f64`, whatever the files hold.
+//! Depth is camera z in metres. Ground truth of 0 (or NaN, or negative) means none, infinity means beyond every range. Disparity is
+//! 1/depth in 1/m. Arrays are H×W, row by row. All arithmetic is in `f64`, whatever type the files have.
 
 mod array_set;
 pub mod compare;

@@ -2,8 +2,8 @@
 //!
 //! # Conventions
 //! - Camera frame: x right, y down, z forward. Vehicle frame: x forward, y left, z up.
-//! - Depth is camera z in metres, never range. Angles in radians, times in seconds, speeds in m/s.
-//! - Transforms are named `a_from_b`: they take a point of frame b to frame a.
+//! - Depth is camera z in metres, never range. Angles are in radians, times in seconds, speeds in m/s.
+//! - Transforms are named `a_from_b`: they transform a point from frame b to frame a.
 //! - Pixels have integer centres: the centre of the top-left pixel is (0, 0).
 
 pub mod cloud;

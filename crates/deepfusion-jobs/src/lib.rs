@@ -1,52 +1,52 @@
-//! A network over whole recordings and folders.
+//! Runs networks over whole recordings and folders.
 //!
 //! | Module | What it does |
 //! |---|---|
-//! | [`evaluation`] | predictions against ground truth, beside the mean-depth baseline; how far a pixel can be trusted |
-//! | [`intervals`] | whether the intervals hold of a network that says how sure it is, and by how much they are stretched |
-//! | [`TargetFinder`] | frame after frame to 3D targets, followed over time |
-//! | [`labelled`] | 3D targets against labelled boxes |
-//! | [`bulk`] | images in, outputs exactly once, on any number of machines |
-//! | [`outputs`] | what is written of an image: depth in many forms, targets drawn, the sidecar |
-//! | [`live`] | a camera or a stream: always the newest frame |
-//! | [`scene`] | how the camera moved from frame to frame, and whether metres still are what they were |
-//! | [`verdict`] | what a drive with speeds says of a network's depth, without ground truth |
-//! | [`board`] | the board of a calibration in pictures and videos |
-//! | [`int8`] | the ranges of what a network's convolutions read, for int8 |
-//! | [`averaging`] | the mean of several runs' weights |
-//! | [`packing`] | a run's network as a file of its own, with its card |
-//! | [`devices`], [`engine`] | where a network computes, and what runs it there |
-//! | [`bench`](mod@bench) | how fast a network is, and every stage around it |
-//! | [`machine`] | what this machine has: vector instructions, memory, disk, programs from outside |
-//! | [`importing`] | other projects' weights: which are known, and with the feature `train` as a run |
-//! | [`RunHistory`] | how a run learned, by what its folder keeps |
-//! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
+//! | [`evaluation`] | compares predictions with ground truth, next to the mean-depth baseline; how far a pixel can be trusted |
+//! | [`intervals`] | checks the intervals of a network that predicts uncertainty, and calibrates them |
+//! | [`TargetFinder`] | finds 3D targets frame by frame, and tracks them |
+//! | [`labelled`] | compares 3D targets with labelled boxes |
+//! | [`bulk`] | bulk prediction: each image's outputs exactly once, on any number of machines |
+//! | [`outputs`] | what is written for an image: depth in many forms, drawn targets, the sidecar |
+//! | [`live`] | live cameras and streams: always the newest frame |
+//! | [`scene`] | how the camera moved from frame to frame, and whether the scale drifts |
+//! | [`verdict`] | what a drive with speeds shows about a network's depth, without ground truth |
+//! | [`board`] | finds a calibration board in pictures and videos |
+//! | [`int8`] | measures the input ranges of a network's convolutions, for int8 |
+//! | [`averaging`] | averages the weights of several runs |
+//! | [`packing`] | packs a run's network into a file of its own, with its card |
+//! | [`devices`], [`engine`] | where a network computes, and which engine runs it |
+//! | [`bench`](mod@bench) | measures the speed of a network and of every stage around it |
+//! | [`machine`] | what this machine has: vector instructions, memory, disk, external programs |
+//! | [`importing`] | other projects' weights: which are known, and (with the feature `train`) how to make a run of them |
+//! | [`RunHistory`] | how a run's training went, from the files in its folder |
+//! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training has seen the evaluated frames |
 #![cfg_attr(
     feature = "train",
-    doc = "| [`samples`] | the samples that a configuration is trained and validated with |"
+    doc = "| [`samples`] | the samples that a configuration is trained and validated on |"
 )]
 #![cfg_attr(
     feature = "train",
-    doc = "| [`export`] | a network as an ONNX file, compared with it |"
+    doc = "| [`export`] | exports a network as an ONNX file and compares the two |"
 )]
 #![cfg_attr(
     feature = "train",
-    doc = "| [`device_check`] | whether a device computes what the processor does, in processes that its driver may end |"
+    doc = "| [`device_check`] | checks whether a device computes the same as the processor, in processes that its driver may crash |"
 )]
 #![cfg_attr(
     feature = "train",
-    doc = "| [`odometry`] | the pose network's path beside the true one |"
+    doc = "| [`odometry`] | compares the pose network's trajectory with the true one |"
 )]
 #![cfg_attr(
     feature = "train",
-    doc = "| [`training`] | what a run starts from and what it leaves; adapting a network to new drives; the table of an ablation |"
+    doc = "| [`training`] | what a run starts from and what it writes; adapting a network to new drives; ablation tables |"
 )]
 #![cfg_attr(
     feature = "train",
-    doc = "| [`demo`] | the whole way with no data at all, on simulated streets |"
+    doc = "| [`demo`] | the whole workflow without any data, on simulated streets |"
 )]
 //!
-//! Nothing here prints. What a person should know is returned, or passed to a callback.
+//! Nothing here prints. Messages for people are returned, or passed to a callback.
 
 pub mod averaging;
 pub mod bench;

@@ -1,8 +1,8 @@
-//! What stands on the ground: from a depth image to boxes in metres, followed over time.
+//! Finds what stands on the ground: from a depth image to boxes in metres, tracked over time.
 //!
 //! # Conventions
-//! Camera: x right, y down, z forward; depth is camera z in metres, 0 = none. On the ground: right, forward,
-//! height. Metres, seconds, radians.
+//! Camera axes: x right, y down, z forward; depth is camera z in metres, 0 = none. Ground axes: right, forward, height. Units are metres,
+//! seconds and radians.
 
 mod angle;
 mod box_fit;

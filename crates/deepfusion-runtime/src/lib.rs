@@ -12,10 +12,10 @@
 //! # }
 //! ```
 //!
-//! [`ModelSource`] finds a network, [`DepthEstimator`] runs it on a [`DepthRunner`]: the fused engine ([`FusedRunner`]),
-//! ONNX Runtime ([`OrtRunner`]), or any other that yields disparities. Every thread has its own estimator
-//! ([`DepthEstimator::another`]). Those of the fused engine share one copy of the packed weights (each session of ONNX Runtime packs its own), and no lock
-//! is needed. With time to spare, a prediction may be the mean of several of one image: test-time augmentation ([`Augmentation`]).
+//! [`ModelSource`] finds a network, and [`DepthEstimator`] runs it on a [`DepthRunner`]: the fused engine ([`FusedRunner`]), ONNX Runtime
+//! ([`OrtRunner`]), or any other that gives disparities. Give each thread its own estimator ([`DepthEstimator::another`]); no lock is
+//! needed. Estimators on the fused engine share one copy of the packed weights, while each session of ONNX Runtime packs its own. If you
+//! have time to spare, use test-time augmentation ([`Augmentation`]), which averages several predictions of one image.
 
 mod augmentation;
 mod error;

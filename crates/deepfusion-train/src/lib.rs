@@ -1,8 +1,8 @@
-//! Learning metric depth from a drive: view synthesis, losses, the trainer and its checkpoints.
+//! Trains metric depth on drives: view synthesis, losses, the trainer and its checkpoints.
 //!
-//! The path of a training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`synthesise`] →
-//! [`LossTerms`] → [`Adam`] → [`TrainEvent`]. The trainer prints nothing: its caller reads its
-//! events.
+//! A training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`synthesise`] →
+//! [`LossTerms`] → [`Adam`] → [`TrainEvent`]. The trainer prints nothing: it passes events
+//! to its caller.
 
 mod adam;
 mod augment;

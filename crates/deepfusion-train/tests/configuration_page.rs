@@ -45,7 +45,7 @@ fn the_reference_page_is_up_to_date() {
             let title = title(key.table());
             writeln!(
                 page,
-                "\n## {title}\n\n| Key | Is | Default |\n|---|---|---|"
+                "\n## {title}\n\n| Key | Meaning | Default |\n|---|---|---|"
             )
             .unwrap();
         }

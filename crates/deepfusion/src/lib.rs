@@ -1,12 +1,12 @@
 //! Metric depth from one camera and a speed signal.
 //!
-//! DeepFusion learns depth in metres from the video of a vehicle that knows its speed, without depth labels, and turns each
-//! image into metres, a point cloud and 3D targets. This crate is the library; the command `deepfusion` is built on the same crates.
+//! DeepFusion turns each image of a vehicle's camera into depth in metres, a point cloud and 3D targets. It learns from the vehicle's own
+//! video and speed, without depth labels. This crate is the library; the command `deepfusion` is built on the same crates.
 //!
 //! # From an image to metres
 //!
-//! A network comes with the library. It learned from simulated streets alone, so its weights carry no licence but this
-//! project's. [`DepthEstimator`] runs it, or a network that you trained.
+//! The library embeds networks that were trained on simulated views only, so their weights carry no licence but this project's.
+//! [`DepthEstimator`] runs them, or a network that you trained.
 //!
 //! ```
 //! use deepfusion::{DepthEstimator, sim};
@@ -14,7 +14,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let street = sim::Simulation::new(&sim::SimConfig { frames: 1, ..Default::default() })?;
 //! let (image, camera) = (street.frame(0).rgb, street.intrinsics()); // or data::load_photo("street.jpg")
-//! let mut estimator = DepthEstimator::load("tiny")?; // `street` is the better one; or a run's folder
+//! let mut estimator = DepthEstimator::load("tiny")?; // `street` is the better one; or a run folder
 //! let depth = estimator.estimate(&image, Some(&camera))?.depth();
 //! let middle = depth.data[depth.data.len() / 2 + depth.width / 2];
 //! println!("{}x{} pixels, {middle:.1} m in the middle", depth.width, depth.height);
@@ -26,7 +26,7 @@
 //! # From a drive to a trained run
 //!
 //! [`Dataset`](data::Dataset) opens recordings of any known layout: KITTI, a folder of images or a video with a table of
-//! speeds, a ROS bag, and more. Needs the feature `train`, which is on by default.
+//! speeds, a ROS bag, and more. Training needs the feature `train`, which is on by default.
 //!
 #![cfg_attr(feature = "train", doc = "```")]
 #![cfg_attr(not(feature = "train"), doc = "```ignore")]
@@ -36,7 +36,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let (drive, run) = ("drives/monday", "runs/monday");
-//! let config = TrainConfig { steps: Some(2), ..Preset::Tiny.config() }; // thousands, to learn something
+//! let config = TrainConfig { steps: Some(2), ..Preset::Tiny.config() }; // it takes thousands to learn something
 //! # use deepfusion::sim::{SimConfig, Simulation, write_kitti};
 //! # let temporary = tempfile::tempdir()?;
 //! # let small = SimConfig { frames: 12, width: 320, height: 96, ..Default::default() };
@@ -81,39 +81,39 @@
 //!
 //! # Where things are
 //!
-//! | Module | What it holds |
+//! | Module | What it contains |
 //! |---|---|
-//! | [`runtime`] | trained networks that run: [`DepthEstimator`] over the fused engine or ONNX Runtime; no training framework |
+//! | [`runtime`] | running trained networks: [`DepthEstimator`] over the fused engine or ONNX Runtime, without the training framework |
 //! | [`model`] | configurations, weights as safetensors, runs on disk |
-//! | [`weights`] | the networks inside the library |
-//! | [`jobs`] | a network over whole recordings and folders: evaluation, prediction in bulk, verdict, scored targets |
+//! | [`weights`] | the embedded networks |
+//! | [`jobs`] | networks over whole recordings and folders: evaluation, bulk prediction, verdict, scored targets |
 //! | [`eval`] | metrics, the field's protocol, evaluations side by side |
 //! | [`records`] | the JSON beside predictions and targets |
-//! | [`data`] | recordings as datasets, frames and ground truth |
+//! | [`data`] | recordings as data sets, frames and ground truth |
 //! | [`logs`] | speeds and turns from GPS tracks, OBD apps, phones, CAN traces, any table |
-//! | [`calibrate`] | a camera from pictures of a checkerboard |
+//! | [`calibrate`] | a camera's intrinsics and lens, from pictures of a checkerboard |
 //! | [`doctor`] | what is wrong with a recording |
-//! | [`images`] | pictures read, resized and written; what a photograph says of its lens |
+//! | [`images`] | reads, resizes and writes images; the camera from EXIF |
 //! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
-//! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
-//! | [`bags`] | bags of ROS 1, read and written |
+//! | [`motion`] | how a vehicle moved, from IMU, CAN and GPS |
+//! | [`bags`] | reads and writes ROS 1 bags |
 #![cfg_attr(
     feature = "ros2",
-    doc = "| [`ros2_bags`] | bags of ROS 2, as the messages of [`bags`] |"
+    doc = "| [`ros2_bags`] | reads ROS 2 bags as the messages of [`bags`] |"
 )]
-//! | [`perception`] | a depth image to 3D targets, tracks, free space |
-//! | [`instances`] | the things in an image, by your ONNX model of segmentation |
+//! | [`perception`] | from a depth image to 3D targets, tracks and free space |
+//! | [`instances`] | the objects in an image, by your ONNX segmentation model |
 //! | [`geometry`] | cameras, motions, depth images; `cloud`: point clouds and their files |
-//! | [`sim`] | streets with exact depth, to learn from and to test on |
+//! | [`sim`] | streets with exact depth, to train and test on |
 //! | [`onnx`], [`render`] | networks as ONNX files; pictures, charts and reports |
 //! | [`view`] | results in the browser: the server and its page |
 //! | [`infer`] | a network as a graph, and the fused engine that runs it |
 #![cfg_attr(
     feature = "train",
-    doc = "| [`train`], [`nn`] | learning from a drive: losses, trainer, checkpoints; the networks in Burn |"
+    doc = "| [`train`], [`nn`] | training on a drive: losses, trainer, checkpoints; the networks in Burn |"
 )]
 //!
-//! Coordinates are a camera's: x right, y down, z ahead, in metres. A transform is named `target_from_source`.
+//! Camera axes are x right, y down, z forward, in metres. Transforms are named `target_from_source`.
 
 pub use deepfusion_calibrate as calibrate;
 pub use deepfusion_data as data;

@@ -1,7 +1,8 @@
-"""Many machines, by Ray: bulk prediction, the doctor of a fleet's recordings, trials of configurations, and one network learned by several workers.
+"""Work on many machines, by Ray: bulk prediction, checks of a fleet's recordings, trials of configurations, and one network trained by
+several workers.
 
-Needs Ray (`pip install "deepfusion[ray]"`). Everything runs on the cluster that `ray.init()` has joined, or on this machine where
-none was joined. Inputs and outputs are paths or URLs of any file system that fsspec knows: a folder that all machines see,
+Needs Ray (`pip install "deepfusion[ray]"`). Everything runs on the cluster that `ray.init()` has joined, or on this machine if it has
+joined none. Inputs and outputs are paths or URLs of any file system that fsspec knows: a folder that all machines see,
 `s3://bucket/folder` (with s3fs), `gs://…` (with gcsfs).
 """
 

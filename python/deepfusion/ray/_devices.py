@@ -1,4 +1,4 @@
-"""What the workers of a cluster compute on."""
+"""The devices of a cluster's workers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from deepfusion import _native
 def of_workers(device: str | None, gpus: float) -> str:
     """The device that each worker opens, given `gpus` GPUs: by default one of those, else the processor.
 
-    A wrong word, or a backend that the package lacks, is an error here rather than in each worker.
+    A wrong name, or a backend that the package lacks, is an error here rather than in each worker.
     """
     if device is None:
         device = "auto" if gpus else "cpu"
@@ -23,7 +23,7 @@ def of_workers(device: str | None, gpus: float) -> str:
 
 
 def numbered(device: str, index: int) -> str:
-    """The GPU of this index, by the backend that is asked for, or by the first that the package has."""
+    """The GPU with this index, of the backend that is asked for, or of the first that the package has."""
     if device == "auto":
         built = deepfusion.devices()
         device = next((one for one in ("cuda", "metal", "vulkan", "wgpu") if one in built), "cpu")

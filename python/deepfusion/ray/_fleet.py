@@ -1,4 +1,4 @@
-"""What is known of a fleet's recordings, each looked at by one task."""
+"""What is known about a fleet's recordings, with one task per recording."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ def doctor(
     workers: int | None = None,
     storage_options: Mapping[str, Any] | None = None,
 ) -> list[Row]:
-    """What `deepfusion doctor` finds in each recording: `recording`, `drives`, `frames`, `errors`, `warnings`, `findings` (each one's
-    message), `report` (the whole JSON) and `failed` (why it could not be looked at, else None), in the order given.
+    """What `deepfusion doctor` finds in each recording: `recording`, `drives`, `frames`, `errors`, `warnings`, `findings` (their
+    messages), `report` (the whole JSON) and `failed` (why it could not be checked, else None), in the order given.
 
-    Recordings are of any known layout. Those of other file systems are fetched by the machine that looks at them, with the small files beside
-    them that belong to them: a KITTI date's `calib_*.txt` and `dataset.toml`, `drive.toml` of `drive.mp4`, `calibration.yaml`. What
-    `dataset.toml` names elsewhere is not: give the folder then. At most `workers` are looked at together (default: one a core of the cluster).
+    Recordings can have any known layout. Those on other file systems are fetched by the machine that checks them, with the small
+    files beside them that belong to them: a KITTI date's `calib_*.txt` and `dataset.toml`, `drive.toml` of `drive.mp4`,
+    `calibration.yaml`. Files that `dataset.toml` names elsewhere are not fetched: pass the folder then. At most `workers` recordings
+    are checked at once (default: one per core of the cluster).
     """
     return _each(_doctor, recordings, workers, storage_options)
 
@@ -42,13 +43,13 @@ def inspect(
     workers: int | None = None,
     storage_options: Mapping[str, Any] | None = None,
 ) -> list[Row]:
-    """What `deepfusion data inspect` says of each recording: `recording`, `layout`, `drives`, `frames`, `usable_pairs`, `distance_m`,
-    `duration_s`, `report` (the whole JSON) and `failed`. Otherwise as `doctor`."""
+    """What `deepfusion data inspect` says about each recording: `recording`, `layout`, `drives`, `frames`, `usable_pairs`, `distance_m`,
+    `duration_s`, `report` (the whole JSON) and `failed`. Otherwise like `doctor`."""
     return _each(_inspect, recordings, workers, storage_options)
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Rows as a table for people: a line a recording, numbers summed in the last one. Long fields (`report`, `findings`) are left out."""
+    """Rows as a readable table: one line per recording, with sums in the last line. Long fields (`report`, `findings`) are left out."""
     if not rows:
         return "no recordings"
     columns = [key for key in rows[0] if key not in {"report", "findings"}]

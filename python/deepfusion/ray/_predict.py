@@ -45,22 +45,22 @@ _MOST_BLOCKS = 4000
 
 @dataclass(frozen=True)
 class PredictSummary:
-    """What a job did."""
+    """The result of a job."""
 
     images: int
-    """Images that the inputs mean."""
+    """Number of images among the inputs."""
     done: int
-    """Made by this job."""
+    """Predicted by this job."""
     kept: int
     """Already there, from an earlier job with the same network and options."""
     failed: list[tuple[str, str]]
-    """Images that could not be done, and why. Mend them and start the same job again."""
+    """Images that could not be predicted, and why. Repair them and start the same job again."""
     seconds: float
     """Wall time."""
 
     @property
     def images_per_second(self) -> float:
-        """Of those made by this job."""
+        """Of the images that this job predicted."""
         return self.done / self.seconds
 
 
@@ -86,7 +86,7 @@ class _Job:
     gpus: float
 
     def made_with(self) -> dict[str, Any]:
-        """What the outputs depend on beside the image."""
+        """What the outputs depend on apart from the image."""
         asked = asdict(self)
         named = ("precision", "data_set", "focal_correction", "stretch", "weights")
         made = {name: asked[name] for name in named}
@@ -181,8 +181,8 @@ class _Worker:
         }
 
     def there(self, url: str, name: str, mark: dict[str, Any]) -> tuple[str, str] | None:
-        """What is in the folder of an image: `done` where this job made it before a worker died, `kept` where an earlier one did,
-        `failed` where it is of something else, None where it is not there whole."""
+        """What the folder has of an image: `done` if this job made it before a worker died, `kept` if an earlier job did, `failed` if it
+        belongs to something else, None if it is not complete."""
         written = self.folder.read(f"{name}.json")
         if written is None:
             return None
@@ -210,7 +210,7 @@ class _Worker:
         return ("done" if sidecar.get("job") == self.job.id else "kept"), ""
 
     def write(self, url: str, name: str, mark: dict[str, Any], prediction: deepfusion.Prediction) -> None:
-        """Writes the outputs, then the sidecar, which is the mark of the image's being done."""
+        """Writes the outputs, then the sidecar, which marks the image as done."""
         depth = prediction.depth
         outputs = {f"{name}{_ENDINGS[kind]}": _encoded(kind, prediction) for kind in self.job.save}
         if self.job.overwrite:
@@ -255,7 +255,7 @@ def _encoded(kind: str, prediction: deepfusion.Prediction) -> bytes:
 
 
 def _depth_png(depth: np.ndarray) -> bytes:
-    """KITTI's: 16-bit grey, steps of 1/256 m, 0 where there is none."""
+    """KITTI's format: 16-bit grey, in steps of 1/256 m, 0 where there is no depth."""
     from PIL import Image
 
     # Half a step goes up, as in the program's own files.
@@ -266,7 +266,8 @@ def _depth_png(depth: np.ndarray) -> bytes:
 
 
 def _check(model: str, precision: Precision, data_set: str | None, save: Sequence[str], post_process: PostProcess | None) -> None:
-    """Raises what every worker would: a wrong name, a run without weights. This machine may lack their GPU, and their processors' precision."""
+    """Raises what every worker would: a wrong name, a run without weights. This machine may lack the workers' GPU and their processors'
+    precision."""
     opened = deepfusion.load(model, data_set=data_set)
     if precision == "int8":
         # Whether it was calibrated is seen where the processor can.
@@ -304,24 +305,24 @@ def predict(
     overwrite: bool = False,
     storage_options: Mapping[str, Any] | None = None,
 ) -> PredictSummary:
-    """Depth of many images on a cluster, each exactly once.
+    """Predicts the depth of many images on a cluster, each exactly once.
 
-    `paths` are images, folders (with all below them, but for `output` and earlier pictures of depth) and globs; `output` is a folder. Both, and `model`, where it is no embedded
-    network, are paths that all machines see, or URLs; `storage_options` are those of their file system (fsspec's). The images are
-    of one camera: `intrinsics` are fx, fy, cx, cy in its pixels, or the 3 x 3 matrix; without them each file's EXIF is asked, then the lens of the
-    training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
-    (`NAME_depth.npy`, f32 metres), "sigma" and "confidence" (`NAME_sigma.npy`, `NAME_confidence.npy`, of a network that says how sure it
-    is). `post_process` is that of `Model.predict`, `precision` that of `deepfusion.load`: the workers' processors must have it, this
-    machine's may lack it.
+    `paths` are images, folders (with everything below them, except `output` and earlier pictures of depth) and globs; `output` is a
+    folder. Both, and `model` unless it is an embedded network, are paths that all machines see, or URLs; `storage_options` are those
+    of their file system (fsspec's). The images come from one camera: `intrinsics` are fx, fy, cx, cy in its pixels, or the 3 x 3
+    matrix; without them, each file's EXIF data is used, else the training camera's lens is assumed. `save` names what to write:
+    "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy" (`NAME_depth.npy`, f32 metres), "sigma" and "confidence"
+    (`NAME_sigma.npy`, `NAME_confidence.npy`, for a network that predicts uncertainty). `post_process` is that of `Model.predict`,
+    `precision` that of `deepfusion.load`: the workers' processors must support it, this machine's need not.
 
-    Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads, and with
-    `gpus_per_worker` a GPU, or a share of one (0.5: two processes on each). It then computes there: `device` is "auto" by default, or the
-    backend (as in `deepfusion.load`). By CUDA each process sees the GPU that Ray gave it and no other; by another backend all processes of a
-    machine take the one that this prefers.
+    Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads,
+    and with `gpus_per_worker` a GPU, or a share of one (0.5: two processes on each). It then computes there: `device` is "auto" by
+    default, or the backend (as in `deepfusion.load`). With CUDA, each process sees only the GPU that Ray gave it; with another
+    backend, all processes of a machine use the one that the backend prefers.
 
-    An image's `NAME.json` is written last and marks it as done: what is there whole, of the same image, network and options, is kept.
-    So a job goes on where it was stopped, by the same call. A worker that dies is replaced, and what it had not finished is done
-    again. An image that cannot be read, or whose outputs are of something else, is in the summary's `failed`; the others are done.
+    An image's `NAME.json` is written last and marks it as done: complete outputs of the same image, network and options are kept. So
+    the same call resumes a stopped job. A worker that dies is replaced, and what it had not finished is done again. An image that
+    cannot be read, or whose existing outputs belong to something else, is in the summary's `failed`; the others are done.
     """
     unknown = [kind for kind in save if kind not in _ENDINGS]
     if unknown or not save:

@@ -31,7 +31,7 @@ _MOST_BESIDE = 64 << 20
 
 
 def is_local(fs: Any) -> bool:
-    """Whether it is the machine's own tree of files (mounts included)."""
+    """Whether it is in the machine's own file tree (mounts included)."""
     return "file" in _protocols(fs)
 
 
@@ -52,7 +52,7 @@ class Folder:
         return f"{self.root.rstrip('/')}/{name}"
 
     def read(self, name: str) -> bytes | None:
-        """What the file holds; None where there is none."""
+        """The file's contents; None if there is none."""
         try:
             return self.fs.cat_file(self.path(name))
         except FileNotFoundError:
@@ -72,7 +72,7 @@ class Folder:
             pass
 
     def write(self, name: str, data: bytes) -> None:
-        """Writes it so that a reader, or the next run after a power cut, finds the whole file or none."""
+        """Writes the file so that a reader, or the next run after a power cut, finds all of it or none."""
         path = self.path(name)
         parent = path.rpartition("/")[0]
         if self.atomic_put:
@@ -116,7 +116,8 @@ class Sources:
 
     @contextmanager
     def local(self, urls: Sequence[str]) -> Iterator[list[str | Exception]]:
-        """Paths on this machine with what the files hold, in their order, for as long as the block lasts; why, where one cannot be read."""
+        """Paths on this machine with the files' contents, in their order, for as long as the block lasts; instead of a path, why the
+        file cannot be read."""
         with tempfile.TemporaryDirectory(prefix="deepfusion-") as folder:
             paths: list[str | Exception] = []
             for i, url in enumerate(urls):
@@ -134,7 +135,7 @@ class Sources:
 
     @contextmanager
     def local_tree(self, url: str) -> Iterator[str]:
-        """A path on this machine with what the file or folder holds, for as long as the block lasts."""
+        """A path on this machine with the contents of the file or folder, for as long as the block lasts."""
         fs, path = fsspec.core.url_to_fs(url, **self.options)
         if is_local(fs):
             yield path
@@ -146,9 +147,10 @@ class Sources:
 
     @contextmanager
     def local_recording(self, url: str) -> Iterator[str]:
-        """As `local_tree`, with what belongs to a recording and lies beside it: files of its name without the ending (`drive.toml` of
-        `drive.mp4`, or of the folder `drive`), and those of the names that are looked for there (a KITTI date's `calib_*.txt`, `dataset.toml`,
-        `calibration.yaml` …), each below 64 MB. Other files that `dataset.toml` names are not fetched: give the folder then."""
+        """Like `local_tree`, together with the files that belong to a recording and are beside it: files of its name without the ending
+        (`drive.toml` of `drive.mp4`, or of the folder `drive`), and those of the names that are looked for there (a KITTI date's
+        `calib_*.txt`, `dataset.toml`, `calibration.yaml` …), each below 64 MB. Other files that `dataset.toml` names are not fetched:
+        pass the folder then."""
         fs, path = fsspec.core.url_to_fs(url, **self.options)
         if is_local(fs):
             yield path
@@ -170,7 +172,7 @@ class Sources:
 
 
 def _files(fs: Any, folder: str) -> list[dict[str, Any]]:
-    """The files of a folder; none where it may not be listed, as it need not be for one that is known by name."""
+    """The files of a folder; none if it may not be listed, which a file that is known by name does not need."""
     if not _protocols(fs).isdisjoint({"http", "https"}):
         return []
     # A listing may be of an earlier look, before somebody mended the recording.
@@ -182,7 +184,7 @@ def _files(fs: Any, folder: str) -> list[dict[str, Any]]:
 
 
 def urls(given: str | PathLike[str] | Sequence[str | PathLike[str]]) -> list[str]:
-    """Paths become absolute: a worker stands elsewhere."""
+    """Makes paths absolute, because a worker has another working directory."""
     if isinstance(given, (str, PathLike)):
         given = [given]
     found = []
@@ -193,8 +195,8 @@ def urls(given: str | PathLike[str] | Sequence[str | PathLike[str]]) -> list[str
 
 
 def network(given: str | PathLike[str]) -> str:
-    """A network as every worker finds it: the name of an embedded one, a URL, else an absolute path. A folder with an embedded one's name is
-    meant where it holds a run, or what is left of one, as `deepfusion.load` has it."""
+    """A network as every worker finds it: the name of an embedded one, a URL, or an absolute path. A folder with an embedded network's
+    name is meant if it holds a run, or the remains of one, as in `deepfusion.load`."""
     given = os.fspath(given)
     if given.rstrip("/") in deepfusion.networks() and not _holds_a_run(given):
         return given.rstrip("/")
@@ -216,9 +218,9 @@ def _holds_a_run(folder: str) -> bool:
 
 
 def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Every image that files, folders (with those below them) and globs mean, once, with the name of its outputs: the path
-    below the folder or the glob's fixed part, without its ending; where two would have the same, the second gets `-2`. Not pictures of depth in a
-    folder or glob that the sidecar of their image lists: those are what an earlier job made."""
+    """Every image that files, folders (with everything below them) and globs mean, once, with the name of its outputs: the path below
+    the folder or the glob's fixed part, without its ending. If two would have the same name, the second gets `-2`. Pictures of depth
+    in a folder or glob are left out if the sidecar of their image lists them: an earlier job made those."""
     found: dict[str, str] = {}
     for url in given:
         fs, path = fsspec.core.url_to_fs(url, **options)
@@ -253,7 +255,7 @@ def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, 
 
 
 def _is_output(fs: Any, path: str) -> bool:
-    """Whether a picture of depth lies beside the sidecar of its image, which lists it: depth of it means nothing."""
+    """Whether this is a picture of depth beside the sidecar of its image, which lists it: predicting its depth makes no sense."""
     folder, _, file = path.rpartition("/")
     if not file.endswith("_depth.png"):
         return False
@@ -264,8 +266,8 @@ def _is_output(fs: Any, path: str) -> bool:
 
 
 def weights_mark(model: str, options: Mapping[str, Any]) -> str | None:
-    """SHA-256 over the configuration and weights of a run (`network` says which); None of an embedded network, which the program's
-    version tells."""
+    """SHA-256 over the configuration and weights of a run (`network` says which); None for an embedded network, which the program's
+    version identifies."""
     import hashlib
 
     if model in deepfusion.networks():

@@ -1,4 +1,4 @@
-"""One network learned by several workers, by Ray Train."""
+"""One network trained by several workers, by Ray Train."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ def train(
     validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     camera: str | None = None,
 ) -> deepfusion.Run:
-    """Learns one network with several workers, each with `config`'s own `batch` and `accumulate`, as `deepfusion.distributed` has it.
+    """Trains one network with several workers, each with `config`'s own `batch` and `accumulate`, as in `deepfusion.distributed`.
 
-    Needs torch, whose process group adds the gradients: `backend` is "gloo", or "nccl" between GPUs, with a torch that has CUDA. `out` is
-    a folder that all machines see, new or empty; a run that is there goes on with its own configuration, or begins again where it has no
-    checkpoint yet. Where a worker dies Ray starts all of them again, at most `restarts` times, and they go on from the last checkpoint
-    (`checkpoint_minutes`, `validate_every`).
+    Needs torch, whose process group adds the gradients: `backend` is "gloo", or "nccl" between GPUs, with a torch that has CUDA.
+    `out` is a folder that all machines see, new or empty; a run that is already there continues with its own configuration, or starts
+    again if it has no checkpoint yet. If a worker dies, Ray starts all of them again, at most `restarts` times, and they continue
+    from the last checkpoint (`checkpoint_minutes`, `validate_every`).
 
-    With `use_gpu` each worker is given a GPU and learns on it: `device` is "auto" by default, or the backend ("cuda", "vulkan"), without a
-    number: Ray says which of a machine's GPUs is whose. CUDA sees those alone that Ray gives; the others count all of a machine's, so that two
-    jobs on one machine would share them.
+    With `use_gpu`, each worker gets a GPU and trains on it: `device` is "auto" by default, or the backend ("cuda", "vulkan") without
+    a number, because Ray decides which of a machine's GPUs is whose. CUDA sees only the GPUs that Ray gives; the other backends count
+    all of a machine's GPUs, so that two jobs on one machine would share them.
     """
     if backend not in ("gloo", "nccl"):
         raise ValueError(f'backend: expected "gloo" or "nccl", found {backend!r}')

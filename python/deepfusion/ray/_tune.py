@@ -23,19 +23,19 @@ class Trial:
     """A configuration that was tried."""
 
     settings: dict[str, Any]
-    """What was set over `config`, keys as in the configuration with dots between tables."""
+    """What was set over `config`: keys of the configuration, with dots between tables."""
     path: Path | None
     """The run's folder, on the machine that trained it."""
     step: int | None
-    """The last step that was reported."""
+    """The last step that it reported."""
     selection: float | None
     """The lowest value that `best` is chosen by: a loss on held-out samples."""
     metrics: dict[str, Any]
-    """What was reported last: `step`, `selection`, `scale_ratio` where something says it, and the held-out losses by their names in log.csv."""
+    """Its last report: `step`, `selection`, `scale_ratio` if something determines it, and the held-out losses by their names in log.csv."""
     error: str | None
-    """Why it failed; None where it did not."""
+    """Why it failed; None if it did not."""
     row: str | None = None
-    """The row that it is of; None but for `ablate`. Its seed is among the settings."""
+    """The row that it belongs to; None except from `ablate`. Its seed is among the settings."""
 
 
 def tune(
@@ -56,17 +56,17 @@ def tune(
     scheduler: Any | None = None,
     search: Any | None = None,
 ) -> list[Trial]:
-    """Trains one run for each draw from `space`, and gives them all, the best first.
+    """Trains one run for each draw from `space`, and returns them all, the best first.
 
-    `space` maps keys of the configuration (dots between tables: `"loss.smoothness"`, `"learning_rate"`) to Ray Tune's ranges
-    (`ray.tune.loguniform(1e-5, 1e-3)`, `ray.tune.grid_search([...])`) or to fixed values; `trials` is how often it is drawn from
-    (grids: as often each of their points). `config` is a preset, or a dict over one. Each validation reports, so that a `scheduler`
-    (`ASHAScheduler`) can stop what lags behind; `search` proposes values (Optuna's, for example). Each trial's run lies in a folder
+    `space` maps keys of the configuration (with dots between tables: `"loss.smoothness"`, `"learning_rate"`) to Ray Tune's ranges
+    (`ray.tune.loguniform(1e-5, 1e-3)`, `ray.tune.grid_search([...])`) or to fixed values; `trials` is the number of draws (for grids:
+    of draws per grid point). `config` is a preset, or a dict over one. Each validation reports, so that a `scheduler`
+    (`ASHAScheduler`) can stop trials that lag behind; `search` proposes values (Optuna's, for example). Each trial's run has a folder
     of its own below `out`, which all machines see.
 
-    `validation` and `camera` are those of `deepfusion.train`. With `gpus_per_trial` each trial is given a GPU, or a share of one, and learns
-    on it: `device` is "auto" by default, or the backend ("cuda", "vulkan"), without a number. By CUDA it sees the GPU that Ray gave it and no
-    other; by another backend all trials of a machine take the one that this prefers.
+    `validation` and `camera` are those of `deepfusion.train`. With `gpus_per_trial`, each trial gets a GPU, or a share of one, and
+    trains on it: `device` is "auto" by default, or the backend ("cuda", "vulkan") without a number. With CUDA, it sees only the GPU
+    that Ray gave it; with another backend, all trials of a machine use the one that the backend prefers.
     """
     learning = _learning(init, validation, camera, gpus_per_trial, device)
     fixed = {"preset": config} if isinstance(config, str) else dict(config)
@@ -93,9 +93,9 @@ def ablate(
     gpus_per_trial: float = 0,
     device: str | None = None,
 ) -> dict[str, list[Trial]]:
-    """Trains every row, settings over `config`, with every seed, and gives the trials by row, in the order of `seeds`.
+    """Trains every row, settings over `config`, with every seed, and returns the trials by row, in the order of `seeds`.
 
-    `{"all": {}, "no smoothness": {"loss.smoothness": 0.0}}`; otherwise as `tune`.
+    `{"all": {}, "no smoothness": {"loss.smoothness": 0.0}}`; otherwise like `tune`.
     """
     learning = _learning(init, validation, camera, gpus_per_trial, device)
     fixed = {"preset": config} if isinstance(config, str) else dict(config)

@@ -21,11 +21,11 @@ const SHARED_TERMS: [&str; 6] = [
 /// `deepfusion ablate`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Trains and measures the on/off table of the paper's Table 3: the context encoding (hce), the speed loss and the flow loss, all \
-    eight combinations. A row differs from the others by these alone; steps, attention and everything else are equal, and every row \
-    warps by PoseNet's motion, as a measured one would teach the rows without the speed loss, too. A further row, minimum, is made \
-    where --rows names it: everything on, with three frames and minimum reprojection instead of two frames in both directions.\n\n\
-    Every seed of a row is a run of its own, kept in DIR/rows; --resume goes on where it stopped, also inside a row. The table is \
+    after_help = "Trains and evaluates the paper's Table 3: context encoding (hce), speed loss and flow loss, each on or off, in all eight \
+    combinations. Rows differ in these alone: steps, attention and everything else are equal. Every row warps with PoseNet's motion, \
+    because a measured one would also teach the rows without the speed loss. A further row, minimum, is trained if --rows names it: \
+    everything on, with three frames and minimum reprojection instead of two frames in both directions.\n\n\
+    Every seed of a row is a run of its own, kept in DIR/rows; --resume continues where it stopped, even inside a row. The table is \
     written after every run: table.txt, .csv, .md, .tex.\n\n\
     Examples:\n  deepfusion ablate --data street --eval-data other-street --budget 1200 --seeds 3 --out runs/ablation\n  \
     deepfusion ablate --data street --budget 1200 --with attention,moving --rows hce+speed+flow,speed+flow,minimum\n  \
@@ -35,10 +35,10 @@ pub(crate) struct AblateArgs {
     /// Recordings to train on: drive folders, date folders or KITTI roots.
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present = "resume")]
     pub data: Vec<PathBuf>,
-    /// Recordings to measure on [default: those trained on, which the table says].
+    /// Recordings to evaluate on [default: those trained on, which the table then says].
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "resume")]
     pub eval_data: Vec<PathBuf>,
-    /// Optimiser steps of every run.
+    /// Optimiser steps of each run.
     #[arg(
         long,
         value_name = "N",
@@ -46,13 +46,13 @@ pub(crate) struct AblateArgs {
         conflicts_with = "resume"
     )]
     pub budget: Option<usize>,
-    /// Runs of every row, with the seeds 0 to K − 1; more than before adds them to a resumed table [default: 1].
+    /// Runs per row, with the seeds 0 to K − 1; a larger K adds runs to a resumed table [default: 1].
     #[arg(long, value_name = "K")]
     pub seeds: Option<usize>,
-    /// Settings of everything that the rows do not change [default: light].
+    /// Preset for everything that the rows do not change [default: light].
     #[arg(long, value_parser = names::preset(), conflicts_with = "resume")]
     pub preset: Option<Preset>,
-    /// Settings from a file, as written into every run as config.toml.
+    /// Settings from a file, like the config.toml of every run.
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["preset", "resume"])]
     pub config: Option<PathBuf>,
     /// Only these rows: what is on, joined by +; none; or minimum [default: the eight of Table 3].
@@ -63,25 +63,25 @@ pub(crate) struct AblateArgs {
         conflicts_with = "resume"
     )]
     pub rows: Vec<String>,
-    /// Size of the network's input.
+    /// Input size of the network.
     #[arg(long, value_name = "WxH", conflicts_with = "resume")]
     pub size: Option<Size>,
-    /// Samples a step.
+    /// Samples per step.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     pub batch: Option<usize>,
-    /// Parts that all rows have; moving works where the flow is on.
+    /// Parts that all rows have; moving only works where the flow is on.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = SHARED_TERMS, conflicts_with = "resume")]
     pub with: Vec<String>,
     /// Parts that no row has.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = SHARED_TERMS, conflicts_with = "resume")]
     pub without: Vec<String>,
-    /// The pose used for warping [default: posenet; with --config the file's].
+    /// Pose used for warping [default: posenet; with --config the file's].
     #[arg(long, value_parser = names::view_motion(), value_name = "MOTION", conflicts_with = "resume")]
     pub view_motion: Option<ViewMotion>,
-    /// Any key of the configuration, as `loss.smoothness=0.01` (`deepfusion config show` prints them all); may be repeated.
+    /// Set a key of the configuration, such as `loss.smoothness=0.01` (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "resume")]
     pub set: Vec<String>,
-    /// Which cameras.
+    /// Which cameras to use.
     #[arg(
         long,
         value_name = "2|3|both",
@@ -89,13 +89,13 @@ pub(crate) struct AblateArgs {
         conflicts_with = "resume"
     )]
     pub camera: Cameras,
-    /// Folder of the table and its runs [default: runs/ablate-TIME].
+    /// Folder for the table and its runs [default: runs/ablate-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Go on with the table in --out.
+    /// Continue the table in --out.
     #[arg(long, requires = "out")]
     pub resume: bool,
-    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    /// Device to compute on; with several GPUs add an index, such as cuda:1.
     #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
     /// Print the table as JSON on stdout.

@@ -10,60 +10,65 @@ use crate::devices::ComputeDevice;
 /// `deepfusion adapt`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "The end of each drive is held out. The network is judged there without ground truth before and after it has learned on the rest \
-    (see `eval`): how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the bias of the \
-    metre. Where any of these gets worse by more than it varies anyway (the table's last column: 1 % of the reprojection error, 15 % of a \
-    disagreement of depths or half a percent of depth, 2 percent of bias) the result is refused: it is moved to OUT.refused, and the exit code is 1.\n\n\
-    The network that was given stays as it is. OUT is a run: other commands take it as --model. --undo OUT makes OUT predict as it did before. \
-    Interrupted, the same command goes on.\n\n\
+    after_help = "The end of each drive is held out. There, the network is judged without ground truth (see `eval`) before and after it has been \
+    trained on the rest: how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, \
+    and the scale bias. If any of these gets worse by more than it varies by chance (the table's last column: 1 % of the reprojection error, \
+    15 % of the disagreement of depths or half a percent of depth, 2 percent of bias), the result is refused: it is moved to OUT.refused, \
+    and the exit code is 1.\n\n\
+    The given network does not change. OUT is a run that other commands take as --model. --undo OUT makes OUT predict like the \
+    network that it started from. If interrupted, repeat the command to continue.\n\n\
     Examples:\n  deepfusion adapt --data my-drive --out runs/mine\n  \
     deepfusion adapt --model runs/city --data kitti/2011_09_26 --steps 400 --out runs/kitti\n  \
     deepfusion adapt --undo runs/mine"
 )]
 pub(crate) struct AdaptArgs {
-    /// The network to begin from: a run, a checkpoint in it, or the name of an embedded network [default: street].
+    /// Network to start from: a run, a checkpoint in it, or the name of an embedded network [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// The data set whose metric scale to use, for a network trained on several.
+    /// Data set whose metric scale to use, for a network trained on several.
     #[arg(long = "data-set", value_name = "NAME")]
     pub data_set: Option<String>,
-    /// Drives to learn on, with a speed; turns that are not recorded are taken from the images.
+    /// Drives to train on, with a speed; turns that were not recorded are estimated from the images.
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present = "undo")]
     pub data: Vec<PathBuf>,
-    /// Folder of the adapted network's run, new.
+    /// New folder for the adapted network's run.
     #[arg(long, value_name = "DIR", required_unless_present = "undo")]
     pub out: Option<PathBuf>,
-    /// Make an adapted network predict as the one it began from; what was learned stays beside it.
+    /// Make an adapted network predict like the one that it started from; what it learned stays beside it.
     #[arg(long, value_name = "DIR", exclusive = true)]
     pub undo: Option<PathBuf>,
-    /// Steps of learning.
+    /// Training steps.
     #[arg(long, value_name = "N", default_value_t = 240)]
     pub steps: usize,
-    /// Samples of the drive a step.
+    /// Samples of the drive per step.
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub batch: usize,
-    /// Samples of simulated depth a step, which keep what the network knows already; 0: none, and no head for uncertainty.
+    /// Samples of simulated depth per step, which preserve what the network already knows; 0: none, and no uncertainty head.
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub simulated: usize,
-    /// The camera that sees the simulated streets: the drives' own, at its height above the road in their images, or any.
+    /// Camera of the simulated streets: the drives' own, at the height above the road that their images show, or any.
     #[arg(long, value_name = "own|any", value_enum, default_value_t)]
     pub simulated_camera: SimulatedView,
-    /// The largest learning rate.
+    /// Largest learning rate.
     #[arg(long, value_name = "RATE", default_value_t = 5e-5)]
     pub learning_rate: f64,
-    /// Share of each drive's end to judge on.
+    /// Share of each drive to hold out at its end, to judge the network on.
     #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = held_out)]
     pub held_out: f64,
-    /// Which cameras. Where rectified cameras are both taken, each is also a second view of the same moment (as `train --stereo`), unless
-    /// the given network learned from drives without it; `--set stereo=false` turns that off. Drives with one camera may stand beside.
+    /// Which cameras to use.
+    ///
+    /// If both are used and rectified, each is also a second view of the same moment (as in `train --stereo`), unless the given network was
+    /// trained on drives without it; `--set stereo=false` turns that off. Drives with one camera may be among them.
     #[arg(long, value_name = "2|3|both", default_value = "2")]
     pub camera: Cameras,
-    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth). May be repeated.
+    /// For bags: which topic to use for a role, if several match; may be repeated.
+    ///
+    /// Roles are image, camera_info, lidar, dynamic, imu, speed, steering, can and truth.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
-    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    /// How many milliseconds the camera's clock is ahead of the vehicle's, or `auto` [default: the recording's clock.camera_ahead_s].
+    ///
+    /// `auto` measures the offset from how the images turn when the vehicle turns. If the images do not show it, that is an error.
     #[arg(
         long = "clock-offset",
         alias = "clock",
@@ -71,19 +76,21 @@ pub(crate) struct AdaptArgs {
         allow_negative_numbers = true
     )]
     pub clock_offset: Option<ClockOffset>,
-    /// What the vehicle's speed may be off by (one standard error).
+    /// Uncertainty of the vehicle's speed in per cent (one standard error).
     #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative)]
     pub speed_error: f64,
-    /// Fixes everything that is random.
+    /// Random seed.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub seed: u64,
-    /// Any key of the configuration, as `loss.smoothness=0.01` or `data.sets[0].learn=depth` (`deepfusion config show` prints them all); may be repeated.
+    /// Set a key of the configuration; may be repeated.
+    ///
+    /// For example `loss.smoothness=0.01` or `data.sets[0].learn=depth`; `deepfusion config show` prints all keys.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    /// Device to compute on; with several GPUs add an index, such as cuda:1.
     #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
-    /// Print before and after as JSON.
+    /// Print the results before and after as JSON.
     #[arg(long)]
     pub json: bool,
 }
@@ -94,7 +101,7 @@ pub(crate) enum SimulatedView {
     /// The drives' own cameras.
     #[default]
     Own,
-    /// Any camera, as the embedded networks learned.
+    /// Any camera, as in the training of the embedded networks.
     Any,
 }
 

@@ -9,10 +9,10 @@ use clap::{Args, ValueEnum};
     deepfusion completions zsh > ~/.zfunc/_deepfusion\n  \
     deepfusion completions man --out ~/.local/share/man/man1")]
 pub(crate) struct CompletionsArgs {
-    /// The shell, or `man` for pages of the manual.
+    /// Shell, or `man` for man pages.
     #[arg(value_enum, value_name = "SHELL")]
     pub kind: CompletionsKind,
-    /// Folder for the pages of the manual, one a command.
+    /// Folder for the man pages, one per command.
     #[arg(long, value_name = "DIR", required_if_eq("kind", "man"))]
     pub out: Option<PathBuf>,
 }
@@ -30,6 +30,6 @@ pub(crate) enum CompletionsKind {
     Powershell,
     /// Zsh.
     Zsh,
-    /// Pages of the manual.
+    /// Man pages.
     Man,
 }

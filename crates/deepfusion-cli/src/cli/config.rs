@@ -12,24 +12,24 @@ use crate::devices::ComputeDevice;
 /// `deepfusion config …`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum ConfigCommand {
-    /// The whole configuration of a preset, or of a run, as TOML, with a line on each key.
+    /// Print the whole configuration of a preset or a run as TOML, with a line on each key.
     Show(ShowArgs),
 }
 
 /// `deepfusion config show`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "What it prints is a file for `train --config`. Such a file may also name a preset and only the keys in which it differs.\n\n\
+    after_help = "The output is a file for `train --config`. Such a file may also contain just a preset and the keys in which it differs.\n\n\
     Examples:\n  deepfusion config show light > light.toml\n  deepfusion config show tiny --set loss.smoothness=0.01 --set batch=8\n  deepfusion config show runs/first"
 )]
 pub(crate) struct ShowArgs {
-    /// The preset, or a run's folder: what it learned with.
+    /// Preset, or run folder: the configuration that the run was trained with.
     #[arg(value_name = "PRESET|RUN", value_parser = PresetOrRun, default_value = "tiny")]
     pub of: ConfigSource,
-    /// A key and its value, as for `train`; may be repeated.
+    /// Set a key, as in `train`; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// What is to be trained on: a preset's sizes follow it.
+    /// Device to train on; a preset's sizes depend on it.
     #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
 }

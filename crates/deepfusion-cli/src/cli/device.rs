@@ -48,7 +48,7 @@ impl TypedValueParser for Parser {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let auto = PossibleValue::new("auto")
-            .help("A GPU where this build and this machine have one, else the processor");
+            .help("A GPU if this build and this machine have one, else the processor");
         let named = Backend::ALL.iter().map(|one| {
             let named = PossibleValue::new(one.name());
             named.help(one.meaning()).hide(!one.is_built())

@@ -11,19 +11,19 @@ use crate::devices::ComputeDevice;
 /// What runs a trained network, and where.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EngineArgs {
-    /// What runs the network.
+    /// Inference engine.
     #[arg(long, value_parser = names::engine(), default_value_t)]
     pub engine: Engine,
-    /// In which numbers the fused engine computes.
+    /// Precision of the fused engine.
     #[arg(long, value_parser = names::precision(), default_value = "f32")]
     pub precision: Precision,
-    /// The ONNX Runtime library of `--engine ort` [default: found].
+    /// ONNX Runtime library for `--engine ort` [default: ORT_DYLIB_PATH, or the first one found].
     #[arg(long, value_name = "FILE")]
     pub ort_lib: Option<PathBuf>,
-    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    /// Device to compute on; with several GPUs add an index, such as cuda:1.
     #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
-    /// The data set whose metric scale to use, for a run trained on several.
+    /// Data set whose metric scale to use, for a run trained on several.
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
 }

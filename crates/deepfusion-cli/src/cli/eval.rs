@@ -11,27 +11,27 @@ use super::{CameraIntrinsics, EngineArgs, names};
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("what").args(["model", "pred"])),
-    after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels separately where \
+    after_help = "Metrics are means over images, always both unscaled and median-scaled; static and dynamic pixels are also reported separately if \
     the simulator's masks or KITTI's tracklets exist. Drives with a speed are also judged without ground truth: the scale \
-    certificate is the bias of the metre with a 95 % interval, from frames that training did not see. Array files: .npz (matched by \
-    name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. The result \
-    of a run is kept in RUN/eval, where `compare` finds it.\n\n\
+    certificate is the scale bias with a 95 % interval, from frames that training did not see. Array files are .npz (matched by \
+    name) or N×H×W .npy (in split order), float32 or float64, of any size: predictions are resized as disparity. The result of a run \
+    is kept in RUN/eval, where `compare` finds it.\n\n\
     Examples:\n  deepfusion eval --model runs/train-1 --data kitti --split eigen/test_files.txt\n  \
     deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json\n  \
     deepfusion eval --model runs/train-1 --data street --points 10000 --report street.html\n  \
     deepfusion eval --model runs/train-1 --data my-drive --speed-error 1"
 )]
 pub(crate) struct EvalArgs {
-    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
+    /// Run folder, checkpoint in it, or name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME", requires = "data")]
     pub model: Option<PathBuf>,
     /// Recordings to evaluate on: KITTI (raw, odometry, 360) drives or roots, nuScenes, image folders, videos, RGB-D folders.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred", required_unless_present = "pred")]
     pub data: Vec<PathBuf>,
-    /// Only the frames of this split file (lines "folder index side").
+    /// Use only the frames of this split file (lines "folder index side").
     #[arg(long, value_name = "FILE", conflicts_with = "pred")]
     pub split: Option<PathBuf>,
-    /// Which camera.
+    /// Which camera to use.
     #[arg(
         long,
         value_name = "2|3|both",
@@ -39,7 +39,7 @@ pub(crate) struct EvalArgs {
         conflicts_with = "pred"
     )]
     pub camera: Cameras,
-    /// The camera of recordings without a calibration, in pixels of their images.
+    /// Camera intrinsics in pixels of the images, for recordings without a calibration.
     #[arg(
         long,
         allow_hyphen_values = true,
@@ -50,15 +50,17 @@ pub(crate) struct EvalArgs {
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "pred"])]
     pub hfov: Option<f64>,
-    /// Fail unless every frame of --split is there and has ground truth.
+    /// Fail unless every frame of --split exists and has ground truth.
     #[arg(long, requires = "split")]
     pub strict: bool,
-    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth). May be repeated.
+    /// For bags: which topic to use for a role, if several match; may be repeated.
+    ///
+    /// Roles are image, camera_info, lidar, dynamic, imu, speed, steering, can and truth.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
-    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    /// How many milliseconds the camera's clock is ahead of the vehicle's, or `auto` [default: the recording's clock.camera_ahead_s].
+    ///
+    /// `auto` measures the offset from how the images turn when the vehicle turns. If the images do not show it, that is an error.
     #[arg(
         long = "clock-offset",
         alias = "clock",
@@ -67,73 +69,77 @@ pub(crate) struct EvalArgs {
         conflicts_with = "pred"
     )]
     pub clock_offset: Option<ClockOffset>,
-    /// Predicted arrays.
+    /// File of predicted arrays.
     #[arg(long, value_name = "FILE", requires = "pred_kind", requires = "gt")]
     pub pred: Option<PathBuf>,
-    /// What the predicted arrays hold.
+    /// What the predicted arrays contain.
     #[arg(long, value_enum, requires = "pred")]
     pub pred_kind: Option<PredKind>,
-    /// Ground-truth depth in metres, 0 = none; with --model, instead of the recording's scans.
+    /// Ground-truth depth in metres, 0 = none; with --model, used instead of the recording's scans.
     #[arg(long, value_name = "FILE")]
     pub gt: Option<PathBuf>,
-    /// Which depth the ground truth is.
+    /// Convention of the ground truth: which depth, at which pixel.
     #[arg(long, value_parser = names::gt_kind(), default_value = "z")]
     pub gt_depth: GtKind,
     /// Part of the image to compare [default: garg for KITTI raw, else none].
     #[arg(long, value_parser = names::crop())]
     pub crop: Option<Crop>,
-    /// Farthest ground truth that counts, in metres; predictions are clamped to it.
+    /// Largest ground-truth depth that counts, in metres; predictions are clamped to it.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub cap: f64,
-    /// Nearest ground truth that counts, in metres; predictions are clamped to it.
+    /// Smallest ground-truth depth that counts, in metres; predictions are clamped to it.
     #[arg(long, value_name = "M", default_value_t = 1e-3, value_parser = positive)]
     pub min: f64,
-    /// An extra row with a fixed factor (fixed=F); none and median are always reported.
+    /// Add a row with a fixed factor (fixed=F); none and median are always reported.
     #[arg(long, value_name = "none|median|fixed=F", default_value = "none", value_parser = scaling)]
     pub scale: Scaling,
-    /// Also draw N of the compared pixels at random and report how far their points are from the LiDAR's in space.
+    /// Also sample N of the compared pixels at random, and report how far their points are from the LiDAR's in space.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub points: usize,
-    /// Which points are drawn.
+    /// Random seed; decides which points are sampled.
     #[arg(long, value_name = "S", default_value_t = 0, requires = "points")]
     pub points_seed: u64,
-    /// Also write the drawn points: image, pixel, true and predicted place in the camera's axes, error, as CSV.
+    /// Also write the sampled points as CSV: image, pixel, true and predicted position in the camera's axes, error.
     #[arg(long, value_name = "FILE.csv", requires = "points")]
     pub points_out: Option<PathBuf>,
-    /// Test-time augmentation: take the mean of several predictions of each image, as `predict --post-process` does; without the verdict, which is of the network's
-    /// own predictions.
+    /// Test-time augmentation: average several predictions of each image, as `predict --post-process` does.
+    ///
+    /// The verdict is then left out, because it is about the network's own predictions.
     #[arg(long, value_parser = names::post_process(), conflicts_with_all = ["pred", "calibrate_confidence", "calibrate_uncertainty"])]
     pub post_process: Option<PostProcess>,
     /// Also write a page that opens offline: tables, charts, best and worst frames, learning curves, settings.
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
-    /// Replace the files of --report and --points-out if they are there.
+    /// Replace existing files of --report and --points-out.
     #[arg(long)]
     pub overwrite: bool,
-    /// Predicted values that are NaN, infinite or not above 0 mean "none here": leave them out and count them.
+    /// Allow holes: leave out and count predicted values that are NaN, infinite or not above 0.
     #[arg(long)]
     pub allow_holes: bool,
     /// Training scans (from data export-gt) for the mean-depth baseline [default: those the model was trained on, if known].
     #[arg(long, value_name = "FILE.npz")]
     pub trivial: Option<PathBuf>,
-    /// Do not correct depth for another focal length than the one trained on.
+    /// Do not correct depth for a focal length other than the training camera's.
     #[arg(long, conflicts_with = "pred")]
     pub no_focal_correction: bool,
-    /// Learn a confidence for each pixel, and keep it beside the run: `perceive` then gives its clouds a
-    /// confidence, and --report shows whether it holds on frames not learned from: other drives, or of one drive another part.
+    /// Fit a confidence for each pixel, and keep it beside the run.
+    ///
+    /// `perceive` then adds a confidence to its clouds, and --report shows whether it holds on frames that the fit has not seen: other
+    /// drives, or another part of a single drive.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_confidence: bool,
-    /// Calibrate the intervals that a network with `depth_net.uncertainty` predicts, and keep the factors beside the run. Use drives that
-    /// training has not seen, and measure the result on others.
+    /// Calibrate the intervals that a network with `depth_net.uncertainty` predicts, and keep the factors beside the run.
+    ///
+    /// Use drives that training has not seen, and measure the result on others.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_uncertainty: bool,
-    /// Compare with ground truth only: skip the verdict from speeds and images.
+    /// Compare with ground truth only; skip the verdict from speeds and images.
     #[arg(long, conflicts_with = "pred")]
     pub no_verdict: bool,
-    /// What the vehicle's speed may be off by (one standard error), which the scale certificate's interval then allows for.
+    /// Uncertainty of the vehicle's speed in per cent (one standard error), which the scale certificate's interval allows for.
     #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative, conflicts_with_all = ["pred", "no_verdict"])]
     pub speed_error: f64,
-    /// Assume that training saw none of these frames, where the program cannot know: for a network that was trained elsewhere.
+    /// Assume that training saw none of these frames, if the program cannot know: for networks that were trained elsewhere.
     #[arg(long, conflicts_with_all = ["pred", "no_verdict"])]
     pub assume_unseen: bool,
     /// What runs the network.

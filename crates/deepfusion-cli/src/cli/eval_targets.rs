@@ -9,8 +9,8 @@ use super::{EngineArgs, names};
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("source").args(["model", "depth"]).required(true)),
-    after_help = "Boxes come from a drive's tracklet_labels.xml: KITTI raw's, or the simulator's. A box counts where enough of it is seen; \
-    trees, poles, buildings and fences count as neither.\n\n\
+    after_help = "Boxes come from a drive's tracklet_labels.xml (KITTI raw's or the simulator's) or from KITTI's object labels. A box counts if \
+    enough of it is visible; trees, poles, buildings and fences count as neither right nor wrong.\n\n\
     Examples:\n  deepfusion eval-targets --data street --depth truth\n  \
     deepfusion eval-targets --data kitti/2011_09_26/2011_09_26_drive_0005_sync --model runs/train-1"
 )]
@@ -18,19 +18,19 @@ pub(crate) struct EvalTargetsArgs {
     /// Drives with labelled boxes.
     #[arg(long, required = true, num_args = 1.., value_name = "PATH")]
     pub data: Vec<PathBuf>,
-    /// Depth predicted by a run (its folder or a checkpoint in it), or by an embedded network of this name.
+    /// Run (its folder or a checkpoint in it) or name of an embedded network whose predicted depth to use.
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// Depth that was measured.
+    /// Measured depth to use instead.
     #[arg(long, value_enum)]
     pub depth: Option<TargetDepth>,
-    /// Test-time augmentation: take the mean of several predictions of each image, as `predict --post-process` does.
+    /// Test-time augmentation: average several predictions of each image, as `predict --post-process` does.
     #[arg(long, value_parser = names::post_process(), conflicts_with = "depth")]
     pub post_process: Option<PostProcess>,
-    /// Settings of the perception (TOML).
+    /// Perception settings (TOML).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Write each frame's picture with the targets' boxes into this folder, to see what was found.
+    /// Folder for a picture of each frame with its targets' boxes, to see what was found.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// What runs the network.
@@ -46,6 +46,6 @@ pub(crate) struct EvalTargetsArgs {
 pub(crate) enum TargetDepth {
     /// The simulator's exact depth of every pixel.
     Truth,
-    /// The drive's scans, gathered to as coarse an image as they fill.
+    /// The drive's scans, as an image coarse enough for them to fill.
     Lidar,
 }

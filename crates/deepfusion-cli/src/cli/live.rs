@@ -8,7 +8,7 @@ pub(crate) struct LiveArgs {
     /// Stop this many seconds after the first frame.
     #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
     pub duration: Option<f64>,
-    /// Give up on a source after this many seconds of silence [default: 10].
+    /// Give up on a source that sends nothing for this many seconds [default: 10].
     #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
     pub timeout: Option<f64>,
 }

@@ -66,10 +66,10 @@ pub(crate) use weights::{AverageArgs, CalibrateWeightsArgs, PackArgs, WeightsCom
     subcommand_required = false
 )]
 pub(crate) struct Cli {
-    /// What to do; without it, an overview with examples.
+    /// What to do. Without a command: an overview with examples.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// No progress on stderr, only warnings and errors.
+    /// Print no progress on stderr, only warnings and errors.
     #[arg(long, short, global = true, display_order = 900)]
     pub quiet: bool,
 }
@@ -77,99 +77,104 @@ pub(crate) struct Cli {
 /// Everything the program can do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// With no data at all: depth, cloud and targets of a new street, then learning there.
+    /// Run the whole workflow without any data: depth, point cloud and targets of a simulated street, then training there.
     #[cfg(feature = "train")]
     Demo(DemoArgs),
-    /// Write a simulated drive with exact ground truth.
+    /// Simulate a drive with exact ground truth.
     Simulate(SimulateArgs),
-    /// Look into recordings.
+    /// Inspect, convert and import recordings, and export their ground truth.
     #[command(subcommand)]
     Data(DataCommand),
-    /// A camera's intrinsics and lens from pictures or a video of a checkerboard, as a calibration file.
+    /// Measure a camera's intrinsics and lens distortion from pictures or a video of a checkerboard; writes a calibration file.
     Calibrate(CalibrateArgs),
-    /// Every reason why training on a recording would fail or give a wrong scale; alone, what this machine has.
+    /// List every reason why training on a recording would fail or give a wrong scale; without a recording, show what this machine has.
     Doctor(DoctorArgs),
-    /// Train on drives, without depth labels.
+    /// Train a network on drives, without depth labels.
     #[cfg(feature = "train")]
     Train(Box<TrainArgs>),
     /// Fine-tune an existing network on new drives; the result is kept only if no check gets clearly worse.
     #[cfg(feature = "train")]
     Adapt(Box<AdaptArgs>),
-    /// What can be configured.
+    /// Show the configuration, with the meaning of every key.
     #[command(subcommand)]
     Config(ConfigCommand),
-    /// Train and measure with parts of the system switched off: the on/off table of the paper.
+    /// Train and evaluate with parts of the system switched off: the paper's ablation table.
     #[cfg(feature = "train")]
     Ablate(Box<AblateArgs>),
-    /// Measure depth: the field's seven metrics, unscaled and median-scaled.
+    /// Evaluate depth: the field's seven metrics, unscaled and median-scaled.
     Eval(Box<EvalArgs>),
-    /// Evaluations side by side, and beside the field's published tables.
+    /// Compare evaluations side by side, and with the field's published tables.
     Compare(Box<CompareArgs>),
-    /// Measure the camera's path: drift, five-frame error, scale.
+    /// Evaluate the camera's trajectory: drift, five-frame error, scale.
     #[cfg(feature = "train")]
     EvalOdometry(EvalOdometryArgs),
-    /// Measure 3D targets against labelled boxes: recall, precision, errors, identities.
+    /// Evaluate 3D targets against labelled boxes: recall, precision, errors, identities.
     EvalTargets(Box<EvalTargetsArgs>),
-    /// Metric depth of images.
+    /// Predict metric depth for images, recordings or a live camera.
     Predict(Box<PredictArgs>),
-    /// 3D targets: boxes, distance, size, track, velocity.
+    /// Find 3D targets: boxes with distance, size, track and velocity.
     Perceive(Box<PerceiveArgs>),
-    /// Look at results in the browser: picture, depth in metres, cloud, boxes and tracks, over time.
+    /// View results in the browser: image, depth in metres, point cloud, boxes and tracks over time.
     View(ViewArgs),
-    /// A trained network as an ONNX file, checked before it is kept.
+    /// Export a trained network as an ONNX file, checked before it is kept.
     #[cfg(feature = "train")]
     Export(ExportArgs),
-    /// Embedded networks, and weights of other programs.
+    /// List embedded networks; import, average, pack and calibrate weights.
     #[command(subcommand)]
     Weights(WeightsCommand),
-    /// Measure speed: milliseconds per stage, frames a second, memory.
+    /// Measure speed: milliseconds per stage, frames per second, memory.
     Bench(BenchArgs),
-    /// What a shell needs to complete the command line, or pages of the manual.
+    /// Print shell completions, or write man pages.
     Completions(CompletionsArgs),
 }
 
 /// `deepfusion demo`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Takes a few minutes on two cores. Leaves pictures, a point cloud and report.html.\n\n\
+    after_help = "It takes a few minutes on two cores, and leaves pictures, a point cloud and report.html.\n\n\
     Examples:\n  deepfusion demo --out runs/first\n  deepfusion demo --from-scratch --out runs/second"
 )]
 pub(crate) struct DemoArgs {
-    /// Folder for everything it makes [default: runs/demo-TIME].
+    /// Output folder [default: runs/demo-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print the final evaluation as JSON on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Start from nothing: train a small network on six simulated streets for some minutes, and measure it on a seventh.
+    /// Start from random weights.
+    ///
+    /// A small network trains on six simulated streets for some minutes, and is evaluated on a seventh.
     #[arg(long)]
     pub from_scratch: bool,
-    /// Chooses the streets.
+    /// Random seed; decides which streets are simulated.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    /// Device to compute on; with several GPUs add an index, such as cuda:1.
     #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
-    /// Frames of each drive; fewer than 12 may leave no scan to measure on. This and the next two make the way short enough to be tested.
+    /// Frames of each drive; fewer than 12 may leave no scan to measure on. This and the next two options make the demo short enough for
+    /// tests.
     #[arg(long, hide = true, value_name = "N", value_parser = clap::value_parser!(u16).range(12..))]
     pub frames: Option<u16>,
-    /// Steps of training.
+    /// Training steps.
     #[arg(long, hide = true, value_name = "N")]
     pub steps: Option<usize>,
-    /// Size of the pictures, and of what the network learns from.
+    /// Size of the images and of the network's input.
     #[arg(long, hide = true, value_name = "WxH")]
     pub size: Option<Size>,
 }
 
 /// `deepfusion simulate`.
 #[derive(Debug, Args)]
-#[command(after_help = "Equal settings give equal drives, byte for byte.\n\n\
+#[command(
+    after_help = "The same settings give the same drive, byte for byte.\n\n\
     Examples:\n  deepfusion simulate --out street --frames 200 --seed 7\n  \
     deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375\n  \
     deepfusion simulate --out other --varied --seed 8 --scene country\n  \
-    deepfusion simulate --out garage --format bag --scene garage --frames 250")]
+    deepfusion simulate --out garage --format bag --scene garage --frames 250"
+)]
 pub(crate) struct SimulateArgs {
-    /// Folder to write, new or empty.
+    /// Output folder, new or empty.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Layout of the drive.
@@ -178,39 +183,41 @@ pub(crate) struct SimulateArgs {
     /// Number of frames.
     #[arg(long, value_name = "N", default_value_t = 100)]
     pub frames: usize,
-    /// Chooses the street, its look, the light and the way it is driven.
+    /// Random seed; decides the street, its look, the light and how it is driven.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// Kind of place.
+    /// Kind of scene.
     #[arg(long, value_parser = names::scene(), default_value = "urban")]
     pub scene: Scene,
     /// Number of moving cars; with --varied, cars whose way is blocked are left out.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub moving_cars: usize,
-    /// Number of people who ride bicycles, walk along pavements and cross the road.
+    /// Number of people who ride bicycles, walk along pavements or cross the road.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub riders: usize,
-    /// Draw the camera (lens, height, pitch, roll, softness, noise, exposure, JPEG), the light, the weather and what the street looks like from the seed,
-    /// once for the drive, as training draws its simulated views. varied.json in the drive's folder (of a bag: NAME.varied.json beside it) says what was
-    /// drawn. Roads stay flat, and a LiDAR sees as in clear air.
+    /// Randomise camera, light, weather and street, as training does for its simulated views.
+    ///
+    /// The camera (lens, height, pitch, roll, softness, noise, exposure, JPEG), the light, the weather and the look of the street are drawn
+    /// from the seed, once per drive. varied.json in the drive's folder (for a bag: NAME.varied.json beside it) records what was drawn.
+    /// Roads stay flat, and the LiDAR sees as in clear air.
     #[arg(long)]
     pub varied: bool,
-    /// Size of the pictures [default: 640x192; UMAD's 640x480 in a bag].
+    /// Size of the images [default: 640x192; in a bag UMAD's 640x480].
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Frames a second [default: 10; UMAD's 25 in a bag].
+    /// Frames per second [default: 10; in a bag UMAD's 25].
     #[arg(long, allow_negative_numbers = true, value_name = "HZ")]
     pub fps: Option<f64>,
-    /// Sensors of the car [default: those of the layout's data set].
+    /// The vehicle's sensors [default: those of the layout's data set].
     #[arg(long, value_parser = names::sensors())]
     pub sensors: Option<Sensors>,
-    /// Height of the camera above the road [default: 1.65].
+    /// Height of the camera above the road, in metres [default: 1.65].
     #[arg(long, value_name = "M", value_parser = values::positive)]
     pub camera_height: Option<f64>,
-    /// Write the pictures of a second camera, too, so far to the right of the first one (KITTI's: 0.53).
+    /// Also write the images of a second camera, this far to the right of the first one, in metres (KITTI's: 0.53).
     #[arg(long, value_name = "M", value_parser = values::positive)]
     pub stereo: Option<f64>,
-    /// Set the clock of camera and LiDAR so many milliseconds ahead of the vehicle's (bag).
+    /// Set the clock of camera and LiDAR this many milliseconds ahead of the vehicle's (bags only).
     #[arg(
         long,
         value_name = "MS",
@@ -221,7 +228,7 @@ pub(crate) struct SimulateArgs {
     /// Compression of the bag [default: lz4].
     #[arg(long, value_parser = names::compression())]
     pub compression: Option<Compression>,
-    /// A velodyne scan for every N-th frame (KITTI); 0 writes none [default: 1].
+    /// Write a velodyne scan for every N-th frame (KITTI only); 0 writes none [default: 1].
     #[arg(long, value_name = "N")]
     pub scan_every: Option<usize>,
     /// Print what was written as JSON on stdout.
@@ -232,9 +239,9 @@ pub(crate) struct SimulateArgs {
 /// Layouts the simulator writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum SimulateFormat {
-    /// KITTI raw: images, oxts, velodyne scans, calibration, and exact depth beside them.
+    /// KITTI raw: images, OXTS, velodyne scans and calibration, with exact depth beside them.
     #[default]
     Kitti,
-    /// A ROS 1 bag as UMAD's: camera, FMCW LiDAR, inertial unit, CAN speed and steering, and the truth.
+    /// A ROS 1 bag like UMAD's: camera, FMCW LiDAR, IMU, CAN speed and steering, and the ground truth.
     Bag,
 }

@@ -31,19 +31,19 @@ pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
         &[
             (
                 Preset::Tiny,
-                "ResNet-18 at half width, 320×96: useful on two cores in minutes",
+                "ResNet-18 at half width, 320×96: learns something useful on two cores in minutes",
             ),
             (
                 Preset::Light,
-                "ResNet-18, 640×192; trained on a processor 320×96",
+                "ResNet-18, 640×192; 320×96 if trained on a processor",
             ),
             (
                 Preset::Resnet50,
-                "ResNet-50, 640×192, batch 12; trained on a processor 320×96, batch 4",
+                "ResNet-50, 640×192, batch 12; 320×96, batch 4 if trained on a processor",
             ),
             (
                 Preset::Paper,
-                "The paper's network: ResNet-50 with context and attention; sizes as resnet50",
+                "The paper's network: ResNet-50 with context encoding and attention; sizes as for resnet50",
             ),
             (
                 Preset::Monodepth2,
@@ -55,7 +55,7 @@ pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
             ),
             (
                 Preset::LiteMono,
-                "Lite-Mono (3.1 M parameters), Monodepth2's losses with the speed term",
+                "Lite-Mono (3.1 M parameters) with Monodepth2's losses and the speed term",
             ),
             (Preset::LiteMonoSmall, "Lite-Mono-small (2.5 M)"),
             (Preset::LiteMonoTiny, "Lite-Mono-tiny (2.2 M)"),
@@ -80,11 +80,11 @@ pub(super) fn learn() -> impl TypedValueParser<Value = Learn> {
         &[
             (
                 Learn::OwnMotion,
-                "Its own motion: views of one frame from another; needs a speed",
+                "Its own motion: one frame synthesised from another; needs a speed",
             ),
             (
                 Learn::Depth,
-                "Its depth: RGB-D images or a LiDAR's scans; needs no speed",
+                "Its depth: RGB-D images or LiDAR scans; needs no speed",
             ),
             (Learn::Both, "Both"),
         ],
@@ -98,19 +98,19 @@ pub(super) fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
         &[
             (
                 ViewMotion::PoseNet,
-                "PoseNet's; the speed loss pulls its length to the vehicle's",
+                "PoseNet's; the speed loss pulls its length towards the vehicle's",
             ),
             (
                 ViewMotion::Distance,
-                "PoseNet's direction and rotation, the vehicle's distance",
+                "PoseNet's direction and rotation, with the vehicle's distance",
             ),
             (
                 ViewMotion::Vehicle,
-                "The vehicle's, from its speed and its turns: measured ones, else those that the images show",
+                "The vehicle's, from its speed and its turns: as measured, else as the images show them",
             ),
             (
                 ViewMotion::Auto,
-                "vehicle for drives whose turns are known, distance for the others",
+                "`vehicle` for drives whose turns are known, `distance` for the others",
             ),
         ],
     )
@@ -121,8 +121,11 @@ pub(super) fn checkpoint() -> impl TypedValueParser<Value = CheckpointKind> {
     one_of(
         CheckpointKind::name,
         &[
-            (CheckpointKind::Best, "At the lowest held-out loss"),
-            (CheckpointKind::Last, "Where training ended"),
+            (
+                CheckpointKind::Best,
+                "The one with the lowest held-out loss",
+            ),
+            (CheckpointKind::Last, "The one at the end of training"),
         ],
     )
 }
@@ -136,9 +139,12 @@ pub(super) fn engine() -> impl TypedValueParser<Value = Engine> {
                 Engine::Auto,
                 "`fused` on the processor, `burn` on any other device",
             ),
-            (Engine::Burn, "The network as it is trained"),
+            (
+                Engine::Burn,
+                "Burn, the framework that also trains the network",
+            ),
             (Engine::Fused, "This program's own engine for processors"),
-            (Engine::Ort, "ONNX Runtime, a library of your own"),
+            (Engine::Ort, "ONNX Runtime, from a library that you provide"),
         ],
     )
 }
@@ -151,11 +157,11 @@ pub(super) fn precision() -> impl TypedValueParser<Value = Precision> {
             (Precision::F32, "32-bit floats"),
             (
                 Precision::Bf16,
-                "Eight bits of mantissa: faster on processors with AMX or AVX512-BF16, a little less exact",
+                "Eight bits of mantissa: faster on processors with AMX or AVX512-BF16, slightly less exact",
             ),
             (
                 Precision::Int8,
-                "8-bit integers: faster still on processors with AVX512-VNNI, less exact; for networks that `weights calibrate` saw",
+                "8-bit integers: even faster on processors with AVX512-VNNI, less exact; for networks calibrated by `weights calibrate`",
             ),
         ],
     )
@@ -172,11 +178,11 @@ pub(super) fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
             ),
             (
                 GtKind::Velodyne,
-                "The velodyne's forward distance at pixel round(u) - 1, round(v) - 1: the field's eigen files",
+                "The velodyne's forward distance at pixel round(u) - 1, round(v) - 1, as in the field's eigen files",
             ),
             (
                 GtKind::Annotated,
-                "KITTI's annotated depth, from proj_depth/groundtruth beside a drive's images: the field's eigen_benchmark",
+                "KITTI's annotated depth, from proj_depth/groundtruth beside a drive's images, as in the field's eigen_benchmark",
             ),
         ],
     )
@@ -189,15 +195,15 @@ pub(super) fn post_process() -> impl TypedValueParser<Value = PostProcess> {
         &[
             (
                 PostProcess::Flip,
-                "The mean with the mirrored image's prediction (near the left edge the mirrored image's alone, near the right edge the image's own); twice the time",
+                "Mean with the prediction of the mirrored image (near the left edge only the mirrored image's, near the right edge only the image's own); twice the time",
             ),
             (
                 PostProcess::MultiScale,
-                "The mean of a smaller input's prediction (0.8 times as wide and high) and a larger one's (1.2); two to two and a half times the time",
+                "Mean of the predictions for a smaller input (0.8 times as wide and high) and a larger one (1.2 times); two to two and a half times the time",
             ),
             (
                 PostProcess::MultiScaleFlip,
-                "The same, each with the mirrored image's; four to five times the time",
+                "The same, each also with the mirrored image; four to five times the time",
             ),
         ],
     )
@@ -211,7 +217,7 @@ pub(super) fn crop() -> impl TypedValueParser<Value = Crop> {
             (Crop::None, "The whole image"),
             (
                 Crop::Garg,
-                "Garg et al.'s window, the field's default for KITTI",
+                "Garg et al.'s crop, the field's default for KITTI",
             ),
         ],
     )
@@ -234,10 +240,10 @@ pub(super) fn sensors() -> impl TypedValueParser<Value = Sensors> {
     one_of(
         Sensors::name,
         &[
-            (Sensors::Kitti, "KITTI's, camera and velodyne on the roof"),
+            (Sensors::Kitti, "KITTI's: camera and velodyne on the roof"),
             (
                 Sensors::Umad,
-                "UMAD's, camera, FMCW LiDAR and inertial unit in one head",
+                "UMAD's: camera, FMCW LiDAR and IMU in one head",
             ),
         ],
     )
@@ -248,24 +254,27 @@ pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
     one_of(
         Scene::name,
         &[
-            (Scene::Urban, "A street with houses, parked cars, trees"),
+            (Scene::Urban, "A street with houses, parked cars and trees"),
             (Scene::Park, "A narrow road between lawns and trees"),
             (
                 Scene::Garage,
-                "Underground: dark, near walls, pillars, a low ceiling",
+                "Underground: dark, with near walls, pillars and a low ceiling",
             ),
             (
                 Scene::Commercial,
-                "Large houses, wide pavements, many parked cars",
+                "Large buildings, wide pavements, many parked cars",
             ),
-            (Scene::Night, "The urban street by night, under its lamps"),
+            (
+                Scene::Night,
+                "The urban street at night, under street lamps",
+            ),
             (
                 Scene::Motorway,
-                "Several lanes, guard rails, embankments; with --varied alone",
+                "Several lanes, guard rails, embankments; only with --varied",
             ),
             (
                 Scene::Country,
-                "A road between fields, trees and banks; with --varied alone",
+                "A road between fields, trees and banks; only with --varied",
             ),
         ],
     )
@@ -280,11 +289,11 @@ pub(super) fn depth_output() -> impl TypedValueParser<Value = DepthOutput> {
             (DepthOutput::Npy, "H×W f32 metres, for NumPy"),
             (
                 DepthOutput::Sigma,
-                "How sure the network is: H×W f32, the standard deviation of depth in metres, for NumPy; of networks that learned it",
+                "Standard deviation of depth in metres: H×W f32, for NumPy; needs a network that predicts uncertainty",
             ),
             (
                 DepthOutput::Confidence,
-                "How far each pixel can be trusted: H×W f32 from 0 to 1, for NumPy; 0.9 where an error of 10 % is to be expected. Of networks that say how sure they are",
+                "How far each pixel can be trusted: H×W f32 from 0 to 1 (0.9: an error of 10 % is expected), for NumPy; needs a network that predicts uncertainty",
             ),
             (
                 DepthOutput::Color,
@@ -308,11 +317,11 @@ pub(super) fn depth_output() -> impl TypedValueParser<Value = DepthOutput> {
             ),
             (
                 DepthOutput::Features,
-                "What the network sees: its features and attention masks on the image",
+                "What the network sees: its features and attention masks, drawn on the image",
             ),
             (
                 DepthOutput::Video,
-                "The pictures of `side-by-side`, which are kept, too, as an MP4 of each recording (through ffmpeg)",
+                "An MP4 of each recording (through ffmpeg), from the pictures of `side-by-side`, which are also kept",
             ),
         ],
     )
@@ -325,11 +334,11 @@ pub(super) fn target_output() -> impl TypedValueParser<Value = TargetOutput> {
         &[
             (
                 TargetOutput::DepthPng,
-                "Depth as 16-bit PNG, metres × 256: what `view` shows",
+                "Depth as 16-bit PNG, metres × 256, which `view` shows",
             ),
             (
                 TargetOutput::Sigma,
-                "How sure the network is, as `predict --save sigma` writes it: `view` can then fade what is unsure",
+                "Standard deviation of depth, as from `predict --save sigma`; `view` can then fade uncertain pixels",
             ),
             (TargetOutput::Overlay, "The image with boxes"),
             (
@@ -342,7 +351,7 @@ pub(super) fn target_output() -> impl TypedValueParser<Value = TargetOutput> {
             ),
             (
                 TargetOutput::Ply,
-                "Coloured point cloud in the camera's axes, without the points that hang between near and far, as PLY",
+                "Coloured point cloud in the camera's axes, as PLY, without the points that float between near and far",
             ),
             (
                 TargetOutput::Pcd,

@@ -10,11 +10,11 @@ use super::{InstanceArgs, PredictionArgs, names};
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Targets are followed from frame to frame of a recording that brings times, speed and yaw rate: they then keep \
-    their id and have a velocity over ground. Single images stand for themselves.\n\n\
-    For every frame NAME_targets.json is written, and all of them as lines of targets.jsonl.\n\n\
-    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is opened by ffmpeg. Always its newest \
-    frame is looked at; the others are skipped, and counted. Its targets are followed where --speed tells how the camera moves.\n\n\
+    after_help = "In recordings with times, speed and yaw rate, targets are tracked from frame to frame: they keep their id and have a velocity \
+    over ground. Single images are independent of each other.\n\n\
+    Each frame gets a file NAME_targets.json; targets.jsonl has all of them, one per line.\n\n\
+    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is read through ffmpeg. The network \
+    always takes the newest frame; the frames it skips are counted. Targets are tracked if --speed says how the camera moves.\n\n\
     Examples:\n  deepfusion perceive --model runs/train-1 kitti/2011_09_26/2011_09_26_drive_0005_sync --out targets\n  \
     deepfusion perceive --model runs/train-1 drive.bag --out targets --save overlay,birds-eye\n  \
     deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets\n  \
@@ -25,22 +25,22 @@ pub(crate) struct PerceiveArgs {
     /// Which images, through which network, to where.
     #[command(flatten)]
     pub prediction: PredictionArgs,
-    /// What to write for every frame, beside its targets.
+    /// What to write for each frame, beside its targets.
     #[arg(long, value_parser = names::target_output(), value_delimiter = ',', default_values = ["depth-png", "overlay"])]
     pub save: Vec<TargetOutput>,
-    /// Farthest depth that is looked at, in metres [default: 60, or what --config says].
+    /// Largest depth to look at, in metres [default: 60, or the value in --config].
     #[arg(long, allow_negative_numbers = true, value_name = "M", value_parser = positive)]
     pub max_depth: Option<f64>,
-    /// Settings of the perception (TOML); what is not in it keeps its default.
+    /// Perception settings (TOML); missing keys keep their defaults.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Masks of a user's model.
     #[command(flatten)]
     pub masks: InstanceArgs,
-    /// How fast the camera's vehicle drives straight on, m/s; 0 for a camera that stands. Targets are then followed.
+    /// Speed of the camera's vehicle, driving straight on, in m/s (0 for a fixed camera); targets are then tracked.
     #[arg(long, allow_negative_numbers = true, value_name = "M/S", help_heading = HEADING, value_parser = not_negative)]
     pub speed: Option<f64>,
-    /// Print one JSON object a frame on stdout, as it comes.
+    /// Print one JSON object per frame on stdout, as it comes.
     #[arg(long)]
     pub json: bool,
 }

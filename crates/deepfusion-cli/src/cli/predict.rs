@@ -10,12 +10,12 @@ use super::{EngineArgs, PredictionArgs, Shard, Size, names};
 /// `deepfusion predict`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "A network sees metres through the focal length it was trained at; depth is corrected for the input's. \
-    Without intrinsics the training camera's field of view is assumed, and the sidecar says so.\n\n\
-    A run that was stopped goes on where it was: outputs that are complete are kept. An image that cannot be read is \
-    named at the end; the others are done.\n\n\
-    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is opened by ffmpeg. Always its newest \
-    frame is looked at; the others are skipped, and counted.\n\n\
+    after_help = "A network's metres hold for the focal length that it was trained with, so depth is corrected for the focal length of the input. \
+    Without intrinsics, the training camera's field of view is assumed, and the sidecar says so.\n\n\
+    To resume a stopped run, repeat the command: complete outputs are kept. Images that cannot be read are listed at the end; all \
+    others are predicted.\n\n\
+    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is read through ffmpeg. The network \
+    always takes the newest frame; the frames it skips are counted.\n\n\
     Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
     deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth\n  \
     deepfusion predict --model runs/train-1 drive.bag --save video --out depth\n  \
@@ -26,18 +26,21 @@ pub(crate) struct PredictArgs {
     /// Which images, through which network, to where.
     #[command(flatten)]
     pub prediction: PredictionArgs,
-    /// What to write for every image [default: depth-png,color; of videos and bags image, too].
+    /// What to write for each image [default: depth-png,color; for videos and bags also image].
     #[arg(long, value_parser = names::depth_output(), value_delimiter = ',')]
     pub save: Option<Vec<DepthOutput>>,
-    /// Leave out points of the cloud beyond this depth, in metres.
+    /// Leave out cloud points beyond this depth, in metres.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
-    /// Leave out points of the cloud whose standard deviation is above this share of their depth (0.4: two fifths); of networks that
-    /// say how sure they are.
+    /// Leave out cloud points whose standard deviation is above this share of their depth, such as 0.4.
+    ///
+    /// Needs a network that predicts uncertainty.
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     pub max_sigma: Option<f64>,
-    /// Do one shard of the work: the I-th of N (counted from 1) of the images in the order of their paths. Started
-    /// with the same inputs and options, N such runs, at once and on any machines, do every image once.
+    /// Predict only shard I of N: every N-th image, in the order of the paths; I counts from 1.
+    ///
+    /// Start N such runs with the same inputs and options, at once or one after the other, on any machines. Together they predict every
+    /// image once.
     #[arg(
         long,
         value_name = "I/N",
@@ -45,7 +48,7 @@ pub(crate) struct PredictArgs {
         hide_default_value = true
     )]
     pub shard: Shard,
-    /// Print the sidecars as a JSON array on stdout; of a live source one a line, as they come.
+    /// Print the sidecars as a JSON array on stdout; for a live source one per line, as they come.
     #[arg(long)]
     pub json: bool,
 }
@@ -84,19 +87,19 @@ impl PredictArgs {
     after_help = "Example:\n  deepfusion bench --preset light --size 640x192"
 )]
 pub(crate) struct BenchArgs {
-    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street, where embedded].
+    /// Run folder, checkpoint in it, or name of an embedded network (`weights list`) [default: street, if embedded].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// A preset's network with random weights [default with --size, and where no network is embedded: tiny].
+    /// Use a preset's network with random weights [default with --size, or if no network is embedded: tiny].
     #[arg(long, value_parser = names::preset())]
     pub preset: Option<Preset>,
-    /// Size of a preset's input [default: the preset's own].
+    /// Input size of the preset's network [default: the preset's own].
     #[arg(long, value_name = "WxH", conflicts_with = "model")]
     pub size: Option<Size>,
-    /// How often each stage is measured.
+    /// How often to measure each stage.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub repeats: usize,
-    /// Also show what each step of the fused engine takes.
+    /// Also show the time of each step of the fused engine.
     #[arg(long)]
     pub profile: bool,
     /// What runs the network.

@@ -12,15 +12,17 @@ use super::{CameraIntrinsics, EngineArgs, LiveArgs, names};
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PredictionArgs {
-    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
+    /// Run folder, checkpoint in it, or name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// Images, folders of images, globs, or recordings: a drive of KITTI (raw, odometry, 360), a nuScenes folder, a bag, a video, a comma2k19
-    /// segment, an RGB-D folder, a folder with dataset.toml. Recordings know their camera, and lens distortion is removed. Or one live source.
+    /// Images, folders of images, globs, recordings, or one live source.
+    ///
+    /// Recordings are a KITTI drive (raw, odometry, 360), a nuScenes folder, a bag, a video, a comma2k19 segment, an RGB-D folder or a
+    /// folder with dataset.toml. They know their camera, and lens distortion is removed.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
-    /// The camera, in pixels of the input images [default: the recording's, else EXIF's focal length, else the one trained with is
-    /// assumed].
+    /// Camera intrinsics in pixels of the input images [default: the recording's, else from EXIF's focal length, else assumed as in
+    /// training].
     #[arg(
         long,
         allow_hyphen_values = true,
@@ -31,36 +33,43 @@ pub(crate) struct PredictionArgs {
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calib"])]
     pub hfov: Option<f64>,
-    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lens distortion is removed.
+    /// Calibration file: KITTI's calib_cam_to_cam.txt, YAML from OpenCV, ROS or Kalibr, or four numbers; lens distortion is removed.
     #[arg(long, value_name = "FILE")]
     pub calib: Option<PathBuf>,
-    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth). May be repeated.
+    /// For bags: which topic to use for a role, if several match; may be repeated.
+    ///
+    /// Roles are image, camera_info, lidar, dynamic, imu, speed, steering, can and truth.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
-    /// Do not correct depth for another focal length than the one trained on.
+    /// Do not correct depth for a focal length other than the training camera's.
     #[arg(long)]
     pub no_focal_correction: bool,
-    /// Stretch images of another aspect ratio instead of cropping them about the principal row. A network that learned with many
-    /// cameras, as the embedded ones, sees the whole image either way, at an input of its aspect ratio.
+    /// Stretch images of another aspect ratio instead of cropping them around the principal row.
+    ///
+    /// A network trained with many cameras, like the embedded ones, sees the whole image either way, at an input size of its aspect ratio.
     #[arg(long)]
     pub stretch: bool,
-    /// Test-time augmentation: take the mean of several predictions of each image, which usually errs less on real streets and takes longer. Several sizes are for
-    /// networks that learned at several, as `street` did; others may be worse by them. Sigma and confidence stay those of one prediction.
+    /// Test-time augmentation: average several predictions of each image.
+    ///
+    /// This usually lowers the error on real streets, and takes longer. Several sizes are for networks trained at several sizes, such as
+    /// `street`; others may get worse. Sigma and confidence remain those of a single prediction.
     #[arg(long, value_parser = names::post_process())]
     pub post_process: Option<PostProcess>,
-    /// The camera's height over the road in metres, where it was measured: the scale monitor, which watches recordings
-    /// with speed and yaw rate, otherwise learns it from the first frames.
+    /// Measured height of the camera above the road, in metres.
+    ///
+    /// The scale monitor, which watches recordings with speed and yaw rate, uses this height; without it, the monitor learns one from the
+    /// first frames.
     #[arg(long, value_name = "M", value_parser = positive)]
     pub camera_height: Option<f64>,
-    /// When the scale monitor detects drift, slowly correct depth back to the scale of the first hundred frames. It follows the
-    /// vehicle's speed: a wrong speed corrects wrongly.
+    /// Slowly correct depth back to the scale of the first hundred frames when the scale monitor detects drift.
+    ///
+    /// The correction relies on the vehicle's speed: with a wrong speed, it makes depth wrong.
     #[arg(long)]
     pub correct_scale: bool,
-    /// Folder to write.
+    /// Output folder.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Replace existing outputs, even those made with other options or from an image that has changed.
+    /// Replace existing outputs, even those made with other options or from an image that has changed since.
     #[arg(long)]
     pub overwrite: bool,
     /// Take only the first N images: of each recording, and of those that belong to none. A live source is left after N frames; skipped ones do not

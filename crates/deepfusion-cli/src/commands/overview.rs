@@ -2,34 +2,35 @@ use crate::failure::Result;
 use crate::output;
 
 const OVERVIEW: &str = "\
-deepfusion: metric depth from one camera and a speed signal, learnt without depth labels.
+deepfusion: metric depth from one camera and a speed signal, learned without depth labels.
 
-Try it, with no data at all (a few minutes):
+Try it without any data (takes a few minutes):
   deepfusion demo
 
-With recordings (KITTI raw, ROS bags, videos, folders):
-  deepfusion data inspect DRIVE            what is in it, and whether it can train
-  deepfusion doctor DRIVE                  what would go wrong, before training
+With your own recordings (KITTI raw, ROS bags, videos, folders):
+  deepfusion data inspect DRIVE            what it contains, and whether you can train on it
+  deepfusion doctor DRIVE                  what would go wrong in training
   deepfusion train --data DRIVE            learn from its images and speeds
   deepfusion eval --model RUN --data DRIVE measure against its LiDAR
   deepfusion predict --model RUN IMAGE --out DIR
                                            depth pictures, arrays, point clouds
   deepfusion perceive --model RUN DRIVE --out DIR
                                            3D targets: boxes, tracks, velocities
-  deepfusion view DIR                      look at them in the browser
+  deepfusion view DIR                      look at the results in the browser
 
 Without recordings:
   deepfusion simulate --out DIR            a drive with exact ground truth
 
-Numbers of any method, from arrays:
+Metrics of any method, from arrays:
   deepfusion data export-gt DRIVE --out gt.npz
   deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz
 
-Also: adapt (a trained network to a new drive), calibrate (a camera, from a checkerboard), compare
-(runs side by side, published tables), ablate (the system's parts on and off), eval-odometry (the
-camera's path), eval-targets (boxes), export (ONNX), data import (a log beside a video), data convert,
-weights list, average, pack, calibrate and import (networks), bench, config show, completions.
-Every command explains itself: deepfusion train --help
+Also: adapt (fine-tune a network on a new drive), calibrate (a camera, with a checkerboard),
+compare (runs side by side, and with published tables), ablate (switch parts of the system off),
+eval-odometry (the camera's trajectory), eval-targets (boxes), export (ONNX), data import (a speed
+log and its video), data convert, weights list, average, pack, calibrate and import, bench, config
+show, completions.
+Every command has its own help: deepfusion train --help
 ";
 
 /// `deepfusion` alone: what it can do, with examples to copy.
@@ -39,7 +40,7 @@ pub(super) fn run() -> Result<()> {
         Ok(())
     } else {
         output::print(
-            "\nThis build is without training: demo, train, ablate, eval-odometry, export and weights import are left out.\n",
+            "\nThis build has no training: demo, train, adapt, ablate, eval-odometry, export and weights import are left out.\n",
         )
     }
 }

@@ -9,8 +9,7 @@ use super::{ExpectedNetworkSetting as Expected, NetworkError};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum AttentionForm {
-    /// F' = F ⊙ M_s ⊙ M_c, the paper's Eq. 15. Masks that know nothing yet are ½ each: the feature starts
-    /// at a quarter.
+    /// F' = F ⊙ M_s ⊙ M_c, the paper's Eq. 15. Untrained masks are ½ each, so the feature starts at a quarter.
     #[default]
     Product,
     /// F' = F ⊙ (1 + M_s ⊙ M_c): the feature always passes.
@@ -21,11 +20,11 @@ pub enum AttentionForm {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AttentionConfig {
-    /// How the masks act.
+    /// How the masks act on the feature.
     pub form: AttentionForm,
-    /// The channel mask's hidden layer has this share of the feature's channels (rounded up).
+    /// How many times fewer channels the channel mask's hidden layer has than the feature (rounded up).
     pub reduction: usize,
-    /// Side of the spatial mask's kernel in pixels, odd.
+    /// Side of the spatial mask's kernel in pixels; odd.
     pub kernel: usize,
 }
 

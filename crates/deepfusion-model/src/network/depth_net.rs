@@ -67,41 +67,41 @@ pub struct DepthScale {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DepthNetConfig {
-    /// The backbone. Where there is a `lite_mono`, an `r_msfm` or a `disp_net`, only `normalisation` and `frozen_statistics` of it are read.
+    /// The backbone. With `lite_mono`, `r_msfm` or `disp_net`, only its `normalisation` and `frozen_statistics` are used.
     pub encoder: ResNetConfig,
-    /// Lite-Mono in place of the ResNet and its decoder; absent: those.
+    /// Lite-Mono instead of the ResNet and its decoder; absent: those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lite_mono: Option<LiteMonoConfig>,
-    /// R-MSFM in place of them; absent: those.
+    /// R-MSFM instead of them; absent: those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub r_msfm: Option<RMsfmConfig>,
-    /// SfMLearner's DispNet in place of them; absent: those.
+    /// SfMLearner's DispNet instead of them; absent: those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disp_net: Option<DispNetConfig>,
     /// Hierarchical context encoding of the features of `layer1`…`layer4` on their way to the decoder;
     /// absent: the decoder reads the features as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hce: Option<HceConfig>,
-    /// Attention on what the context encoding gives (or on the features themselves); absent: none.
+    /// Attention on the output of the context encoding (or on the features themselves); absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attention: Option<AttentionConfig>,
-    /// Whether the mean of the coarsest feature over the image is projected and added to it.
+    /// Whether to project the mean of the coarsest feature over the image and add it to that feature.
     #[serde(default)]
     pub aggregation: bool,
     /// The decoder.
     #[serde(default)]
     pub decoder: DecoderConfig,
-    /// The depths that the ends of the sigmoid mean.
+    /// Depths at the two ends of the sigmoid.
     #[serde(default)]
     pub range: DepthRange,
-    /// The depth in metres that a new network starts at everywhere, by the heads' bias; absent: the
-    /// heads start with a random bias. R-MSFM, a trained one too, refines from this depth; absent: from the middle of the range of disparities.
+    /// Depth in metres that a new network predicts everywhere at first, by the heads' bias; absent: the bias is random. R-MSFM, even a
+    /// trained one, refines from this depth; absent: from the middle of the range of disparities.
     ///
-    /// With a bias near zero the first depths are about 0.2 m, and a metric pose then projects every
-    /// pixel out of view: nothing is left to learn from.
+    /// With a bias near zero, the first depths are about 0.2 m, and a metric pose then projects every pixel out of view: nothing is left to
+    /// learn from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_depth_m: Option<f64>,
-    /// Whether a further head says how sure the network is of each pixel.
+    /// Whether an additional head predicts the uncertainty of each pixel.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub uncertainty: bool,
 }

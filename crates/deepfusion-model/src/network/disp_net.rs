@@ -22,7 +22,7 @@ const SCALES: usize = 4;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DispNetConfig {
-    /// Channels of the first layer, even; 32 is the published network.
+    /// Channels of the first layer, even; 32 in the published network.
     #[serde(default = "default_base_width")]
     pub base_width: usize,
 }

@@ -9,9 +9,9 @@ use super::{ExpectedNetworkSetting as Expected, NetworkError};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlowDecoderConfig {
-    /// The largest residual displacement that a level looks for along each axis, in its own pixels.
+    /// Largest residual displacement that a level searches along each axis, in its own pixels.
     pub radius: usize,
-    /// Channels that the encoder's features are projected to before they are correlated.
+    /// Channels to which the encoder's features are projected before they are correlated.
     pub feature_width: usize,
     /// Channels of each level's 3×3 convolutions, in order.
     pub widths: Vec<usize>,

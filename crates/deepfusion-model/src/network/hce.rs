@@ -12,16 +12,16 @@ use super::{ExpectedNetworkSetting as Expected, NetworkError};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HceConfig {
-    /// The dilation of each 3×3 branch: its multi-scale factor.
+    /// Dilation of each 3×3 branch, which is its multi-scale factor.
     pub rates: Vec<usize>,
-    /// Whether the mean over the image is a branch too.
+    /// Whether the mean over the image is also a branch.
     pub global_pool: bool,
-    /// Whether the dilated branches read a 1×1 reduction to the branch width instead of the feature itself:
-    /// at a ResNet-50's widths four HCEs without it cost more than the backbone.
+    /// Whether the dilated branches read a 1×1 reduction to the branch width instead of the feature itself. Without it, four HCEs at a
+    /// ResNet-50's widths cost more than the backbone.
     pub reduce_first: bool,
-    /// By what a branch, and the output, has fewer channels than the feature.
+    /// How many times fewer channels a branch, and the output, has than the feature.
     pub width_divisor: usize,
-    /// The least channels that a branch, and the output, has.
+    /// Smallest number of channels of a branch, and of the output.
     pub min_width: usize,
 }
 

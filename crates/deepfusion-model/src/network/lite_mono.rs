@@ -39,13 +39,13 @@ impl LiteMonoSize {
 pub struct LiteMonoConfig {
     /// Channels of the three stages, fine to coarse.
     pub widths: [usize; 3],
-    /// The dilation of each stage's convolutions, in order. Published: 1, 2, 3 (the last stage once or twice, then 2, 4, 6) for
-    /// 640×192; for 1024×320 all but Lite-Mono-8M have 5 and 10 in place of 3 and 6.
+    /// Dilations of each stage's convolutions, in order. Published: 1, 2, 3 (in the last stage once or twice, then 2, 4, 6) for 640×192;
+    /// for 1024×320, all but Lite-Mono-8M have 5 and 10 instead of 3 and 6.
     pub dilations: [Vec<usize>; 3],
-    /// Groups of channels that attend to each other.
+    /// Number of attention heads: groups of channels that attend to each other.
     #[serde(default = "eight")]
     pub heads: usize,
-    /// Channels within a block over those of its stage.
+    /// How many times more channels a block has than its stage.
     #[serde(default = "six")]
     pub expansion: usize,
 }

@@ -19,15 +19,15 @@ pub const EXPLAINABILITY_WIDTHS: [usize; 5] = [256, 128, 64, 32, 16];
 pub struct PoseNetConfig {
     /// The backbone, on two frames.
     pub encoder: ResNetConfig,
-    /// How many poses the last convolution has channels for (six each); the first is used.
+    /// Number of poses that the last convolution outputs (six channels each); the first is used.
     #[serde(default = "one_pose")]
     pub poses: usize,
     /// Metres of translation per unit of the raw output. The data's mean displacement per pair
     /// keeps the raw output near one.
     #[serde(default = "one_metre")]
     pub metres_per_unit: f64,
-    /// Whether it also says, pixel by pixel, how far a warp between the two frames can explain them (SfMLearner's explainability masks);
-    /// `loss.explainability` then holds the masks up.
+    /// Whether PoseNet also predicts, pixel by pixel, how far a warp between the two frames can explain them (SfMLearner's explainability
+    /// masks). `loss.explainability` then holds the masks up.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub explainability: bool,
 }

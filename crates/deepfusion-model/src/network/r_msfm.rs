@@ -24,7 +24,7 @@ pub enum RefinementInput {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RMsfmConfig {
-    /// How often the disparity is refined: 3 (R-MSFM3: once by each feature) or 6 (R-MSFM6: twice).
+    /// How often the disparity is refined: 3 (R-MSFM3: once by each feature) or 6 (R-MSFM6: twice by each).
     pub iterations: usize,
 }
 

@@ -62,7 +62,7 @@ pub enum InputNormalisation {
     ImageNet,
     /// (x − 0.45) / 0.225 on every channel.
     Monodepth,
-    /// (x − 0.5) / 0.5 on every channel: SfMLearner's.
+    /// (x − 0.5) / 0.5 on every channel, as in SfMLearner.
     Centred,
 }
 
@@ -92,29 +92,27 @@ impl InputNormalisation {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResNetConfig {
-    /// The layout.
+    /// Layout of the ResNet.
     pub depth: ResNetDepth,
-    /// Channels of the first convolution; 64 is the published network, less is a narrower one
-    /// that torchvision's weights do not fit.
+    /// Channels of the first convolution: 64 in the published network; fewer make a narrower network, which torchvision's weights do not
+    /// fit.
     #[serde(default = "default_base_width")]
     pub base_width: usize,
-    /// Images stacked along the channels: 1, or 2 for a pose network.
+    /// Number of images stacked along the channels: 1, or 2 for a pose network.
     #[serde(default = "default_frames")]
     pub frames: usize,
-    /// Applied to the input first.
+    /// Normalisation of the input.
     #[serde(default = "default_normalisation")]
     pub normalisation: InputNormalisation,
-    /// Whether the batch norms keep their running statistics while training (for batches too small
-    /// to have statistics of their own; needs imported weights). Of a depth network these are all its batch norms,
-    /// the context encoding's too.
+    /// Whether batch norms keep their running statistics in training. This is for batches too small to have statistics of their own, and
+    /// needs imported weights. In a depth network it applies to all batch norms, the context encoding's included.
     #[serde(default)]
     pub frozen_statistics: bool,
-    /// By what the coarsest feature is smaller than the image: 32, or 16. At 16 `layer4` keeps the stride of
-    /// 1 and its 3×3 convolutions are dilated instead, by 2 × `multi_grid` (DeepLabv3); its weights are the
-    /// same ones.
+    /// How many times smaller the coarsest feature is than the image: 32 or 16. At 16, `layer4` keeps a stride of 1 and its 3×3
+    /// convolutions are dilated instead, by 2 × `multi_grid` (DeepLabv3); its weights are the same.
     #[serde(default = "default_output_stride")]
     pub output_stride: usize,
-    /// The dilation of `layer4`'s blocks over 2, at output stride 16; cut to as many as there are blocks.
+    /// Dilations of `layer4`'s blocks divided by 2, at output stride 16; cut to the number of blocks.
     #[serde(default = "default_multi_grid")]
     pub multi_grid: [usize; 3],
 }

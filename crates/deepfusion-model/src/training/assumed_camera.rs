@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, ExpectedSetting, TrainConfig};
 
-/// The camera of recordings of which nothing says it, and whether its focal length is learned: the last resort. Absent: such
-/// recordings are an error. The principal point is the middle of the images, and stays there.
+/// The camera of recordings that do not state theirs, and whether its focal length is learned: a last resort. Absent: such recordings are
+/// an error. The principal point is, and stays, in the middle of the images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AssumedCamera {
-    /// The field of view along the images' longer side in degrees: where it begins, if it is learned.
+    /// Field of view along the images' longer side, in degrees; if it is learned, the value to start from.
     pub hfov_deg: f64,
-    /// fy/fx, which is not learned: turns to the side say nothing about fy. 1 of square pixels, which nearly every camera has.
+    /// fy/fx, which is not learned; 1 for square pixels, which nearly every camera has. Turns to the side say nothing about fy.
     pub aspect: f64,
-    /// Whether the focal length is learned with the networks, from the photometric error of the warped images.
+    /// Whether to learn the focal length with the networks, from the photometric error of the warped images.
     pub learn: bool,
-    /// Adam's learning rate of ln f, which follows the run's schedule: the largest relative change a step.
+    /// Adam's learning rate for ln f: the largest relative change per step. It follows the run's schedule.
     pub learning_rate: f64,
 }
 

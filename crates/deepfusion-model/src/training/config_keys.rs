@@ -14,7 +14,7 @@ pub struct ConfigKey {
     pub meaning: String,
     /// The words that it may be, and what each means; empty where it is something else.
     pub words: Vec<(String, String)>,
-    /// What it is where it is no word: a number, a text, …
+    /// What it is if it is no word: a number, a string, …
     pub kind: &'static str,
     /// What it is where a file leaves it out, as TOML; `None` where it has to be there, or is then absent.
     pub default: Option<String>,
@@ -120,13 +120,13 @@ fn kind(schema: &Value, items: Option<&Value>) -> &'static str {
     match items {
         Some(items) => match kind(items, None) {
             "whole number" => "list of whole numbers",
-            "text" => "list of texts",
+            "string" => "list of strings",
             _ => "list of tables",
         },
         None if has("boolean") => "true or false",
         None if has("integer") => "whole number",
         None if has("number") => "number",
-        None if has("string") => "text",
+        None if has("string") => "string",
         None => "word",
     }
 }

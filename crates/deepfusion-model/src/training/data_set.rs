@@ -6,15 +6,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// What is learned from a recording.
+/// What to learn from a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Learn {
-    /// Depth from its own motion: views of one frame synthesised from another.
+    /// Depth from its own motion: one frame synthesised from another.
     #[default]
     #[serde(rename = "self")]
     OwnMotion,
-    /// The depth that was recorded with it, of images one by one: no speed is needed.
+    /// The depth recorded with it, image by image; needs no speed.
     Depth,
     /// Both.
     Both,
@@ -48,41 +48,41 @@ impl Learn {
     }
 }
 
-/// Views of simulated worlds that are rendered while they are learned from, each another one, without a file.
+/// Simulated views that are rendered during training, each one new, without a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedConfig {
-    /// Chooses the worlds.
+    /// Random seed, which decides the worlds.
     pub seed: u64,
-    /// Views that count as a pass over the data.
+    /// Views that count as one pass over the data.
     pub views: usize,
     /// Views of other worlds to validate on, the same each time.
     pub validation_views: usize,
-    /// Views of a world before it makes room for another.
+    /// Views of a world before another world takes its place.
     pub views_per_world: usize,
-    /// Share of the worlds that are as `simulate` draws them: not varied, in clear weather, by a camera without noise.
+    /// Share of the worlds that are drawn as by `simulate`: not varied, in clear weather, through a camera without noise.
     pub plain: f64,
-    /// Share of the varied views in the open whose road rises and falls ahead of the camera.
+    /// Share of the varied outdoor views whose road rises and falls ahead of the camera.
     pub hills: f64,
-    /// Share of the varied views on streets, in parks and on country roads in which people ride bicycles ahead of the camera and towards it, walk
-    /// along pavements and cross the road, where there is room for them.
+    /// Share of the varied views with people in them, on streets, in parks and on country roads. They ride bicycles ahead of the camera and
+    /// towards it, walk along pavements and cross the road, where there is room for them.
     pub riders: f64,
-    /// Whether a camera's image formation (exposure, noise, blur, JPEG and so on) is applied.
+    /// Whether to apply a camera's image formation (exposure, noise, blur, JPEG and so on).
     pub formation: bool,
-    /// The kinds of scene that worlds are of, each as often as the others: `urban`, `park`, `garage`, `commercial`, `night`, `motorway`,
-    /// `country`, `indoor`; none: all, streets most often. For a robot in rooms: `["indoor"]`.
+    /// Kinds of scene, all equally often: `urban`, `park`, `garage`, `commercial`, `night`, `motorway`, `country`, `indoor`; empty: all of
+    /// them, streets most often. For a robot in rooms: `["indoor"]`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub scenes: Vec<String>,
-    /// What is left out of the varied views, so that a table can show what it is worth: `camera-height`, `camera-tilt`, `lenses`,
-    /// `squeeze`, `weather`, `variety`, `traffic`.
+    /// What to leave out of the varied views, to measure what it is worth: `camera-height`, `camera-tilt`, `lenses`, `squeeze`, `weather`,
+    /// `variety`, `traffic`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
-    /// The cameras of one's own vehicles, which then take all views; none: any camera.
+    /// Cameras of your own vehicles, which then take all views; empty: any camera.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<SimulatedCamera>,
 }
 
-/// A camera as it is mounted on a vehicle, through which simulated views are seen. Its image may be of any size.
+/// A camera as mounted on a vehicle, through which simulated views are seen. Its image may have any size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimulatedCamera {
@@ -98,13 +98,13 @@ pub struct SimulatedCamera {
     pub cx: f64,
     /// Principal point, y, in pixels.
     pub cy: f64,
-    /// Its height above the ground, in metres; absent: any height that cameras on cars have.
+    /// Height of the camera above the ground, in metres; absent: any height that cameras on cars have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
-    /// How far it looks down, in degrees.
+    /// How far the camera looks down, in degrees.
     #[serde(default)]
     pub pitch_degrees: f64,
-    /// How far it is turned about its axis, clockwise as it looks, in degrees.
+    /// How far the camera is rotated about its axis, clockwise in viewing direction, in degrees.
     #[serde(default)]
     pub roll_degrees: f64,
 }
@@ -136,45 +136,44 @@ impl Default for SimulatedConfig {
     }
 }
 
-/// One of the data sets that a run learns from together (`[[data.sets]]` in a configuration file).
+/// One of several data sets that a run learns from (`[[data.sets]]` in a configuration file).
 ///
-/// The networks' raw outputs stay near one for each of them: the sigmoid spans the set's own range of depths,
-/// and a unit of PoseNet's translation is the set's own mean displacement. What the networks say about an image
-/// therefore means metres only together with a set: [`TrainConfig::for_set`].
+/// The networks' raw outputs stay near one for each of them: the sigmoid spans the set's own range of depths, and a unit of PoseNet's
+/// translation is the set's own mean displacement. So the networks' outputs mean metres only together with a set: [`TrainConfig::for_set`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataSetConfig {
-    /// By what name the set is chosen.
+    /// Name by which the set is chosen.
     pub name: String,
     /// Drive folders, date folders or KITTI roots.
     pub paths: Vec<PathBuf>,
-    /// Recordings to validate on; none: the held-out end of each drive. Given for all sets or for none.
+    /// Recordings to validate on; empty: the held-out end of each drive. Given for all sets or for none.
     pub validation: Vec<PathBuf>,
     /// A split file that selects the frames to train on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<PathBuf>,
-    /// A split file that selects the frames to validate on: of `validation`, or of `paths` where that is empty. Given,
-    /// or `validation`, for all sets or for none.
+    /// A split file that selects the frames to validate on, from `validation` or, if that is empty, from `paths`. Either of the two is
+    /// given for all sets or for none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_split: Option<PathBuf>,
-    /// How far the cameras' clock is ahead of the vehicles', in seconds; absent: as `data.camera_ahead_s`.
+    /// How far the cameras' clock is ahead of the vehicles', in seconds; absent: `data.camera_ahead_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera_ahead_s: Option<f64>,
-    /// Topics of its bags for a role, as `image=/camera/front/image_raw`; none: as `data.topics`.
+    /// Which topic of its bags to use for a role, such as `image=/camera/front/image_raw`; empty: `data.topics`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
-    /// Which cameras: `2`, `3` or `both`; empty means `data.camera`.
+    /// Which cameras to use: `2`, `3` or `both`; empty: `data.camera`.
     pub camera: String,
-    /// What is learned from it.
+    /// What to learn from it.
     #[serde(skip_serializing_if = "Learn::is_own_motion")]
     pub learn: Learn,
-    /// Simulated views instead of recordings; `learn` is `depth` then, and there are no `paths`.
+    /// Simulated views instead of recordings; `learn` is then `depth`, and there are no `paths`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulated: Option<SimulatedConfig>,
-    /// The depths that the sigmoid spans; absent: the depth network's.
+    /// Depths that the sigmoid spans; absent: the depth network's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<DepthRange>,
-    /// Metres of translation per unit of PoseNet's output; 0 means the set's mean displacement per pair.
+    /// Metres of translation per unit of PoseNet's output; 0: the set's mean displacement per pair.
     pub metres_per_unit: f64,
 }
 

@@ -2,15 +2,15 @@ use crate::{AskedBy, Error, ExpectedSetting};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The size at which the views of a coarser scale are compared with their targets.
+/// The size at which views at a coarser scale are compared with their targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CompareAt {
-    /// Full size, to which its disparity is enlarged: fewer holes and copied textures.
+    /// Full size, to which the scale's disparity is enlarged: fewer holes and copied textures.
     #[default]
     Full,
-    /// The scale's own: a pixel there sees 2ˢ times as far, so that near things, which move far, are found
-    /// from a wrong first depth; and it costs a third.
+    /// The scale's own size. There, a pixel sees 2ˢ times as far, so that near objects, which move far, are found even from a wrong first
+    /// depth; and it costs a third.
     Own,
 }
 
@@ -18,48 +18,48 @@ pub enum CompareAt {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LossConfig {
-    /// α of the photometric error: the share of SSIM beside the absolute difference.
+    /// α of the photometric error: the share of SSIM; the rest is the absolute difference.
     pub ssim_weight: f64,
-    /// The size at which the views of a coarser scale are compared.
+    /// The size at which views at a coarser scale are compared.
     #[serde(default)]
     pub compare_at: CompareAt,
     /// λ_s of the edge-aware smoothness at full resolution; halved at each coarser scale.
     pub smoothness: f64,
     /// λ_v of the speed loss.
     pub speed: f64,
-    /// β_R: weight of the rotation inside the speed loss. Not read where the pose used for warping is
-    /// the vehicle's motion: PoseNet then learns the whole of it, at a weight of its own.
+    /// β_R: weight of the rotation within the speed loss. It is not used if warping uses the vehicle's motion: PoseNet then learns all of
+    /// that motion, with a weight of its own.
     pub rotation: f64,
-    /// Steps over which λ_v rises from 0; at least an epoch, at most a tenth of the run.
+    /// Steps over which λ_v rises from 0; at least one epoch, at most a tenth of the run.
     pub speed_warmup_steps: usize,
-    /// Whether pixels that the unwarped source explains better contribute that constant instead.
+    /// Automask: whether pixels that the unwarped source explains better contribute its error, a constant, instead.
     pub automask: bool,
-    /// λ_e of the explainability masks' −ln E, which keeps them from explaining nothing: above 0 where `pose_net.explainability` is true, 0
-    /// (absent) elsewhere.
+    /// λ_e of the explainability masks' −ln E, which keeps the masks from explaining nothing; above 0 if `pose_net.explainability` is true,
+    /// else 0 (absent).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub explainability: f64,
-    /// λ_a of the affine invariant loss, which both frames' depths are needed for.
+    /// λ_a of the affine invariant loss, which needs the depths of both frames.
     #[serde(default)]
     pub affine: f64,
-    /// The terms of the optical flow.
+    /// The optical flow's terms.
     #[serde(default)]
     pub flow: FlowLossConfig,
-    /// The pixels that move by themselves.
+    /// Dynamic pixels.
     #[serde(default)]
     pub moving: MovingConfig,
-    /// Known depth, of the data sets that are learned from by it.
+    /// Known depth, for data sets that train on it.
     #[serde(default)]
     pub depth: DepthLossConfig,
 }
 
-/// The loss on known depth. It has an effect only where a data set says `learn = "depth"` or `"both"`.
+/// The loss on known depth. It only has an effect if a data set says `learn = "depth"` or `"both"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DepthLossConfig {
-    /// Weight of the whole beside the terms that are learned from video. 0 with `depth_net.uncertainty`: the head for
-    /// uncertainty learns alone.
+    /// Weight of the depth loss relative to the terms that are learned from video. 0 with `depth_net.uncertainty`: only the uncertainty
+    /// head learns.
     pub weight: f64,
-    /// λ_g of the differences between neighbours, which make edges sharp.
+    /// λ_g of the differences between neighbouring pixels, which make edges sharp.
     pub gradient: f64,
 }
 
@@ -72,18 +72,18 @@ impl Default for DepthLossConfig {
     }
 }
 
-/// The terms of the optical flow (Eq. 16–20), all of them inside L_flow but for the agreement.
+/// The terms of the optical flow (Eq. 16–20), all within L_flow except the agreement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlowLossConfig {
-    /// λ_f of the whole; 0 trains no flow decoder.
+    /// λ_f of the flow loss; 0 trains no flow decoder.
     pub weight: f64,
-    /// Weight of the consistency L_c beside the photometric terms (the paper's 0.1).
+    /// Weight of the consistency L_c relative to the photometric terms (0.1 in the paper).
     pub consistency: f64,
-    /// Weight of the flow's edge-aware smoothness beside them.
+    /// Weight of the flow's edge-aware smoothness relative to the photometric terms.
     pub smoothness: f64,
-    /// Weight, in the whole loss, of the agreement between the flow and the rigid flow where both explain
-    /// the pixel, per pixel of distance; from the moment on at which moving pixels are looked for.
+    /// Weight, in the total loss, of the agreement between flow and rigid flow where both explain the pixel, per pixel of distance. It
+    /// applies from when dynamic pixels are looked for.
     pub agreement: f64,
 }
 
@@ -99,29 +99,28 @@ impl Default for FlowLossConfig {
     }
 }
 
-/// Which pixels count as moving by themselves, and so are taken out of the rigid reprojection.
+/// Which pixels count as dynamic, and are therefore taken out of the rigid reprojection.
 ///
-/// Those are pixels that the flow explains better than the rigid warp by `margin`, while the two flows differ by
-/// more than `min_flow_px` and `min_flow_share`. The flow also has to leave the epipolar line by `min_epipolar_px`, or
-/// go along it `min_parallax_ratio` times as far as the depth says, or as little. Neither limit set: neither is asked.
+/// These are pixels that the flow explains better than the rigid warp by `margin`, while the two flows differ by more than `min_flow_px`
+/// and `min_flow_share`. The flow also has to leave the epipolar line by `min_epipolar_px`, or go along it `min_parallax_ratio` times as
+/// far as the depth says, or as little. If neither limit is set, neither is checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MovingConfig {
-    /// Whether they are looked for; needs the flow.
+    /// Whether to look for dynamic pixels; needs the flow.
     pub enabled: bool,
-    /// How much smaller the flow's photometric error must be.
+    /// How much smaller the flow's photometric error must be than the rigid warp's.
     pub margin: f64,
-    /// Least distance between the flow and the rigid flow, in pixels of the training size.
+    /// Smallest distance between flow and rigid flow, in pixels of the training size.
     pub min_flow_px: f64,
-    /// The same as a share of the longer of the two.
+    /// Smallest distance between flow and rigid flow, as a share of the longer of the two.
     pub min_flow_share: f64,
-    /// Distance of the flow's end from the epipolar line of the motion from which it cannot stand still, in
-    /// pixels; 0: not looked at.
+    /// Distance of the flow's end from the motion's epipolar line, in pixels, from which a pixel cannot be static; 0: not checked.
     pub min_epipolar_px: f64,
-    /// Ratio of the flow's parallax to that of the predicted depth, or the other way round, from which it
-    /// cannot stand still: what drives along the road moves along its epipolar lines. 0: not looked at.
+    /// Ratio of the flow's parallax to that of the predicted depth, or the inverse, from which a pixel cannot be static; 0: not checked.
+    /// Whatever drives along the road moves along its epipolar lines.
     pub min_parallax_ratio: f64,
-    /// Share of the run before which nothing is taken out: the flow has to be learned first.
+    /// Share of the run before which no pixel is taken out, because the flow has to be learned first.
     pub warmup_share: f64,
 }
 

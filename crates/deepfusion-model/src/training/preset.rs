@@ -31,22 +31,22 @@ pub enum Preset {
     /// Lite-Mono (3.1 M parameters) with the losses of `monodepth2`, 640×192.
     #[serde(rename = "lite-mono")]
     LiteMono,
-    /// Lite-Mono-small: 2.5 M.
+    /// Lite-Mono-small (2.5 M parameters).
     #[serde(rename = "lite-mono-small")]
     LiteMonoSmall,
-    /// Lite-Mono-tiny: 2.2 M.
+    /// Lite-Mono-tiny (2.2 M parameters).
     #[serde(rename = "lite-mono-tiny")]
     LiteMonoTiny,
-    /// Lite-Mono-8M: 8.7 M.
+    /// Lite-Mono-8M (8.7 M parameters).
     #[serde(rename = "lite-mono-8m")]
     LiteMono8m,
-    /// R-MSFM3 (3.5 M parameters): a disparity refined three times, with the losses of `monodepth2`, 640×192.
+    /// R-MSFM3 (3.5 M parameters), which refines a disparity three times, with the losses of `monodepth2`, 640×192.
     #[serde(rename = "r-msfm3")]
     RMsfm3,
-    /// R-MSFM6: refined six times, 3.8 M.
+    /// R-MSFM6 (3.8 M parameters), which refines it six times.
     #[serde(rename = "r-msfm6")]
     RMsfm6,
-    /// SfMLearner: DispNet (31.6 M parameters), colours alone compared, explainability masks; 416×128, batch 4.
+    /// SfMLearner: DispNet (31.6 M parameters), images compared by colour alone, explainability masks; 416×128, batch 4.
     Sfmlearner,
 }
 

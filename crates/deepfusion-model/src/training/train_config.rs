@@ -9,42 +9,41 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// How the views of a target are compared.
+/// How warped views are compared with their target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Reprojection {
     /// Two frames, each warped onto the other: the paper's double-frame coupled reprojection.
     Bidirectional,
-    /// The smallest error of all sources at each pixel: Monodepth2's.
+    /// At each pixel the smallest error of all sources, as in Monodepth2.
     Minimum,
-    /// The mean error of all sources at each pixel, each times its explainability mask where there are such masks: SfMLearner's.
+    /// At each pixel the mean error of all sources, each times its explainability mask if there are such masks, as in SfMLearner.
     Mean,
 }
 
-/// Where the motion of the reversed pair comes from in bidirectional reprojection.
+/// How the motion of the reversed pair is obtained in bidirectional reprojection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ReversedPose {
-    /// The network is asked again with the frames swapped.
+    /// PoseNet runs again with the frames swapped.
     Predicted,
-    /// The forward motion is inverted: half the work of the pose network.
+    /// The forward motion is inverted, which halves the pose network's work.
     Inverted,
 }
 
-/// The pose used for warping. The first error that depth has to wait for is PoseNet's:
-/// what the vehicle knows already need not be learned first.
+/// The pose used for warping. At first, depth has to wait for PoseNet; what the vehicle already knows does not have to be learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ViewMotion {
-    /// PoseNet's, whose length the speed loss pulls towards the vehicle's: the paper's way.
+    /// PoseNet's, whose length the speed loss pulls towards the vehicle's, as in the paper.
     #[default]
     PoseNet,
-    /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
+    /// PoseNet's rotation and direction, with the length given by the vehicle's speed.
     Distance,
-    /// The vehicle's own, from its speed and its turns: yaw, roll and pitch as they were measured, else as the images show them. PoseNet
-    /// learns that motion beside it.
+    /// The vehicle's own, from its speed and its turns: yaw, roll and pitch as measured, else as the images show them. PoseNet learns this
+    /// motion alongside.
     Vehicle,
-    /// As much of it as is known of each drive: `vehicle` where its turns are, measured or by the images, else `distance`.
+    /// As much as is known of each drive's motion: `vehicle` if its turns are known, measured or from the images, else `distance`.
     Auto,
 }
 
@@ -61,79 +60,79 @@ impl ViewMotion {
     }
 }
 
-/// What is done to the images before the networks see them.
+/// How images are changed before the networks see them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Augmentation {
-    /// Mirror every other sample left to right, its camera and motion with it.
+    /// Mirror every other sample left to right, together with its camera and motion.
     pub flip: bool,
-    /// Probability of a colour jitter; the losses always see the clean images.
+    /// Probability of a colour jitter; the losses always see the original images.
     pub jitter: f64,
     /// Largest change of brightness, contrast and saturation, as a factor around 1.
     pub brightness: f32,
     /// Largest change of hue, in turns.
     pub hue: f32,
-    /// How much smaller than the image the part may be that is cut from it, of images whose depth is known; 1: all of it.
+    /// Largest zoom into images with known depth: the window cut out of an image is up to this many times smaller; 1: the whole image.
     #[serde(default = "no_zoom")]
     pub zoom: f32,
-    /// Other sizes of images whose depth is known, for a network that is to see pictures of other aspect ratios: half of
-    /// the batches have the run's own size, the others in turns one of these.
+    /// Additional sizes of images with known depth, for a network that has to handle other aspect ratios. Half of the batches have the
+    /// run's own size, the others take turns among these.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sizes: Vec<InputSize>,
-    /// Other sizes of video's images, for a network that is to predict each image at several scales: half of the
-    /// batches have the run's own size, the others in turns one of these. Only with `canonical_focal_px`.
+    /// Additional sizes of video images, for a network that predicts each image at several scales. Half of the batches have the run's own
+    /// size, the others take turns among these. Only with `canonical_focal_px`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub video_sizes: Vec<InputSize>,
 }
 
-/// How the learning rate changes over a run, after its rise.
+/// How the learning rate falls over a run, after its warm-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LearningRateSchedule {
-    /// A tenth from `learning_rate_drop` on.
+    /// To a tenth, at `learning_rate_drop`.
     #[default]
     Drop,
-    /// Half a cosine from `learning_rate` to a hundredth of it.
+    /// Along half a cosine, from `learning_rate` to a hundredth of it.
     Cosine,
 }
 
-/// Where a run's images come from; a resumed run finds them again by this.
+/// Where a run's images come from; a resumed run finds them by this.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataConfig {
     /// Drive folders, date folders or KITTI roots.
     pub paths: Vec<PathBuf>,
-    /// Recordings to validate on; none: the held-out end of each drive.
+    /// Recordings to validate on; empty: the held-out end of each drive.
     pub validation: Vec<PathBuf>,
     /// A split file that selects the frames to train on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<PathBuf>,
-    /// A split file that selects the frames to validate on: of `validation`, or of `paths` where that is empty.
+    /// A split file that selects the frames to validate on, from `validation` or, if that is empty, from `paths`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_split: Option<PathBuf>,
-    /// How far the cameras' clock is ahead of the vehicles', in seconds, instead of what the recordings' own files say.
+    /// How far the cameras' clock is ahead of the vehicles', in seconds; overrides the recordings' own files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera_ahead_s: Option<f64>,
-    /// Topics of bags for a role, as `image=/camera/front/image_raw`, where their types do not tell.
+    /// Which topic of a bag to use for a role, such as `image=/camera/front/image_raw`, if message types do not decide it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
-    /// Which cameras: `2`, `3` or `both`; empty means 2.
+    /// Which cameras to use: `2`, `3` or `both`; empty: 2.
     pub camera: String,
-    /// Whether turns that no sensor measured stay unknown: roll and pitch are then 0, and drives without a yaw rate have no turns. Else
-    /// they are taken from the images, which are all read for that before training.
+    /// Whether to use only turns that a sensor measured. Others are then unknown: roll and pitch are 0, and drives without a yaw rate have
+    /// no turns. If false, they are estimated from the images, all of which are read for this before training.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub measured_turns_only: bool,
-    /// What is learned from.
+    /// What to learn from.
     #[serde(skip_serializing_if = "Learn::is_own_motion")]
     pub learn: Learn,
-    /// Threads that decode, resize and render ahead of the training; absent: one a processor, at most 4.
+    /// Threads that decode, resize and render ahead of the training; absent: one per processor, at most 4.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loader_threads: Option<usize>,
-    /// Memory for images at the run's size (and at each of `augmentation.video_sizes`), in MiB, so that they are decoded once and not every
-    /// epoch; absent: 2048. Workers and trials on one machine have one each.
+    /// Memory for decoded images, in MiB; absent: 2048. It keeps images at the run's size (and at each of `augmentation.video_sizes`), so
+    /// that they are decoded once and not in every epoch. Workers and trials on one machine have a cache each.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cache_mib: Option<usize>,
-    /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
+    /// Several data sets with their own cameras, ranges and displacements, instead of `paths`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<DataSetConfig>,
 }
@@ -143,95 +142,97 @@ pub struct DataConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
-    /// The preset this started from.
+    /// The preset that this started from.
     pub preset: Preset,
-    /// Width and height of the images the networks see.
+    /// Width and height of the network's input images.
     pub size: InputSize,
-    /// Offsets of the sources: `[1]` or `[-1, 1]`.
+    /// Offsets of the source frames, such as `[1]` or `[-1, 1]`.
     pub frames: Vec<i32>,
-    /// An offset counts in steps of at least so many metres that the camera moved, where its frames are closer; 0:
-    /// in frames. At walking pace a frame differs from the next by less than a pixel, which says nothing about depth.
+    /// Length of one step of an offset, in metres: one frame, or as many as the camera takes to move this far; 0: always one frame. At
+    /// walking pace, a frame differs from the next by less than a pixel, which says nothing about depth.
     #[serde(default)]
     pub frame_distance_m: f64,
-    /// How views are compared.
+    /// How warped views are compared with their target.
     pub reprojection: Reprojection,
-    /// Where the reversed pair's motion comes from.
+    /// How the motion of the reversed pair is obtained.
     pub reversed_pose: ReversedPose,
-    /// Whether the other camera's image of the same moment is a source, too, warped by the calibrated baseline, which gives metres
-    /// whatever the speeds say. Needs `reprojection = "minimum"` and both cameras of a drive; drives with one learn from their own frames.
+    /// Whether the other camera's image of the same moment is also a source. It is warped by the calibrated baseline, which gives metres
+    /// whatever the speeds say. Needs `reprojection = "minimum"` and both cameras of a drive; drives with one camera learn from their own
+    /// frames.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub stereo: bool,
-    /// Samples a step.
+    /// Samples per step.
     pub batch: usize,
-    /// Samples of known depth a step, beside those of video where there are both; 0: as many as `batch`.
+    /// Samples with known depth per step, in addition to those of video if there are both; 0: as many as `batch`.
     #[serde(default)]
     pub depth_batch: usize,
-    /// Batches whose gradients are averaged before a step of the optimiser.
+    /// Batches whose gradients are averaged for one step of the optimiser.
     pub accumulate: usize,
     /// Passes over the data; `steps` overrides it.
     pub epochs: usize,
-    /// Steps of the optimiser, where given.
+    /// Steps of the optimiser, instead of `epochs`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<usize>,
-    /// The least steps of the optimiser where `steps` is not given: the epochs of a short drive are too few to learn from.
+    /// Minimum number of optimiser steps if `steps` is not given: on a short drive, the epochs alone are too few to learn from.
     #[serde(default)]
     pub min_steps: usize,
     /// Adam's learning rate.
     pub learning_rate: f64,
-    /// Steps over which the learning rate rises from 0: large first steps can flatten the depth for good.
+    /// Steps over which the learning rate rises from 0. Large first steps can flatten the depth for good.
     pub learning_rate_warmup_steps: usize,
-    /// How it falls.
+    /// How the learning rate falls.
     #[serde(default)]
     pub learning_rate_schedule: LearningRateSchedule,
-    /// Steps over which it falls, where they are not those of the run: a run that ends before has had a part of a longer one's schedule.
+    /// Steps over which the learning rate falls, if not those of the run. A run that ends earlier has then followed part of a longer run's
+    /// schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate_steps: Option<usize>,
-    /// Share of the run after which the learning rate is divided by ten, where it falls by `drop`.
+    /// Share of the run after which the learning rate is divided by ten, with the schedule `drop`.
     pub learning_rate_drop: f64,
-    /// Share of each weight, not of biases and norms, that a step at a learning rate of 1 takes away beside Adam's own (AdamW).
+    /// Decoupled weight decay (AdamW): the share of each weight that a step at a learning rate of 1 removes in addition to Adam's update.
+    /// Biases and norms do not decay.
     #[serde(default)]
     pub weight_decay: f64,
-    /// Largest norm of the gradient; longer ones are shortened to it. 0: no limit.
+    /// Largest norm of the gradient; longer ones are scaled down to it; 0: no limit.
     pub clip_norm: f64,
-    /// Decides everything random.
+    /// Random seed, which decides everything random.
     pub seed: u64,
-    /// How the networks' convolutions multiply while they learn. What a trained network then predicts is computed in f32, or
-    /// as its runner says.
+    /// How the networks' convolutions multiply in training. A trained network then predicts in f32, or as its runner says.
     #[serde(default)]
     pub precision: Precision,
-    /// The weights to begin from: a path, or with `init_sha256` the name of a network that the program carries.
+    /// Weights to start from: a path, or with `init_sha256` the name of an embedded network.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init: Option<PathBuf>,
-    /// SHA-256 of the embedded network's weights, so that a repeated run notices that it would begin from others.
+    /// SHA-256 of the embedded network's weights, so that a repeated run notices if it would start from others.
     #[schemars(skip)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_sha256: Option<String>,
-    /// Pairs slower than this are dropped, in m/s.
+    /// Pairs slower than this are left out, in m/s.
     pub min_speed_mps: f64,
-    /// Share of each drive's end that is held out for validation.
+    /// Share of each drive, at its end, that is held out for validation.
     pub validation_share: f64,
-    /// Steps between validations, checkpoints and panels; 0: once an epoch.
+    /// Steps between validations, checkpoints and panels; 0: once per epoch.
     pub validate_every: usize,
-    /// Minutes after which a checkpoint is written also between those; 0: never. What a run learns does not depend on it.
+    /// Minutes after which a checkpoint is also written in between; 0: never. It does not affect what a run learns.
     #[serde(default = "checkpoint_minutes")]
     pub checkpoint_minutes: f64,
-    /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
-    /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
+    /// Whether PoseNet starts out driving ahead by the data's mean displacement, instead of standing still. Needs the frames in time order,
+    /// so it has no effect if the reversed pose is predicted.
     pub start_moving: bool,
     /// The pose used for warping.
     #[serde(default)]
     pub view_motion: ViewMotion,
-    /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network
-    /// predicts depth × f_c/f_y, so that equal pixels mean equal output for every lens. Absent: it predicts depth for the
-    /// training camera, and where several are trained with, for the first of them.
+    /// Canonical focal length f_c, in pixels of the network's input, to which all cameras are brought (Metric3D). The network predicts
+    /// depth × f_c/f_y, so that equal pixels mean equal output for every lens. Absent: it predicts depth for the training camera, the first
+    /// one if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
-    /// Weights that do not learn, by the beginning of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's
-    /// statistics are none of them (`frozen_statistics`). With `pose` and `view_motion = "vehicle"` PoseNet is left out, unless it has masks
-    /// (`explainability`): nothing would read what it says, steps are shorter, and the run has no odometry.
+    /// Weights that do not learn, given by the beginnings of their names: `depth.encoder`, `depth.encoder.layer1`, `pose`. A batch norm's
+    /// statistics are not among them (see `frozen_statistics`). With `pose` and `view_motion = "vehicle"`, PoseNet is left out unless it
+    /// has masks (`explainability`): nothing would use its output, steps are shorter, and the run has no odometry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub freeze: Vec<String>,
-    /// The camera of recordings that do not say theirs.
+    /// The camera of recordings that do not state theirs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed_camera: Option<AssumedCamera>,
     /// The recordings.
@@ -246,7 +247,7 @@ pub struct TrainConfig {
     /// The pose network. `metres_per_unit` 0 means the data's mean displacement per pair, and 1 without
     /// the speed loss.
     pub pose_net: PoseNetConfig,
-    /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
+    /// The flow decoder. It exists only in training, and only if `loss.flow.weight` is above 0.
     #[serde(default)]
     pub flow_decoder: FlowDecoderConfig,
 }
@@ -436,7 +437,7 @@ impl TrainConfig {
         own.unwrap_or(self.data.learn)
     }
 
-    /// Samples of known depth a step.
+    /// Samples with known depth per step.
     #[must_use]
     pub fn depth_batch(&self) -> usize {
         match self.depth_batch {

@@ -35,9 +35,9 @@ pub enum Precision {
     /// Everything in f32: the same bits on every processor with fused multiply-add.
     #[default]
     F32,
-    /// Images, gradients and weights rounded to bf16 where they are multiplied, sums and results in f32.
-    /// Of convolutions with a multiple of 16 input and output channels, on processors with AMX or AVX512-BF16 and on GPUs with
-    /// tensor cores for bf16; the others stay in f32.
+    /// Images, gradients and weights are rounded to bf16 for multiplication; sums and results are in f32. This applies to convolutions with
+    /// a multiple of 16 input and output channels, on processors with AMX or AVX512-BF16 and on GPUs with tensor cores for bf16; the others
+    /// stay in f32.
     Bf16,
 }
 
