@@ -35,7 +35,7 @@ pub(crate) struct InspectArgs {
     /// Camera intrinsics in pixels, if the recording has no calibration.
     #[arg(long, allow_hyphen_values = true, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    /// Horizontal field of view of the camera, in degrees (assumes square pixels and the principal point in the middle).
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
     pub hfov: Option<f64>,
     /// For bags: which topic to use for a role, if several match; may be repeated.
@@ -89,7 +89,7 @@ pub(crate) struct ConvertArgs {
     /// Camera intrinsics in pixels of the images, for a recording without a calibration.
     #[arg(long, allow_hyphen_values = true, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    /// Horizontal field of view of the camera, in degrees (assumes square pixels and the principal point in the middle).
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
     pub hfov: Option<f64>,
     /// Which camera to use.
@@ -178,7 +178,7 @@ pub(crate) struct ImportArgs {
     /// Camera intrinsics in pixels of the images.
     #[arg(long, allow_hyphen_values = true, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    /// Horizontal field of view of the camera, in degrees (assumes square pixels and the principal point in the middle).
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calibration"])]
     pub hfov: Option<f64>,
     /// Print how the log was understood, as JSON.

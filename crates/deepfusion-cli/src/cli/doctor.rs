@@ -32,7 +32,7 @@ pub(crate) struct DoctorArgs {
         requires = "path"
     )]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    /// Horizontal field of view of the camera, in degrees (assumes square pixels and the principal point in the middle).
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics", requires = "path")]
     pub hfov: Option<f64>,
     /// For bags: which topic to use for a role, if several match; may be repeated.

@@ -47,7 +47,7 @@ pub(crate) struct EvalArgs {
         conflicts_with = "pred"
     )]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    /// Horizontal field of view of the camera, in degrees (assumes square pixels and the principal point in the middle).
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "pred"])]
     pub hfov: Option<f64>,
     /// Fail unless every frame of --split exists and has ground truth.

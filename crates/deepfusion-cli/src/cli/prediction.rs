@@ -30,7 +30,7 @@ pub(crate) struct PredictionArgs {
         conflicts_with = "calib"
     )]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    /// Horizontal field of view of the camera, in degrees (assumes square pixels and the principal point in the middle).
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calib"])]
     pub hfov: Option<f64>,
     /// Calibration file: KITTI's calib_cam_to_cam.txt, YAML from OpenCV, ROS or Kalibr, or four numbers; lens distortion is removed.
