@@ -91,7 +91,7 @@ fn is_within(printed: &str, ahead_ms: f64) {
 fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     let temporary = tempfile::tempdir().unwrap();
     let at = temporary.path();
-    let readings = drive(at, 500);
+    let readings = drive(at, 700);
     let mut table = String::from("time_s,speed_mps,yaw_rate_radps\n");
     let mut track = String::from("<gpx version=\"1.1\"><trk><trkseg>\n");
     for (i, reading) in readings.iter().enumerate() {

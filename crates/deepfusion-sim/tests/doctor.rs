@@ -50,9 +50,9 @@ fn config(scene: Scene, frames: usize) -> SimConfig {
     }
 }
 
-fn bag(folder: &Path, scene: Scene, settings: BagSettings) -> PathBuf {
+fn bag(folder: &Path, scene: Scene, frames: usize, settings: BagSettings) -> PathBuf {
     let config = SimConfig {
-        frames: 140,
+        frames,
         width: 240,
         height: 180,
         moving_cars: 3,
@@ -120,7 +120,10 @@ fn every_place_is_clean() {
 fn every_place_is_clean_as_a_bag() {
     for scene in Scene::ALL {
         let folder = tempfile::tempdir().unwrap();
-        let diagnosis = doctor(&bag(folder.path(), scene, BagSettings::default()), None);
+        let diagnosis = doctor(
+            &bag(folder.path(), scene, 140, BagSettings::default()),
+            None,
+        );
         assert!(
             complaints(&diagnosis).is_empty(),
             "{scene:?}: {:#?}",
@@ -530,7 +533,7 @@ fn a_bag_whose_camera_clock_is_off_is_reported() {
             clock_offset_s: ahead_s,
             ..BagSettings::default()
         };
-        let path = bag(folder.path(), Scene::Urban, settings);
+        let path = bag(folder.path(), Scene::Urban, 200, settings);
         let diagnosis = doctor(&path, None);
         let finding = found(&diagnosis, "clock", "offset");
         // `data inspect` shows the same, as a figure.
@@ -604,7 +607,7 @@ fn a_wrong_wheelbase_is_found_by_the_gyro() {
 #[test]
 fn a_lidar_that_is_turned_or_pitched_on_the_car_is_found_by_its_velocities() {
     let folder = tempfile::tempdir().unwrap();
-    let path = bag(folder.path(), Scene::Urban, BagSettings::default());
+    let path = bag(folder.path(), Scene::Urban, 200, BagSettings::default());
     let sidecar = path.with_extension("toml");
     let text = std::fs::read_to_string(&sidecar).unwrap();
     // The rotation of cam_from_lidar, turned by 4 degrees about the camera's x (pitch) or y (yaw).
