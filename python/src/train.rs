@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use deepfusion::jobs::recordings::warnings_of;
 use deepfusion::jobs::samples::{SampleWarning, open_samples};
-use deepfusion::jobs::training::resume::{MovedRecordings, ResumeRequest, go_on_with};
+use deepfusion::jobs::training::resume::{
+    MovedRecordings, ResumeRequest, go_on_with, require_no_fewer_steps,
+};
 use deepfusion::jobs::training::{RunLock, RunLog, Start, StartReport};
-use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
+use deepfusion::model::{CheckpointKind, Compute, Preset, RunFolder, TrainConfig};
 use deepfusion::train::{
     Control, LossTerms, SampleSet, SingleWorker, TrainEvent, Trainer, Workers,
 };
@@ -220,11 +222,20 @@ fn opened(
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
         let lock = lock_of(&folder, leads)?;
-        let config = go_on_with(&folder.read_settings()?, &asked.to_resume(place.compute())?)?;
+        let run = folder.read_settings()?;
+        let config = go_on_with(&run, &asked.to_resume(place.compute())?)?;
         config.validate()?;
+        // What is wrong with the run is said before the recordings are looked at, which may take long.
+        folder.require_checkpoint(CheckpointKind::Last)?;
+        if let Some(steps) = config.steps {
+            let made = folder.read_state(CheckpointKind::Last)?.step;
+            require_no_fewer_steps(&run, &config, made, steps)?;
+        }
         let sets = samples(&config, warnings)?;
         let settings = config.clone();
         let trainer = Trainer::resume_among(workers, config, folder.clone(), sets, &device)?;
+        // How many epochs are is known now.
+        require_no_fewer_steps(&run, &settings, trainer.step(), trainer.steps())?;
         // Only settings with which the run goes on.
         if leads {
             folder.write_config(&settings, &folder.read_findings()?)?;

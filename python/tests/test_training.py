@@ -124,6 +124,7 @@ def test_a_run_goes_on_with_its_own_settings(run, street, tmp_path):
         ({"loss": {"smoothness": 0.0}}, {}),
         ("light", {}),
         ({"preset": "light"}, {}),
+        ({"steps": 2}, {}),
         ({}, {"init": "street"}),
     ]:
         with pytest.raises(deepfusion.DeepFusionError) as caught:

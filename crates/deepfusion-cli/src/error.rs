@@ -196,15 +196,6 @@ pub(crate) enum CliError {
         /// The command that goes on with it.
         go_on: String,
     },
-    /// A run that has made more steps than it is asked for.
-    #[cfg(feature = "train")]
-    #[error("the run has made {} already, more than the {asked} that it is to have", count_of(*made, "step"))]
-    FewerSteps {
-        /// Steps that it has made.
-        made: usize,
-        /// Steps of the whole run, as asked for.
-        asked: usize,
-    },
     /// A recording of a resumed run that is not where it was.
     #[error("{}: no such file or folder, and {} learns from it", path.display(), run.display())]
     Moved {
@@ -327,11 +318,6 @@ impl Reportable for CliError {
             Self::NotAFolder { .. } => Some("give --out a folder, which is made where it is not there".into()),
             Self::Interrupted { resumes, .. } => Some(again(*resumes).to_owned()),
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
-            #[cfg(feature = "train")]
-            Self::FewerSteps { made, .. } => Some(format!(
-                "--steps and --epochs count from the run's beginning: give more than {}",
-                count_of(*made, "step")
-            )),
             Self::Moved { option: Some(option), .. } => Some(format!(
                 "if it was moved, say where it is now: {option} PATH; if its disk is not mounted, mount it"
             )),

@@ -84,8 +84,8 @@ pub fn image_size(path: &Path) -> Result<(u32, u32)> {
     }
 }
 
-/// That an image was not cut off. One that begins and ends as its format does is taken for whole; any other is decoded, as some programs leave out the end or
-/// add to it.
+/// That an image was not cut off. One that begins and ends as its format does is taken for whole; any other is read, as some programs leave out the end or
+/// add to it: cameras append to a JPEG, which is then searched for its end, and anything else is decoded.
 ///
 /// # Errors
 /// As [`load_rgb`].
@@ -93,7 +93,11 @@ pub fn check_whole(path: &Path) -> Result<()> {
     if has_both_ends(path).unwrap_or(false) {
         return Ok(());
     }
-    decode(path).map(drop)
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    if jpeg::is_jpeg(&bytes) && jpeg::has_end(&bytes) {
+        return Ok(());
+    }
+    decode_bytes(&bytes, path).map(drop)
 }
 
 /// Whether a file begins and ends as a PNG or a JPEG.

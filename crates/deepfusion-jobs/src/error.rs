@@ -388,6 +388,15 @@ pub enum Error {
     #[cfg(feature = "train")]
     #[error(transparent)]
     Contradiction(Contradiction),
+    /// A run that has made more steps than it is asked for.
+    #[cfg(feature = "train")]
+    #[error("the run has made {} already, more than the {asked} that it is to have", count_of(*made, "step"))]
+    FewerSteps {
+        /// Steps that it has made.
+        made: usize,
+        /// Steps of the whole run, as asked for.
+        asked: usize,
+    },
     /// Recordings, or something of how they are opened, that are asked for beside a configuration's data sets.
     #[cfg(feature = "train")]
     #[error(

@@ -5,7 +5,7 @@ use std::fmt;
 
 use deepfusion_data::{Dataset, OpenOptions, SpeedWarning, speed_unit_warning};
 use deepfusion_model::TrainConfig;
-use deepfusion_train::{SampleSet, SharedFrames, shared_frames};
+use deepfusion_train::{SampleSet, SharedFrames, Skipped, shared_frames};
 
 use crate::Result;
 use crate::recordings::{RecordingRole, open_for, validates};
@@ -23,8 +23,10 @@ pub enum SampleWarning {
     Fault(Fault),
     /// The speeds of a drive, by its name, do not fit its images.
     Speed(String, SpeedWarning),
-    /// A drive that gives no samples, and why.
-    Skipped(deepfusion_train::Skipped),
+    /// A drive that gives no samples, or fewer, and why.
+    Skipped(Skipped),
+    /// Images of a drive that cannot be read, and are done without.
+    BrokenImages(Skipped),
     /// Validation frames that are sources of training samples.
     Neighbours(SharedFrames),
 }
@@ -35,6 +37,7 @@ impl fmt::Display for SampleWarning {
             Self::Fault(fault) => write!(f, "{fault}"),
             Self::Speed(drive, warning) => write!(f, "{drive}: {warning}"),
             Self::Skipped(reason) => write!(f, "skipped: {reason}"),
+            Self::BrokenImages(reason) => write!(f, "{reason}"),
             Self::Neighbours(SharedFrames {
                 drive, sources: 1, ..
             }) => write!(
@@ -46,6 +49,16 @@ impl fmt::Display for SampleWarning {
                 "{}: {} of its validation frames are neighbours of training frames, and were seen as such",
                 shared.drive, shared.sources
             ),
+        }
+    }
+}
+
+impl From<Skipped> for SampleWarning {
+    fn from(reason: Skipped) -> Self {
+        match reason {
+            // Their drive is learned from.
+            Skipped::BrokenImages { .. } => Self::BrokenImages(reason),
+            _ => Self::Skipped(reason),
         }
     }
 }
@@ -85,7 +98,7 @@ pub fn open_samples(
     let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;
     skipped
         .into_iter()
-        .map(SampleWarning::Skipped)
+        .map(SampleWarning::from)
         .for_each(&mut *warn);
     if apart {
         let shared = shared_frames(&train, &validation);
@@ -103,4 +116,22 @@ fn speed_warning(dataset: &Dataset) -> Option<SpeedWarning> {
         tracing::debug!("speed check of {}: {error}", dataset.name());
         None
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drive_with_a_broken_image_is_not_skipped() {
+        let reason = Skipped::BrokenImages {
+            drive: "monday".into(),
+            broken: 1,
+            of: 40,
+            images: vec!["a.png: cut".into()],
+        };
+        let warning = SampleWarning::from(reason.clone());
+        assert!(matches!(warning, SampleWarning::BrokenImages(_)));
+        assert_eq!(warning.to_string(), reason.to_string());
+    }
 }

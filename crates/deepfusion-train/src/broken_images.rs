@@ -12,10 +12,13 @@ const ONE_IN: usize = 20;
 const NAMED: usize = 3;
 
 /// A recording and a frame of it, by their indices.
-type Place = (usize, usize);
+pub(crate) type Place = (usize, usize);
+
+/// What looks for them among the frames of a run: [`BrokenImages::among`], or [`BrokenImages::none`].
+pub(crate) type Look = fn(&[Dataset], &BTreeSet<Place>) -> Result<BrokenImages, Error>;
 
 /// Frames to do without.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct BrokenImages {
     frames: BTreeSet<Place>,
     /// Of each recording that has some.
@@ -61,6 +64,11 @@ impl BrokenImages {
         }
         let frames = broken.into_keys().collect();
         Ok(Self { frames, reasons })
+    }
+
+    /// None, without a look.
+    pub(crate) fn none(_: &[Dataset], _: &BTreeSet<Place>) -> Result<Self, Error> {
+        Ok(Self::default())
     }
 
     /// Whether a frame's image can be read.

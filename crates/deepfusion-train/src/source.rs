@@ -1,4 +1,4 @@
-use crate::broken_images::BrokenImages;
+use crate::broken_images::{BrokenImages, Look};
 use crate::error::MOST_SIGMA_SHARE;
 use crate::shared_frames::Files;
 use crate::stereo::{OtherCameras, StereoSource};
@@ -99,11 +99,12 @@ fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample], datasets
 /// Leaves out frames with depth whose image cannot be read, and notes it.
 fn leave_out_broken(
     [train, held]: [&mut DepthSet; 2],
+    look: Look,
     skipped: &mut Vec<Skipped>,
 ) -> Result<(), Error> {
     let frames = train.frames.iter().chain(&held.frames);
     let used = frames.map(DepthFrame::place).collect();
-    let broken = BrokenImages::among(&train.datasets, &used)?;
+    let broken = look(&train.datasets, &used)?;
     for depth in [train, held] {
         depth.frames.retain(|frame| broken.is_whole(frame.place()));
     }
@@ -168,6 +169,28 @@ impl SampleSet {
         train: Vec<(usize, Dataset)>,
         validation: Option<Vec<(usize, Dataset)>>,
     ) -> Result<(Self, Self, Vec<Skipped>), Error> {
+        Self::split_by(config, train, validation, BrokenImages::among)
+    }
+
+    /// As [`Self::split_sets`], with the frames whose image cannot be read: which frames a run may have seen, of recordings whose images need not be
+    /// there any more. None is looked at.
+    ///
+    /// # Errors
+    /// As [`Self::split_sets`].
+    pub fn split_unread(
+        config: &TrainConfig,
+        train: Vec<(usize, Dataset)>,
+        validation: Option<Vec<(usize, Dataset)>>,
+    ) -> Result<(Self, Self, Vec<Skipped>), Error> {
+        Self::split_by(config, train, validation, BrokenImages::none)
+    }
+
+    fn split_by(
+        config: &TrainConfig,
+        train: Vec<(usize, Dataset)>,
+        validation: Option<Vec<(usize, Dataset)>>,
+        look: Look,
+    ) -> Result<(Self, Self, Vec<Skipped>), Error> {
         let mut skipped = Vec::new();
         let apart = validation.is_some();
         let share = if apart { 0.0 } else { config.validation_share };
@@ -176,7 +199,8 @@ impl SampleSet {
             (Arc::new(sets), Arc::new(datasets))
         };
         let (set_of, train) = shared(train);
-        let (mut samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
+        let (mut samples, held_out) =
+            Self::gather(config, (&train, &set_of), share, (look, &mut skipped))?;
         leave_out_held_views(&mut samples, &held_out, &train);
         if let (true, Some(first)) = (config.stereo, samples.first())
             && samples.iter().all(|sample| sample.stereo.is_none())
@@ -187,14 +211,14 @@ impl SampleSet {
             });
         }
         let (mut depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
-        leave_out_broken([&mut depth, &mut held_depth], &mut skipped)?;
+        leave_out_broken([&mut depth, &mut held_depth], look, &mut skipped)?;
         let validation = match validation {
             Some(datasets) => {
                 let (set_of, datasets) = shared(datasets);
                 let both: (&[Dataset], &[usize]) = (&datasets, &set_of);
-                let (samples, _) = Self::gather(config, both, 0.0, &mut skipped)?;
+                let (samples, _) = Self::gather(config, both, 0.0, (look, &mut skipped))?;
                 let (mut all, mut none) = DepthSet::split(config, &datasets, &set_of, 0.0)?;
-                leave_out_broken([&mut all, &mut none], &mut skipped)?;
+                leave_out_broken([&mut all, &mut none], look, &mut skipped)?;
                 held_depth = DepthSet {
                     // Those of training's worlds are not for validation.
                     simulated: held_depth.simulated,
@@ -246,7 +270,7 @@ impl SampleSet {
         config: &TrainConfig,
         (datasets, set_of): (&[Dataset], &[usize]),
         share: f64,
-        skipped: &mut Vec<Skipped>,
+        (look, skipped): (Look, &mut Vec<Skipped>),
     ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
         let (mut train, mut held) = (Vec::new(), Vec::new());
         // Why drives have no sample: an error, the last, or unsure distances. Where they stand in `skipped`.
@@ -308,7 +332,7 @@ impl SampleSet {
             }
         }
         let used = train.iter().chain(&held).flat_map(Sample::shown).collect();
-        let broken = BrokenImages::among(datasets, &used)?;
+        let broken = look(datasets, &used)?;
         let is_whole = |sample: &Sample| sample.shown().all(|frame| broken.is_whole(frame));
         train.retain(is_whole);
         held.retain(is_whole);

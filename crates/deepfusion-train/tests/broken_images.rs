@@ -52,6 +52,13 @@ fn samples_of_broken_images_are_left_out() {
     }
 
     (5..8).for_each(|frame| cut(&drive, frame));
+    // Who asks what a run may have seen does not read the images.
+    let datasets = Dataset::open(&drive, &OpenOptions::default()).unwrap();
+    let recordings = datasets.into_iter().map(|dataset| (0, dataset)).collect();
+    let mut config = small_without_data(1);
+    config.data.learn = Learn::OwnMotion;
+    let (unread, ..) = SampleSet::split_unread(&config, recordings, None).unwrap();
+    assert_eq!(shown(&unread), shown(&whole));
     let error = split(Learn::OwnMotion).unwrap_err();
     assert!(
         matches!(error, Error::BrokenImages { broken: 4, .. }),

@@ -79,17 +79,6 @@ fn request(args: &TrainArgs) -> Result<ResumeRequest> {
     })
 }
 
-/// That a run is not asked for fewer steps than it has made.
-///
-/// # Errors
-/// [`CliError::FewerSteps`].
-pub(super) fn require_no_fewer_steps(made: usize, asked: usize) -> Result<()> {
-    if made > asked {
-        return Err(CliError::FewerSteps { made, asked }.into());
-    }
-    Ok(())
-}
-
 /// Where an error is that one of the run's recordings is not there, one whose hint is the option that says where it is now.
 pub(super) fn where_recordings_are(error: Failure, config: &TrainConfig, run: &Path) -> Failure {
     let Some(path) = error.missing().map(Path::to_owned) else {

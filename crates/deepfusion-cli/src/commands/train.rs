@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use deepfusion_hint::count_of;
+use deepfusion_jobs::training::resume::require_no_fewer_steps;
 use deepfusion_jobs::training::{
     AskedRecordings, Pace, RunLock, SettingsOfMean, Start, StartReport, StartRequest, TrainingPlan,
     leaves_turns_unused,
@@ -80,19 +81,20 @@ fn begun(args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
 fn gone_on_with(out: &Path, args: &TrainArgs, device: &Device) -> Result<(Trainer, RunLock)> {
     let (folder, _) = RunFolder::open(out)?;
     let lock = RunLock::take(folder.path())?;
-    let config = resume::with_options(&folder.read_settings()?, args)?;
+    let run = folder.read_settings()?;
+    let config = resume::with_options(&run, args)?;
     config.validate()?;
     folder.require_checkpoint(CheckpointKind::Last)?;
     if let Some(steps) = config.steps {
         let done = folder.read_state(CheckpointKind::Last)?.step;
-        resume::require_no_fewer_steps(done, steps)?;
+        require_no_fewer_steps(&run, &config, done, steps)?;
     }
     let sets = open_samples(&config)
         .map_err(|error| resume::where_recordings_are(error, &config, folder.path()))?;
     let settings = config.clone();
     let trainer = Trainer::resume(config, folder.clone(), sets, device)?;
     // How many epochs are is known now.
-    resume::require_no_fewer_steps(trainer.step(), trainer.steps())?;
+    require_no_fewer_steps(&run, &settings, trainer.step(), trainer.steps())?;
     // Only settings with which the run goes on.
     folder.write_config(&settings, &folder.read_findings()?)?;
     Ok((trainer, lock))

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use deepfusion_hint::Hint;
 #[cfg(feature = "train")]
+use deepfusion_hint::count_of;
+#[cfg(feature = "train")]
 use deepfusion_jobs::training::resume::{Contradiction, RequestedValue, Setting};
 use deepfusion_jobs::{Error, OtherJob, StaleReason};
 use deepfusion_records::Difference;
@@ -101,6 +103,11 @@ impl Reportable for Error {
             Self::NoTopic { problem, .. } => {
                 Some(problem.hint().unwrap_or_else(|| set_in_file("data.topics")))
             }
+            #[cfg(feature = "train")]
+            Self::FewerSteps { made, .. } => Some(format!(
+                "--steps and --epochs count from the run's beginning: give more than {}",
+                count_of(*made, "step")
+            )),
             #[cfg(feature = "train")]
             Self::BesideSets { .. } => {
                 Some("leave it out, or change the sets in the config file".into())

@@ -42,6 +42,7 @@ pub use progress::{BulkProgress, Summary};
 pub use records::{RecordLines, record_line, record_lines_path, record_path, write_record};
 pub use resume::{BulkJob, StartedJob};
 pub use shard::{NoShard, Shard};
+pub(crate) use sidecars::outputs_of;
 pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};
 pub use target_run::{TargetSummary, WrittenTargets, perceive};
 pub use video::{VIDEO_ENDING, write_one_video, write_videos};

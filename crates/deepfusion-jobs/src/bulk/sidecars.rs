@@ -68,6 +68,17 @@ pub fn write_unsynced(sidecar: &Sidecar, folder: &Path, name: &str) -> Result<()
     })?)
 }
 
+/// The outputs that a sidecar names, each with the content that was written; none of a sidecar of an older version, which has no checksums.
+pub(crate) fn outputs_of(sidecar: &Sidecar) -> impl Iterator<Item = (&str, Content)> {
+    let contents = sidecar.file_bytes.iter().zip(&sidecar.file_crc32);
+    let outputs = sidecar.files.iter().zip(contents);
+    outputs.filter_map(|(file, (bytes, crc32))| {
+        let crc32 = u32::from_str_radix(crc32, 16).ok()?;
+        let bytes = *bytes;
+        Some((file.as_str(), Content { bytes, crc32 }))
+    })
+}
+
 /// Whether every output is there with the content that was written.
 #[must_use]
 pub(super) fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
@@ -75,17 +86,11 @@ pub(super) fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
     if (sidecar.file_bytes.len(), sidecar.file_crc32.len()) != (files, files) {
         return false;
     }
-    let contents = sidecar.file_bytes.iter().zip(&sidecar.file_crc32);
-    sidecar
-        .files
-        .iter()
-        .zip(contents)
-        .all(|(file, (bytes, crc32))| {
-            u32::from_str_radix(crc32, 16).is_ok_and(|crc32| {
-                let bytes = *bytes;
-                Content { bytes, crc32 }.is_of(&folder.join(file))
-            })
-        })
+    let mut outputs = outputs_of(sidecar);
+    sidecar.files.iter().all(|file| {
+        let output = outputs.next().filter(|(of, _)| of == file);
+        output.is_some_and(|(_, content)| content.is_of(&folder.join(file)))
+    })
 }
 
 /// Writes a value as indented JSON, atomically.

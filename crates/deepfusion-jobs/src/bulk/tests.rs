@@ -12,7 +12,7 @@ use deepfusion_perception::PerceptionConfig;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Precision};
 
 use super::*;
-use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs, without_outputs};
+use crate::outputs::{CloudLimits, DepthOutput, DepthOutputs, TargetOutput, without_outputs};
 use crate::scene::MotionTracker;
 use crate::{Error, Input, Result, TargetFinder, TargetSettings};
 
@@ -188,7 +188,8 @@ fn what_is_overwritten_leaves_nothing_of_its_own() {
         ("a_depth.png", true),
         ("a_depth.npy", false),
         ("a_targets.json", false),
-        ("a_overlay.png", false),
+        // No sidecar says that a run of this program drew it.
+        ("a_overlay.png", true),
         ("a_depth.txt", true),
         ("c_depth.npy", true),
         ("b_depth.npy", true),
@@ -363,6 +364,14 @@ fn targets_of(
     folder: &Path,
     report: impl FnMut(WrittenTargets<'_>) -> Result<()> + Send,
 ) -> TargetSummary<Error> {
+    drawn_targets_of(folder, &[], report)
+}
+
+fn drawn_targets_of(
+    folder: &Path,
+    draw: &[TargetOutput],
+    report: impl FnMut(WrittenTargets<'_>) -> Result<()> + Send,
+) -> TargetSummary<Error> {
     let (model, mut estimator) = network();
     let out = folder_for_outputs(folder);
     let settings = settings(Some(GivenCamera::Numbers(CAMERA)));
@@ -373,7 +382,7 @@ fn targets_of(
         instances: None,
         scale: ScaleMonitorConfig::default(),
         correct_scale: false,
-        draw: Vec::new(),
+        draw: draw.to_vec(),
     };
     let finder = TargetFinder::open(&model, &mut estimator, settings).unwrap();
     let all = inputs(folder, &["a", "missing", "b"]);
@@ -410,14 +419,24 @@ fn targets_are_written_and_reported_in_order() {
 fn targets_that_are_overwritten_leave_no_pictures() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    targets_of(at, |_| Ok(()));
     let out = at.join("out");
-    for file in ["a_overlay.png", "c_overlay.png"] {
-        std::fs::write(out.join(file), "x").unwrap();
+    let draw = [TargetOutput::Overlay, TargetOutput::Ply];
+    drawn_targets_of(at, &draw, |_| Ok(()));
+    assert!(out.join("a_overlay.png").exists() && out.join("a.ply").exists());
+    // A mask that somebody keeps beside the outputs.
+    std::fs::write(out.join("a_segments.png"), "x").unwrap();
+    drawn_targets_of(at, &[TargetOutput::Ply], |_| Ok(()));
+    for (file, stays) in [
+        ("a_targets.json", true),
+        ("a_overlay.png", false),
+        // The old cloud is removed, and the new one is not.
+        ("a.ply", true),
+        ("a_segments.png", true),
+    ] {
+        assert_eq!(out.join(file).exists(), stays, "{file}");
     }
     targets_of(at, |_| Ok(()));
-    assert!(out.join("a_targets.json").exists() && !out.join("a_overlay.png").exists());
-    assert!(out.join("c_overlay.png").exists());
+    assert!(!out.join("a.ply").exists());
 }
 
 #[test]

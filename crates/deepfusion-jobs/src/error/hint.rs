@@ -1,3 +1,5 @@
+#[cfg(feature = "train")]
+use deepfusion_hint::count_of;
 use deepfusion_hint::{Hint, system_hint};
 
 use super::{Error, NoMean, UnfitCamera};
@@ -111,6 +113,11 @@ impl Hint for Error {
                 Some("choose ONNX Runtime as the engine, or leave its library out".into())
             }
             Self::NoFramework => Some("build it with the feature `train`".into()),
+            #[cfg(feature = "train")]
+            Self::FewerSteps { made, .. } => Some(format!(
+                "steps and epochs count from the run's beginning: give more than {}",
+                count_of(*made, "step")
+            )),
             #[cfg(feature = "train")]
             Self::AtWork { .. } => {
                 Some("wait for it, stop it first, or choose another folder".into())

@@ -70,7 +70,7 @@ fn seen_by(
         config.validation_share = 0.0;
     }
     let recordings = training_recordings(&config).ok()?;
-    let (train, _, _) = SampleSet::split_sets(&config, recordings, None).ok()?;
+    let (train, _, _) = SampleSet::split_unread(&config, recordings, None).ok()?;
     let mut seen = HashSet::new();
     for sample in &train.samples {
         let of = |(dataset, frame): (usize, usize)| keys(&train.datasets[dataset].frames()[frame]);

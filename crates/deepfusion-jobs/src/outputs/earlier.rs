@@ -6,14 +6,14 @@ use std::path::Path;
 use deepfusion_records::{FileMark, FrameRecord, MadeWith, Sidecar, same_number};
 
 use super::{DepthOutput, TargetOutput};
-use crate::Result;
-use crate::bulk::{record_path, sidecar_path};
+use crate::bulk::{outputs_of, record_path, sidecar_path};
+use crate::{Input, Result};
 
 /// The depth of an image that is about to be written.
 pub(super) struct NewDepth<'a> {
-    /// What the names of the image's outputs begin with.
-    pub(super) name: &'a str,
-    /// The image's file.
+    /// The image.
+    pub(super) input: &'a Input,
+    /// Its file.
     pub(super) mark: FileMark,
     /// fx, fy, cx, cy.
     pub(super) intrinsics: Option<[f64; 4]>,
@@ -27,35 +27,62 @@ pub(super) struct NewDepth<'a> {
 /// they would pass for its own. It comes before the new outputs: if the run is stopped then, the old sidecar still names everything that is left,
 /// and the image is not done.
 pub(super) fn remove_earlier(folder: &Path, new: &NewDepth<'_>) -> Result<()> {
-    let text = std::fs::read(sidecar_path(folder, new.name)).unwrap_or_default();
-    // Without a sidecar of ours nothing says that a file is.
-    let Ok(earlier) = serde_json::from_slice::<Sidecar>(&text) else {
+    let Some(earlier) = earlier_sidecar(folder, &new.input.name) else {
         return Ok(());
     };
-    for file in &earlier.files {
-        if is_output(file, new.name) && !new.files.contains(file) {
-            remove(&folder.join(file))?;
-        }
-    }
     if new.is_of_other_depth(&earlier) {
-        remove_targets(folder, new.name)?;
+        remove_targets(folder, new.input)?;
+    }
+    remove_named(folder, new.input, &earlier, |ending| {
+        DepthOutput::ALL.iter().any(|o| o.ending() == ending)
+            && !new.files.contains(&format!("{}{ending}", new.input.name))
+    })
+}
+
+/// Removes the targets of an image that were found by this program, and the pictures of them that its sidecar names.
+pub(super) fn remove_targets(folder: &Path, input: &Input) -> Result<()> {
+    if let Some(earlier) = earlier_sidecar(folder, &input.name) {
+        remove_named(folder, input, &earlier, |ending| {
+            TargetOutput::PICTURES
+                .iter()
+                .any(|picture| picture.ending() == ending)
+        })?;
+    }
+    if has_targets(folder, &input.name) {
+        remove(&record_path(folder, &input.name))?;
     }
     Ok(())
 }
 
-/// Removes the targets of an image and the pictures of them, if these targets were found by this program.
-pub(super) fn remove_targets(folder: &Path, name: &str) -> Result<()> {
-    let path = record_path(folder, name);
-    let text = std::fs::read(&path).unwrap_or_default();
-    let ours = serde_json::from_slice::<FrameRecord>(&text).is_ok_and(|r| r.frame == name);
-    if !ours {
-        return Ok(());
+/// Whether this program found targets in an image of that name.
+pub(super) fn has_targets(folder: &Path, name: &str) -> bool {
+    let text = std::fs::read(record_path(folder, name)).unwrap_or_default();
+    serde_json::from_slice::<FrameRecord>(&text).is_ok_and(|record| record.frame == name)
+}
+
+/// The sidecar of an earlier run; without one of ours nothing says that a file is.
+fn earlier_sidecar(folder: &Path, name: &str) -> Option<Sidecar> {
+    let text = std::fs::read(sidecar_path(folder, name)).ok()?;
+    serde_json::from_slice(&text).ok()
+}
+
+/// Removes what a sidecar names and `goes` says by its ending. What is not as it was written is somebody else's by now, and the image itself is no output.
+fn remove_named(
+    folder: &Path,
+    input: &Input,
+    sidecar: &Sidecar,
+    goes: impl Fn(&str) -> bool,
+) -> Result<()> {
+    for (file, content) in outputs_of(sidecar) {
+        let path = folder.join(file);
+        if file.strip_prefix(&input.name).is_some_and(&goes)
+            && content.is_of(&path)
+            && path.canonicalize().ok() != input.path.canonicalize().ok()
+        {
+            remove(&path)?;
+        }
     }
-    for picture in TargetOutput::PICTURES {
-        remove(&picture.path(folder, name))?;
-    }
-    // Last: it says whose the pictures are.
-    remove(&path)
+    Ok(())
 }
 
 impl NewDepth<'_> {
@@ -77,12 +104,6 @@ impl NewDepth<'_> {
     }
 }
 
-/// Whether a file can be an output of an image, as sidecars name them: in their own folder.
-fn is_output(file: &str, name: &str) -> bool {
-    let ending = file.strip_prefix(name);
-    ending.is_some_and(|ending| DepthOutput::ALL.iter().any(|o| o.ending() == ending))
-}
-
 fn remove(path: &Path) -> Result<()> {
     match std::fs::remove_file(path) {
         Err(e) if e.kind() != ErrorKind::NotFound => {
@@ -95,37 +116,99 @@ fn remove(path: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bulk::{add_output, write_unsynced};
+    use deepfusion_records::PredictionRecord;
+    use std::path::PathBuf;
+
+    const ALL: fn(&str) -> bool = |_| true;
+
+    fn input(folder: &Path, image: &str) -> Input {
+        Input {
+            path: folder.join(image),
+            name: "a".into(),
+            frame: None,
+        }
+    }
+
+    /// A sidecar of `a` that names these files, which are there.
+    fn sidecar_of(folder: &Path, files: &[&str]) -> Sidecar {
+        let mut sidecar = Sidecar {
+            prediction: PredictionRecord::default(),
+            files: Vec::new(),
+            file_bytes: Vec::new(),
+            file_crc32: Vec::new(),
+            live: None,
+            made_with: MadeWith {
+                version: "1".into(),
+                weights: String::new(),
+                engine: String::new(),
+                save: Vec::new(),
+                max_depth_m: 80.0,
+                max_sigma: None,
+                intrinsics: None,
+                hfov_deg: None,
+                calibration_sha256: None,
+                focal_correction: true,
+                stretch: false,
+                correct_scale: false,
+                post_process: None,
+                set: None,
+                topics: Vec::new(),
+                camera_height_m: None,
+            },
+        };
+        for file in files {
+            std::fs::write(folder.join(file), file).unwrap();
+            add_output(&mut sidecar, folder, (*file).to_owned()).unwrap();
+        }
+        sidecar
+    }
 
     #[test]
-    fn only_outputs_of_the_image_itself_are_removed() {
-        assert!(is_output("a_depth.npy", "a") && is_output("a.ply", "a"));
-        for other in [
+    fn only_what_is_as_it_was_written_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        let at = root.join("out");
+        std::fs::create_dir(&at).unwrap();
+        // The last three are no outputs of `a` in that folder, whatever the sidecar says.
+        let outside = root.join("a_depth.npy").display().to_string();
+        let files = [
+            "a_depth.npy",
+            "a_depth.png",
+            "a_image.jpg",
             "b_depth.npy",
-            "a.json",
-            "a_notes.txt",
             "../a_depth.npy",
-            "/a.ply",
-        ] {
-            assert!(!is_output(other, "a"), "{other}");
+            outside.as_str(),
+        ];
+        let sidecar = sidecar_of(&at, &files);
+        std::fs::write(at.join("a_depth.png"), "somebody else's").unwrap();
+        // Who makes a recording of kept images, and lets its outputs go to the same folder.
+        remove_named(&at, &input(&at, "a_image.jpg"), &sidecar, ALL).unwrap();
+        for file in files {
+            let goes = file == "a_depth.npy";
+            assert_eq!(at.join(file).exists(), !goes, "{file}");
         }
-        assert!(!is_output("a/../../b_depth.npy", "a"));
     }
 
     #[test]
     fn targets_of_somebody_else_stay() {
         let folder = tempfile::tempdir().unwrap();
-        let at = |file: &str| folder.path().join(file);
-        std::fs::write(at("a_overlay.png"), "").unwrap();
-        for (record, stay) in [
-            ("[1, 2]", true),
-            (r#"{"frame": "b"}"#, true),
-            (r#"{"frame": "a"}"#, false),
+        let at = |file: &str| -> PathBuf { folder.path().join(file) };
+        let image = input(folder.path(), "a.png");
+        let sidecar = sidecar_of(folder.path(), &["a_overlay.png", "a_depth.npy"]);
+        write_unsynced(&sidecar, folder.path(), "a").unwrap();
+        // A mask of the user's beside it, which no run wrote.
+        std::fs::write(at("a_segments.png"), "").unwrap();
+        for (record, goes) in [
+            ("[1, 2]", false),
+            (r#"{"frame": "b"}"#, false),
+            (r#"{"frame": "a"}"#, true),
         ] {
             std::fs::write(at("a_targets.json"), record).unwrap();
-            remove_targets(folder.path(), "a").unwrap();
-            for file in ["a_overlay.png", "a_targets.json"] {
-                assert_eq!(at(file).exists(), stay, "{record} {file}");
-            }
+            remove_targets(folder.path(), &image).unwrap();
+            assert_eq!(at("a_targets.json").exists(), !goes, "{record}");
         }
+        assert!(!at("a_overlay.png").exists());
+        assert!(at("a_segments.png").exists() && at("a_depth.npy").exists());
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use deepfusion_records::Sidecar;
 
+use super::earlier::has_targets;
 use super::{DepthOutput, DepthWriter, TargetOutput};
 use crate::bulk::{record_lines_path, record_path, sidecar_path};
 use crate::{Error, Input, Result};
@@ -66,7 +67,7 @@ fn is_output(picture: &Path, folder: Option<&Path>) -> bool {
     };
     let of_targets = |output: &TargetOutput| {
         let image = name.strip_suffix(output.ending());
-        image.is_some_and(|image| record_path(parent, image).exists())
+        image.is_some_and(|image| has_targets(parent, image))
     };
     if of_an_image(&DepthOutput::Image) {
         return folder.is_some() && parent.canonicalize().ok().as_deref() == folder;
@@ -87,14 +88,16 @@ mod tests {
             name: file.to_owned(),
             frame: None,
         };
-        // Of the second image nothing was written: its name ends like a picture's by chance.
-        let images = ["a.png", "b_overlay.png", "a_overlay.png"].map(input);
-        for file in ["a.png", "b_overlay.png", "a_overlay.png", "a_targets.json"] {
+        // Of the second image nothing was written: its name ends like a picture's by chance. Beside the third somebody keeps targets of his own.
+        let images = ["a.png", "b_overlay.png", "c_segments.png", "a_overlay.png"].map(input);
+        for file in ["a.png", "b_overlay.png", "c_segments.png", "a_overlay.png"] {
             std::fs::write(at(file), []).unwrap();
         }
+        std::fs::write(at("a_targets.json"), r#"{"frame": "a"}"#).unwrap();
+        std::fs::write(at("c_targets.json"), r#"[{"class": "car"}]"#).unwrap();
         let left = without_outputs(images.to_vec(), folder.path());
-        assert_eq!(left, images[..2]);
+        assert_eq!(left, images[..3]);
         // Whatever folder the next outputs go to.
-        assert_eq!(without_outputs(images.to_vec(), &at("none")), images[..2]);
+        assert_eq!(without_outputs(images.to_vec(), &at("none")), images[..3]);
     }
 }

@@ -2,7 +2,10 @@ use std::sync::{Mutex, PoisonError};
 
 use super::DepthWriter;
 use super::earlier::remove_targets;
-use crate::bulk::{RecordLines, record_line, record_lines_path, record_path, write_record};
+use crate::bulk::{
+    RecordLines, add_output, record_line, record_lines_path, record_path, write_record,
+    write_unsynced,
+};
 use crate::{PerceivedFrame, Result};
 
 /// Writes what was found in frame after frame: pictures, depth, targets, and the file of all targets.
@@ -30,12 +33,17 @@ impl<'a> TargetWriter<'a> {
     /// As [`DepthWriter::write`].
     pub fn write(&self, found: &PerceivedFrame) -> Result<String> {
         let (folder, input) = (self.depth.folder, &found.input);
-        // Of an earlier run, which may have drawn others.
-        remove_targets(folder, &input.name)?;
+        // Of an earlier run, which may have drawn others. What it left of depth goes with the depth that is written: clouds of the same name come after it.
+        remove_targets(folder, input)?;
+        let mut sidecar = self
+            .depth
+            .write_outputs(input, &found.loaded, &found.seen)?;
         for (form, picture) in &found.pictures {
             picture.save(&form.path(folder, &input.name))?;
+            // Whose they are says the sidecar: other pictures may have such names.
+            add_output(&mut sidecar, folder, form.file(&input.name))?;
         }
-        self.depth.write(input, &found.loaded, &found.seen)?;
+        write_unsynced(&sidecar, folder, &input.name)?;
         write_record(&found.record, &record_path(folder, &input.name))?;
         let line = record_line(&found.record)?;
         // Who panicked added whole lines only.

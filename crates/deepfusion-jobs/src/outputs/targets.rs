@@ -76,7 +76,12 @@ impl TargetOutput {
     /// Where a frame's file goes.
     #[must_use]
     pub fn path(self, folder: &Path, name: &str) -> PathBuf {
-        folder.join(format!("{name}{}", self.ending()))
+        folder.join(self.file(name))
+    }
+
+    /// The name of a frame's file.
+    pub(super) fn file(self, name: &str) -> String {
+        format!("{name}{}", self.ending())
     }
 
     /// The form of the prediction that it is, where it is one.

@@ -92,7 +92,7 @@ impl DepthWriter<'_> {
         let saves = self.outputs.of_image(is_file);
         let files: Vec<String> = saves.iter().map(|save| file_of(input, *save)).collect();
         let new = NewDepth {
-            name: &input.name,
+            input,
             mark: loaded.mark,
             intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
             made_with: &self.made_with,

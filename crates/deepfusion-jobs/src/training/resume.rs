@@ -186,6 +186,25 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
     Ok(config)
 }
 
+/// That a run is not asked for fewer steps than it has made; `config` is `run`'s with what is asked of it, and has `steps` steps. Of a run of which nothing else is
+/// asked it is no error: its epochs may be shorter than they were, and it is done.
+///
+/// # Errors
+/// [`Error::FewerSteps`].
+pub fn require_no_fewer_steps(
+    run: &TrainConfig,
+    config: &TrainConfig,
+    made: usize,
+    steps: usize,
+) -> Result<()> {
+    let is_asked = (config.steps, config.epochs) != (run.steps, run.epochs);
+    if is_asked && made > steps {
+        let asked = steps;
+        return Err(Error::FewerSteps { made, asked });
+    }
+    Ok(())
+}
+
 /// Refuses each of these that would change the run.
 fn changes_nothing(
     run: &TrainConfig,
@@ -402,5 +421,23 @@ pub fn setting_of(missing: &Path, config: &TrainConfig) -> Option<Setting> {
         Some(Setting::DataSet)
     } else {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_who_asks_for_fewer_steps_is_refused() {
+        let run = Preset::Tiny.config();
+        let require = |asked: &TrainConfig, steps| require_no_fewer_steps(&run, asked, 100, steps);
+        let mut fewer = run.clone();
+        fewer.epochs += 1;
+        let error = require(&fewer, 50).unwrap_err().to_string();
+        assert!(error.contains("made 100 steps already"), "{error}");
+        require(&fewer, 100).unwrap();
+        // Images of it may be broken since: it is done, whatever its epochs are by now.
+        require(&run, 50).unwrap();
     }
 }
