@@ -113,11 +113,12 @@ impl DriveFolder<'_> {
         measure: impl FnOnce(&Path) -> std::result::Result<Option<f64>, E>,
     ) -> std::result::Result<Vec<LogNote>, E> {
         self.check(out)?;
-        let trial = PartialFolder::beside(out).map_err(|e| Error::file(out, e))?;
+        // `.` has no name of its own.
+        let whole = std::path::absolute(out).map_err(|e| Error::file(out, e))?;
+        let trial = PartialFolder::beside(&whole).map_err(|e| Error::file(out, e))?;
         // Of the drive's own name, which errors say.
-        let folder = trial
-            .path()
-            .join(out.file_name().unwrap_or(out.as_os_str()));
+        let name = whole.file_name().unwrap_or("drive".as_ref());
+        let folder = trial.path().join(name);
         std::fs::create_dir(&folder).map_err(|e| Error::file(&folder, e))?;
         link_files(out, &folder)?;
         self.write_into(&folder, out)?;

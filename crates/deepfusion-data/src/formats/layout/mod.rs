@@ -471,6 +471,8 @@ mod tests {
             "tuesday/0.png",
             "out/0_depth.png",
             "out/predict-1-of-1.manifest.json",
+            "found/0_overlay.png",
+            "found/targets.jsonl",
             "drive.mp4.frames/0000000000.jpg",
             "drive.mp4.frames/origin.json",
             "notes/read.me",
