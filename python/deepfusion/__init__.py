@@ -81,9 +81,9 @@ def load(
 ) -> Model:
     """Loads a trained network: a run folder, a checkpoint in it, a packed file, or an embedded network by its name (`networks()`).
 
-    `precision` is "f32", "bf16" on processors with AMX or AVX512-BF16, or "int8" on those with AVX512-VNNI, for networks calibrated
-    by `deepfusion weights calibrate`. For a run that was trained on several data sets, `data_set` names the one whose metric scale to
-    use (`--data-set` on the command line).
+    `precision` is "f32", "bf16" on processors with AMX or AVX512-BF16, or "int8" on those with AVX512-VNNI and AVX512-BF16, for
+    networks calibrated by `deepfusion weights calibrate`. For a run that was trained on several data sets, `data_set` names the one
+    whose metric scale to use (`--data-set` on the command line).
 
     `device` is "cpu", a GPU by its backend ("cuda", "vulkan", "wgpu", "metal"; "cuda:1" is the second one), or "auto": a GPU if the
     package supports one and the machine has one, else the processor. A GPU computes in f32. `devices()` lists the backends that the

@@ -208,6 +208,12 @@ fn an_offset_that_cannot_be_found_is_refused() {
         "data import straight/speed.csv --images images --hfov 80 --clock-offset auto --out drive",
         &["nothing measured changes", "--clock-offset MS"],
     );
+    // Nor does the current folder.
+    fails(
+        &at.join("drive"),
+        "data import ../straight/speed.csv --images ../images --hfov 80 --clock-offset auto --out .",
+        &["nothing measured changes", "--clock-offset MS"],
+    );
     let left: Vec<_> = fs::read_dir(at.join("drive")).unwrap().collect();
     assert_eq!(left.len(), 1, "{left:?}");
     // Turns of another drive.

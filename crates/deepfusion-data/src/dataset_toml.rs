@@ -185,7 +185,11 @@ fn is_for_folders(line: &str) -> bool {
     };
     let letters = key.chars().filter(|c| c.is_ascii_alphabetic() || *c == '#');
     let key = letters.collect::<String>().to_ascii_lowercase();
-    key.starts_with("for") && key.contains("fold")
+    // Not `format_folder`, which may stand in another program's file.
+    let of = key.strip_prefix("for").unwrap_or_default();
+    ["fold", "allfold", "subfold"]
+        .iter()
+        .any(|word| of.starts_with(word))
 }
 
 impl FolderConfig {

@@ -99,7 +99,12 @@ fn the_file_above_completes_what_is_not_said() {
 
 #[test]
 fn a_file_above_that_is_a_recordings_says_nothing() {
-    for above in ["fps = 20\n", "yaw_known = false\n", "= no TOML\n"] {
+    for above in [
+        "fps = 20\n",
+        "yaw_known = false\n",
+        "= no TOML\n",
+        "format_folder = 'png'\n",
+    ] {
         let config = read_below(above, "").unwrap();
         assert_eq!(
             (config.fps, config.above.is_some()),

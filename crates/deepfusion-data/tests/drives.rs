@@ -40,6 +40,41 @@ fn a_drive_a_date_and_a_root_open_the_same() {
     assert_eq!(all[0].load_image(3).unwrap().get_pixel(1, 1).0, [4, 13, 90]);
 }
 
+/// What a fleet's folders hold may be whole roots of drives, of the same names, and lack a camera.
+#[test]
+fn of_a_fleet_those_without_images_of_the_camera_are_left_out() {
+    let fleet = tempfile::tempdir().unwrap();
+    for (place, cameras) in [("a", vec![2]), ("b", vec![2, 3])] {
+        let drive = TinyDrive {
+            cameras,
+            ..TinyDrive::default()
+        };
+        drive.write(&fleet.path().join(place));
+    }
+    fs::write(fleet.path().join("dataset.toml"), "for_folders = true\n").unwrap();
+    let both = open(fleet.path()).unwrap();
+    assert_eq!(both.len(), 2);
+    assert_eq!(both[0].name(), both[1].name());
+    assert_ne!(both[0].place(), both[1].place());
+    let right = || {
+        let options = OpenOptions {
+            camera: Cameras::Right,
+            ..OpenOptions::default()
+        };
+        Dataset::open(fleet.path(), &options)
+    };
+    let found = right().unwrap();
+    assert_eq!(found.len(), 1);
+    let said = text_of(found[0].warnings());
+    assert!(
+        said.contains("left out, as they give no images: a"),
+        "{said}"
+    );
+    fs::remove_dir_all(fleet.path().join("b")).unwrap();
+    let error = right().unwrap_err();
+    assert!(matches!(error, Error::NoImages { .. }), "{error}");
+}
+
 #[test]
 fn either_camera_or_both() {
     let root = tempfile::tempdir().unwrap();

@@ -35,7 +35,8 @@ pub fn depth_pictures(
         ..options.clone()
     };
     let datasets = Dataset::open(path, &options)?;
-    let Some(dataset) = datasets.iter().find(|d| d.name() == drive.name) else {
+    let is_it = |d: &&Dataset| d.name() == drive.name && d.place() == drive.place;
+    let Some(dataset) = datasets.iter().find(is_it) else {
         return Ok(Vec::new());
     };
     let mut pictures = Vec::new();

@@ -70,7 +70,7 @@ use deepfusion_data::{
 };
 use deepfusion_motion::TimeOffset;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use survey::Survey;
 
 /// What the checks say about a recording.
@@ -97,6 +97,9 @@ pub struct DriveDiagnosis {
     pub looked_at: usize,
     /// Check by check.
     pub outcomes: Vec<Outcome>,
+    /// Its folder or file: another's name may be the same.
+    #[serde(skip)]
+    pub place: PathBuf,
     /// What was measured over time, to be drawn.
     #[serde(skip)]
     pub plots: DrivePlots,
@@ -257,6 +260,7 @@ fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
         frames: dataset.frames().len(),
         looked_at: survey.frames.len(),
         outcomes,
+        place: dataset.place().to_owned(),
         plots: DrivePlots::of(&survey, &pairs),
     }
 }

@@ -34,7 +34,10 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     };
     let mut moved = Vec::new();
     for left in is(Camera::Left) {
-        for right in is(Camera::Right).filter(|right| right.name() == left.name()) {
+        // Drives in different places may have one name.
+        let of_drive =
+            |right: &&Dataset| right.name() == left.name() && right.place() == left.place();
+        for right in is(Camera::Right).filter(of_drive) {
             match disparities(left, right) {
                 Ok(found) => moved.extend(found),
                 Err(error) => return Outcome::skipped(CHECK, SharedError::from(error)),

@@ -69,6 +69,7 @@ mod tests {
             frames: 9,
             looked_at: 9,
             outcomes,
+            place: name.into(),
             plots: DrivePlots::default(),
         }
     }

@@ -113,18 +113,19 @@ impl DriveFolder<'_> {
         measure: impl FnOnce(&Path) -> std::result::Result<Option<f64>, E>,
     ) -> std::result::Result<Vec<LogNote>, E> {
         self.check(out)?;
-        let trial = PartialFolder::beside(out).map_err(|e| Error::file(out, e))?;
+        // `.` has no name of its own.
+        let whole = std::path::absolute(out).map_err(|e| Error::file(out, e))?;
+        let trial = PartialFolder::beside(&whole).map_err(|e| Error::file(out, e))?;
         // Of the drive's own name, which errors say.
-        let folder = trial
-            .path()
-            .join(out.file_name().unwrap_or(out.as_os_str()));
+        let name = whole.file_name().unwrap_or("drive".as_ref());
+        let folder = trial.path().join(name);
         std::fs::create_dir(&folder).map_err(|e| Error::file(&folder, e))?;
         link_files(out, &folder)?;
         self.write_into(&folder, out)?;
         let was_there = out.exists();
         self.camera_ahead_s = measure(&folder).inspect_err(|_| {
-            if !was_there {
-                remove_frames(out);
+            if let (false, Media::Video(video)) = (was_there, &self.media) {
+                remove_frames(out, video);
             }
         })?;
         drop(trial);
@@ -211,16 +212,24 @@ fn link_files(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Removes a folder that holds decoded frames alone, as far as that goes.
-fn remove_frames(folder: &Path) {
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.extension().is_some_and(|ending| ending == "frames") {
-            let _ = std::fs::remove_dir_all(path);
+/// Removes a folder that holds a video's decoded frames and nothing else. Another process may have filled it meanwhile: then all of it stays.
+fn remove_frames(folder: &Path, video: &Path) {
+    let video = video.file_name().unwrap_or_default().to_string_lossy();
+    let begin = format!("{video}-");
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let found: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    let are_its_frames = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let named = name.starts_with(&begin) && path.extension().is_some_and(|e| e == "frames");
+        named && path.is_dir()
+    };
+    if found.iter().all(are_its_frames) {
+        for frames in found {
+            let _ = std::fs::remove_dir_all(frames);
         }
+        // Not where there is anything by now.
+        let _ = std::fs::remove_dir(folder);
     }
-    // Not where there is anything else.
-    let _ = std::fs::remove_dir(folder);
 }
 
 /// The table of speeds; with their standard deviations where every one has one.
@@ -379,20 +388,37 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_measured_leaves_no_folder() {
+    fn what_is_not_measured_leaves_no_folder_but_one_with_other_files() {
         let at = tempfile::tempdir().unwrap();
         let out = at.path().join("drive");
         let log = log(Clock::Date, 1_777_636_800_000_000_000);
-        let refused: Result<Vec<LogNote>> = folder(&log, None).write_measured(&out, |_| {
-            std::fs::create_dir_all(out.join("a.mp4-0.frames")).unwrap();
-            std::fs::write(out.join("a.mp4-0.frames/0000000000.jpg"), "").unwrap();
-            Err(Error::NoStart {
-                first_ns: 0,
-                time_of_day: false,
-            })
-        });
-        refused.unwrap_err();
+        let refused_with = |files: &[&str]| {
+            let media = Media::Video("a.mp4".into());
+            let mut drive = DriveFolder {
+                media,
+                ..folder(&log, None)
+            };
+            let refused: Result<Vec<LogNote>> = drive.write_measured(&out, |_| {
+                for file in files.iter().map(|file| out.join(file)) {
+                    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+                    std::fs::write(file, "").unwrap();
+                }
+                Err(Error::NoStart {
+                    first_ns: 0,
+                    time_of_day: false,
+                })
+            });
+            refused.unwrap_err();
+        };
+        let frame = "a.mp4-0.frames/0000000000.jpg";
+        refused_with(&[frame]);
         assert_eq!(std::fs::read_dir(at.path()).unwrap().count(), 0);
+        // Somebody's, or what another process wrote there.
+        for other in ["notes.txt", "dataset.toml.bak", "my.frames/0.jpg"] {
+            refused_with(&[frame, other]);
+            assert!(out.join(frame).is_file() && out.join(other).is_file());
+            std::fs::remove_dir_all(&out).unwrap();
+        }
     }
 
     #[test]

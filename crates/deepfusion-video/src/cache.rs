@@ -111,6 +111,15 @@ pub fn frames_folder(folder: &Path, file: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}-{hash:016x}.frames"))
 }
 
+/// Whether a folder holds the frames of a video as it is now: they are then read from there, and nothing is written.
+#[must_use]
+pub fn holds_frames_of(folder: &Path, video: &Path) -> bool {
+    Origin::read(folder).is_some_and(|kept| {
+        let now = Origin::of(video, kept.frames, None);
+        now.is_ok_and(|now| now.with_size(kept.size).kept_in(folder, video) == kept)
+    })
+}
+
 /// The hash FNV-1a of 64 bits: the same on every machine and in every version.
 fn fnv_1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
@@ -271,6 +280,25 @@ mod tests {
         let [(.., cache, _), (.., other)] = &kept;
         let refused = keep(cache, other, frame("another")).unwrap_err();
         assert!(refused.to_string().contains("another file"), "{refused}");
+    }
+
+    #[test]
+    fn frames_are_a_videos_until_it_changes() {
+        let root = tempfile::tempdir().unwrap();
+        let file = root.path().join("front.mp4");
+        std::fs::write(&file, "x").unwrap();
+        let places = [root.path().to_owned(), root.path().join("scratch")];
+        let caches = places.map(|place| frames_folder(&place, &file, "front.mp4"));
+        for cache in &caches {
+            assert!(!holds_frames_of(cache, &file));
+            let origin = Origin::of(&file, 1, None).unwrap().kept_in(cache, &file);
+            keep(cache, &origin, frame("")).unwrap();
+            assert!(holds_frames_of(cache, &file));
+        }
+        std::fs::write(&file, "longer").unwrap();
+        for cache in &caches {
+            assert!(!holds_frames_of(cache, &file));
+        }
     }
 
     /// The values of the algorithm's own page.

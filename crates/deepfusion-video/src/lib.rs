@@ -15,7 +15,7 @@ mod problem;
 mod program;
 mod write;
 
-pub use cache::frames_folder;
+pub use cache::{frames_folder, holds_frames_of};
 pub use endings::{VIDEO_ENDINGS, is_video};
 pub use error::{Error, Result};
 pub use frames::VideoFrames;

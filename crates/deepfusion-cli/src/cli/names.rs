@@ -157,11 +157,11 @@ pub(super) fn precision() -> impl TypedValueParser<Value = Precision> {
             (Precision::F32, "32-bit floats"),
             (
                 Precision::Bf16,
-                "Eight bits of mantissa: faster on processors with AMX or AVX512-BF16, slightly less exact",
+                "Eight bits of mantissa: faster, slightly less exact; needs a processor with AMX or AVX512-BF16",
             ),
             (
                 Precision::Int8,
-                "8-bit integers: even faster on processors with AVX512-VNNI, less exact; for networks calibrated by `weights calibrate`",
+                "8-bit integers: even faster, less exact; needs a processor with AVX512-VNNI and AVX512-BF16, and a network calibrated by `weights calibrate`",
             ),
         ],
     )

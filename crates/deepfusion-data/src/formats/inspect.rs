@@ -173,11 +173,7 @@ struct UnopenedRecording {
 impl UnopenedRecording {
     /// As [`Dataset::open`] leaves recordings out: drives without images of the camera, and bags that give none.
     fn lacks_images(&self) -> bool {
-        match self.error {
-            Error::NoImages { .. } => true,
-            Error::NoFrames { .. } => self.recording.kind() == DatasetKind::Bag,
-            _ => false,
-        }
+        self.recording.lacks_images(&self.error)
     }
 
     /// What is wrong, without the recording's own name.

@@ -16,6 +16,9 @@ pub(super) fn hint(warning: &DataWarning) -> &'static str {
         DataWarning::Times(warning) => of_times(warning),
         DataWarning::Motion(warning) => of_motion(warning),
         DataWarning::Incomplete(warning) => of_what_is_missing(warning),
+        DataWarning::FramesElsewhere { .. } => {
+            "nothing has to be done; a folder of your own, whose dataset.toml names the video, may have the key cache for another place"
+        }
         _ => SEE,
     }
 }
@@ -134,7 +137,7 @@ mod tests {
 
     #[test]
     fn the_file_and_its_key_are_named() {
-        let cases: [(DataWarning, &str); 6] = [
+        let cases: [(DataWarning, &str); 7] = [
             (
                 CameraWarning::Assumed {
                     fx: 900.0,
@@ -158,6 +161,12 @@ mod tests {
                 }
                 .into(),
                 "imu in dataset.toml",
+            ),
+            (
+                DataWarning::FramesElsewhere {
+                    folder: "frames".into(),
+                },
+                "the key cache",
             ),
             (DataWarning::Other("it rained".into()), "dataset.toml"),
         ];

@@ -7,14 +7,14 @@ use super::kitti::{self, Drive, drive_around, find_drives};
 use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset::selection::Selection;
 use crate::dataset_toml::FolderConfig;
-use crate::formats::shared::files::folders;
+use crate::formats::shared::files::{folders, name_of};
 use crate::{
     ConfigProblem, Dataset, DatasetKind, Error, FoundInstead, IncompleteWarning, OpenOptions,
     Result,
 };
 use deepfusion_rosbag::MessageSource;
 use deepfusion_video::is_video;
-use neighbours::{NeighbourSearch, unread};
+use neighbours::{NeighbourSearch, holds_outputs, unread};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -94,7 +94,8 @@ impl Layout {
         let mut recordings = folders(path)?;
         if FolderConfig::read_for_folders(path)?.is_some() {
             let mut found = Vec::new();
-            for folder in &recordings {
+            // Predictions and decoded frames are images, too.
+            for folder in recordings.iter().filter(|folder| !holds_outputs(folder)) {
                 // One that is broken is not left out silently.
                 found.extend(Self::known(folder)?.map(|layout| (folder.clone(), layout)));
             }
@@ -221,6 +222,15 @@ impl Layout {
         }
     }
 
+    /// Whether an error says of a recording no more than that it has no images: of several it is then left out.
+    pub(crate) fn lacks_images(&self, error: &Error) -> bool {
+        match error {
+            Error::NoImages { .. } => true,
+            Error::NoFrames { .. } => self.kind() == DatasetKind::Bag,
+            _ => false,
+        }
+    }
+
     /// Topics are a bag's alone, and a camera is given where the layout has none: for another recording they would silently say nothing.
     ///
     /// # Errors
@@ -261,7 +271,11 @@ impl Layout {
             videos: !matches!(self, Self::Comma(_) | Self::Folder(_) | Self::Video(_)),
             folders: match self {
                 Self::Kitti(_) => !used.contains(&folder),
-                Self::RgbD(_) | Self::Bags(_) | Self::Folder(_) | Self::Video(_) => true,
+                Self::RgbD(_)
+                | Self::Bags(_)
+                | Self::Folder(_)
+                | Self::Video(_)
+                | Self::Several(_) => true,
                 _ => false,
             },
         };
@@ -282,6 +296,10 @@ impl Layout {
         match self {
             Self::Kitti(drives) => drives.iter().map(|drive| drive.folder.clone()).collect(),
             Self::RgbD(places) | Self::Bags(places) => places.clone(),
+            Self::Several(all) => {
+                let names = all.iter().filter_map(|(place, _)| place.file_name());
+                names.map(|name| folder.join(name)).collect()
+            }
             Self::Folder(_) | Self::Video(_) => {
                 let config = FolderConfig::read(folder).unwrap_or_default();
                 let mut places = config.places(folder);
@@ -342,22 +360,36 @@ impl Layout {
     }
 }
 
-/// Opens each of several recordings; those without a selected frame are left out.
+/// Opens each of several recordings; those without images of the camera, or without a selected frame, are left out.
 fn open_several(
     path: &Path,
     all: &[(PathBuf, Layout)],
     options: &OpenOptions,
 ) -> Result<Vec<Dataset>> {
-    let mut datasets = Vec::new();
+    let (mut datasets, mut without_images) = (Vec::<Dataset>::new(), Vec::new());
+    let mut refused = None;
     for (folder, layout) in all {
         match layout.open_warning(folder, options) {
             Ok(found) => datasets.extend(found),
-            Err(Error::SplitSelectsNothing { .. }) => {}
+            Err(Error::SplitSelectsNothing { .. }) => {
+                refused = Selection::new(options).nothing(path);
+            }
+            Err(error) if layout.lacks_images(&error) => {
+                without_images.push(name_of(folder));
+                refused = refused.or(Some(error));
+            }
             Err(other) => return Err(other),
         }
     }
-    match Selection::new(options).nothing(path) {
-        Some(error) if datasets.is_empty() => Err(error),
+    match (datasets.first_mut(), refused) {
+        (None, Some(error)) => Err(error),
+        (Some(first), _) if !without_images.is_empty() => {
+            first.warn(IncompleteWarning::NoImages {
+                camera: None,
+                recordings: without_images,
+            });
+            Ok(datasets)
+        }
         _ => Ok(datasets),
     }
 }
@@ -427,6 +459,35 @@ mod tests {
             at.display()
         );
         assert_eq!(passed_over(at), Some(expected));
+    }
+
+    /// Of folders in a folder whose settings are for them.
+    #[test]
+    fn outputs_in_a_fleet_are_no_recordings_and_what_is_deeper_is_said() {
+        let root = tempfile::tempdir().unwrap();
+        let at = root.path();
+        let files = [
+            "monday/0.png",
+            "tuesday/0.png",
+            "out/0_depth.png",
+            "out/predict-1-of-1.manifest.json",
+            "found/0_overlay.png",
+            "found/targets.jsonl",
+            "drive.mp4.frames/0000000000.jpg",
+            "drive.mp4.frames/origin.json",
+            "notes/read.me",
+        ];
+        write(at, &files);
+        fs::write(at.join(FolderConfig::NAME), "for_folders = true\n").unwrap();
+        let Layout::Several(found) = Layout::of(at).unwrap() else {
+            panic!("no fleet");
+        };
+        let names: Vec<String> = found.iter().map(|(place, _)| name_of(place)).collect();
+        assert_eq!(names, ["monday", "tuesday"]);
+        assert_eq!(passed_over(at), None);
+        write(at, &["week/monday/0.png", "week/dataset.toml"]);
+        let said = passed_over(at).unwrap();
+        assert!(said.contains("and is not read: week"), "{said}");
     }
 
     #[test]

@@ -21,6 +21,10 @@ const MARKS: [&str; 9] = [
 ];
 /// How the name of what `predict` keeps of its work ends: videos beside it are outputs.
 const OUTPUTS: &str = ".manifest.json";
+/// The file of all targets that `perceive` writes.
+const TARGETS: &str = "targets.jsonl";
+/// What a folder of a video's decoded frames, whose name ends in `.frames`, says of them.
+const ORIGIN: &str = "origin.json";
 /// How the names of the videos end that `predict` makes, of live sources too, whose folder has no such file.
 const OUTPUT_VIDEO: &str = "_video.mp4";
 
@@ -58,6 +62,17 @@ pub(crate) fn unread(folder: &Path, wanted: NeighbourSearch) -> Vec<String> {
     }
     found.sort();
     found
+}
+
+/// Whether a folder holds what was made of recordings: what `predict` and `perceive` write, or a video's decoded frames.
+pub(crate) fn holds_outputs(folder: &Path) -> bool {
+    let is_of_frames = folder.extension().is_some_and(|ending| ending == "frames");
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.any(|entry| {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        name.ends_with(OUTPUTS) || name == TARGETS || is_of_frames && name == ORIGIN
+    })
 }
 
 fn holds_a_recording(folder: &Path) -> bool {

@@ -1,20 +1,19 @@
 //! Where the frames of a video are kept, once decoded, that no settings name a folder for.
 
 use crate::{Error, Result};
-use deepfusion_fs::PartialFolder;
-use deepfusion_video::frames_folder;
+use deepfusion_video::{frames_folder, holds_frames_of};
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// The video's own folder, or, where nothing can be written there (a card, a share), one in the user's cache folder. That is found out before
-/// hours of work.
+/// hours of work, and nothing is written for it: who looks into a recording may never need its frames.
 ///
 /// # Errors
 /// [`Error::NoPlaceForFrames`] where neither can be written.
 pub(crate) fn folder_for_frames(video: &Path, user_cache: Option<PathBuf>) -> Result<PathBuf> {
     let beside = video.parent().unwrap_or(Path::new("."));
     let name = video.file_name().unwrap_or_default().to_string_lossy();
-    let keeps = |folder: &Path| can_keep(&frames_folder(folder, video, &name));
+    let keeps = |folder: &Path| can_keep(&frames_folder(folder, video, &name), video);
     let Err(source) = keeps(beside) else {
         return Ok(beside.to_owned());
     };
@@ -26,12 +25,46 @@ pub(crate) fn folder_for_frames(video: &Path, user_cache: Option<PathBuf>) -> Re
     })
 }
 
-/// Whether frames are there, or a folder for them can be made.
-fn can_keep(frames: &Path) -> io::Result<()> {
-    if frames.is_dir() {
+/// Whether a video's frames are there, as it is now, or a folder for them can be made.
+fn can_keep(frames: &Path, video: &Path) -> io::Result<()> {
+    if holds_frames_of(frames, video) {
         return Ok(());
     }
-    PartialFolder::beside(frames).map(drop)
+    // Of a link, what it leads to: frames are kept where there is room for them.
+    let real = frames.canonicalize();
+    can_be_made(real.as_deref().unwrap_or(frames))
+}
+
+/// Whether a folder can be made, with those around it that are not there: what the system says without trying it.
+#[cfg(unix)]
+fn can_be_made(folder: &Path) -> io::Result<()> {
+    use nix::unistd::{AccessFlags, access};
+    use std::io::ErrorKind;
+
+    for around in folder.ancestors().skip(1) {
+        // Around a bare name.
+        let around = if around.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            around
+        };
+        match std::fs::metadata(around) {
+            Ok(there) if there.is_dir() => {
+                let both = AccessFlags::W_OK | AccessFlags::X_OK;
+                return access(around, both).map_err(io::Error::from);
+            }
+            Ok(_) => return Err(ErrorKind::NotADirectory.into()),
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(ErrorKind::NotFound.into())
+}
+
+/// The same, by trying it.
+#[cfg(not(unix))]
+fn can_be_made(folder: &Path) -> io::Result<()> {
+    deepfusion_fs::PartialFolder::beside(folder).map(drop)
 }
 
 #[cfg(test)]
@@ -63,13 +96,36 @@ mod tests {
         assert!(hint.contains("cache = "), "{hint}");
     }
 
+    /// Programs that watch a folder, to copy it or to index it, would start for nothing.
+    #[cfg(unix)]
     #[test]
-    fn frames_that_are_there_are_used() {
+    fn to_find_a_place_writes_nothing() {
         let root = tempfile::tempdir().unwrap();
+        let folder = fs::File::open(root.path()).unwrap();
+        let long_ago = std::time::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
+        folder.set_modified(long_ago).unwrap();
+        folder_for_frames(&root.path().join("drive.mp4"), None).unwrap();
+        let now = fs::metadata(root.path()).unwrap().modified().unwrap();
+        assert_eq!(now, long_ago);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_leads_to_where_the_frames_are_kept() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+
+        let root = tempfile::tempdir().unwrap();
+        let disk = root.path().join("disk");
         let frames = root.path().join("drive.mp4.frames");
-        fs::create_dir(&frames).unwrap();
-        let found = folder_for_frames(&root.path().join("drive.mp4"), None);
-        assert_eq!(found.unwrap(), root.path());
-        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
+        fs::create_dir_all(disk.join("frames")).unwrap();
+        symlink(disk.join("frames"), &frames).unwrap();
+        let keeps = || can_keep(&frames, &root.path().join("drive.mp4")).is_ok();
+        assert!(keeps());
+        let allow = |mode| fs::set_permissions(&disk, fs::Permissions::from_mode(mode)).unwrap();
+        allow(0o555);
+        // The administrator can.
+        let can = fs::create_dir(disk.join("tried")).is_ok();
+        assert_eq!(keeps(), can);
+        allow(0o755);
     }
 }
