@@ -1,12 +1,12 @@
 //! What is wrong with a recording, by what the checks look at.
 
+mod assumed;
 mod camera;
 mod frames;
 mod log;
 mod motion;
 mod opening;
 mod pictures;
-mod taken;
 
 pub use self::camera::{CameraReason, CentreCoordinate, HeadingAngle, RoadAngle};
 pub use self::frames::FramesReason;

@@ -349,16 +349,21 @@ mod tests {
     /// down by some degrees.
     const TOO_LOW_PX: f64 = 13.0;
 
-    /// A simulated drive as a folder of images with speeds, whose mount nothing says.
-    fn folder(at: &Path) -> std::result::Result<PathBuf, Box<dyn Error>> {
-        let simulation = Simulation::new(&SimConfig {
+    /// A drive long enough to show where its camera looks.
+    fn street() -> SimConfig {
+        SimConfig {
             seed: 5,
             frames: 60,
             width: 320,
             height: 192,
             scan_every: 0,
             ..SimConfig::default()
-        })?;
+        }
+    }
+
+    /// A simulated drive as a folder of images with speeds, whose mount nothing says.
+    fn folder(at: &Path) -> std::result::Result<PathBuf, Box<dyn Error>> {
+        let simulation = Simulation::new(&street())?;
         let kitti = write_kitti(&simulation, &at.join("kitti"), &mut |_, _| {
             ControlFlow::Continue(())
         })?;
@@ -451,13 +456,8 @@ mod tests {
     fn two_cameras_of_a_drive_are_aimed_as_one() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
         let simulation = Simulation::new(&SimConfig {
-            seed: 5,
-            frames: 60,
-            width: 320,
-            height: 192,
-            scan_every: 0,
             stereo_baseline_m: 0.5,
-            ..SimConfig::default()
+            ..street()
         })?;
         let root = write_kitti(
             &simulation,

@@ -102,7 +102,7 @@ impl Adam {
     }
 
     /// The same of gradients on a device that decides by itself, with nothing read from it: `squares`, `[1]`, is the sum of their squares.
-    /// The step is made if that and the `losses` are finite. Returns whether it is, `[1]`; [`Self::settle`] is told when it was read, at the
+    /// The step is made if that and the `losses` are finite. Returns whether it is, `[1]`; [`Self::settle`] is called when it was read, at the
     /// latest after [`MOST_UNDECIDED`] steps.
     #[must_use]
     pub(crate) fn begin_on_device(

@@ -12,15 +12,15 @@ const ONE_IN: usize = 20;
 const NAMED: usize = 3;
 
 /// A recording and a frame of it, by their indices.
-pub(crate) type Place = (usize, usize);
+pub(crate) type FrameIndex = (usize, usize);
 
 /// What looks for them among the frames of a run: [`BrokenImages::among`], or [`BrokenImages::none`].
-pub(crate) type Look = fn(&[Dataset], &BTreeSet<Place>) -> Result<BrokenImages, Error>;
+pub(crate) type ImageCheck = fn(&[Dataset], &BTreeSet<FrameIndex>) -> Result<BrokenImages, Error>;
 
 /// Frames to do without.
 #[derive(Debug, Default)]
 pub(crate) struct BrokenImages {
-    frames: BTreeSet<Place>,
+    frames: BTreeSet<FrameIndex>,
     /// Of each recording that has some.
     pub(crate) reasons: Vec<Skipped>,
 }
@@ -30,8 +30,8 @@ impl BrokenImages {
     ///
     /// # Errors
     /// [`Error::BrokenImages`] where they are too many for a mishap.
-    pub(crate) fn among(datasets: &[Dataset], used: &BTreeSet<Place>) -> Result<Self, Error> {
-        let broken: BTreeMap<Place, String> = used
+    pub(crate) fn among(datasets: &[Dataset], used: &BTreeSet<FrameIndex>) -> Result<Self, Error> {
+        let broken: BTreeMap<FrameIndex, String> = used
             .par_iter()
             .filter_map(|&(dataset, frame)| {
                 let error = datasets[dataset].check_image(frame).err()?;
@@ -66,13 +66,13 @@ impl BrokenImages {
         Ok(Self { frames, reasons })
     }
 
-    /// None, without a look.
-    pub(crate) fn none(_: &[Dataset], _: &BTreeSet<Place>) -> Result<Self, Error> {
+    /// None, unchecked.
+    pub(crate) fn none(_: &[Dataset], _: &BTreeSet<FrameIndex>) -> Result<Self, Error> {
         Ok(Self::default())
     }
 
     /// Whether a frame's image can be read.
-    pub(crate) fn is_whole(&self, frame: Place) -> bool {
+    pub(crate) fn is_whole(&self, frame: FrameIndex) -> bool {
         !self.frames.contains(&frame)
     }
 }

@@ -1,4 +1,4 @@
-use crate::broken_images::{BrokenImages, Look};
+use crate::broken_images::{BrokenImages, ImageCheck};
 use crate::error::MOST_SIGMA_SHARE;
 use crate::shared_frames::Files;
 use crate::stereo::{OtherCameras, StereoSource};
@@ -99,12 +99,12 @@ fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample], datasets
 /// Leaves out frames with depth whose image cannot be read, and notes it.
 fn leave_out_broken(
     [train, held]: [&mut DepthSet; 2],
-    look: Look,
+    check: ImageCheck,
     skipped: &mut Vec<Skipped>,
 ) -> Result<(), Error> {
     let frames = train.frames.iter().chain(&held.frames);
     let used = frames.map(DepthFrame::place).collect();
-    let broken = look(&train.datasets, &used)?;
+    let broken = check(&train.datasets, &used)?;
     for depth in [train, held] {
         depth.frames.retain(|frame| broken.is_whole(frame.place()));
     }
@@ -189,7 +189,7 @@ impl SampleSet {
         config: &TrainConfig,
         train: Vec<(usize, Dataset)>,
         validation: Option<Vec<(usize, Dataset)>>,
-        look: Look,
+        check: ImageCheck,
     ) -> Result<(Self, Self, Vec<Skipped>), Error> {
         let mut skipped = Vec::new();
         let apart = validation.is_some();
@@ -200,7 +200,7 @@ impl SampleSet {
         };
         let (set_of, train) = shared(train);
         let (mut samples, held_out) =
-            Self::gather(config, (&train, &set_of), share, (look, &mut skipped))?;
+            Self::gather(config, (&train, &set_of), share, (check, &mut skipped))?;
         leave_out_held_views(&mut samples, &held_out, &train);
         if let (true, Some(first)) = (config.stereo, samples.first())
             && samples.iter().all(|sample| sample.stereo.is_none())
@@ -211,14 +211,14 @@ impl SampleSet {
             });
         }
         let (mut depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
-        leave_out_broken([&mut depth, &mut held_depth], look, &mut skipped)?;
+        leave_out_broken([&mut depth, &mut held_depth], check, &mut skipped)?;
         let validation = match validation {
             Some(datasets) => {
                 let (set_of, datasets) = shared(datasets);
                 let both: (&[Dataset], &[usize]) = (&datasets, &set_of);
-                let (samples, _) = Self::gather(config, both, 0.0, (look, &mut skipped))?;
+                let (samples, _) = Self::gather(config, both, 0.0, (check, &mut skipped))?;
                 let (mut all, mut none) = DepthSet::split(config, &datasets, &set_of, 0.0)?;
-                leave_out_broken([&mut all, &mut none], look, &mut skipped)?;
+                leave_out_broken([&mut all, &mut none], check, &mut skipped)?;
                 held_depth = DepthSet {
                     // Those of training's worlds are not for validation.
                     simulated: held_depth.simulated,
@@ -270,7 +270,7 @@ impl SampleSet {
         config: &TrainConfig,
         (datasets, set_of): (&[Dataset], &[usize]),
         share: f64,
-        (look, skipped): (Look, &mut Vec<Skipped>),
+        (check, skipped): (ImageCheck, &mut Vec<Skipped>),
     ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
         let (mut train, mut held) = (Vec::new(), Vec::new());
         // Why drives have no sample: an error, the last, or unsure distances. Where they stand in `skipped`.
@@ -332,7 +332,7 @@ impl SampleSet {
             }
         }
         let used = train.iter().chain(&held).flat_map(Sample::shown).collect();
-        let broken = look(datasets, &used)?;
+        let broken = check(datasets, &used)?;
         let is_whole = |sample: &Sample| sample.shown().all(|frame| broken.is_whole(frame));
         train.retain(is_whole);
         held.retain(is_whole);

@@ -7,7 +7,7 @@ mod report;
 mod schedule;
 mod start;
 mod step;
-mod told;
+mod step_reports;
 mod validation;
 
 pub use validation::validation_loss;
@@ -27,7 +27,7 @@ use start::{check_precision, check_samples, findings, focal_warning, turns_warni
 use std::path::Path;
 use std::time::Instant;
 use step::Loaders;
-use told::{ReadInterval, Told};
+use step_reports::{ReadInterval, StepReports};
 
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
@@ -279,7 +279,7 @@ impl Trainer {
         }
         let start = Instant::now();
         let mut saved = start;
-        let mut told = Told::new(steps);
+        let mut reports = StepReports::new(steps);
         let mut stopped = false;
         while self.state.step < steps && !stopped {
             let learned = self.learn(&loaders, self.schedule(steps));
@@ -287,7 +287,7 @@ impl Trainer {
             let [failed] = self.workers.any([learned.is_err()])?;
             if learned.is_err() {
                 // What went before is heard of before.
-                self.tell_waiting(&mut told, listen)?;
+                self.report_waiting(&mut reports, listen)?;
             }
             let mut learned = learned?;
             if failed {
@@ -296,16 +296,16 @@ impl Trainer {
             let losses = &mut learned.figures.losses;
             self.workers.average(&mut learned.gradients, losses)?;
             let panel = learned.panel.take();
-            let control = self.make_step(learned, &mut told, listen)?;
+            let control = self.make_step(learned, &mut reports, listen)?;
             let save = self.workers.leads() && self.checkpoint_is_due(saved.elapsed());
             let [stop, save] = self.workers.any([control == Control::Stop, save])?;
             stopped = stop;
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
             if due || stopped || save {
-                stopped |= self.tell_waiting(&mut told, listen)? == Control::Stop;
+                stopped |= self.report_waiting(&mut reports, listen)? == Control::Stop;
                 self.share_statistics()?;
                 let reported = if due || stopped {
-                    self.report(listen, panel, told.shares(), due)
+                    self.report(listen, panel, reports.shares(), due)
                         .and_then(|()| {
                             if stopped || self.state.step == steps {
                                 self.report_camera(listen)

@@ -89,7 +89,7 @@ impl Dataset {
                             continue 'targets;
                         }
                     };
-                    // No larger step makes a distance of what is no number.
+                    // No larger step makes a distance of NaN or infinity.
                     if !motion.distance_m.is_finite() {
                         no_motion += 1;
                         continue 'targets;

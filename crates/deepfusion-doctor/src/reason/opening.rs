@@ -53,7 +53,7 @@ impl OpeningReason {
                 return problem.hint().unwrap_or_else(|| known.to_owned());
             }
             Self::NoTurns | Self::CourseAlone => "record an inertial unit or the steering angle",
-            Self::Warning(warning) => super::taken::hint(warning),
+            Self::Warning(warning) => super::assumed::hint(warning),
         };
         text.to_owned()
     }

@@ -269,16 +269,16 @@ fn by_hand(
     steps: usize,
     said: &mut Said,
     learn: fn(&mut Trainer, &Loaders, usize) -> WorkerStep,
-) -> (Told, Result<(), Error>) {
-    let (loaders, mut told) = (loaders(trainer), Told::new(steps));
+) -> (StepReports, Result<(), Error>) {
+    let (loaders, mut reports) = (loaders(trainer), StepReports::new(steps));
     for number in 1..=steps {
         let learned = learn(trainer, &loaders, number);
         let mut listen = |event: TrainEvent| said.hear(&event);
-        if let Err(error) = trainer.make_step(learned, &mut told, &mut listen) {
-            return (told, Err(error));
+        if let Err(error) = trainer.make_step(learned, &mut reports, &mut listen) {
+            return (reports, Err(error));
         }
     }
-    (told, Ok(()))
+    (reports, Ok(()))
 }
 
 /// A gradient of NaN skips its own step alone, and Adam does not count it.
@@ -289,18 +289,19 @@ fn a_gradient_that_is_not_finite_skips_one_step() {
     let run = |read_every: Option<usize>| {
         let at = folder.path().join(format!("{read_every:?}"));
         let (mut trainer, mut said) = (run_of(6, &drive, &at, read_every), Said::default());
-        let (mut told, made) = by_hand(&mut trainer, 6, &mut said, |trainer, loaders, number| {
-            let mut learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
-            if number == 3 {
-                let mut values = flat(&learned.gradients);
-                values[7] = f32::NAN;
-                learned.gradients.take_from(&values);
-            }
-            learned
-        });
+        let (mut reports, made) =
+            by_hand(&mut trainer, 6, &mut said, |trainer, loaders, number| {
+                let mut learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
+                if number == 3 {
+                    let mut values = flat(&learned.gradients);
+                    values[7] = f32::NAN;
+                    learned.gradients.take_from(&values);
+                }
+                learned
+            });
         made.unwrap();
         let mut listen = |event: TrainEvent| said.hear(&event);
-        trainer.tell_waiting(&mut told, &mut listen).unwrap();
+        trainer.report_waiting(&mut reports, &mut listen).unwrap();
         assert_eq!((trainer.state.step, trainer.state.skipped), (6, 1));
         assert_eq!(trainer.adam.steps(), 5);
         assert_eq!(said.skipped, [3]);
@@ -323,7 +324,7 @@ fn a_gradient_that_is_not_finite_skips_one_step() {
     }
 }
 
-/// A loss of NaN in the middle ends the run when it is read, by its own step's name; that step was not made, and what went before it is told.
+/// A loss of NaN in the middle ends the run when it is read, by its own step's name; that step was not made, and what went before it is reported.
 #[test]
 fn a_loss_that_is_not_finite_is_found_late() {
     let folder = tempfile::tempdir().unwrap();

@@ -28,12 +28,12 @@ pub(super) struct Listing {
     places: HashMap<String, usize>,
     /// Counts the changes, from 1.
     version: u64,
-    listed: Option<Listed>,
+    last: Option<LastListing>,
 }
 
 /// How the folder was listed last.
 #[derive(Debug, Clone, Copy)]
-struct Listed {
+struct LastListing {
     /// When it was done.
     done: Instant,
     took: Duration,
@@ -41,7 +41,7 @@ struct Listed {
     changed: SystemTime,
 }
 
-impl Listed {
+impl LastListing {
     /// Whether the list still stands for a folder with this time of change.
     fn stands(self, changed: SystemTime) -> bool {
         let age = self.done.elapsed();
@@ -57,7 +57,7 @@ impl Listing {
             entries: Vec::new(),
             places: HashMap::new(),
             version: 1,
-            listed: None,
+            last: None,
         }
     }
 
@@ -87,7 +87,7 @@ impl Listing {
         let changed = std::fs::metadata(&self.folder)?
             .modified()
             .unwrap_or(SystemTime::UNIX_EPOCH);
-        if self.listed.is_some_and(|listed| listed.stands(changed)) {
+        if self.last.is_some_and(|last| last.stands(changed)) {
             return Ok(());
         }
         let begun = Instant::now();
@@ -113,7 +113,7 @@ impl Listing {
             }
         }
         self.replace(found);
-        self.listed = Some(Listed {
+        self.last = Some(LastListing {
             done: Instant::now(),
             took: begun.elapsed(),
             changed,
@@ -175,14 +175,14 @@ mod tests {
         let done = Instant::now();
         let changed = SystemTime::UNIX_EPOCH;
         let later = changed + Duration::from_secs(1);
-        let quick = Listed {
+        let quick = LastListing {
             done,
             took: LONG / 2,
             changed,
         };
         assert!(quick.stands(changed));
         assert!(!quick.stands(later));
-        let slow = Listed {
+        let slow = LastListing {
             took: Duration::from_secs(60),
             ..quick
         };

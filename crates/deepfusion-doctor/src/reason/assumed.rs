@@ -1,4 +1,4 @@
-//! What to do about what was taken for granted on opening a recording: which key says otherwise, and in which file.
+//! What to do about what was assumed on opening a recording: which key says otherwise, and in which file.
 
 use deepfusion_data::{
     CameraWarning, DataWarning, IncompleteWarning, MotionWarning, MountWarning, TimesWarning,

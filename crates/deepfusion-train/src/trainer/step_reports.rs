@@ -27,9 +27,9 @@ impl ReadInterval {
         time: Duration::from_secs(1),
     };
 
-    /// Whether steps that wait are read now, in a call that has said what `told` steps were.
-    fn is_due(self, told: usize, waiting: usize, pace: &Pace) -> bool {
-        told < self.alone
+    /// Whether steps that wait are read now, in a call that has reported `reported` steps.
+    fn is_due(self, reported: usize, waiting: usize, pace: &Pace) -> bool {
+        reported < self.alone
             || waiting >= self.together.min(MOST_UNDECIDED)
             || pace.since_lap() >= self.time
             || pace.least_seconds_per_step() * waiting as f64 >= self.time.as_secs_f64()
@@ -48,11 +48,11 @@ pub(super) struct Step {
 }
 
 /// What was said of the steps of a run, and those of which nothing was yet.
-pub(super) struct Told {
+pub(super) struct StepReports {
     /// Steps of the whole run.
     pub(super) steps: usize,
     /// In this call.
-    told: usize,
+    reported: usize,
     waiting: Vec<(Step, UnreadStep)>,
     skipped_in_row: usize,
     pace: Pace,
@@ -61,11 +61,11 @@ pub(super) struct Told {
     moving: Smoothed,
 }
 
-impl Told {
+impl StepReports {
     pub(super) fn new(steps: usize) -> Self {
         Self {
             steps,
-            told: 0,
+            reported: 0,
             waiting: Vec::new(),
             skipped_in_row: 0,
             pace: Pace::new(),
@@ -91,7 +91,7 @@ impl Told {
     }
 
     fn reading_is_due(&self, interval: ReadInterval) -> bool {
-        interval.is_due(self.told, self.waiting.len(), &self.pace)
+        interval.is_due(self.reported, self.waiting.len(), &self.pace)
     }
 }
 
@@ -100,11 +100,11 @@ impl Trainer {
     /// when the numbers of the steps are due to be read.
     ///
     /// # Errors
-    /// As [`Self::tell_waiting`].
+    /// As [`Self::report_waiting`].
     pub(super) fn make_step(
         &mut self,
         learned: WorkerStep,
-        told: &mut Told,
+        reports: &mut StepReports,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
     ) -> Result<Control, Error> {
         let WorkerStep {
@@ -115,7 +115,7 @@ impl Trainer {
             unread,
             ..
         } = learned;
-        let learning_rate = self.learning_rate(told.steps);
+        let learning_rate = self.learning_rate(reports.steps);
         let step = Step {
             number: self.state.step + 1,
             names,
@@ -125,9 +125,9 @@ impl Trainer {
         if self.decides_on_device() {
             let unread = self.step_on_device(unread, &gradients, learning_rate);
             self.state.step += 1;
-            told.waiting.push((step, unread));
-            return if told.reading_is_due(self.read_interval) {
-                self.tell_waiting(told, listen)
+            reports.waiting.push((step, unread));
+            return if reports.reading_is_due(self.read_interval) {
+                self.report_waiting(reports, listen)
             } else {
                 Ok(Control::Continue)
             };
@@ -142,8 +142,8 @@ impl Trainer {
             self.apply(prepared, &gradients);
         }
         self.state.step += 1;
-        let seconds = told.pace.lap(1);
-        self.tell(told, step, (figures, outcome), seconds, listen)
+        let seconds = reports.pace.lap(1);
+        self.report_step(reports, step, (figures, outcome), seconds, listen)
     }
 
     /// Reads the numbers of the steps that wait on the device, in one transfer, and says of each what it was. Nothing is done where none
@@ -154,12 +154,12 @@ impl Trainer {
     /// the weights are as good as before. Running statistics of batch norms are not: the forward pass moves them at once, and they stay NaN
     /// where the images' features were. The run ends here, before anything is written, and goes on from the checkpoint before.
     /// [`Error::GradientsNotFinite`].
-    pub(super) fn tell_waiting(
+    pub(super) fn report_waiting(
         &mut self,
-        told: &mut Told,
+        reports: &mut StepReports,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
     ) -> Result<Control, Error> {
-        let waiting = std::mem::take(&mut told.waiting);
+        let waiting = std::mem::take(&mut reports.waiting);
         if waiting.is_empty() {
             return Ok(Control::Continue);
         }
@@ -167,14 +167,14 @@ impl Trainer {
         let read = UnreadStep::read(&unread);
         let made = read.iter().filter(|step| step.is_made).count();
         self.adam.settle(made as u32);
-        let seconds = told.pace.lap(waiting.len());
+        let seconds = reports.pace.lap(waiting.len());
         let share = 1.0 / self.config.accumulate as f64;
         let mut control = Control::Continue;
         for ((step, unread), read) in waiting.into_iter().zip(read) {
             let figures = unread.figures(&read, share, step.number)?;
             let said = (figures, read.outcome());
             // Who asks to stop hears of the steps that were made already.
-            if self.tell(told, step, said, seconds, listen)? == Control::Stop {
+            if self.report_step(reports, step, said, seconds, listen)? == Control::Stop {
                 control = Control::Stop;
             }
         }
@@ -182,27 +182,27 @@ impl Trainer {
     }
 
     /// Says what a step was.
-    fn tell(
+    fn report_step(
         &mut self,
-        told: &mut Told,
+        reports: &mut StepReports,
         step: Step,
         (figures, outcome): (Figures, StepOutcome),
         seconds: f64,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
     ) -> Result<Control, Error> {
-        told.told += 1;
-        told.add(figures.monitors);
+        reports.reported += 1;
+        reports.add(figures.monitors);
         let gradient_norm = match outcome {
             StepOutcome::Done { gradient_norm } => {
-                told.skipped_in_row = 0;
+                reports.skipped_in_row = 0;
                 gradient_norm
             }
             StepOutcome::Skipped => {
                 self.state.skipped += 1;
-                told.skipped_in_row += 1;
-                if told.skipped_in_row == MAX_SKIPPED {
+                reports.skipped_in_row += 1;
+                if reports.skipped_in_row == MAX_SKIPPED {
                     return Err(Error::GradientsNotFinite {
-                        count: told.skipped_in_row,
+                        count: reports.skipped_in_row,
                         step: step.number,
                         frames: step.names.join(", "),
                     });
@@ -214,15 +214,15 @@ impl Trainer {
                 f64::NAN
             }
         };
-        told.pace.step(step.images, seconds);
+        reports.pace.step(step.images, seconds);
         Ok(listen(TrainEvent::Step {
             step: step.number,
-            steps: told.steps,
+            steps: reports.steps,
             losses: figures.losses,
             learning_rate: step.learning_rate,
-            images_per_second: told.pace.images_per_second(),
-            remaining_s: told.pace.seconds_per_step() * (told.steps - step.number) as f64,
-            scale_ratio: told.ratio.value(),
+            images_per_second: reports.pace.images_per_second(),
+            remaining_s: reports.pace.seconds_per_step() * (reports.steps - step.number) as f64,
+            scale_ratio: reports.ratio.value(),
             gradient_norm,
         }))
     }
