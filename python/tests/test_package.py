@@ -41,7 +41,7 @@ def test_a_varied_drive_has_a_camera_of_its_own(tmp_path):
         assert 0.3 <= said["height_m"] <= 2.5
         cameras.append(said)
     assert cameras[0] != cameras[1]
-    with pytest.raises(deepfusion.DeepFusionError, match="only varied drives lead there") as refused:
+    with pytest.raises(deepfusion.DeepFusionError, match="only varied drives have this scene") as refused:
         deepfusion.simulate(tmp_path / "plain", frames=1, scene="country")
     assert "varied" in refused.value.hint
 

@@ -171,7 +171,7 @@ fn a_varied_drive_says_what_was_drawn() {
         ),
         (
             "--scene motorway",
-            "--scene motorway: only varied drives lead there",
+            "--scene motorway: only varied drives have this scene",
             "add --varied, or choose another --scene",
         ),
     ] {

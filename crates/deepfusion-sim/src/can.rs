@@ -3,36 +3,36 @@
 use crate::scanner::gaussian;
 use crate::texture::noise::hash;
 
-/// Rates of speed and angle, per second.
+/// Readings of the speed per second.
 pub(crate) const SPEED_RATE_HZ: f64 = 50.0;
-/// See [`SPEED_RATE_HZ`].
+/// Readings of the road-wheel angle per second.
 pub(crate) const STEERING_RATE_HZ: f64 = 80.0;
 
-/// Distance of the axles, metres.
+/// Wheelbase, metres.
 pub const WHEELBASE_M: f64 = 2.7;
 
-/// Smallest step of the speed, m/s (0.05 km/h), and its noise.
+/// Resolution of the speed, m/s (0.05 km/h), and standard deviation of its noise.
 const SPEED_STEP: f64 = 0.05 / 3.6;
 const SPEED_NOISE: f64 = 0.02;
-/// Smallest step of the road-wheel angle, rad, and its noise.
+/// Resolution of the road-wheel angle, radians, and standard deviation of its noise.
 const ANGLE_STEP: f64 = 5e-4;
 const ANGLE_NOISE: f64 = 8e-4;
 
-/// Speed of the rear axle's middle.
+/// Speed of the middle of the rear axle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedReading {
-    /// Seconds since the drive's begin.
+    /// Seconds since the start of the drive.
     pub time_s: f64,
-    /// Forward, m/s.
+    /// Forward speed, m/s.
     pub speed_mps: f64,
 }
 
 /// Angle of the front wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteeringReading {
-    /// Seconds since the drive's begin.
+    /// Seconds since the start of the drive.
     pub time_s: f64,
-    /// Of a single wheel in the middle of the front axle, positive to the left, radians.
+    /// Angle of a single wheel in the middle of the front axle, positive to the left, radians.
     pub angle_rad: f64,
 }
 
@@ -47,7 +47,7 @@ impl SpeedReading {
 }
 
 impl SteeringReading {
-    /// δ of a vehicle whose rear axle turns at `yaw_rate` (rad/s) while it moves at `speed_mps`: tan δ = L·ω/v.
+    /// Road-wheel angle δ of a vehicle whose rear axle turns at `yaw_rate` (rad/s) and moves at `speed_mps`: tan δ = L·ω/v.
     pub(crate) fn of(
         time_s: f64,
         (speed_mps, yaw_rate): (f64, f64),

@@ -37,7 +37,7 @@ impl Scene {
         Self::Night,
     ];
 
-    /// The scenes of varied worlds: UMAD's five and those that only varied worlds have.
+    /// The scenes of varied worlds: UMAD's five, and three that only varied worlds have.
     pub const EVERY: [Self; 8] = [
         Self::Urban,
         Self::Park,
@@ -64,10 +64,10 @@ impl Scene {
         }
     }
 
-    /// The scene of a name, of varied worlds' as well.
+    /// The scene with this name, also one of varied worlds.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name of no scene.
+    /// [`Error::Config`] for an unknown name.
     pub fn of_varied(name: &str) -> Result<Self> {
         let found = Self::EVERY.into_iter().find(|scene| scene.name() == name);
         found.ok_or_else(|| Error::Config {
@@ -82,7 +82,7 @@ impl Scene {
         !matches!(self, Self::Garage | Self::Motorway | Self::Indoor)
     }
 
-    /// How fast it is driven through, as a share of what a street allows.
+    /// Speed of the drive, as a share of the speed on a street.
     pub(crate) fn pace(self) -> f64 {
         match self {
             Self::Garage | Self::Indoor => 0.3,
@@ -127,7 +127,7 @@ impl Sensors {
     }
 }
 
-/// A street of half an hour's drive still fits into memory, and its coordinates into f32.
+/// Longest drive, seconds: its street still fits into memory, and its coordinates into f32.
 const LONGEST_DRIVE_S: f64 = 1800.0;
 
 /// The configuration of a simulation. Equal configurations give equal drives, byte for byte.
@@ -142,7 +142,7 @@ pub struct SimConfig {
     pub width: u32,
     /// Height of the pictures, in pixels.
     pub height: u32,
-    /// Number of moving cars; in a varied drive cars whose way is blocked are left out.
+    /// Number of moving cars. A varied drive leaves out cars whose way is blocked.
     pub moving_cars: usize,
     /// Number of people who ride bicycles in traffic, walk along pavements and cross the road; fewer where a street has no room for
     /// them.
@@ -154,12 +154,12 @@ pub struct SimConfig {
     /// The sensors of the car, and their mounts.
     pub sensors: Sensors,
     /// Whether the camera (lens, height, pitch, roll, imaging), the light, the weather and the world's materials and people are drawn from
-    /// the seed, once for the drive; [`crate::Simulation::drawn`] gives what was drawn.
+    /// the seed, once for the drive; [`crate::Simulation::drawn`] returns what was drawn.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub varied: bool,
     /// Height of the camera above the road, in metres; must keep its default in a varied drive.
     pub camera_height_m: f64,
-    /// [`crate::write_kitti`] also writes the pictures of a second camera, so far to the right of the first one, in metres; 0: of none.
+    /// Distance of a second camera to the right of the first, metres. [`crate::write_kitti`] also writes its pictures; 0: no second camera.
     pub stereo_baseline_m: f64,
     /// [`crate::write_kitti`] writes a velodyne scan for every n-th frame; 0 writes none.
     pub scan_every: usize,
@@ -192,7 +192,7 @@ impl SimConfig {
     /// Checks every field; [`crate::Simulation::new`] also checks the scene.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first field out of range; [`Error::Varied`] for what a varied drive cannot have.
+    /// [`Error::Config`] naming the first field out of range; [`Error::Varied`] for a setting that a varied drive cannot have.
     pub fn validate(&self) -> Result<()> {
         let metres = |field, value: f64, from: f64, to: f64| {
             check(
@@ -231,7 +231,7 @@ impl SimConfig {
         Ok(())
     }
 
-    /// That nothing is asked for which is drawn, or for which a varied drive has no room.
+    /// Checks that no setting contradicts `varied`.
     fn check_varied(&self) -> Result<()> {
         let why = if self.camera_height_m != CAMERA_HEIGHT {
             VariedConflict::CameraHeight
@@ -245,7 +245,7 @@ impl SimConfig {
         Err(self.conflict(why))
     }
 
-    /// That the scene is one that such a drive leads through.
+    /// Checks that a drive can lead through the scene.
     ///
     /// # Errors
     /// [`Error::Varied`].

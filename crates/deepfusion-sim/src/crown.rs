@@ -1,8 +1,8 @@
 //! Leaves: a lobe of a tree's crown as shells of leaf clumps, with holes between them.
 //!
-//! A ray meets up to four ellipsoidal shells, one in the other, from the front and then from behind. Each shell is
-//! there only where a clump of leaves is; clumps are balls at random places of two grids, with ragged edges. So
-//! crowns have irregular outlines, let the sky through, and every leaf that is drawn has its own exact depth.
+//! A ray crosses up to four nested ellipsoidal shells, first their front and then their back. A shell exists only where there is a clump of
+//! leaves; clumps are balls with ragged edges at random places of two grids. So crowns have irregular outlines and let the sky through, and
+//! every leaf that is drawn has its own exact depth.
 
 use crate::primitive::{Entry, FACE_LEAVES, V3};
 use crate::texture::noise::{hash, unit};
@@ -13,29 +13,29 @@ const SHELLS: [f32; 4] = [1.0, 0.83, 0.64, 0.42];
 /// How full the shells are, as shares of the lobe's: the outer ones let more light through.
 const FILL: [f32; 4] = [0.5, 0.75, 0.95, 1.1];
 
-/// Share of coarse cells, some clumps wide, that the two outer shells leave out: dents in the outline.
+/// Share of coarse cells (some clumps wide) that are left out of the two outer shells, as dents in the outline.
 const DENTS: [f32; 4] = [0.5, 0.25, 0.06, 0.0];
 
-/// One lobe.
+/// One lobe of a crown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Crown {
     /// Half axes of the outermost shell, metres.
     pub radii: [f32; 3],
     /// Side of the cells that hold one clump each, metres.
     pub cell: f32,
-    /// How full the cells are: 0.3 lets most of the light through, 1 hardly any.
+    /// Density of the cells: 0.3 lets most of the light through, 1 hardly any.
     pub fill: f32,
-    /// Chooses the clumps.
+    /// Seed of the clumps.
     pub salt: u32,
 }
 
-/// Number of the shell that a face of a crown belongs to, from the outside.
+/// Number of the shell that a face of a crown belongs to, counted from the outside.
 #[inline]
 pub(crate) fn shell_of(face: u8) -> u8 {
     (face.saturating_sub(FACE_LEAVES)) % SHELLS.len() as u8
 }
 
-/// The clump of leaves at a point of a lobe (its axes): a hash that is the clump's own, if one is there.
+/// The clump of leaves at a point of a lobe (in its axes): the clump's own hash, or `None` if there is no clump.
 #[inline]
 pub(crate) fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
     let q = p / cell;
@@ -50,7 +50,7 @@ pub(crate) fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
             1,
         )
     };
-    // A ragged edge: each small cell moves it.
+    // A ragged edge: each small cell moves the edge a little.
     let radius = (0.34 + 0.3 * fill) * (0.62 + 0.76 * fine);
     let square = radius * radius;
     let at = |q: V3, salt: u32| {
@@ -69,7 +69,7 @@ pub(crate) fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
         (away.norm_squared() < square && unit(code, 3) < 0.45 + 0.55 * fill).then_some(code)
     };
     at(q, salt).or_else(|| {
-        // The second grid lies askew to the first.
+        // The second grid is rotated against the first.
         let r = V3::new(
             0.8 * q.x + 0.6 * q.y + 0.31,
             0.8 * q.y - 0.6 * q.x,
@@ -80,7 +80,7 @@ pub(crate) fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
 }
 
 impl Crown {
-    /// Where a ray (the lobe's axes) first meets a leaf, at t in (0, `limit`).
+    /// Where a ray (in the lobe's axes) first hits a leaf, at t in (0, `limit`).
     #[inline(always)]
     pub(crate) fn enter(&self, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
         let inverse = V3::new(
@@ -91,7 +91,7 @@ impl Crown {
         let (so, sd) = (o.component_mul(&inverse), d.component_mul(&inverse));
         let square = sd.norm_squared();
         let middle = -so.dot(&sd) / square;
-        // How far the ray passes the centre.
+        // Squared distance at which the ray passes the centre, in units of the radii.
         let pass = (so + sd * middle).norm_squared();
         if pass >= 1.0 {
             return None;
@@ -130,7 +130,7 @@ impl Crown {
         dent >= DENTS[shell] && clump(p, self.cell, self.fill * FILL[shell], self.salt).is_some()
     }
 
-    /// Where the leaves at a point face: outward, each clump a little otherwise.
+    /// Normal of the leaves at a point: outward, with a random tilt for each clump.
     #[inline]
     pub(crate) fn normal(&self, p: &V3) -> V3 {
         let [a, b, c] = self.radii;
@@ -159,7 +159,7 @@ mod tests {
         }
     }
 
-    /// Rays from around through the lobe.
+    /// Rays from all sides through the lobe.
     fn rays() -> impl Iterator<Item = (V3, V3)> {
         (0..4000).map(|i| {
             let angle = i as f32 * 0.37;
@@ -186,7 +186,7 @@ mod tests {
             let depth = V3::new(p.x / 2.0, p.y / 1.5, p.z / 1.2).norm();
             assert!((depth - SHELLS[usize::from(shell_of(entry.face))]).abs() < 1e-3);
             assert!((crown.normal(&p).norm() - 1.0).abs() < 1e-4);
-            // Nothing is met when the ray is cut off before.
+            // A ray that ends earlier hits nothing.
             let shorter = crown.enter(&o, &d, entry.t);
             assert!(shorter.is_none());
         }

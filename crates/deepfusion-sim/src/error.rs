@@ -9,18 +9,18 @@ use deepfusion_hint::{Hint, count_of, system_hint};
 use deepfusion_rosbag::Error as BagError;
 use std::path::{Path, PathBuf};
 
-/// What can go wrong while a drive is made or written.
+/// Why a drive cannot be simulated or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A value of the configuration is out of its range.
+    /// A setting is out of range.
     #[error("simulator setting `{field}` is {value}, expected {expected}")]
     Config {
         /// Name of the field of [`crate::SimConfig`].
         field: &'static str,
-        /// The value given.
+        /// Its value.
         value: String,
-        /// What would be accepted.
+        /// The values that are accepted.
         expected: ExpectedSetting,
     },
     /// A setting and [`crate::SimConfig::varied`] contradict each other.
@@ -28,24 +28,24 @@ pub enum Error {
     Varied {
         /// The setting's value.
         value: String,
-        /// Which setting, and why not.
+        /// Which setting, and why it conflicts.
         why: VariedConflict,
     },
-    /// The output folder holds something already.
+    /// The output folder is not empty.
     #[error("{}: the output folder is not empty", path.display())]
     OutputNotEmpty {
         /// The folder.
         path: PathBuf,
     },
-    /// The folder for a simulated drive looks empty, and another writer is at work there, or died and what it left cannot be removed.
+    /// The output folder looks empty, but another writer is at work in it, or died and left files there that cannot be removed.
     #[error(transparent)]
     Unfinished(#[from] Unfinished),
-    /// Simulating ended before the last frame, as its caller wanted: nothing of it is left.
+    /// The caller stopped the simulation before its last frame. Nothing was written.
     #[error("nothing is written: stopped after {done} of {}", count_of(*total, "frame"))]
     Stopped {
-        /// Frames done.
+        /// Frames rendered before the stop.
         done: usize,
-        /// Frames in all.
+        /// Frames of the whole drive.
         total: usize,
     },
     /// A folder or file cannot be written.
@@ -53,7 +53,7 @@ pub enum Error {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was being done.
+        /// What was attempted, after "cannot" in the message.
         action: &'static str,
         /// Why it failed.
         source: std::io::Error,
@@ -61,16 +61,16 @@ pub enum Error {
     /// A bag cannot be written.
     #[error(transparent)]
     Bag(#[from] BagError),
-    /// A message cannot be made.
-    #[error("a message of {topic}: {problem}")]
+    /// A message of the bag cannot be encoded.
+    #[error("cannot encode a message of {topic}: {problem}")]
     Message {
-        /// Its topic.
+        /// Topic of the message.
         topic: &'static str,
-        /// What does not fit.
+        /// Why it cannot be encoded.
         problem: deepfusion_rosbag::msg::MessageError,
     },
-    /// A picture cannot be encoded.
-    #[error("{}: cannot encode the picture: {source}", path.display())]
+    /// An image cannot be encoded.
+    #[error("{}: cannot encode the image: {source}", path.display())]
     Encode {
         /// The file that was to be written.
         path: PathBuf,
@@ -105,7 +105,7 @@ impl Hint for Error {
             ),
             Self::Bag(error) => error.hint(),
             Self::Message { problem, .. } => problem.hint(),
-            Self::Stopped { .. } => Some("start it again: nothing is in the way".to_owned()),
+            Self::Stopped { .. } => Some("start it again: nothing was left behind".to_owned()),
             Self::Encode {
                 source: image::ImageError::IoError(source),
                 ..
@@ -116,7 +116,7 @@ impl Hint for Error {
 }
 
 impl Error {
-    /// The same error with `to` in place of `from` in the path that it names: what was written aside is gone when it is read.
+    /// The same error with `from` replaced by `to` in its path: by the time the message is read, the temporary folder is gone.
     pub(crate) fn moved(self, from: &Path, to: &Path) -> Self {
         let moved = |path| moved_path(path, from, to);
         match self {
@@ -142,7 +142,7 @@ impl Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// That a setting is as it must be.
+/// Returns [`Error::Config`] unless `ok`.
 ///
 /// # Errors
 /// [`Error::Config`].
@@ -163,7 +163,7 @@ pub(crate) fn check(
     }
 }
 
-/// That a setting without a unit lies between two bounds, both allowed.
+/// Checks that a setting without a unit is in `from..=to`.
 ///
 /// # Errors
 /// [`Error::Config`].

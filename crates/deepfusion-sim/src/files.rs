@@ -9,7 +9,7 @@ use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Refuses an output folder that holds something; there may be none.
+/// Refuses an output folder that is not empty. The folder need not exist.
 pub(crate) fn require_empty(out: &Path) -> Result<()> {
     let found = deepfusion_fs::in_the_way(out);
     match found.map_err(io(out, "use this as the output folder"))? {
@@ -34,10 +34,10 @@ pub(crate) fn io<'a>(
 }
 
 pub(crate) fn make_folder(path: &Path) -> Result<()> {
-    fs::create_dir_all(path).map_err(io(path, "make this folder"))
+    fs::create_dir_all(path).map_err(io(path, "create this folder"))
 }
 
-/// Writes a file of the drive, of which nothing is seen before all of it is on the disk.
+/// Writes a file of the drive through a buffer.
 pub(crate) fn write_with(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<()>,
@@ -90,7 +90,7 @@ pub(crate) fn encode_depth(out: impl Write, path: &Path, depth: &DepthMap) -> Re
         .flat_map(|d| {
             let value = (f64::from(*d) * 256.0).round();
             let value = if value < 65_536.0 { value as u16 } else { 0 };
-            // The encoder takes the machine's own byte order.
+            // The encoder expects native byte order.
             value.to_ne_bytes()
         })
         .collect();

@@ -10,7 +10,7 @@ use deepfusion_geometry::cloud::PointCloud;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Lines, and the angle between two of them, degrees.
+/// Number of lines, and the angle between two of them, degrees.
 pub(crate) const LINES: usize = 120;
 const LINE_STEP_DEG: f32 = 0.08;
 /// Elevation of the topmost line, degrees: two thirds of the field of view lie below the horizon.
@@ -32,14 +32,14 @@ const RANGE: (f32, f32) = (1.0, 150.0);
 const RANGE_NOISE: f32 = 0.02;
 const VELOCITY_NOISE: f32 = 0.05;
 
-/// Time over which velocities are taken from two positions, seconds.
+/// Time between the two positions that a velocity is computed from, seconds.
 pub(crate) const VELOCITY_STEP_S: f64 = 1e-3;
 
 /// A scan with its ground truth.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FmcwScan {
-    /// Points in the sensor's axes (x forward, y left, z up), metres, with intensity and the radial velocity
-    /// against the sensor in m/s, positive receding.
+    /// Points in the sensor's axes (x forward, y left, z up), metres, with intensity and the radial velocity relative to the sensor in m/s,
+    /// positive receding.
     pub cloud: PointCloud,
     /// Whether each point is on a dynamic object.
     pub moving: Vec<bool>,
@@ -47,11 +47,11 @@ pub struct FmcwScan {
     pub ground_radial_mps: Vec<f32>,
 }
 
-/// Dynamic objects, now and [`VELOCITY_STEP_S`] later, solid by solid.
+/// The solids of dynamic objects now and [`VELOCITY_STEP_S`] later.
 pub(crate) struct MovingSolids {
-    /// Now.
+    /// The solids now.
     pub now: Vec<Primitive>,
-    /// Later, in the same order.
+    /// The same solids later, in the same order.
     pub later: Vec<Primitive>,
 }
 
@@ -77,8 +77,8 @@ impl MovingSolids {
     }
 }
 
-/// One scan at one instant, with a column every `column_step_deg`. `velocity` is that of the sensor over ground, world axes, m/s; `key`
-/// makes the noise.
+/// One scan at one instant, with a column every `column_step_deg`. `velocity` is the sensor's velocity over ground, world axes, m/s; `key`
+/// seeds the noise.
 pub(crate) fn scan(
     world: &World,
     light: &GroundLight,

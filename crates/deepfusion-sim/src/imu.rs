@@ -9,21 +9,21 @@ use nalgebra::Vector3;
 /// Readings per second.
 pub(crate) const RATE_HZ: f64 = 100.0;
 
-/// Standard deviations of a reading: m/s² and rad/s. Those of a good MEMS unit at this rate.
+/// Standard deviations of the noise, m/s² and rad/s: those of a good MEMS unit at this rate.
 const NOISE: (f64, f64) = (0.03, 0.002);
 
 /// The largest constant bias of an axis: m/s² and rad/s.
 const BIAS: (f64, f64) = (0.08, 0.008);
 
-/// Positions this far apart give velocities and accelerations, seconds.
+/// Time between the positions that velocity and acceleration are computed from, seconds.
 const STEP_S: f64 = 0.02;
 
 /// A reading of an inertial unit, in its own axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuReading {
-    /// Seconds since the drive's begin.
+    /// Seconds since the start of the drive.
     pub time_s: f64,
-    /// Specific force, m/s²: at rest it points up with 9.81.
+    /// Specific force, m/s²: 9.81 upwards at rest.
     pub acceleration: Vector3<f64>,
     /// Angular rate, rad/s.
     pub angular_rate: Vector3<f64>,
@@ -62,7 +62,7 @@ impl BodyMotion {
 }
 
 impl ImuReading {
-    /// What the unit of the drive `seed` reads in a motion; `index` numbers its readings.
+    /// The reading during a motion, with bias and noise. `index` is the number of the reading, `seed` that of the drive.
     pub fn of(motion: &BodyMotion, time_s: f64, (index, seed): (usize, u32)) -> Self {
         let held_up = motion.acceleration + Vector3::new(0.0, 0.0, GRAVITY);
         let exact = motion.pose.inverse().rotate(&held_up);

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// The date every simulated drive carries.
+/// Date of every simulated drive.
 const DATE: &str = "2026_01_01";
 
 /// Frames rendered and encoded together.
@@ -29,20 +29,20 @@ const BATCH: usize = 8;
 /// - `oxts`; `velodyne_points` of every [`crate::SimConfig::scan_every`]-th frame;
 /// - `proj_depth/groundtruth/image_02`: dense exact camera z, 16-bit PNG, metres × 256, 0 beyond 255 m;
 /// - `moving_02`: 255 on dynamic objects;
-/// - `tracklet_labels.xml`: exact boxes of everything in reach, in the velodyne's axes. Objects are `Car`, `Pole`, `Tree`, `Building`,
+/// - `tracklet_labels.xml`: exact boxes of all objects near the velodyne, in its axes. Objects are `Car`, `Pole`, `Tree`, `Building`,
 ///   `Fence`, and with [`crate::SimConfig::riders`] `Cyclist` and `Pedestrian`;
 /// - `poses.txt`: `world_from_cam`, the upper three rows of the matrix in 12 numbers a line.
 ///
-/// A varied drive ([`crate::SimConfig::varied`]) also has `varied.json`: what it drew
-/// ([`Simulation::drawn`]). Its boxes also hold what of an object was cut away over the camera's lane, as of a tree's crown.
+/// A varied drive ([`crate::SimConfig::varied`]) also has `varied.json` with what it drew ([`Simulation::drawn`]). Its boxes cover whole
+/// objects, including parts that were cut away over the camera's lane, such as a part of a tree's crown.
 ///
-/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
-/// is written to a folder beside its final place and renamed at the end: after an error, or stopped, `out` is as it was. What a writer that
-/// was killed left there is removed, and is not in the way.
+/// `progress` is called with the number of frames done and the number of all frames. Until all are done, it can stop the writer with
+/// [`ControlFlow::Break`]. Everything is written to a temporary folder beside its final place, which is renamed at the end: after an error
+/// or a stop, `out` is as it was. Files that a killed writer left there are removed first.
 ///
 /// # Errors
-/// [`Error::OutputNotEmpty`] if `out` holds anything, [`Error::Unfinished`] if that is what another writes, or left and cannot be removed;
-/// [`Error::Stopped`]; [`Error::Io`] and [`Error::Encode`], with the path, if something cannot be written.
+/// [`Error::OutputNotEmpty`] if `out` contains anything; [`Error::Unfinished`] if another writer is at work there, or left files that
+/// cannot be removed; [`Error::Stopped`]; [`Error::Io`] and [`Error::Encode`], with the path, if something cannot be written.
 pub fn write_kitti(
     simulation: &Simulation,
     out: &Path,

@@ -17,12 +17,11 @@
 //! camera z. Vehicle, IMU, velodyne: x forward, y left, z up. Metres, seconds, radians.
 //!
 //! # Consistency
-//! Textures are attached to the surfaces and never depend on the viewer, and what a pixel cannot
-//! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
-//! one. Of a varied drive ([`SimConfig::varied`]) that holds of depth, pose and surfaces, not of what
-//! the air, wet ground, the lens and the sensor do to colours. Shadows under moving cars move with
-//! them; the mask of dynamic pixels holds the cars and the people who ride and walk. Whatever moves is
-//! a rigid body: nobody pedals or swings their arms.
+//! Textures are attached to surfaces and never depend on the viewer, and detail smaller than a pixel is averaged, not aliased: one frame,
+//! warped by its true depth and pose, gives the next one. In a varied drive ([`SimConfig::varied`]) this applies to depth, pose and
+//! surfaces, but not to what air, wet ground, lens and sensor do to colours. Shadows under moving cars move with them. The mask of dynamic
+//! pixels covers the moving cars and the people who ride and walk. Every dynamic object is a rigid body: nobody pedals or swings their
+//! arms.
 
 mod can;
 mod config;

@@ -10,19 +10,19 @@ use nalgebra::Vector3;
 /// Size of a cell along the street and across it, metres.
 const CELL: f32 = 0.16;
 
-/// Metres on both sides of the centreline that are baked.
+/// Width of the baked strip on each side of the centreline, metres.
 const REACH: f32 = 26.0;
 
 /// Cells across.
 const ACROSS: usize = (2.0 * REACH / CELL) as usize;
 
-/// A caster's shadow is followed this far, metres.
+/// Longest shadow, metres.
 const LONGEST: f32 = 26.0;
 
 /// Rows of cells that are baked together.
 const CHUNK: usize = 64;
 
-/// The share of sun and sky that is visible from each point of the street.
+/// The shares of sun and sky that are visible from each point of the street.
 pub(crate) struct GroundLight {
     start: f32,
     rows: usize,
@@ -32,7 +32,7 @@ pub(crate) struct GroundLight {
     coarse: Vec<[u8; 2]>,
 }
 
-/// A solid as the baking sees it.
+/// A solid that casts a shadow, prepared for baking.
 struct Caster {
     primitive: Primitive,
     s: f32,
@@ -40,11 +40,11 @@ struct Caster {
     reach: f32,
     middle: (f64, f64),
     radius: f32,
-    /// How long its shadow is at most.
+    /// Greatest length of its shadow, metres.
     length: f32,
 }
 
-/// The foot of something that keeps the sky off the ground beside it.
+/// Footprint of an object that hides a part of the sky from the ground beside it.
 pub(crate) struct Foot {
     middle: (f64, f64),
     heading: (f32, f32),
@@ -75,7 +75,7 @@ impl GroundLight {
         }
     }
 
-    /// Share of the sun and of the sky that a patch of ground of this size sees.
+    /// Shares of the sun and of the sky that reach a patch of ground of this size.
     #[inline]
     pub(crate) fn at(&self, p: &StreetPoint, size: f32) -> (f32, f32) {
         if p.lateral.abs() >= REACH - 1.0 {
@@ -147,7 +147,7 @@ fn shrink(cells: &[[u8; 2]], rows: usize) -> Vec<[u8; 2]> {
 
 fn casters(world: &World) -> Vec<Caster> {
     if !world.rooms.is_empty() {
-        // No sun shines into rooms.
+        // Rooms have no sun.
         return Vec::new();
     }
     let slope = world.sun.x.hypot(world.sun.y) / world.sun.z;
@@ -166,7 +166,7 @@ fn casters(world: &World) -> Vec<Caster> {
             (p.lateral.abs() < REACH + length + radius).then(|| Caster {
                 primitive: *primitive,
                 s: *s,
-                // Street coordinates stretch inside a bend.
+                // Street coordinates are stretched on the inside of a bend.
                 reach: 1.8 * (radius + length) + 2.0,
                 middle: (primitive.position[0], primitive.position[1]),
                 radius,
@@ -177,7 +177,7 @@ fn casters(world: &World) -> Vec<Caster> {
 }
 
 impl Foot {
-    /// The foot of an object.
+    /// The footprint of an object.
     pub(crate) fn of(world: &World, object: &SceneObject) -> Self {
         let t = object.world_from_object.translation();
         let forward = object.world_from_object.rotate(&Vector3::x());
@@ -202,7 +202,7 @@ impl Foot {
         }
     }
 
-    /// Share of the sky it leaves to the ground at a place.
+    /// Share of the sky that is still visible from the ground at a place.
     #[inline]
     pub(crate) fn open_at(&self, x: f64, y: f64) -> f32 {
         let (dx, dy) = ((x - self.middle.0) as f32, (y - self.middle.1) as f32);
@@ -276,7 +276,8 @@ impl Row {
         )
     }
 
-    /// The cells whose laterals are in all of these ranges, each given as value + slope · lateral within bounds.
+    /// The cells whose lateral position is in all of these ranges, each given as [value, slope, least, most] with least ≤ value + slope ·
+    /// lateral ≤ most.
     fn columns(&self, ranges: [[f64; 4]; 2]) -> std::ops::Range<usize> {
         let (mut low, mut high) = (-f64::from(REACH), f64::from(REACH));
         for [value, slope, least, most] in ranges {
@@ -293,13 +294,13 @@ impl Row {
         if low > high {
             return 0..0;
         }
-        // One more on each side: the exact test follows.
+        // One more on each side, since an exact test follows.
         let column = |lateral: f64| (lateral + f64::from(REACH)) / f64::from(CELL);
         let first = (column(low) - 1.5).max(0.0) as usize;
         first..((column(high) + 1.5) as usize).min(ACROSS)
     }
 
-    /// Marks what a caster keeps the sun from.
+    /// Marks the cells in the shadow of a caster.
     fn shade(&self, world: &World, caster: &Caster, shaded: &mut [bool]) {
         let sun = world.sun;
         let flat = sun.x.hypot(sun.y);
@@ -326,7 +327,7 @@ impl Row {
                 continue;
             }
             let (x, y) = self.place(column);
-            // The ray's foot passes the caster's circle, on the sun's side.
+            // Skip unless the ray towards the sun passes over the caster's circle.
             let (dx, dy) = ((caster.middle.0 - x) as f32, (caster.middle.1 - y) as f32);
             let along = (dx * sun.x + dy * sun.y) / flat;
             let across = (dx * sun.y - dy * sun.x) / flat;
@@ -338,14 +339,14 @@ impl Row {
             }
             let ground = Vector3::new(x, y, f64::from(world.road.kerb));
             let o = caster.primitive.local_point(&ground);
-            // Within a solid's own foot there is no entry; the other face counts then.
+            // A ray from within the solid's footprint has no entry; the solid still shades it.
             let d = caster.primitive.local_of(&sun);
             shaded[column] = enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
                 || inside_foot(&caster.primitive.shape, &o);
         }
     }
 
-    /// Takes from the sky what a foot takes.
+    /// Darkens the sky of the cells beside a footprint.
     fn close(&self, foot: &Foot, sky: &mut [f32]) {
         let reach = f64::from(foot.half[0] + foot.half[1] + 4.0 * foot.range);
         let (dx, dy) = (foot.middle.0 - self.x, foot.middle.1 - self.y);

@@ -12,13 +12,13 @@ const STEP: f64 = 0.01;
 /// The table begins this long before time 0, so that derivatives exist there.
 const LEAD: f64 = 1.0;
 
-/// Slowest and fastest the car drives, m/s.
+/// Lowest and highest speed of the car, m/s.
 const SPEED: (f64, f64) = (3.0, 14.0);
 
-/// The largest lateral acceleration a driver takes a bend with, m/s².
+/// The largest lateral acceleration that the driver accepts in a bend, m/s².
 const MAX_LATERAL: f64 = 2.3;
 
-/// Where the driver keeps on the road: metres left of the centreline.
+/// Lateral position of the car on the road: metres left of the centreline.
 const LANE: f64 = -1.65;
 
 /// Height of the IMU above the road, metres.
@@ -81,7 +81,7 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
-    /// Drives along `road` from s = 0 for `duration_s` seconds, `pace` times as fast as a street allows.
+    /// Drives along `road` from s = 0 for `duration_s` seconds; `pace` scales the speed (1: as on a street).
     pub(crate) fn simulate(rng: &mut ChaCha8Rng, road: &Road, duration_s: f64, pace: f64) -> Self {
         let wish = Wander::new(rng, 7.0, 9.0, 40.0);
         let mean = rng.random_range(7.5..9.5);
@@ -100,7 +100,7 @@ impl Drive {
             table.push([s, speed, acceleration]);
             let time = step as f64 * STEP - LEAD;
             let command = (0.9 * (wanted(s, time) - speed)).clamp(-2.6, 1.8);
-            // The lag of the pedals bounds the jerk; it keeps the acceleration continuous.
+            // The pedals react with a lag, which bounds the jerk and keeps the acceleration continuous.
             let next = acceleration + STEP / 0.35 * (command - acceleration);
             let middle = 0.5 * (acceleration + next);
             s += STEP * speed + 0.5 * STEP * STEP * acceleration;
@@ -151,7 +151,7 @@ impl Drive {
         let (s, _, acceleration) = self.progress(time_s);
         let (_, _, heading, curvature) = road.centre(s);
         let lateral = LANE + self.lateral.at(s);
-        // The tangent of the driven line: the wheels do not slip.
+        // The tangent of the path driven: the wheels do not slip.
         let drift = self.lateral.slope(s).atan2(1.0 - curvature * lateral);
         (
             heading + drift,

@@ -34,7 +34,7 @@ impl OxtsReading {
         let world_from_body = rotation(yaw, pitch, roll);
         let into = |axes: &Matrix3<f64>, v: &Vector3<f64>| axes.transpose() * v;
         let velocity = into(&world_from_level, &motion.velocity);
-        // An accelerometer feels what holds it up.
+        // An accelerometer measures the force that holds it up.
         let felt = motion.acceleration + Vector3::new(0.0, 0.0, GRAVITY);
         let (body, level) = (
             into(&world_from_body, &felt),

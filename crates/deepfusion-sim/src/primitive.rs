@@ -11,10 +11,10 @@ pub(crate) type V3 = Vector3<f32>;
 pub(crate) const FACE_TOP: u8 = 4;
 /// A curved surface.
 pub(crate) const FACE_ROUND: u8 = 6;
-/// The shells of a crown are this face and those after it; no hull has so many.
+/// The shells of a crown have this number and those after it; no hull has that many faces.
 pub(crate) const FACE_LEAVES: u8 = 100;
 
-/// No solid is thicker, metres.
+/// No solid is thicker than this, metres.
 const THICKEST: f32 = 1000.0;
 
 /// A convex solid bounded by planes n·p ≤ d in its own axes.
@@ -81,7 +81,7 @@ pub(crate) struct Primitive {
     pub shape: Shape,
     /// Index into the scene's materials.
     pub material: u32,
-    /// Varies its texture.
+    /// Seed of its texture.
     pub seed: u32,
     /// Whether it belongs to a dynamic object.
     pub moving: bool,
@@ -90,9 +90,9 @@ pub(crate) struct Primitive {
 /// Where a ray enters a solid.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
-    /// In units of the ray's direction.
+    /// Position along the ray, in units of the ray's direction.
     pub t: f32,
-    /// The face.
+    /// The face that the ray enters by.
     pub face: u8,
 }
 
@@ -111,7 +111,7 @@ impl Primitive {
         V3::new(c * d.x - s * d.y, s * d.x + c * d.y, d.z)
     }
 
-    /// A world point in the solid's axes; subtracted in f64, so far from the origin too.
+    /// A world point in the solid's axes; subtracted in f64, so that it is exact far from the origin.
     pub(crate) fn local_point(&self, p: &Vector3<f64>) -> V3 {
         let d = V3::new(
             (p.x - self.position[0]) as f32,
@@ -149,7 +149,7 @@ impl Primitive {
     }
 }
 
-/// Where a ray from `o` along `d` (the solid's axes) enters the shape, if at t in (0, `limit`).
+/// Where a ray from `o` along `d` (in the solid's axes) enters the shape, if at t in (0, `limit`).
 #[inline(always)]
 pub(crate) fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     match *shape {
@@ -195,7 +195,7 @@ fn enter_box(hx: f32, hy: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Optio
 fn enter_cylinder(radius: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     let a = d.x * d.x + d.y * d.y;
     let b = o.x * d.x + o.y * d.y;
-    // The distance of the ray to the axis from the cross product: no cancellation far away.
+    // The distance of the ray from the axis, by the cross product: it does not cancel far away.
     let cross = o.x * d.y - o.y * d.x;
     let root = radius * radius * a - cross * cross;
     if root <= 0.0 {
@@ -289,7 +289,7 @@ fn enter_hull(hull: &Hull, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
 
 #[inline(always)]
 fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
-    // Seen from the ray's point nearest to the middle, where nothing large cancels.
+    // The origin moves to the point of the ray nearest to the middle, so that large numbers do not cancel.
     let square = d.norm_squared();
     let shift = -o.dot(d) / square;
     let o = o + d * shift;
@@ -320,7 +320,7 @@ fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -
             return found(t);
         }
     }
-    // The balls at the ends: the one the ray meets first.
+    // The balls at the ends: the ray enters the nearer one.
     let ball = |centre: V3| {
         let from = o - centre;
         let b = from.dot(d);
@@ -334,8 +334,8 @@ fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -
     found(ball(half).min(ball(-half)))
 }
 
-/// As [`enter`], of a ray that begins at t = `from`. Where that is within the solid, it is cut there, and the cut shows the
-/// face that the ray would have entered by.
+/// As [`enter`], for a ray that begins at t = `from`. If it begins within the solid, the solid is cut there, and the cut has the face that
+/// the ray would have entered by.
 #[inline]
 pub(crate) fn enter_beyond(
     shape: &Shape,
@@ -345,7 +345,7 @@ pub(crate) fn enter_beyond(
 ) -> Option<Entry> {
     let begin = o + d * from;
     let (near, back) = if contains(shape, hulls, &begin) {
-        // Far enough behind to be outside.
+        // Start again so far behind that the point is surely outside.
         let back = THICKEST / d.norm();
         (begin - d * back, back)
     } else {
@@ -358,7 +358,7 @@ pub(crate) fn enter_beyond(
     })
 }
 
-/// Whether a point (the solid's axes) is within a solid; never of a crown, which is mostly air.
+/// Whether a point (in the solid's axes) is within a solid; false for a crown, which is mostly air.
 #[inline]
 fn contains(shape: &Shape, hulls: &[Hull], p: &V3) -> bool {
     match *shape {
@@ -391,7 +391,7 @@ fn contains(shape: &Shape, hulls: &[Hull], p: &V3) -> bool {
     }
 }
 
-/// Outward normal of the surface at a point (the solid's axes).
+/// Outward normal of the surface at a point (in the solid's axes).
 #[inline]
 pub(crate) fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
     match (shape, face) {
@@ -424,7 +424,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn hulls() -> Vec<Hull> {
-        // A unit box with a slanted front, as a hull.
+        // A box with a slanted front, as a hull.
         let slant = V3::new(1.0, 0.0, 1.0).normalize();
         vec![Hull {
             planes: vec![
@@ -470,15 +470,14 @@ mod tests {
                 let along = (half.dot(p) / half.norm_squared()).clamp(-1.0, 1.0);
                 (p - half * along).norm() - radius
             }
-            // Its holes have a test of their own.
+            // The holes of a crown have their own test.
             Shape::Crown(_) => f32::MIN,
         }
     }
 
     proptest! {
-        /// The entry is on the surface, everything before it is outside, and the normal faces the ray;
-        /// without an entry, the whole ray is outside. Rays from below are not cast (nor tested: an
-        /// upright cylinder has no bottom).
+        /// The entry is on the surface, everything before it is outside, and the normal faces the ray; without an entry, the whole ray is
+        /// outside. Rays from below are neither cast nor tested: an upright cylinder has no bottom.
         #[test]
         fn a_ray_enters_where_the_solid_begins(
             which in 0usize..6, angle in 0.0..std::f32::consts::TAU, distance in 4.0..30.0f32,
@@ -506,7 +505,7 @@ mod tests {
                 prop_assert!(outside(&shape, &hulls, &p).abs() < 1e-3);
                 prop_assert!(normal_at(&shape, &hulls, &p, e.face).dot(&d) < 1e-3);
                 prop_assert!(enter(&shape, &hulls, &o, &d, e.t * 0.999).is_none());
-                // Begun before the entry it is the same; begun just within the solid it is cut there, with the same face.
+                // A ray that begins before the entry has the same entry. One that begins just inside is cut there, with the same face.
                 let beyond = |from: f32| enter_beyond(&shape, &hulls, (&o, &d), (from, 2.0));
                 let before = beyond(0.5 * e.t);
                 prop_assert!(before.is_some_and(|b| (b.t - e.t).abs() < 1e-3 && b.face == e.face));

@@ -11,37 +11,37 @@ use crate::scene::cars::CarModel;
 use crate::scene::{SceneObject, World, upright};
 use nalgebra::Vector3;
 
-/// Someone faces from where they were to where they will be, so long before and after, seconds: corners are turned in twice
+/// A person faces along the line from their position this long before to their position this long after, seconds. So a corner takes twice
 /// this time.
 const TURN_S: f64 = 0.2;
 
-/// Velocities are taken from two positions so far apart, seconds.
+/// Time between the two positions that a velocity is computed from, seconds.
 const VELOCITY_STEP_S: f64 = 1e-3;
 
-/// Someone steps down from a pavement and up to it over this length on the carriageway, metres.
+/// Length on the carriageway over which a person steps down from the pavement or up to it, metres.
 const STEP_DOWN_M: f64 = 0.3;
 
-/// A route at a constant speed: along the street, and at most once straight across it.
+/// A route at constant speed: along the street, and at most once straight across it.
 #[derive(Debug, Clone, Copy)]
 struct Route {
-    /// Metres along the street at time 0, as if nothing had been crossed before.
+    /// Metres along the street at time 0, extrapolated as if there were no crossing.
     s: f64,
-    /// Metres left of the centreline, until something is crossed.
+    /// Metres left of the centreline, before the crossing.
     lateral: f64,
-    /// Along the street, m/s; negative: towards its start.
+    /// Speed along the street, m/s; negative: towards its start.
     rate: f64,
-    /// Where the road is crossed.
+    /// The crossing of the road, if there is one.
     crossing: Option<Crossing>,
 }
 
-/// The way across the road.
+/// A way across the road.
 #[derive(Debug, Clone, Copy)]
 struct Crossing {
-    /// When it begins, seconds.
+    /// Time at which it begins, seconds.
     begins_s: f64,
-    /// How long it takes, seconds.
+    /// Duration, seconds.
     lasts_s: f64,
-    /// Where it leads to, metres left of the centreline.
+    /// Where it ends, metres left of the centreline.
     to: f64,
 }
 
@@ -59,33 +59,33 @@ impl Route {
         )
     }
 
-    /// Whether it leads across the road at a time.
+    /// Whether the person is crossing the road at a time.
     fn crosses_at(&self, time_s: f64) -> bool {
         self.crossing
             .is_some_and(|c| (c.begins_s..=c.begins_s + c.lasts_s).contains(&time_s))
     }
 }
 
-/// Someone on the way.
+/// A person and their route.
 #[derive(Debug, Clone)]
 struct Person {
     model: CarModel,
     seed: u32,
     route: Route,
-    /// From when to when they are on the street, seconds.
+    /// When they are on the street, from and to, seconds.
     during: (f64, f64),
 }
 
-/// Where someone is.
+/// Position and heading of a person.
 #[derive(Debug, Clone, Copy)]
 struct Stance {
     /// Metres along the street.
     s: f64,
-    /// Metres left of its centreline.
+    /// Metres left of the centreline.
     lateral: f64,
-    /// On the ground below them, in the world, metres.
+    /// The ground below them, in the world, metres.
     base: [f64; 3],
-    /// Where they face, against the world's x axis, radians.
+    /// Direction they face, against the world's x axis, radians.
     heading: f64,
 }
 
@@ -111,7 +111,7 @@ impl Person {
         }
     }
 
-    /// Over ground, in the world's axes, m/s.
+    /// Velocity over ground, in the world's axes, m/s.
     fn velocity(&self, road: &Road, time_s: f64) -> Vector3<f64> {
         let [before, after] = [-0.5, 0.5].map(|steps| {
             let stance = self.stance(road, time_s + steps * VELOCITY_STEP_S);
@@ -121,31 +121,31 @@ impl Person {
     }
 }
 
-/// Height of what someone stands on: the carriageway, what is beside it, or the step between them, as a slope.
+/// Height of the ground that a person stands on: carriageway, pavement, or a slope between them.
 fn ground(road: &Road, x: f64, y: f64) -> f64 {
     let beyond = f64::from(road.kerb_distance(&road.locate(x, y)));
     f64::from(road.kerb) * (1.0 + beyond / STEP_DOWN_M).clamp(0.0, 1.0)
 }
 
-/// All who ride and walk.
+/// All people who ride and walk.
 #[derive(Default)]
 pub(crate) struct Riders {
     people: Vec<Person>,
 }
 
 impl Riders {
-    /// How many there are.
+    /// Number of people.
     pub(crate) fn count(&self) -> usize {
         self.people.len()
     }
 
-    /// Those who are on the street at a time.
+    /// The people who are on the street at a time.
     fn present(&self, time_s: f64) -> impl Iterator<Item = (usize, &Person)> {
         let all = self.people.iter().enumerate();
         all.filter(move |(_, person)| person.is_there(time_s))
     }
 
-    /// The solids, at a time, of those who are on the street at `present_s`: the same people a moment later.
+    /// The solids at `time_s` of the people who are on the street at `present_s`.
     pub(crate) fn solids(&self, world: &World, time_s: f64, present_s: f64) -> Vec<Primitive> {
         self.present(present_s)
             .flat_map(|(_, person)| {
@@ -157,7 +157,7 @@ impl Riders {
             .collect()
     }
 
-    /// Their boxes and velocities at a time; the first one's identity is `first_id`.
+    /// The boxes and velocities of the people at a time; ids start at `first_id`.
     pub(crate) fn objects(&self, world: &World, time_s: f64, first_id: usize) -> Vec<SceneObject> {
         self.present(time_s)
             .map(|(index, person)| {

@@ -4,7 +4,7 @@ use crate::motion::{IMU_HEIGHT, rotation};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Vector3};
 
-/// Height of camera 2 above the road where nothing else is asked for, metres.
+/// Default height of camera 2 above the road, metres.
 pub(crate) const CAMERA_HEIGHT: f64 = 1.65;
 
 /// Camera 2 sits this far left of camera 0, metres (KITTI's P_rect_02 has the same 6 cm).
@@ -22,7 +22,7 @@ pub struct Rig {
     pub cam0_from_velo: Se3,
     /// Velodyne from the IMU.
     pub velo_from_imu: Se3,
-    /// The 6-axis unit in the sensor head from the IMU; the same where there is but one.
+    /// The 6-axis unit in the sensor head from the IMU; the identity if the IMU is the only unit.
     pub head_imu_from_imu: Se3,
 }
 
@@ -37,7 +37,7 @@ impl Rig {
             Se3::from_axis_angle(Vector3::zeros(), Vector3::new(-0.004, -0.076, -0.272))
                 * cam0_from_vehicle_axes
                 * tilt;
-        // The IMU's axes are the vehicle's; its place is given by the height of the camera.
+        // The IMU's axes are the vehicle's; its position follows from the camera's height.
         let velo_in_vehicle = Vector3::new(0.81, -0.32, camera_height_m + 0.076 - IMU_HEIGHT);
         let velo_from_imu =
             tilt.inverse() * Se3::from_axis_angle(Vector3::zeros(), -velo_in_vehicle);
@@ -48,8 +48,8 @@ impl Rig {
         }
     }
 
-    /// UMAD's arrangement on a roof: the camera 80 mm above the LiDAR, a 6-axis unit 50 mm behind it, all of them
-    /// 1.6 m before the rear axle; the LiDAR turned against the car by fractions of a degree.
+    /// UMAD's arrangement on a roof: the camera 80 mm above the LiDAR, a 6-axis unit 50 mm behind it, all of them 1.6 m ahead of the rear
+    /// axle; the LiDAR turned against the car by fractions of a degree.
     pub fn umad_like(camera_height_m: f64) -> Self {
         let axes = VEHICLE_FROM_CAM_AXES.transpose();
         let cam_axes_from_vehicle_axes = Se3::from_parts(&axes, Vector3::zeros());
@@ -63,7 +63,8 @@ impl Rig {
         }
     }
 
-    /// The same with camera 2 turned about its own centre: so far down, and clockwise as it looks, radians. The other sensors stay.
+    /// The same rig with camera 2 turned about its own centre, in radians: `pitch` turns it down, `roll` clockwise in the viewing
+    /// direction. The other sensors keep their poses.
     pub(crate) fn with_camera_turned(self, pitch: f64, roll: f64) -> Self {
         let axes = VEHICLE_FROM_CAM_AXES;
         let level_from_turned = axes.transpose() * rotation(0.0, pitch, roll) * axes;
@@ -159,7 +160,7 @@ mod tests {
             );
             assert!((before.translation() - after.translation()).norm() < 1e-9);
             let (forward, right) = (after.rotate(&Vector3::z()), after.rotate(&Vector3::x()));
-            // Down by the pitch, not aside; and clockwise: the right side is the lower one.
+            // Pitch turns it down and not sideways; roll turns it clockwise, so its right side is lower.
             assert!((forward.z + 0.1f64.sin()).abs() < 1e-9 && forward.y.abs() < 1e-9);
             let lower = 0.1f64.cos() * 0.05f64.sin();
             assert!((right.z + lower).abs() < 1e-9, "{right}");

@@ -19,7 +19,7 @@ const CELL: f64 = 4.0;
 /// Half the width of the look-up grid across the road, in cells.
 const CELL_REACH: i64 = 36;
 
-/// How far a side street goes, measured from the centreline, in metres.
+/// Length of a side street, measured from the centreline, in metres.
 pub(crate) const SIDE_STREET_LENGTH: f32 = 75.0;
 
 /// Largest heading of the road against the world's x axis, in radians: a road that never turns back
@@ -41,16 +41,16 @@ pub(crate) struct RoadSample {
     pub half_width: f32,
     /// Width of the pavements, metres: right, left.
     pub pavement: [f32; 2],
-    /// Width of a strip of grass between kerb and pavement, metres: right, left.
+    /// Width of the strips of grass between kerb and pavement, metres: right, left.
     pub verge: [f32; 2],
-    /// Index into [`Road::side_streets`] + 1 of a side street nearby; 0: none. Right, left.
+    /// Index into [`Road::side_streets`] + 1 of a nearby side street, or 0: right, left.
     side_street: [u16; 2],
 }
 
 /// A street that leaves the main one at a right angle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SideStreet {
-    /// Where it leaves, metres along the centreline.
+    /// Position of the junction, metres along the centreline.
     pub s: f32,
     /// 0: to the right, 1: to the left.
     pub side: usize,
@@ -73,10 +73,10 @@ pub(crate) struct StreetPoint {
 pub(crate) struct Road {
     /// `s` of the first sample, metres (negative: the street begins behind the start).
     pub start: f64,
-    /// Height of everything beside the carriageway above it, metres.
+    /// Height of the ground beside the carriageway above it, metres.
     pub kerb: f32,
     samples: Vec<RoadSample>,
-    /// Unit tangents and curvature again, in f32 and packed for the renderer.
+    /// Unit tangents, curvature and widths again, in f32 and packed for the renderer.
     packed: Vec<[f32; 5]>,
     side_streets: Vec<SideStreet>,
     grid: Vec<Vec<u32>>,
@@ -96,7 +96,7 @@ impl Road {
         Self::curved(&vec![0.0; count], start)
     }
 
-    /// The same, of gentle bends: as a motorway or a country road, with radii of 150 to 1500 m.
+    /// A road with gentle bends from `start` to at least `end` (metres): a motorway or a country road, with radii of 150 to 1500 m.
     pub(crate) fn gentle(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
         let count = ((end - start) / STEP).ceil() as usize + 2;
         let scale: f64 = rng.random_range(0.08..0.4);
@@ -107,7 +107,7 @@ impl Road {
         Self::curved(&profile, start)
     }
 
-    /// A centreline of these curvatures.
+    /// A centreline with these curvatures.
     fn curved(curvature: &[f64], start: f64) -> Self {
         let count = curvature.len();
         let mut samples = Vec::with_capacity(count);
@@ -237,20 +237,20 @@ impl Road {
     pub(crate) fn locate(&self, x: f64, y: f64) -> StreetPoint {
         let column = (((x - self.grid_x0) / CELL).max(0.0) as usize).min(self.grid.len() - 1);
         let cells = &self.grid[column];
-        // The column's first entry is the centreline's own cell row, the rest the hints.
+        // The first entry of a column is the row of the centreline; the others are hints.
         let row = (y / CELL).floor() as i64 - i64::from(cells[0] as i32) + CELL_REACH;
         let row = row.clamp(0, 2 * CELL_REACH) as usize;
         self.locate_from(x, y, cells[1 + row] as usize)
     }
 
-    /// The same, from the index of a sample nearby.
+    /// As [`Road::locate`], from the index of a sample nearby.
     #[inline]
     pub(crate) fn locate_from(&self, x: f64, y: f64, hint: usize) -> StreetPoint {
         let last = self.packed.len() - 1;
         let mut index = hint.min(last);
         let (mut along, mut lateral, mut stretch) = self.offsets(x, y, index);
         for _ in 0..5 {
-            // A hair over half a step, or a point in the middle of two samples swings between them.
+            // Slightly more than half a step: otherwise a point midway between two samples would alternate between them.
             if along.abs() <= 0.502 * STEP as f32 {
                 break;
             }
@@ -266,13 +266,13 @@ impl Road {
         StreetPoint {
             index,
             s: (self.start + index as f64 * STEP) as f32 + along,
-            // The centreline leaves its tangent by k·along²/2.
+            // The centreline deviates from its tangent by k·along²/2.
             lateral: lateral - 0.5 * k * along * along * stretch,
         }
     }
 
-    /// Metres along the centreline from a sample to a point, metres to its left, and how much
-    /// shorter the centreline's step is there.
+    /// Metres along the centreline from a sample to a point, metres to the left of the centreline, and the length of a parallel through the
+    /// point as a share of the centreline's.
     #[inline]
     fn offsets(&self, x: f64, y: f64, index: usize) -> (f32, f32, f32) {
         let sample = &self.samples[index];
@@ -310,7 +310,7 @@ impl Road {
         width + slope * along
     }
 
-    /// Builds the look-up tables; call it after any change of the samples.
+    /// Builds the look-up tables. Call it after any change of the samples.
     pub(crate) fn index(&mut self) {
         let n = self.samples.len();
         self.packed = (0..n)
@@ -349,7 +349,7 @@ impl Road {
             .collect();
     }
 
-    /// Index of the sample nearest to a point, among those within reach of `middle`.
+    /// Index of the sample nearest to a point, among those near `middle`.
     fn nearest(&self, x: f64, y: f64, middle: usize) -> usize {
         let away = (y - self.samples[middle].y).abs();
         let reach = ((away / STEP) as usize + 20) / 2 * 2;
@@ -376,7 +376,7 @@ fn curvature_profile(rng: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
     let mut curvature = vec![0.0; count];
     let (mut position, mut heading) = (rng.random_range(20.0..70.0), 0.0f64);
     while position < count as f64 * STEP {
-        // Turn towards a new heading; the further off the axis, the likelier back.
+        // Turn towards a new heading. The farther the road is off the axis, the more likely it turns back.
         let target: f64 = rng.random_range(-MAX_HEADING..MAX_HEADING);
         let turn = target - heading;
         let radius: f64 = if rng.random_bool(0.35) {

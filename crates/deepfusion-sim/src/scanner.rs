@@ -8,7 +8,7 @@ use crate::texture::noise::hash;
 use deepfusion_geometry::Se3;
 use nalgebra::Matrix3;
 
-/// Sectors of azimuth that share a list of candidates.
+/// Sectors of azimuth, each with its list of candidate solids.
 const SECTORS: usize = 240;
 
 /// A scanner at one place and instant.
@@ -16,11 +16,11 @@ pub(crate) struct Scanner<'a> {
     eye: Eye<'a>,
     light: &'a GroundLight,
     air: Air,
-    /// Angle that a ray stands for, radians.
+    /// Angle between neighbouring rays, radians.
     pixel: f32,
-    /// Candidates of each sector, nearest first.
+    /// Candidates of each sector (indices of solids), nearest first.
     lists: Vec<Vec<u32>>,
-    /// For each solid, its number among the moving ones.
+    /// For each solid, its index among the moving ones.
     moving: Vec<Option<u32>>,
     world_from_sensor: Matrix3<f32>,
 }
@@ -34,12 +34,12 @@ pub(crate) struct Echo {
     pub brightness: f32,
     /// The ray in world axes, unit length.
     pub direction: V3,
-    /// Number of the solid among the moving ones, where it is one.
+    /// Index of the solid among the moving ones, if it is one.
     pub moving: Option<u32>,
 }
 
 impl<'a> Scanner<'a> {
-    /// A scanner that sees as far as `reach` metres; `pixel` is the angle that one ray stands for.
+    /// A scanner with a range of `reach` metres; `pixel` is the angle between neighbouring rays.
     pub(crate) fn new(
         world: &'a World,
         light: &'a GroundLight,
@@ -48,7 +48,7 @@ impl<'a> Scanner<'a> {
         (reach, pixel): (f32, f32),
     ) -> Self {
         let position = world_from_sensor.translation();
-        // It turns: what is behind counts as well, a large thing's middle included.
+        // The scanner turns, so solids behind it count too, and large ones whose middle is out of reach.
         let all = gather(world, moving, &position, reach + LARGEST_M);
         let first_moving = all.len() - moving.len();
         let mut solids: Vec<(FrameSolid, f32, f32, Option<u32>)> = all
@@ -63,7 +63,7 @@ impl<'a> Scanner<'a> {
                 if away - radius > reach {
                     return None;
                 }
-                // Half the angle it covers; everything around where the scanner is over it.
+                // Half the angle that the solid covers; the full circle if the scanner is above it.
                 let half = if away > radius * 1.001 {
                     (radius / away).asin()
                 } else {
@@ -103,7 +103,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// The first surface along a ray of the sensor's axes (unit length), unless that is the sky.
+    /// The first surface along a ray (unit length, in the sensor's axes); `None` for the sky.
     pub(crate) fn cast(&self, local: &V3) -> Option<Echo> {
         let direction = self.world_from_sensor * local;
         let heading = direction.y.atan2(direction.x);
@@ -135,7 +135,7 @@ impl<'a> Scanner<'a> {
     }
 }
 
-/// A standard normal number by Box and Muller's method.
+/// A standard normal number, by the Box–Muller method.
 pub(crate) fn gaussian(code: u32, key: u32) -> f32 {
     let other = hash(code as i32, 17, key);
     let a = ((code >> 8) as f32 + 0.5) / 16_777_216.0;

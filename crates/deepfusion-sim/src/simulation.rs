@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The street begins this far behind the car and ends this far beyond the drive, metres.
+/// The street begins this far behind the car's start and ends this far beyond the end of the drive, metres.
 const LEAD_IN: f64 = 60.0;
 const LEAD_OUT: f64 = 430.0;
 
@@ -37,7 +37,7 @@ pub struct SimFrame {
     pub moving: Vec<bool>,
     /// Camera (x right, y down, z forward) to world (z up), metres.
     pub world_from_cam: Se3,
-    /// Time of the picture, seconds since the drive's begin.
+    /// Time of the picture, seconds since the start of the drive.
     pub time_s: f64,
     /// Speed of the car (of its IMU), m/s.
     pub speed_mps: f64,
@@ -56,17 +56,17 @@ pub struct Simulation {
     riders: Riders,
     rig: Rig,
     intrinsics: Intrinsics,
-    /// Of a varied drive.
+    /// What a varied drive drew; `None` for a plain one.
     look: Option<DriveLook>,
     times: Vec<f64>,
 }
 
 impl Simulation {
-    /// Lays out the street and the drive; the world is varied where [`SimConfig::varied`] says so.
+    /// Lays out the street and the drive; the world is varied if [`SimConfig::varied`] is set.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a setting is out of range; [`crate::Error::Varied`] for a scene that such a drive does not lead through, and
-    /// for what a varied drive cannot have.
+    /// [`crate::Error::Config`] for a setting out of range; [`crate::Error::Varied`] for a scene that a drive cannot lead through, and for
+    /// a setting that a varied drive cannot have.
     pub fn new(config: &SimConfig) -> Result<Self> {
         config.check_scene()?;
         let variety = if config.varied {
@@ -77,11 +77,11 @@ impl Simulation {
         Self::varied(config, &variety)
     }
 
-    /// As [`Simulation::new`], through a world that is varied in this way, of any scene; with [`Variety::none`] and without [`SimConfig::varied`]
-    /// both are the same, for the scenes that `new` takes.
+    /// As [`Simulation::new`], through a world of any scene that is varied in this way. With [`Variety::none`] and without
+    /// [`SimConfig::varied`] both are the same, for the scenes that `new` takes.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a setting is out of range; [`crate::Error::Varied`] for what a varied drive cannot have.
+    /// [`crate::Error::Config`] for a setting out of range; [`crate::Error::Varied`] for a setting that a varied drive cannot have.
     pub fn varied(config: &SimConfig, variety: &Variety) -> Result<Self> {
         config.validate()?;
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
@@ -157,7 +157,7 @@ impl Simulation {
         self.look.as_ref().map(DriveLook::drawn)
     }
 
-    /// How many cars move: [`SimConfig::moving_cars`], but in a varied drive cars whose way is blocked are left out.
+    /// Number of moving cars: [`SimConfig::moving_cars`], but a varied drive leaves out cars whose way is blocked.
     #[must_use]
     pub fn moving_cars(&self) -> usize {
         self.traffic.count()
@@ -184,7 +184,7 @@ impl Simulation {
     /// Time of a frame, seconds since the first.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn time_s(&self, frame: usize) -> f64 {
         self.times[frame]
@@ -193,7 +193,7 @@ impl Simulation {
     /// World (x east, y north, z up, metres) from the camera at a frame.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn world_from_cam(&self, frame: usize) -> Se3 {
         self.world_from_imu(frame) * self.rig.cam_from_imu().inverse()
@@ -202,7 +202,7 @@ impl Simulation {
     /// World from the IMU (x forward, y left, z up) at a frame.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn world_from_imu(&self, frame: usize) -> Se3 {
         self.drive
@@ -212,7 +212,7 @@ impl Simulation {
     /// World from the velodyne (x forward, y left, z up) at a frame.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn world_from_velo(&self, frame: usize) -> Se3 {
         self.world_from_imu(frame) * self.rig.velo_from_imu.inverse()
@@ -221,7 +221,7 @@ impl Simulation {
     /// The inertial unit's reading at a frame.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn oxts(&self, frame: usize) -> OxtsReading {
         OxtsReading::at(&self.drive, &self.world.road, self.times[frame])
@@ -230,17 +230,17 @@ impl Simulation {
     /// The picture of a frame with its exact depth.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn frame(&self, frame: usize) -> SimFrame {
         self.seen_from(frame, self.world_from_cam(frame))
     }
 
-    /// The picture of the second camera at a frame, with its exact depth; the first one's without a
-    /// [`SimConfig::stereo_baseline_m`].
+    /// The picture of the second camera at a frame, with its exact depth. Without a [`SimConfig::stereo_baseline_m`] it is that of the
+    /// first camera.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn right_frame(&self, frame: usize) -> SimFrame {
         let to_the_right = Vector3::new(self.config.stereo_baseline_m, 0.0, 0.0);
@@ -248,7 +248,7 @@ impl Simulation {
         self.seen_from(frame, self.world_from_cam(frame) * cam_from_right)
     }
 
-    /// What a camera sees from a pose, in the world of a frame's time.
+    /// What a camera with this pose sees at the time of a frame.
     fn seen_from(&self, frame: usize, world_from_cam: Se3) -> SimFrame {
         let time_s = self.times[frame];
         let solids = self.moving_solids(time_s);
@@ -282,7 +282,7 @@ impl Simulation {
     /// One turn of the velodyne at a frame's instant: points in its axes, metres, with intensity.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn velodyne(&self, frame: usize) -> PointCloud {
         let solids = self.moving_solids(self.times[frame]);
@@ -297,8 +297,8 @@ impl Simulation {
         )
     }
 
-    /// One scan of an FMCW LiDAR at the velodyne's position at a time, in seconds since the drive's begin,
-    /// with each point's ground truth.
+    /// One scan of an FMCW LiDAR at the velodyne's position, with each point's ground truth. `time_s` is in seconds since the start of the
+    /// drive.
     #[must_use]
     pub fn fmcw(&self, time_s: f64) -> FmcwScan {
         self.fmcw_with_columns(time_s, fmcw::COLUMN_STEP_DEG)
@@ -309,7 +309,7 @@ impl Simulation {
         let velo_from_imu = self.rig.velo_from_imu;
         let motion = BodyMotion::at(|t| self.imu_at(t) * velo_from_imu.inverse(), time_s);
         let later_s = time_s + VELOCITY_STEP_S;
-        // Those that are there now, a millisecond later too: each is held against itself.
+        // A velocity is the difference between an object's positions now and a moment later, so both lists contain the objects present now.
         let cars = |at_s| self.traffic.solids_at(&self.world, at_s, time_s);
         let (mut now, mut later) = (cars(time_s), cars(later_s));
         let people = |at_s| self.riders.solids(&self.world, at_s, time_s);
@@ -366,7 +366,7 @@ impl Simulation {
         (0..self.readings(STEERING_RATE_HZ)).map(reading).collect()
     }
 
-    /// How many readings at a rate cover the drive.
+    /// Number of readings at a rate that cover the drive.
     fn readings(&self, rate_hz: f64) -> usize {
         (self.times[self.times.len() - 1] * rate_hz).ceil() as usize + 1
     }
@@ -383,11 +383,11 @@ impl Simulation {
         (motion.velocity.xy().norm(), yaw_rate)
     }
 
-    /// Everything on the street at a frame, static or dynamic, with exact boxes. In a varied drive they also hold what of an object was cut
-    /// away over the camera's lane, as of a tree's crown.
+    /// All objects on the street at a frame, static or dynamic, with exact boxes. In a varied drive the boxes cover whole objects,
+    /// including parts that were cut away over the camera's lane, such as a part of a tree's crown.
     ///
     /// # Panics
-    /// Where there is no such frame.
+    /// If the drive has no such frame.
     #[must_use]
     pub fn objects(&self, frame: usize) -> Vec<SceneObject> {
         let mut objects = self.world.objects.clone();
@@ -395,24 +395,24 @@ impl Simulation {
         objects
     }
 
-    /// The solids of everything that moves, at a time.
+    /// The solids of all dynamic objects at a time.
     fn moving_solids(&self, time_s: f64) -> Vec<Primitive> {
         let mut solids = self.traffic.solids(&self.world, time_s);
         solids.extend(self.riders.solids(&self.world, time_s, time_s));
         solids
     }
 
-    /// The boxes of everything that moves, at a time.
+    /// The boxes of all dynamic objects at a time.
     fn moving_objects(&self, time_s: f64) -> Vec<SceneObject> {
         let mut objects = self.traffic.objects(&self.world, time_s);
-        // After everything that stands, and the cars.
+        // Their ids follow those of the static objects and of the cars.
         let first_id = self.world.objects.len() + self.traffic.count();
         objects.extend(self.riders.objects(&self.world, time_s, first_id));
         objects
     }
 }
 
-/// Frame times: 1 / fps apart, give or take a millisecond.
+/// Frame times: 1 / fps apart, ±1 ms.
 fn frame_times(rng: &mut ChaCha8Rng, config: &SimConfig) -> Vec<f64> {
     let jitter = 0.001f64.min(0.05 / config.fps);
     (0..config.frames)
@@ -427,7 +427,7 @@ fn frame_times(rng: &mut ChaCha8Rng, config: &SimConfig) -> Vec<f64> {
         .collect()
 }
 
-/// When a drive of these frames is looked at, seconds: at its frames, and where it becomes a bag at its scans.
+/// Times at which the drive is observed, seconds: its frames, and the scans of a bag.
 fn looked_at(frames: &[f64]) -> Vec<f64> {
     let end_s = frames.last().copied().unwrap_or_default();
     let scans = (0u32..)
@@ -448,7 +448,7 @@ mod tests {
         assert_eq!(found, [0.0, 0.3, 0.0, 0.1, 0.2, 0.3]);
     }
 
-    /// Who is before the camera at a scan is there at the next one, too, though frames are half a second apart.
+    /// A car ahead of the camera at one scan is also there at the next one, although frames are half a second apart.
     #[test]
     fn no_car_vanishes_from_scan_to_scan() {
         let simulation = Simulation::new(&SimConfig {
@@ -487,6 +487,6 @@ mod tests {
                 assert!(all(now).contains(&id), "{id} at {next}");
             }
         }
-        assert!(met > 20, "{met} cars in scans");
+        assert!(met > 20, "only {met} cars in scans");
     }
 }

@@ -8,11 +8,11 @@ use std::fmt::Write;
 /// Boxes whose middle is farther than this from the velodyne are not listed, metres.
 const REACH_M: f64 = 80.0;
 
-/// An object while it is in reach, without a gap.
+/// An object during consecutive frames in which it is within reach.
 struct Stretch {
     object: SceneObject,
     first_frame: usize,
-    /// Bottom's centre and turn about z, in the velodyne's axes.
+    /// Centre of its underside, and its heading about z, in the velodyne's axes.
     poses: Vec<(Vector3<f64>, f64)>,
 }
 
@@ -71,7 +71,7 @@ fn stretches(simulation: &Simulation) -> Vec<Stretch> {
             stretch.poses.push(pose);
             seen.insert(object.id, stretch);
         }
-        // What was not seen in this frame has gone out of reach.
+        // Objects not seen in this frame are out of reach.
         closed.extend(std::mem::replace(&mut open, seen).into_values());
     }
     closed.extend(open.into_values());

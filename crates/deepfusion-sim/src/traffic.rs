@@ -7,16 +7,16 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Where the lanes are, metres left of the centreline.
+/// Positions of the lanes, metres left of the centreline.
 const LANE: f64 = 1.65;
 
-/// Vehicles up to this length need no more room than [`GAP`] gives, metres.
+/// Vehicles up to this length need no more room than [`GAP`], metres.
 const LONG: f64 = 5.0;
 
 /// Distance kept between two cars of one lane, metres.
 const GAP: f64 = 13.0;
 
-/// The cars of a varied drive neither come nor go within this distance, metres before the camera along the street.
+/// Cars of a varied drive never appear or disappear in this range, metres ahead of the camera along the street.
 const SEEN: (f64, f64) = (-20.0, 150.0);
 
 /// One moving car: constant speed along its lane.
@@ -25,7 +25,7 @@ struct MovingCar {
     seed: u32,
     /// Metres along the street at time 0.
     s: f64,
-    /// Along the street, m/s; negative: towards the start.
+    /// Speed along the street, m/s; negative: towards the start.
     speed: f64,
     lateral: f64,
 }
@@ -36,8 +36,8 @@ pub(crate) struct Traffic {
 }
 
 impl Traffic {
-    /// `count` cars around a drive of `duration_s` seconds. All cars of one lane have one speed, so
-    /// that none runs into another; the ones ahead stay ahead of the camera.
+    /// `count` cars around a drive of `duration_s` seconds. All cars of a lane have the same speed, so that none runs into another. The
+    /// ones ahead stay ahead of the camera.
     pub(crate) fn new(
         rng: &mut ChaCha8Rng,
         world: &World,
@@ -49,7 +49,7 @@ impl Traffic {
         let travelled = drive.progress(duration_s).0;
         let with = (travelled / duration_s.max(0.1)).clamp(3.0 * pace, 14.0);
         let against = -pace * rng.random_range(6.0..11.0);
-        // The first car ahead starts so far on that the camera never comes nearer than a few metres.
+        // The first car starts far enough ahead that the camera always stays some metres behind it.
         let closest = (0..=(duration_s * 10.0) as usize)
             .map(|i| {
                 let t = i as f64 * 0.1;
@@ -58,7 +58,7 @@ impl Traffic {
             .fold(0.0, f64::max);
         let mut ahead = closest + rng.random_range(11.0..18.0);
         let oncoming = count - count / 3;
-        // Oncoming cars are met evenly over the drive.
+        // Oncoming cars pass at even intervals.
         let spread = ((travelled - against * duration_s) / oncoming.max(1) as f64).clamp(GAP, 60.0);
         let mut towards = rng.random_range(18.0..40.0);
         let cars = (0..count)
@@ -86,8 +86,7 @@ impl Traffic {
         traffic
     }
 
-    /// Makes room for long vehicles, and drives on the world's own lanes where it has any. Changes nothing for cars on
-    /// a plain street.
+    /// Makes room for long vehicles, and moves cars to the world's own lanes if it has any. Changes nothing for cars on a plain street.
     fn settle(&mut self, world: &World, pace: f64) {
         if !world.rooms.is_empty() {
             self.cars.clear();
@@ -117,8 +116,8 @@ impl Traffic {
         }
     }
 
-    /// Leaves out whoever would drive into something that stands, on a varied street, within 150 m before the camera of a drive: nobody
-    /// vanishes there at any of these times, seconds. Changes nothing on a plain street.
+    /// On a varied street, leaves out each car that would collide with something static while it is within 150 m ahead of the camera at one
+    /// of these times, seconds: so none disappears there. Changes nothing on a plain street.
     pub(crate) fn keep_passing(&mut self, world: &World, drive: &Drive, times: &[f64]) {
         if world.crowd.is_empty() {
             return;
@@ -132,9 +131,9 @@ impl Traffic {
         });
     }
 
-    /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at
-    /// `speed` m/s: vehicles ahead in its lane, at least `nearest` metres away, others beside it and towards it.
-    /// Nothing stands in parked cars. `density` in [0, 1].
+    /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at `speed` m/s: vehicles
+    /// ahead in its lane, at least `nearest` metres away, and others beside it and towards it. None overlaps a static object. `density` is
+    /// in [0, 1].
     pub(crate) fn around(
         rng: &mut ChaCha8Rng,
         world: &World,
@@ -150,7 +149,7 @@ impl Traffic {
             let forward = lane.forward;
             let own = forward && (lane.lateral + LANE).abs() < 1.0;
             let pace = speed.max(3.0) * rng.random_range(0.75..1.1);
-            // The same speed in the camera's lane keeps the distance.
+            // In the camera's own lane equal speeds keep the distance.
             let pace = match (forward, own) {
                 (true, true) => speed,
                 (true, false) => pace * rng.random_range(1.0..1.3),
@@ -181,12 +180,12 @@ impl Traffic {
         traffic
     }
 
-    /// How many cars there are, those included that are not on the street at a time.
+    /// Number of cars, including those that are not on the street at a time.
     pub(crate) fn count(&self) -> usize {
         self.cars.len()
     }
 
-    /// The cars that are on the street at a time, each where it is `at_s`.
+    /// The cars that are on the street at `time_s`, each at its position at `at_s`.
     fn present<'a>(
         &'a self,
         world: &'a World,
@@ -202,7 +201,7 @@ impl Traffic {
                 if s < road.start + 5.0 || s > road.end() - 5.0 {
                     return None;
                 }
-                // Varied streets are narrow in places: whoever meets a parked car there has turned off before.
+                // Varied streets are narrow in places: a car that would hit a parked one is taken to have turned off.
                 if !world.crowd.is_empty() && !fits(world, car, s) {
                     return None;
                 }
@@ -216,12 +215,12 @@ impl Traffic {
             })
     }
 
-    /// Their solids at a time.
+    /// The solids of the cars at a time.
     pub(crate) fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
         self.solids_at(world, time_s, time_s)
     }
 
-    /// The solids at a time of the cars that are on the street at another.
+    /// The solids at `at_s` of the cars that are on the street at `present_s`.
     pub(crate) fn solids_at(&self, world: &World, at_s: f64, present_s: f64) -> Vec<Primitive> {
         self.present(world, present_s, at_s)
             .flat_map(|(_, car, base, heading)| {
@@ -230,7 +229,7 @@ impl Traffic {
             .collect()
     }
 
-    /// Their boxes and velocities at a time.
+    /// The boxes and velocities of the cars at a time.
     pub(crate) fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
         self.present(world, time_s, time_s)
             .map(|(index, car, base, heading)| {
@@ -240,7 +239,7 @@ impl Traffic {
                 let curvature = world.road.centre(s).3;
                 let speed = car.speed.abs() * (1.0 - curvature * car.lateral);
                 SceneObject {
-                    // After everything that stands.
+                    // Ids follow those of the static objects.
                     id: (world.objects.len() + index) as u64,
                     class: world.models[car.model].class,
                     world_from_object: upright(base, heading, size[2]),
@@ -252,7 +251,7 @@ impl Traffic {
     }
 }
 
-/// Whether a car at `s` metres along the street is on its carriageway and in nothing that stands still.
+/// Whether a car at `s` metres along the street is on the carriageway and overlaps no static object.
 fn fits(world: &World, car: &MovingCar, s: f64) -> bool {
     let (x, y, heading) = world.road.world(s, car.lateral);
     let size = world.models[car.model].size.map(f64::from);
@@ -268,7 +267,7 @@ fn fits(world: &World, car: &MovingCar, s: f64) -> bool {
             let t = object.world_from_object.translation();
             let (dx, dy) = (t.x - x, t.y - y);
             let reach = object.size[0].hypot(object.size[1]) * 0.5 + half[0] + 1.0;
-            // Crowns and arms hang over the road.
+            // Tree crowns and lamp arms hang over the road.
             let low = object.size[2] < 2.6 || object.class.is_traffic();
             if !low || dx.hypot(dy) > reach {
                 return false;

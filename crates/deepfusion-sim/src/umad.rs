@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Noon of the first of January 2026, UTC, in nanoseconds since 1970: time 0 of every drive.
 const EPOCH_NS: i64 = 1_767_268_800_000_000_000;
 
-/// What the vehicle calls moving: a point whose speed over ground along its ray exceeds this, m/s.
+/// A point is dynamic if its speed over ground along its ray exceeds this, m/s.
 const DYNAMIC_MPS: f32 = 0.5;
 
 /// Frames rendered and encoded together.
@@ -57,9 +57,9 @@ pub struct BagSettings {
     pub compression: Compression,
     /// Added to the stamps of camera and LiDAR, whose clock is not the vehicle's, in seconds.
     pub clock_offset_s: f64,
-    /// Whether the exact depth of every frame is written too.
+    /// Whether the exact depth of every frame is also written.
     pub true_depth: bool,
-    /// Angle between two columns of the LiDAR, degrees: 0.05 to 5. Fewer columns make a bag smaller and its writing quicker.
+    /// Angle between two columns of the LiDAR, degrees: 0.05 to 5. Fewer columns make a bag smaller and quicker to write.
     pub lidar_step_deg: f64,
 }
 
@@ -78,15 +78,15 @@ impl Default for BagSettings {
 /// and the vehicle's wheelbase, which a bag does not contain; of a varied drive also `<scene>_<seed>.varied.json` with what it drew
 /// ([`Simulation::drawn`]). `out` must be new or empty. Returns the bag's path.
 ///
-/// The camera's stamps and those of the LiDAR carry the clock's offset; IMU, speed, steering and truth do not.
+/// The stamps of camera and LiDAR include [`BagSettings::clock_offset_s`]; those of IMU, speed, steering and truth do not.
 ///
-/// `progress` is called with the frames done and their number, and stops it with [`ControlFlow::Break`], unless all are done. Everything
-/// is written to a folder within `out` and renamed at the end, the bag last: after an error, or stopped, `out` is as it was. What a writer
-/// that was killed left there is removed, and is not in the way.
+/// `progress` is called with the number of frames done and the number of all frames. Until all are done, it can stop the writer with
+/// [`ControlFlow::Break`]. Everything is written to a temporary folder within `out` and moved at the end, the bag last: after an error or a
+/// stop, `out` is as it was. Files that a killed writer left there are removed first.
 ///
 /// # Errors
-/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` holds anything,
-/// [`Error::Unfinished`] if that is what another writes, or left and cannot be removed; [`Error::Stopped`]; [`Error::Io`],
+/// [`Error::Config`] for a setting out of range, or a second camera; [`Error::OutputNotEmpty`] if `out` contains anything;
+/// [`Error::Unfinished`] if another writer is at work there, or left files that cannot be removed; [`Error::Stopped`]; [`Error::Io`],
 /// [`Error::Encode`], [`Error::Bag`].
 pub fn write_bag(
     simulation: &Simulation,
@@ -123,7 +123,7 @@ pub fn write_bag(
     Ok(path)
 }
 
-/// Writes the bag that is to be at `path` into a folder, and what lies beside it; returns their names, the bag's last.
+/// Writes the bag and the files beside it into `folder`; their final place is that of `path`. Returns their names, the bag's last.
 fn write_all(
     simulation: &Simulation,
     folder: &Path,
@@ -198,7 +198,7 @@ fn write_messages(
         } else {
             simulation.time_s(last)
         };
-        // Readings first: within a chunk's length order does not matter, readers sort by time.
+        // Readings first: readers sort by time, so the order within a chunk does not matter.
         vehicle.write(&mut bag, &topics, until_s)?;
         let pictures: Vec<Picture> = (first..last)
             .into_par_iter()
@@ -388,7 +388,7 @@ impl VehicleMessages {
         }
     }
 
-    /// Those before `until_s`.
+    /// Writes the readings before `until_s`.
     fn write(&mut self, bag: &mut BagWriter, topics: &Topics, until_s: f64) -> Result<()> {
         let [imus, speeds, steerings] = &mut self.written;
         while let Some(reading) = self.imu.next_if(|r| r.time_s < until_s) {
@@ -397,7 +397,7 @@ impl VehicleMessages {
                 y: v.y,
                 z: v.z,
             };
-            // −1 in front says that there is no orientation.
+            // −1 as the first element means that there is no orientation.
             let mut no_orientation = [0.0; 9];
             no_orientation[0] = -1.0;
             let imu = Imu {
@@ -444,7 +444,7 @@ impl VehicleMessages {
 /// The sidecar: what a reader cannot know from the bag.
 fn describe(rig: &Rig, scenario: &str) -> String {
     let mut text = String::from(
-        "# What the bag beside this file does not say: where the sensors are, and the vehicle's size.\n\
+        "# What the bag beside this file does not contain: the mounts of the sensors, and the wheelbase.\n\
          # Transforms are target_from_source: metres, and an axis-angle vector in radians.\n",
     );
     let _ = writeln!(text, "scenario = \"{scenario}\"\nsimulated = true\n");

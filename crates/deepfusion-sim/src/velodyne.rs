@@ -29,7 +29,7 @@ fn elevations() -> [f32; 64] {
 }
 
 /// One turn of the scanner at one instant; points in its own axes (x forward, y left, z up), metres.
-/// `key` makes the noise of this scan.
+/// `key` seeds the noise of this scan.
 pub(crate) fn scan(
     world: &World,
     light: &GroundLight,
@@ -56,7 +56,7 @@ pub(crate) fn scan(
                 };
                 let code = hash(column as i32, line as i32, key);
                 let bright: f32 = echo.brightness;
-                // Weak returns are lost: dark things, far away.
+                // Weak returns are lost: those of dark, distant surfaces.
                 let lost: f32 = 0.02
                     + 0.25 * (echo.range / RANGE.1).powi(2) * (1.2 - 2.0 * bright).clamp(0.1, 1.2);
                 if unit(code, 0) < lost {

@@ -1,56 +1,58 @@
-//! What a setting of the simulator must be.
+//! The values that a simulator setting may have.
 
-/// What a setting of the simulator must be.
+/// The values that a simulator setting may have.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedSetting {
-    /// A number from one to the other, both included.
+    /// A number in this range, both ends included.
     #[error("{from} to {to}")]
     Within {
-        /// The smallest.
+        /// Lower end.
         from: f64,
-        /// The largest.
+        /// Upper end.
         to: f64,
     },
-    /// A length from one to the other, both included.
+    /// A length in this range, both ends included.
     #[error("{from} to {to} metres")]
     Metres {
-        /// The smallest, metres.
+        /// Lower end, metres.
         from: f64,
-        /// The largest, metres.
+        /// Upper end, metres.
         to: f64,
     },
-    /// An angle from one to the other, both included.
+    /// An angle in this range, both ends included.
     #[error("{from} to {to} degrees")]
     Degrees {
-        /// The smallest, degrees.
+        /// Lower end, degrees.
         from: f64,
-        /// The largest, degrees.
+        /// Upper end, degrees.
         to: f64,
     },
     /// One of these names.
     #[error("{}", either(.0))]
     OneOf(Vec<&'static str>),
-    /// A drive that is not longer.
+    /// A drive of limited length.
     #[error("a drive of at most {minutes} minutes")]
     DriveUpTo {
-        /// How long it may be, minutes.
+        /// The longest drive, minutes.
         minutes: f64,
     },
-    /// Nobody who rides or walks, where nobody does.
+    /// No riders, in scenes where nobody rides or walks.
     #[error("0 in garages, in rooms and on motorways")]
     NoRiders,
     /// No second camera.
     #[error("0 for a bag, which has one camera")]
     OneCamera,
-    /// The intrinsics of a camera.
-    #[error("a lens")]
+    /// Plausible camera intrinsics.
+    #[error("plausible intrinsics")]
     Lens,
-    /// Scenes among which are some of plain worlds.
-    #[error("one that simulate draws, where a share of the worlds is plain")]
+    /// At least one scene that plain worlds have.
+    #[error(
+        "at least one of urban, park, garage, commercial and night, since some worlds are plain"
+    )]
     PlainScene,
-    /// Scenes among which are some with roads.
-    #[error("one that cars drive through, for cameras on cars")]
+    /// At least one scene with roads.
+    #[error("at least one scene with roads, since all cameras are on cars")]
     SceneForCars,
 }
 

@@ -1,20 +1,20 @@
-//! What a varied drive, or one that is not, cannot have.
+//! Settings that a varied drive cannot have, and scenes that only varied drives have.
 
-/// Why a setting does not go with [`crate::SimConfig::varied`].
+/// Why a setting conflicts with the value of [`crate::SimConfig::varied`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VariedConflict {
-    /// The height is drawn.
+    /// The camera's height is drawn from the seed.
     #[error("a varied drive draws the height of its camera")]
     CameraHeight,
-    /// Cars may park close to the lane that is kept free for the camera.
-    #[error("a varied drive has one camera, beside which cars may park")]
+    /// Cars may be parked where a second camera would drive: only one camera's lane is kept free.
+    #[error("a varied drive has one camera: parked cars may stand where a second one would be")]
     SecondCamera,
-    /// Rooms are for single views.
-    #[error("cars drive through no rooms")]
+    /// Rooms are for single views only.
+    #[error("cars cannot drive through rooms")]
     Rooms,
-    /// Without [`crate::SimConfig::varied`].
-    #[error("only varied drives lead there")]
+    /// Only varied drives have the scene.
+    #[error("only varied drives have this scene")]
     OnlyVaried,
 }
 
@@ -29,11 +29,11 @@ impl VariedConflict {
         }
     }
 
-    /// What to do.
+    /// The hint: what to set or leave out.
     pub(super) fn hint(self) -> String {
         match self {
-            Self::CameraHeight => "leave `camera_height_m` as it is by default, or `varied` out",
-            Self::SecondCamera => "set `stereo_baseline_m` to 0, or leave `varied` out",
+            Self::CameraHeight => "leave out `camera_height_m` or `varied`",
+            Self::SecondCamera => "set `stereo_baseline_m` to 0, or leave out `varied`",
             Self::Rooms => "choose another scene",
             Self::OnlyVaried => "set `varied`, or choose another scene",
         }

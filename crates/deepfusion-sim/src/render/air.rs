@@ -6,20 +6,20 @@ use crate::texture::Rgb;
 use crate::texture::noise::Noise;
 use crate::texture::sky::Sky;
 
-/// The weather and the hour of one picture. It changes colours only, never the end of a ray.
+/// The weather and the time of day of one picture. They change colours only, never where a ray ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Air {
     /// The sky's gradient and clouds.
     pub sky: Sky,
     /// Multiplies the sky's radiance.
     pub tint: Rgb,
-    /// The brightness around the sun, where it is seen.
+    /// The brightness around the sun, if it is visible.
     pub glow: Option<Glow>,
     /// Irradiance of the sun (on a surface that faces it) and of the sky.
     pub light: (Rgb, Rgb),
-    /// What scatters light on the way to the camera.
+    /// Fog or haze between objects and camera, if there is any.
     pub fog: Option<Fog>,
-    /// How wet the ground is, 0 to 1: water fills the pores and darkens what soaks it up.
+    /// Wetness of the ground, 0 to 1: water fills the pores of rough surfaces and darkens them.
     pub wet: f32,
 }
 
@@ -28,19 +28,19 @@ pub(crate) struct Air {
 pub(crate) struct Glow {
     /// Towards the sun, unit length, world axes.
     pub sun: V3,
-    /// Radiance at its middle.
+    /// Radiance at the middle of the disc.
     pub strength: Rgb,
 }
 
-/// Homogeneous fog or haze (Koschmieder): what is at range r keeps e^(−extinction · r) of its light, and the
-/// rest is the fog's own.
+/// Homogeneous fog or haze (Koschmieder): a surface at range r keeps the share e^(−extinction · r) of its light, and the fog adds its own
+/// light for the rest.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fog {
     /// Extinction, 1/m.
     pub extinction: f32,
-    /// Its radiance.
+    /// Radiance of the fog.
     pub colour: Rgb,
-    /// Its thickness above the ground, metres: how much of the sky it covers.
+    /// Thickness above the ground, metres: it determines how much of the sky is covered.
     pub height: f32,
 }
 
@@ -72,7 +72,7 @@ impl Air {
         }
     }
 
-    /// Light of a surface at `t` along `d` (metres for a ray of unit length), as it reaches the camera.
+    /// Light of a surface at `t` along `d` (metres if `d` has unit length), as it reaches the camera.
     #[inline]
     pub(crate) fn through(&self, colour: Rgb, d: &V3, t: f32) -> Rgb {
         match &self.fog {
@@ -81,7 +81,7 @@ impl Air {
         }
     }
 
-    /// What wetness leaves of the albedo of the ground.
+    /// Factor by which wetness darkens the albedo of the ground.
     #[inline]
     pub(crate) fn soaked(&self) -> f32 {
         1.0 - 0.5 * self.wet
@@ -89,7 +89,7 @@ impl Air {
 }
 
 impl Glow {
-    /// The disc is drawn larger than it is, as lenses do; clouds take it away.
+    /// The disc is drawn larger than it is, as glare in a lens does; clouds hide it.
     fn radiance(&self, d: &V3, clouds: f32) -> Rgb {
         let cos = (self.sun.dot(d) / d.norm()).max(0.0);
         let wide = cos.powi(12);
@@ -101,7 +101,7 @@ impl Glow {
 }
 
 impl Fog {
-    /// A colour seen through `range` metres of it.
+    /// A colour seen through `range` metres of fog.
     #[inline]
     fn over(&self, colour: Rgb, range: f32) -> Rgb {
         let kept = (-self.extinction * range).exp();

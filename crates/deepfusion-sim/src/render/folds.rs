@@ -1,10 +1,9 @@
 //! Hills: the flat world, folded at creases across the view.
 //!
-//! A crease is a level line on the ground. All that is beyond it, up to the next one, turns about it by a small angle;
-//! the two sides meet in the plane through the crease that bisects them. Between two creases the world is the flat one
-//! after a rigid motion. So a ray is followed from segment to segment, and within each it is traced in the flat world,
-//! from where the camera is in that segment's axes. A rigid motion keeps the ray's parameter, which is the depth: it stays
-//! exact.
+//! A crease is a level line on the ground. The part of the world beyond it, up to the next one, turns about it by a small angle. The two
+//! parts meet in the bisecting plane through the crease. Between two creases the world is the flat one after a rigid motion. So a ray is
+//! followed from segment to segment, and within each it is traced in the flat world, from the camera's position in that segment's axes. A
+//! rigid motion keeps the ray's parameter, which is the depth, so depth stays exact.
 
 use super::tiles::Tiles;
 use super::{Camera, Eye, Hit, RenderInput, Surface};
@@ -13,36 +12,36 @@ use crate::scene::World;
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
-/// A line on the ground that the world beyond is turned about.
+/// A line on the ground about which the world beyond it is turned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Crease {
-    /// How far it is from the camera's foot, along the ground, metres; positive.
+    /// Distance from the point below the camera, along the ground, metres; positive.
     pub distance: f64,
-    /// Radians; where positive, the ground beyond rises more than before it.
+    /// Angle, radians; if positive, the ground beyond is steeper than before it.
     pub angle: f64,
 }
 
-/// The ground ahead of a camera, which itself stands on level ground.
+/// The ground ahead of a camera. The camera itself stands on level ground.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Folds {
-    /// The direction at a right angle to all creases, against the world's x axis, radians.
+    /// The direction perpendicular to all creases, against the world's x axis, radians.
     pub heading: f64,
-    /// Nearest first; none where all is flat.
+    /// The creases, nearest first; none if the ground is flat.
     pub creases: Vec<Crease>,
 }
 
-/// Where a segment is in the folded world.
+/// Position of a segment in the folded world.
 struct Fold {
-    /// Its axes are those of the flat world.
+    /// The folded world from the segment's axes, which are those of the flat world.
     folded_from_flat: Se3,
-    /// A point of the plane where it begins, folded.
+    /// A point of the plane where the segment begins, in the folded world.
     point: Vector3<f64>,
-    /// That plane's normal, which points into it.
+    /// Normal of that plane, towards the segment.
     normal: Vector3<f64>,
 }
 
 impl Folds {
-    /// The segments before a camera, the one that it stands in first.
+    /// The segments ahead of a camera, the one that it stands in first.
     fn segments(&self, foot: &Vector3<f64>) -> Vec<Fold> {
         let ahead = Vector3::new(self.heading.cos(), self.heading.sin(), 0.0);
         let right = Vector3::new(ahead.y, -ahead.x, 0.0);
@@ -86,7 +85,7 @@ impl Folds {
         let highest = (z + f64::from(low)).abs().max((z + f64::from(high)).abs());
         let (x, y) = (solid.position[0] - foot.x, solid.position[1] - foot.y);
         let along = x * self.heading.cos() + y * self.heading.sin();
-        // The planes between the segments lean by half the angle of their crease.
+        // The planes between the segments are tilted by half the angle of their crease.
         let reach = |crease: &Crease| {
             f64::from(half_x.hypot(half_y)) + highest * (0.5 * crease.angle).tan().abs() + 0.01
         };
@@ -99,21 +98,21 @@ impl Folds {
 
 /// A part of the world between two creases.
 pub(super) struct Segment<'a> {
-    /// The camera in the segment's axes: its pose.
+    /// The pose of the camera in the segment's axes.
     pub world_from_cam: Se3,
-    /// Its rays.
+    /// The rays of the camera in the segment's axes.
     pub camera: Camera,
-    /// What it sees in the flat world.
+    /// The camera's view of the flat world from there.
     pub eye: Eye<'a>,
     tiles: Tiles,
-    /// The plane where the segment begins: its normal in the first segment's axes, and how far ahead of the camera it is
-    /// along that, metres.
+    /// The plane where the segment begins: its normal in the first segment's axes, and its distance ahead of the camera along that normal,
+    /// metres.
     begin: (V3, f32),
 }
 
-/// The world as a camera sees it.
+/// The folded world, as the camera sees it.
 pub(super) struct Folded<'a> {
-    /// The nearest first; the camera is in it.
+    /// The segments, nearest first; the camera is in the first.
     pub segments: Vec<Segment<'a>>,
 }
 
@@ -168,7 +167,7 @@ impl<'a> Folded<'a> {
         }
     }
 
-    /// The end of the ray through (`x`, `y`), which is within the pixel (`u`, `v`), and that [`Folded::ray`].
+    /// The hit of the ray through (`x`, `y`), which is within the pixel (`u`, `v`), and the ray as [`Folded::ray`] returns it.
     #[inline]
     pub(super) fn trace(&self, (u, v): (usize, usize), (x, y): (f32, f32)) -> (Hit, V3) {
         let first = &self.segments[0];
@@ -179,7 +178,7 @@ impl<'a> Folded<'a> {
         (first.eye.trace(first.tiles.at(u, v), &d), d)
     }
 
-    /// Follows a ray from segment to segment; `d`: in the first one's axes.
+    /// Follows a ray from segment to segment; `d` is its direction in the first one's axes.
     #[inline(never)]
     fn walk(&self, (u, v): (usize, usize), (x, y): (f32, f32), d: V3) -> (Hit, V3) {
         let mut from = 0.0;
@@ -208,7 +207,7 @@ impl<'a> Folded<'a> {
         (Hit::SKY, d)
     }
 
-    /// The ray through (`x`, `y`), in the axes of the segment that it ends in; the sky is in the first one's.
+    /// The ray through (`x`, `y`), in the axes of the segment that it ends in; for the sky, in those of the first.
     #[inline]
     pub(super) fn ray(&self, hit: &Hit, (x, y): (f32, f32)) -> V3 {
         self.segments[usize::from(hit.segment)].camera.ray(x, y)

@@ -24,19 +24,19 @@ use tiles::TILE;
 
 /// Solids farther ahead along the street than this are not drawn, metres.
 const AHEAD: f32 = 420.0;
-/// The same behind it, for what looks ahead.
+/// Likewise behind it, for a camera that looks ahead.
 pub(crate) const BEHIND: f32 = 70.0;
 
-/// No solid but the hills around reaches farther from its middle, metres.
+/// No solid reaches farther from its middle, metres, except the hills around the street.
 pub(crate) const LARGEST_M: f32 = 60.0;
 
 /// Ground beyond this depth counts as horizon, metres.
 const FARTHEST_GROUND: f32 = 600.0;
 
-/// What a ray hits.
+/// A surface that a ray hits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Surface {
-    /// Nothing.
+    /// No surface.
     Sky,
     /// A solid of the frame: its index and face.
     Solid(u32, u8),
@@ -49,7 +49,7 @@ pub(crate) enum Surface {
 }
 
 impl Surface {
-    /// Whether it is the same surface; all leaves of a lobe are one.
+    /// Whether both are the same surface; all leaves of a lobe count as one.
     #[inline]
     pub(crate) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
@@ -61,26 +61,26 @@ impl Surface {
     }
 }
 
-/// Where a ray ends: `t` in units of its direction.
+/// Where a ray ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hit {
-    /// In units of the ray's direction; infinite for the sky.
+    /// Position along the ray, in units of its direction; infinite for the sky.
     pub t: f32,
     /// The surface it hit.
     pub surface: Surface,
-    /// The segment of a folded world that it is in; the solids are numbered in each.
+    /// Segment of the folded world; each has its own numbering of solids.
     pub segment: u8,
 }
 
 impl Hit {
-    /// No surface, in any direction.
+    /// The sky.
     pub(crate) const SKY: Self = Self {
         t: f32::INFINITY,
         surface: Surface::Sky,
         segment: 0,
     };
 
-    /// Whether it is of the same surface. Ground goes on from one segment to the next, but not behind a crest.
+    /// Whether both hits are on the same surface. Ground continues from one segment to the next, but not behind a crest.
     #[inline]
     fn is_like(&self, other: &Self) -> bool {
         let goes_on = || {
@@ -97,11 +97,11 @@ pub(crate) struct FrameSolid {
     pub primitive: Primitive,
     /// The eye in the solid's axes.
     pub eye: V3,
-    /// Its nearest possible depth (for the camera) or range (for a scanner), metres.
+    /// Least possible depth (for the camera) or range (for a scanner) of the solid, metres.
     pub nearest: f32,
 }
 
-/// The solids around a place on the street (ahead of it, and as far `behind` it along the street), and those that move.
+/// The solids around a place on the street, from `behind` metres behind it to [`AHEAD`] ahead, and the moving ones.
 pub(crate) fn gather(
     world: &World,
     moving: &[Primitive],
@@ -119,18 +119,18 @@ pub(crate) fn gather(
         .collect()
 }
 
-/// The origin of rays in the world.
+/// The point that rays start from.
 pub(crate) struct Eye<'a> {
     /// The world.
     pub world: &'a World,
-    /// Its position.
+    /// Position in the world.
     pub position: Vector3<f64>,
     /// Solids that may be visible, nearest first.
     pub solids: Vec<FrameSolid>,
 }
 
 impl Eye<'_> {
-    /// First solid among `candidates` (indices, nearest first) along `d`, or the ground, or the sky.
+    /// The first of the `candidates` (indices of solids, nearest first), the ground or the sky, along `d`.
     #[inline]
     pub(crate) fn trace(&self, candidates: &[u32], d: &V3) -> Hit {
         self.first(
@@ -144,11 +144,11 @@ impl Eye<'_> {
         )
     }
 
-    /// As [`Eye::trace`], but only what the ray meets between two values of t. A solid that it begins in is cut there.
+    /// As [`Eye::trace`], but only between two values of t. A solid that contains the start is cut there.
     #[inline(never)]
     pub(crate) fn trace_between(&self, candidates: &[u32], d: &V3, (from, to): (f32, f32)) -> Hit {
         if from <= 0.0 {
-            // The camera is in no solid.
+            // The camera is outside all solids.
             return self.first(candidates, d, (0.0, to), |solid, local, limit| {
                 let (shape, hulls) = (&solid.primitive.shape, &self.world.hulls);
                 enter(shape, hulls, &solid.eye, local, limit)
@@ -160,8 +160,7 @@ impl Eye<'_> {
         })
     }
 
-    /// The first of the solids, by where the ray (in the solid's axes) enters each before a limit, or the ground, or the
-    /// sky.
+    /// The first of the solids, the ground or the sky. `enter` returns where the ray (in the solid's axes) enters a solid before a limit.
     #[inline(always)]
     fn first(
         &self,
@@ -206,8 +205,8 @@ impl Eye<'_> {
         self.world.road.locate(x, y)
     }
 
-    /// The ground is a road at height 0 and everything else at the kerb's height, with upright
-    /// kerbs between them. It is solid: a ray that begins in it, at t = `from`, ends there.
+    /// The ground has height 0 on the road and the kerb's height elsewhere, with upright kerbs between. It is solid: a ray that begins
+    /// inside it, at t = `from`, ends there.
     #[inline(always)]
     fn ground(&self, d: &V3, (from, limit): (f32, f32)) -> (f32, Surface) {
         let road = &self.world.road;
@@ -250,9 +249,9 @@ pub(crate) struct Picture {
     pub moving: Vec<bool>,
 }
 
-/// The linear light at the camera, before image formation.
+/// Light at the camera in linear colours, before image formation.
 pub(crate) struct Exposure {
-    /// Linear light, row by row.
+    /// Linear colours, row by row.
     pub light: Vec<Rgb>,
     /// The hits of the rays through the pixels' centres.
     pub hits: Vec<Hit>,
@@ -260,7 +259,7 @@ pub(crate) struct Exposure {
     pub depth: DepthMap,
     /// Pixels of dynamic objects.
     pub moving: Vec<bool>,
-    /// World from the camera, in the axes of each segment that hits are in.
+    /// World from the camera, in the axes of each segment.
     pub segments: Vec<Se3>,
 }
 
@@ -279,7 +278,7 @@ pub(crate) struct RenderInput<'a> {
     pub world_from_cam: &'a Se3,
     /// The camera.
     pub intrinsics: &'a Intrinsics,
-    /// The hills before the camera.
+    /// The hills ahead of the camera.
     pub folds: &'a Folds,
 }
 
@@ -311,19 +310,19 @@ pub(crate) fn render(
     }
 }
 
-/// The image of an ideal camera, without a real one's imperfections.
+/// The image of an ideal camera, without the imperfections of a real one.
 pub(crate) fn encode(light: &[Rgb], width: u32, height: u32) -> RgbImage {
     let bytes = light.iter().flat_map(encode_srgb).collect();
     // The buffer has 3 · width · height bytes by construction.
     RgbImage::from_raw(width, height, bytes).unwrap_or_else(|| RgbImage::new(width, height))
 }
 
-/// The cores to use.
+/// The threads to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Cores {
-    /// On this thread, for callers that have many of their own.
+    /// The calling thread alone, for callers that use several threads themselves.
     One,
-    /// On all of rayon's.
+    /// All threads of rayon.
     All,
 }
 
@@ -349,12 +348,12 @@ impl Cores {
     }
 }
 
-/// The antialiasing of a pixel with several surfaces, from the four rays through it.
+/// How a pixel that contains several surfaces is antialiased, from four rays through it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Edges {
     /// Every ray is shaded.
     EachRay,
-    /// Every surface is shaded once: twice as fast, and as smooth at edges.
+    /// Every surface is shaded once: twice as fast, with edges as smooth.
     EachSurface,
 }
 
@@ -390,7 +389,7 @@ pub(crate) fn expose(
         });
         shader.collect()
     };
-    // Where four rays share a pixel, each stands for a part of it.
+    // Each of the four rays of a pixel covers a part of it.
     let (whole, part) = (shaders(1.0, 3.0), shaders(0.6, 2.0));
     let mut colours = vec![Rgb::zeros(); width * height];
     cores.split(&mut colours, width, |v, row| {
@@ -446,7 +445,7 @@ fn colour_of(shaders: &[Shader], hit: &Hit, d: &V3) -> Rgb {
     shaders[usize::from(hit.segment)].colour(hit, d)
 }
 
-/// The mean of rays of one pixel, each surface shaded once, where the first ray meets it.
+/// The mean of the rays of one pixel. Each surface is shaded once, where the first ray hits it.
 fn by_surface(shaders: &[Shader], rays: &[(Hit, V3); 4]) -> Rgb {
     let mut sum = Rgb::zeros();
     for (i, (hit, d)) in rays.iter().enumerate() {
@@ -459,13 +458,13 @@ fn by_surface(shaders: &[Shader], rays: &[(Hit, V3); 4]) -> Rgb {
     sum
 }
 
-/// Whether a pixel or one of its four neighbours sees another surface.
+/// Whether a pixel and one of its four neighbours see different surfaces.
 #[inline]
 fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> bool {
     let here = hits[v * width + u];
     let differs = |other: &Hit| {
         !other.is_like(&here)
-            // A solid can hide itself, as an ellipsoid does not but a hull's edge would.
+            // A solid can hide a part of itself, so a large step in depth also counts.
             || (here.t.is_finite() && (other.t - here.t).abs() > 0.2 * here.t.min(other.t)
                 && matches!(here.surface, Surface::Solid(..)))
     };
@@ -500,7 +499,7 @@ impl Camera {
         }
     }
 
-    /// The ray of a pixel, with camera z = 1: its parameter is the depth.
+    /// The ray of a pixel, with camera z = 1, so that its parameter is the depth.
     #[inline]
     pub(crate) fn ray(&self, u: f32, v: f32) -> V3 {
         let x = u * self.inverse[0] + self.inverse[1];

@@ -9,27 +9,27 @@ use crate::texture::{Patch, Rgb};
 use nalgebra::Vector3;
 use std::sync::LazyLock;
 
-/// A pixel's longer side is at most this much of the surface, metres.
+/// Longest side of a pixel's footprint on a surface, metres.
 const LONGEST: f32 = 30.0;
 
-/// Shades hits of one eye.
+/// Shades the hits of one eye.
 pub(crate) struct Shader<'a> {
     /// The eye.
     pub eye: &'a Eye<'a>,
     /// Light on the ground.
     pub light: &'a GroundLight,
-    /// Sky, sun and what is between them and the eye.
+    /// Sky, sun and the air between them and the eye.
     pub air: &'a Air,
-    /// Width of a pixel (or of what a ray stands for) at t = 1, metres.
+    /// Width of a pixel (or of the area that one ray covers) at t = 1, metres.
     pub pixel: f32,
     /// At most this many samples along the longer side of a ray's footprint.
     pub samples: f32,
-    /// Dynamic cars, for their shadows on the ground.
+    /// Footprints of dynamic objects, for their shadows on the ground.
     pub moving: &'a [Foot],
 }
 
 impl Shader<'_> {
-    /// Linear colour of a hit of the ray along `d`.
+    /// Linear colour of a hit, for the ray along `d`.
     #[inline]
     pub(crate) fn colour(&self, hit: &Hit, d: &V3) -> Rgb {
         let colour = match hit.surface {
@@ -83,14 +83,14 @@ impl Shader<'_> {
         let (albedo, normal) = self.solid_albedo(t, d, index, face);
         let (sun, sky) = self.air.light;
         let lit = normal.dot(&world.sun).max(0.0);
-        // The lower half of the sky is ground, which is darker; near it the sky is shut off.
+        // Below the horizon there is ground, which is darker than the sky; near the ground the sky is hidden.
         let height = self.eye.position.z as f32 + d.z * t;
         let open = (0.62 + 0.38 * normal.z) * (1.0 - 0.35 * (-height.max(0.0) / 0.7).exp());
         let lamps = self.lamps(hit_place(&self.eye.position, d, t), &normal);
         albedo.component_mul(&(sun * lit + sky * open + lamps))
     }
 
-    /// What the lamps send onto a surface.
+    /// Light of the lamps on a surface.
     fn lamps(&self, place: Vector3<f64>, normal: &V3) -> Rgb {
         let world = self.eye.world;
         if world.lamps.is_empty() {
@@ -177,7 +177,7 @@ impl Shader<'_> {
             for foot in self.moving {
                 let open = foot.open_at(at.x, at.y);
                 sky *= open;
-                // As soft as the sky's shadow, and as dark as the sun's.
+                // As soft as the shade from the sky, and as dark as a shadow from the sun.
                 sun *= (1.4 * open - 0.4).max(0.0);
             }
         }
@@ -192,18 +192,18 @@ impl Shader<'_> {
         } else {
             V3::z()
         };
-        // Below a car it is dark by night too.
+        // It is also dark below a car at night.
         let lamps = self.lamps(hit_place(&self.eye.position, d, hit.t), &normal) * sky;
         albedo.component_mul(&(sun_light * (facing * sun) + sky_light * (open * sky) + lamps))
     }
 }
 
-/// Where a ray ends, world axes, metres.
+/// Where a ray ends, in the world, metres.
 fn hit_place(eye: &Vector3<f64>, d: &V3, t: f32) -> Vector3<f64> {
     eye + (d * t).map(f64::from)
 }
 
-/// The longer side of a pixel's footprint on a surface, and how many samples it takes.
+/// The longer side of a pixel's footprint on a surface, and the number of samples along it.
 #[inline]
 fn stretch(d: &V3, normal: &V3, minor: f32, most: f32) -> (V3, f32) {
     let length = d.norm();
@@ -218,19 +218,19 @@ fn stretch(d: &V3, normal: &V3, minor: f32, most: f32) -> (V3, f32) {
     (tangent * (major / size), samples)
 }
 
-/// How far the tones follow an S-shaped curve instead of a straight line.
+/// Share of an S-shaped tone curve in place of a straight line.
 const CONTRAST: f32 = 0.9;
 
 /// Entries of [`GAMMA`].
 const GAMMA_STEPS: usize = 4096;
 
-/// c^(1/2.2), with contrast, as 8 bits by the square root of c, which spreads the dark tones.
+/// c^(1/2.2), with contrast, as 8 bits, indexed by the square root of c, which gives dark tones more entries.
 static GAMMA: LazyLock<Vec<u8>> = LazyLock::new(|| {
     (0..=GAMMA_STEPS)
         .map(|i| {
             let root = (i as f32 + 0.5) / GAMMA_STEPS as f32;
             let value = root.powf(2.0 / 2.2);
-            // A camera's contrast: darks deeper, lights brighter.
+            // Contrast as of a camera: dark tones darker, bright tones brighter.
             let curve = value * value * (3.0 - 2.0 * value);
             ((value + CONTRAST * (curve - value)) * 255.0 + 0.5) as u8
         })

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 /// Side of a tile, in pixels.
 pub(super) const TILE: usize = 8;
 
-/// Nearest depth anything is drawn at, metres.
+/// Nothing is drawn nearer than this depth, metres.
 const NEAR: f64 = 0.2;
 
 /// For each tile, the solids whose boxes overlap it, nearest first.
@@ -21,7 +21,7 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Projects every solid's box and sorts it into the tiles; returns the visible solids with it.
+    /// Projects every solid's box and sorts it into the tiles; also returns the visible solids.
     pub(super) fn bin(
         world: &World,
         solids: Vec<Primitive>,
@@ -76,7 +76,7 @@ impl Tiles {
         (tiles, seen.into_iter().map(|s| s.0).collect())
     }
 
-    /// The candidates of a pixel.
+    /// The candidates for a pixel.
     #[inline]
     pub(super) fn at(&self, u: usize, v: usize) -> &[u32] {
         let tile = v / TILE * self.columns + u / TILE;
@@ -84,7 +84,7 @@ impl Tiles {
     }
 }
 
-/// The window of pixels (x0, x1, y0, y1, inclusive) a solid's box covers, and its least depth.
+/// The window of pixels (x0, x1, y0, y1, inclusive) that a solid's box covers, and its least depth.
 fn window(
     world: &World,
     primitive: &Primitive,
@@ -131,7 +131,7 @@ fn window(
         if a.z >= NEAR {
             cover(a);
         }
-        // Edges join corners that differ in one bit; those through the near plane are cut there.
+        // Edges connect corners that differ in one bit; an edge through the near plane is cut there.
         for bit in [1, 2, 4] {
             let b = &corners[i ^ bit];
             if a.z < NEAR && b.z >= NEAR {
@@ -139,7 +139,7 @@ fn window(
             }
         }
     }
-    // A pixel's subsamples reach half a pixel to each side.
+    // The subsamples of a pixel reach half a pixel to each side.
     let (last_x, last_y) = (f64::from(k.width) - 1.0, f64::from(k.height) - 1.0);
     if bounds[1] < -1.0 || bounds[0] > last_x + 1.0 || bounds[3] < -1.0 || bounds[2] > last_y + 1.0
     {
@@ -152,6 +152,6 @@ fn window(
         clamp(bounds[2] - 1.0, last_y),
         clamp(bounds[3] + 1.0, last_y),
     ];
-    // A hair less than the corner's depth, which is rounded.
+    // Slightly less than the depth of the corner, which is rounded.
     Some((window, nearest.max(0.0) as f32 * 0.999))
 }

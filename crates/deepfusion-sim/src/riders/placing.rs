@@ -1,4 +1,4 @@
-//! Who rides and walks where: along a drive, and before the camera of a view.
+//! Chooses where people ride and walk: along a drive, and ahead of the camera of a view.
 
 use super::room::{Footprint, Moment, has_room};
 use super::{Crossing, Person, Riders, Route};
@@ -12,38 +12,38 @@ use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Whether there is room is looked at so often along a drive, seconds.
+/// Time between the moments of a drive at which room is checked, seconds.
 const STEP_S: f64 = 0.2;
 
-/// Where people neither come nor go, metres before the camera along the street: farther off they are a few pixels high, and behind it only
-/// scans have them.
+/// People never appear or disappear in this range, metres ahead of the camera along the street. Farther ahead they are a few pixels high;
+/// farther behind only scans see them.
 const SEEN: (f64, f64) = (-4.0, 120.0);
 
-/// Least and greatest distance at which people are met, metres before the camera along the street.
+/// Least and greatest distance at which people are met, metres ahead of the camera along the street.
 const MET: (f64, f64) = (4.0, 60.0);
 
-/// Where the camera's car keeps on the road, metres left of the centreline, and half the width that it needs there.
+/// Lateral position of the camera's car, metres left of the centreline, and half the width that it needs there.
 const LANE: f64 = -1.65;
 const HALF_LANE: f64 = 1.4;
 
-/// People keep so far from a view's camera, metres.
+/// Distance that people keep from a view's camera, metres.
 const ARM: f64 = 2.5;
 
-/// Places that are tried for someone to do one thing.
+/// Places that are tried for each activity.
 const TRIES: usize = 20;
 
 /// Pavements narrower than this are not walked on, metres.
 const LEAST_PAVEMENT: f32 = 0.9;
 
-/// The bars of whoever rides a bicycle are no wider, metres; those of a motorbike are.
+/// Greatest width of a bicycle with its rider, metres; motorbikes are wider.
 const BICYCLE: f32 = 0.7;
 
-/// What people do.
+/// What a person does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Activity {
-    /// Rides as the street goes.
+    /// Rides in the street's direction.
     RideAlong,
-    /// Crosses the road, and walks on.
+    /// Crosses the road and walks on.
     Cross,
     /// Rides against the street's direction.
     RideAgainst,
@@ -54,7 +54,7 @@ enum Activity {
 impl Activity {
     const ALL: [Self; 4] = [Self::RideAlong, Self::Cross, Self::RideAgainst, Self::Walk];
 
-    /// Whether someone of a model does that.
+    /// Whether a person of this model can do it.
     fn suits(self, model: &CarModel) -> bool {
         match self {
             Self::RideAlong | Self::RideAgainst => {
@@ -66,9 +66,9 @@ impl Activity {
 }
 
 impl Riders {
-    /// Up to `count` people along a drive of `duration_s` seconds among its traffic, met evenly over it: by turns who rides ahead,
-    /// crosses, rides towards the camera and walks. Fewer where the street has no room for them. Nobody comes or goes within 120 m
-    /// before the camera, nor gets in its way.
+    /// Up to `count` people along a drive of `duration_s` seconds among its traffic, met at even intervals. In turn, one rides ahead,
+    /// crosses, rides towards the camera, and walks. There are fewer if the street has no room for them. Nobody appears or disappears
+    /// within 120 m ahead of the camera, or gets in its way.
     pub(crate) fn along(
         rng: &mut ChaCha8Rng,
         world: &World,
@@ -95,7 +95,7 @@ impl Riders {
         riders
     }
 
-    /// Two to eight people before the camera of a view among its `vehicles`, at time 0; fewer where there is no room for them.
+    /// Two to eight people ahead of the camera of a view among its `vehicles`, at time 0; fewer if there is no room for them.
     pub(crate) fn before(
         rng: &mut ChaCha8Rng,
         world: &World,
@@ -128,7 +128,7 @@ impl Riders {
         riders
     }
 
-    /// Tries one place for someone who is met at one of the moments; whether there was room.
+    /// Tries one place for a person who is met at moment number `met`; returns whether there was room.
     fn place(
         &mut self,
         rng: &mut ChaCha8Rng,
@@ -148,7 +148,7 @@ impl Riders {
         if !fits(&met) {
             return false;
         }
-        // The street is theirs for as long as there is room before and after.
+        // The person is on the street as long as there is room for them, before and after.
         let first = (0..met).rev().take_while(fits).last().unwrap_or(met);
         let last = (met + 1..moments.len())
             .take_while(fits)
@@ -184,7 +184,7 @@ impl Riders {
     }
 }
 
-/// The moments of a drive, each with its traffic and the way before the camera's own car.
+/// The moments of a drive, each with its traffic and the camera's own lane.
 fn moments(world: &World, drive: &Drive, duration_s: f64, traffic: &Traffic) -> Vec<Moment> {
     let count = (duration_s / STEP_S).ceil() as usize;
     (0..=count)
@@ -193,7 +193,7 @@ fn moments(world: &World, drive: &Drive, duration_s: f64, traffic: &Traffic) -> 
             let (camera_s, speed, _) = drive.progress(time_s);
             let vehicles = traffic.objects(world, time_s);
             let mut occupied: Vec<Footprint> = vehicles.iter().map(Footprint::by).collect();
-            // From 3 m behind the camera to 4 m and 0.6 s before it.
+            // From 3 m behind the camera to 4 m plus 0.6 s of driving ahead of it.
             let free = 0.6 * speed;
             let (x, y, heading) = world.road.world(camera_s + 0.5 * (1.0 + free), LANE);
             let half = [0.5 * (7.0 + free), HALF_LANE];
@@ -208,7 +208,7 @@ fn moments(world: &World, drive: &Drive, duration_s: f64, traffic: &Traffic) -> 
         .collect()
 }
 
-/// Someone who does this at a time and `s` metres along the street; `None` where there is no pavement for it.
+/// A person who does this at a time, `s` metres along the street; `None` if there is no pavement for it.
 fn draw(
     rng: &mut ChaCha8Rng,
     world: &World,
@@ -284,7 +284,7 @@ fn draw(
     })
 }
 
-/// A walker's speed along the street, m/s, to either side.
+/// Velocity of a walker along the street, m/s, in either direction.
 fn pace(rng: &mut ChaCha8Rng) -> f64 {
     let speed = rng.random_range(1.1..1.5);
     if rng.random_bool(0.5) { speed } else { -speed }

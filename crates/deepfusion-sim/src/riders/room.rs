@@ -1,4 +1,4 @@
-//! Where there is room for someone: on the right ground, in nothing that stands and in no one's way.
+//! Where there is room for a person: on the right ground, clear of static objects and of everyone's way.
 
 use super::{Person, Stance};
 use crate::primitive::Shape;
@@ -6,30 +6,30 @@ use crate::road::Road;
 use crate::scene::{ObjectClass, SceneObject, World};
 use nalgebra::Vector3;
 
-/// Three circles of this radius in a row hold someone, metres.
+/// Three circles of this radius in a row cover a person, metres.
 const RADIUS: f64 = 0.42;
 
-/// What is as high as this over the ground is over everyone's head, metres.
+/// Objects at least this high above the ground are over everyone's head, metres.
 const HEADROOM: f64 = 2.0;
 
-/// What is no higher than this over the ground is stepped over, metres.
+/// Objects up to this height above the ground are stepped over, metres.
 const STEP: f64 = 0.15;
 
-/// Solids are looked for so far along the street: none of those that stand along it is larger, metres.
+/// Distance along the street within which solids are checked, metres: none of them is larger.
 const REACH: f64 = 60.0;
 
-/// Nobody is farther from the camera along the street, metres.
+/// Nobody is farther than this from the camera along the street, metres.
 const FARTHEST: f64 = 200.0;
 
-/// A moment of a drive, or that of a view.
+/// One moment of a drive, or the moment of a view.
 pub(super) struct Moment {
-    /// Seconds.
+    /// Time, seconds.
     pub(super) time_s: f64,
-    /// Where the camera is, metres along the street.
+    /// Position of the camera, metres along the street.
     pub(super) camera_s: f64,
-    /// 1 where the camera looks along the street, −1 where it looks back.
+    /// 1 if the camera looks along the street, −1 if it looks back.
     pub(super) looks: f64,
-    /// What people keep out of: vehicles, the lane before the camera, and each other.
+    /// Areas that people keep out of: vehicles, the lane ahead of the camera, and each other.
     pub(super) occupied: Vec<Footprint>,
 }
 
@@ -51,7 +51,7 @@ impl Footprint {
         }
     }
 
-    /// What an object occupies, and a little around it.
+    /// The area that an object occupies, with a margin.
     pub(super) fn by(object: &SceneObject) -> Self {
         let middle = object.world_from_object.translation();
         let forward = object.world_from_object.rotate(&Vector3::x());
@@ -62,7 +62,7 @@ impl Footprint {
         }
     }
 
-    /// What someone occupies at a time.
+    /// The area that a person occupies at a time, with a margin.
     pub(super) fn by_person(person: &Person, road: &Road, time_s: f64) -> Self {
         let stance = person.stance(road, time_s);
         let [long, wide, _] = person.model.size.map(f64::from);
@@ -70,7 +70,7 @@ impl Footprint {
         Self::new([x, y], stance.heading, [0.5 * long + 0.3, 0.5 * wide + 0.2])
     }
 
-    /// Whether a point is within `margin` metres of it.
+    /// Whether a point is within `margin` metres of the area.
     fn holds(&self, [x, y]: [f64; 2], margin: f64) -> bool {
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let (sin, cos) = self.heading.sin_cos();
@@ -79,7 +79,7 @@ impl Footprint {
     }
 }
 
-/// Whether someone has room at a moment.
+/// Whether a person has room at a moment.
 pub(super) fn has_room(world: &World, person: &Person, moment: &Moment) -> bool {
     let road = &world.road;
     let stance = person.stance(road, moment.time_s);
@@ -103,12 +103,12 @@ pub(super) fn has_room(world: &World, person: &Person, moment: &Moment) -> bool 
     on_ground && !middles.iter().any(is_occupied) && is_free(world, &stance, &middles)
 }
 
-/// Whether a wheel there is on the carriageway.
+/// Whether a wheel at this point is on the carriageway.
 fn is_on_road(road: &Road, [x, y]: [f64; 2]) -> bool {
     road.kerb_distance(&road.locate(x, y)) < -0.3
 }
 
-/// Whether someone is on the pavement, or where it would go on over a side street.
+/// Whether a person is on the pavement, or on its continuation across a side street.
 fn is_on_pavement(road: &Road, stance: &Stance) -> bool {
     let sample = road.sample(road.index_at(stance.s));
     let side = usize::from(stance.lateral > 0.0);
@@ -117,7 +117,7 @@ fn is_on_pavement(road: &Road, stance: &Stance) -> bool {
     beyond > 0.2 && beyond < wide + 0.2
 }
 
-/// Whether circles around these places hold nothing that stands there, and no house is around the first one's owner.
+/// Whether no static object is in circles around these places, and the person is not in a house.
 fn is_free(world: &World, stance: &Stance, middles: &[[f64; 2]; 3]) -> bool {
     let [x, y, ground] = stance.base;
     let from = world

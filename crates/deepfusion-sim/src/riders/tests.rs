@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 const DURATION_S: f64 = 10.0;
 
-/// A street, and who rides and walks there during a drive.
+/// A street, and the people of a drive along it.
 fn street(seed: u64) -> (World, Riders) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let road = Road::generate(&mut rng, -60.0, 400.0);
@@ -52,7 +52,7 @@ fn a_route_goes_on_at_one_speed() {
     assert!(route.crosses_at(8.0) && !route.crosses_at(3.9) && !route.crosses_at(12.9));
 }
 
-/// Wheels and feet are on the ground, on the road or on the pavement, and everyone looks where they go.
+/// Wheels and feet are on the ground, on the road or on the pavement, and everyone faces the way they move.
 #[test]
 fn people_stand_on_the_ground_and_face_forward() {
     let (mut riding, mut walking, mut crossing) = (0, 0, 0);
@@ -88,7 +88,8 @@ fn people_stand_on_the_ground_and_face_forward() {
                 assert!((-0.03..0.05).contains(&lowest), "seed {seed}: {lowest}");
                 let velocity = person.velocity(road, time_s).xy();
                 let forward = stance.heading.cos() * velocity.x + stance.heading.sin() * velocity.y;
-                // Half of a corner is turned before it, half after. In a bend a step along the street is not as long as one across it.
+                // Half of a turn at a corner happens before it, half after. In a bend a step along the street differs in length from one
+                // across it.
                 assert!(
                     forward > 0.45 * velocity.norm(),
                     "seed {seed} {time_s}: {person:?}"
@@ -100,7 +101,7 @@ fn people_stand_on_the_ground_and_face_forward() {
     assert!(riding > 2 && walking + crossing > 2);
 }
 
-/// From one moment to the next nobody runs into anybody.
+/// Nobody runs into anybody from one moment to the next.
 #[test]
 fn people_keep_apart() {
     for seed in 1..4 {
@@ -118,7 +119,7 @@ fn people_keep_apart() {
     }
 }
 
-/// A LiDAR sees the same people a moment later, also at the instant in which someone leaves or comes.
+/// A LiDAR sees the same people a moment later, even at the instant in which somebody appears or disappears.
 #[test]
 fn whoever_leaves_does_not_stop_the_others() {
     let (world, riders) = street(1);
@@ -126,14 +127,14 @@ fn whoever_leaves_does_not_stop_the_others() {
         .flat_map(|person| [person.during.0, person.during.1])
         .filter(|time_s| time_s.is_finite())
         .collect();
-    assert!(!ends.is_empty(), "somebody comes or goes");
+    assert!(!ends.is_empty(), "somebody should appear or disappear");
     for now_s in ends {
         let now = riders.solids(&world, now_s, now_s);
         let later = riders.solids(&world, now_s + 1e-3, now_s);
         assert!(!now.is_empty() && now.len() == later.len(), "{now_s}");
         for (a, b) in now.iter().zip(&later) {
             let moved = (Vector3::from(b.position) - Vector3::from(a.position)).norm();
-            // From the slowest walker to the fastest rider, and what turns about its middle.
+            // Up to the fastest rider, and parts that turn about the middle of a body.
             assert!(moved < 0.02, "{now_s}: {moved}");
         }
         let moves = |(a, b): (&Primitive, &Primitive)| a.position != b.position;
