@@ -7,7 +7,7 @@ use crate::texture::{Material, Rgb};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// What kind of house.
+/// Kind of a house.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
     /// In a closed row, two to four floors.
@@ -18,20 +18,20 @@ pub(super) enum Style {
     Commercial,
 }
 
-/// Size of a house to be built, metres.
+/// Position and size of a house, metres.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plot {
-    /// Along the street.
+    /// Size along the street.
     pub width: f64,
-    /// Away from the street.
+    /// Size away from the street.
     pub depth: f64,
-    /// Middle of the house in the world.
+    /// World x of the middle of the house.
     pub x: f64,
-    /// Middle of the house in the world.
+    /// World y of the middle of the house.
     pub y: f64,
-    /// Heading of its width.
+    /// Heading along its front.
     pub heading: f64,
-    /// The street is to its left (+y), else to its right.
+    /// Whether the street is to its left (+y); otherwise it is to its right.
     pub street_left: bool,
 }
 

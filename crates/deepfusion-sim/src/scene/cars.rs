@@ -10,17 +10,16 @@ use rand_chacha::ChaCha8Rng;
 /// One model of car in one colour.
 #[derive(Debug, Clone)]
 pub(crate) struct CarModel {
-    /// What it is.
+    /// Class of the objects made from it.
     pub class: ObjectClass,
     /// Length, width, height, metres.
     pub size: [f32; 3],
-    /// Shape, place in the car's axes (x forward, y left, origin on the ground below the middle)
-    /// and material of each part.
+    /// Shape, position in the car's axes (x forward, y left, origin on the ground below the middle) and material of each part.
     pub(super) parts: Vec<(Shape, [f64; 3], u32)>,
 }
 
 impl CarModel {
-    /// The solids of a car at a place with a heading.
+    /// The solids of a car at a position with a heading.
     pub(crate) fn solids(
         &self,
         base: [f64; 3],
@@ -51,12 +50,12 @@ impl CarModel {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Body {
     pub(super) size: [f32; 3],
-    /// Height of the waist above the road.
+    /// Height of the waistline above the road.
     pub(super) waist: f32,
-    /// Where the cabin ends at the waist and at the roof, from the middle: front and rear.
+    /// Ends of the cabin at the waistline and at the roof, from the middle: front, rear.
     pub(super) cabin: [f32; 2],
     pub(super) roof: [f32; 2],
-    /// Length of the hood's slope and its drop.
+    /// Length and drop of the hood's slope.
     pub(super) hood: [f32; 2],
 }
 
@@ -176,7 +175,7 @@ pub(super) fn model(
     }
 }
 
-/// The plane through two points of the side view, outward to the upper side of a→b turned left.
+/// The plane through two points of the side view; its outside is to the left of the way from a to b.
 fn slope(a: [f32; 2], b: [f32; 2]) -> (V3, f32) {
     let normal = V3::new(-(b[1] - a[1]), 0.0, b[0] - a[0]).normalize();
     (normal, normal.x * a[0] + normal.z * a[1])
@@ -195,7 +194,7 @@ pub(super) fn lower_hull(body: &Body) -> Hull {
             (V3::z(), top),
             (-V3::z(), 0.0),
             slope([half - length, top], [half, top - drop]),
-            // The bumpers are rounded below, the sills drawn in.
+            // The bumpers are rounded below, and the sills lie further in.
             slope([half, 0.22], [half - 0.22, 0.0]),
             slope([0.16 - half, 0.0], [-half, 0.24]),
             slope([-half, top - 0.12], [-half + 0.25, top]),

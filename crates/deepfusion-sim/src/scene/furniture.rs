@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 const GROUND: f64 = KERB_HEIGHT as f64 - 0.02;
 
-/// Materials that the furniture of a drive shares.
+/// Materials shared by the furniture of a drive.
 pub(super) struct Furniture {
     pole: u32,
     dark: u32,
@@ -45,7 +45,7 @@ const SIGNS: [[[f32; 3]; 2]; 6] = [
 ];
 
 impl Furniture {
-    /// Chooses the colours.
+    /// Draws the colours.
     pub(super) fn new(world: &mut World, rng: &mut ChaCha8Rng) -> Self {
         let metal = |world: &mut World, tone: f32| {
             world.material(Material::Metal(Rgb::new(tone, tone, tone * 0.97)))
@@ -80,7 +80,7 @@ impl Furniture {
         }
     }
 
-    /// A lamp post whose arm reaches over the road (`towards` is the heading to it).
+    /// A lamp post with an arm that reaches over the road; `towards` is the heading to the road.
     pub(super) fn lamp(
         &self,
         world: &mut World,
@@ -128,7 +128,7 @@ impl Furniture {
         );
     }
 
-    /// A traffic sign that faces along `heading`.
+    /// A traffic sign that faces `heading`.
     pub(super) fn sign(
         &self,
         world: &mut World,
@@ -170,7 +170,7 @@ impl Furniture {
         world.object(ObjectClass::Pole, [x, y, GROUND], 0.0, [0.14, 0.14, 0.9]);
     }
 
-    /// A column for posters, or a cabinet, or a bin.
+    /// An advertising column, a cabinet or a bin.
     pub(super) fn cabinet(
         &self,
         world: &mut World,

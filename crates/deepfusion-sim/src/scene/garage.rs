@@ -8,22 +8,22 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::FRAC_PI_2;
 
-/// From the lane's middle to the walls, metres.
+/// Distance from the lane's middle to the walls, metres.
 const HALF_WIDTH: f64 = 8.8;
-/// Where the bays begin.
+/// Distance from the lane's middle to the bays, metres.
 const BAYS: f64 = 3.4;
-/// Underside of the ceiling.
+/// Height of the ceiling's underside, metres.
 const CEILING: f64 = 2.75;
-/// Length of a piece of wall or ceiling along the lane; pieces overlap a little in bends.
+/// Length of a piece of wall or ceiling along the lane, metres; pieces overlap a little in bends.
 const PIECE: f64 = 3.0;
-/// Distance between two pillars of a row.
+/// Distance between two pillars of a row, metres.
 const PILLARS: f64 = 7.8;
-/// Width of a bay.
+/// Width of a bay, metres.
 const BAY: f64 = 2.6;
 
 const PILLAR_PAINTS: [[f32; 3]; 3] = [[0.55, 0.42, 0.06], [0.10, 0.22, 0.42], [0.42, 0.09, 0.07]];
 
-/// Builds it along the whole road.
+/// Builds the garage along the whole road.
 pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
     lay_ground(world, rng);
     let concrete = world.material(Material::Masonry(Rgb::new(0.46, 0.45, 0.43)));
@@ -42,7 +42,7 @@ pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
     while s < end {
         for side in [-1.0, 1.0] {
             let (x, y, heading) = world.road.world(s, side * (HALF_WIDTH + 0.15));
-            // Outside of a bend the pieces are farther apart.
+            // On the outside of a bend the pieces must be longer.
             let stretch = 1.0 + world.road.centre(s).3.abs() * HALF_WIDTH;
             let wall = Shape::Box {
                 half_x: (0.5 * PIECE * stretch) as f32 + 0.05,
@@ -99,7 +99,7 @@ pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
                 }
             }
         }
-        // A tube over the lane, brighter than the next one or broken.
+        // A tube lamp over the lane, of random brightness or broken.
         let (x, y, heading) = world.road.world(s + 0.5 * PILLARS, 0.0);
         let tube = Shape::Box {
             half_x: 0.65,

@@ -7,14 +7,14 @@ use crate::texture::{Material, Rgb};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Materials that all plants of a drive share.
+/// Materials shared by the plants of a drive.
 pub(super) struct Greens {
     leaves: Vec<u32>,
     bark: Vec<u32>,
 }
 
 impl Greens {
-    /// The colours of this drive's season.
+    /// Draws the colours of this drive's season.
     pub(super) fn new(world: &mut World, rng: &mut ChaCha8Rng) -> Self {
         let autumn = rng.random_range(0.0..0.35);
         let leaves = (0..8)
@@ -46,7 +46,7 @@ impl Greens {
         of[rng.random_range(0..of.len())]
     }
 
-    /// A tree of broad leaves, or now and then a conifer.
+    /// A broad-leaved tree, or sometimes a conifer.
     pub(super) fn tree(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
         let size = rng.random_range(0.7..1.25f32);
         let (leaves, bark) = (Self::any(rng, &self.leaves), Self::any(rng, &self.bark));

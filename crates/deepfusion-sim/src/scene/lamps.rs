@@ -1,13 +1,13 @@
-//! Lamps: what lights a street by night and a garage by day.
+//! Lamps: they light a street by night and a garage by day.
 
 use crate::primitive::V3;
 use crate::texture::Rgb;
 use nalgebra::Vector3;
 
-/// A lamp farther along the street than this lights nothing, metres.
+/// Range of a lamp along the street, metres.
 const REACH: f32 = 30.0;
 
-/// Light that reaches a surface turned away from a lamp, by way of others, as a share.
+/// Share of the light that reaches a surface turned away from a lamp, reflected by other surfaces.
 const INDIRECT: f32 = 0.12;
 
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ struct Lamp {
     strength: Rgb,
 }
 
-/// All lamps that burn, by their place along the street.
+/// All lamps that are on, by their position along the street.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Lamps {
     lamps: Vec<(f32, Lamp)>,
@@ -30,18 +30,18 @@ impl Lamps {
         self.lamps.push((s, Lamp { place, strength }));
     }
 
-    /// Whether none burns.
+    /// Whether no lamp is on.
     pub(crate) fn is_empty(&self) -> bool {
         self.lamps.is_empty()
     }
 
-    /// To be called once all are there.
+    /// Call this once all lamps are added.
     pub(crate) fn sort(&mut self) {
         self.lamps.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
 
-    /// What they send onto a surface at `place`, `s` metres along the street. It depends on the surface's
-    /// position and direction alone, never on the viewer's. Nothing casts a shadow in it.
+    /// Irradiance of a surface at `place`, `s` metres along the street. It depends on the surface's position and direction alone, never on
+    /// the viewer's. Lamps cast no shadows.
     pub(crate) fn irradiance(&self, place: &Vector3<f64>, s: f32, normal: &V3) -> Rgb {
         let first = self.lamps.partition_point(|lamp| lamp.0 < s - REACH);
         let near = self.lamps[first..]
@@ -50,7 +50,7 @@ impl Lamps {
         let mut sum = Rgb::zeros();
         for (_, lamp) in near {
             let towards = (lamp.place - place).map(|x| x as f32);
-            // A lamp has a size: right beside it the light does not grow without end.
+            // Lamps are not points, so the light close to one is bounded.
             let square = towards.norm_squared().max(0.25);
             let facing = normal.dot(&towards) / square.sqrt();
             let fade = (1.0 - square.sqrt() / REACH).max(0.0);

@@ -16,7 +16,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Over this length the widths of two stretches blend, metres.
 const BLEND: f64 = 14.0;
 
-/// What stands along one side of a stretch.
+/// Kind of one side of a stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Frontage {
     Terrace,
@@ -47,7 +47,7 @@ impl Section {
 }
 
 impl Side {
-    /// What a scene asks for, whatever was drawn.
+    /// Adapts what was drawn to the scene.
     fn suited_to(mut self, scene: Scene) -> Self {
         match scene {
             Scene::Night => self.lamps = true,
@@ -72,9 +72,9 @@ struct Side {
     frontage: Frontage,
     pavement: f32,
     verge: f32,
-    /// From the pavement to the houses, metres.
+    /// Distance from the pavement to the houses, metres.
     setback: f64,
-    /// Share of the places taken by parked cars.
+    /// Share of the parking places that are taken.
     parked: f64,
     /// Distance between the trees of an avenue, metres; 0: none.
     trees: f64,
@@ -246,12 +246,12 @@ impl StreetSide<'_> {
         )
     }
 
-    /// World place `out` metres from the centreline on this side at `s`, and the road's heading.
+    /// Position `out` metres from the centreline on this side at `s`, and the road's heading.
     fn place(&self, s: f64, out: f64) -> (f64, f64, f64) {
         self.world.road.world(s, self.sign() * out)
     }
 
-    /// A place `beyond` metres beyond the kerb, if no road is within `clear` metres of it.
+    /// A position `beyond` metres beyond the kerb, if no road is within `clear` metres of it.
     fn free_place(&self, s: f64, beyond: f64, clear: f32) -> Option<(f64, f64, f64)> {
         let (x, y, heading) = self.place(s, self.edges(s).0 + beyond);
         let p = self.world.road.locate(x, y);
@@ -303,7 +303,7 @@ impl StreetSide<'_> {
         let middle = s + 0.5 * width;
         let (_, edge) = self.edges(middle);
         let curvature = self.world.road.centre(middle).3 * self.sign();
-        // On the inside of a bend the ends of a straight front come nearer to the road.
+        // On the inside of a bend the ends of a straight front are nearer to the road.
         let bulge = (curvature.max(0.0) * width * width / 8.0).min(4.0);
         let out = edge + setback + bulge + 0.5 * depth;
         if curvature > 0.0 && out > 0.8 / curvature {
@@ -326,7 +326,7 @@ impl StreetSide<'_> {
         true
     }
 
-    /// A second row, behind gardens and parks: it closes the view between the houses.
+    /// A second row of houses and trees behind gardens and parks, which closes the view between the houses.
     fn build_background(&mut self, rng: &mut ChaCha8Rng) {
         let mut s = self.section.from + rng.random_range(0.0..12.0);
         while s < self.section.to {
@@ -389,7 +389,7 @@ impl StreetSide<'_> {
             }
             s += rng.random_range(5.5..6.9);
         }
-        // Cars in drives and on forecourts.
+        // Cars on drives and forecourts.
         if matches!(plan.frontage, Frontage::Detached | Frontage::Commercial) && plan.setback > 4.8
         {
             let mut s = self.section.from + rng.random_range(2.0..14.0);
@@ -406,7 +406,7 @@ impl StreetSide<'_> {
         }
     }
 
-    /// Not in a junction, nor on a crossing.
+    /// False in a junction and on a crossing.
     fn may_park(&self, s: f64) -> bool {
         let junction = self.world.road.side_streets().iter().any(|street| {
             street.side == self.side
@@ -421,7 +421,7 @@ impl StreetSide<'_> {
     fn plant(&mut self, rng: &mut ChaCha8Rng) {
         let plan = self.plan();
         let crowded = plan.frontage == Frontage::Terrace && plan.setback < 1.0;
-        // The avenue along the kerb.
+        // The trees along the kerb.
         if plan.trees > 0.0 && plan.pavement + plan.verge > 2.2 && !crowded {
             let mut s = self.section.from + rng.random_range(0.0..plan.trees);
             while s < self.section.to {
@@ -436,7 +436,7 @@ impl StreetSide<'_> {
                 s += plan.trees * rng.random_range(0.85..1.25);
             }
         }
-        // Gardens: a hedge, a fence or a wall along the pavement, with gaps; plants behind.
+        // Gardens: a hedge, a fence or a wall along the pavement, with gaps, and plants behind it.
         if plan.setback > 2.0 && plan.frontage != Frontage::Commercial
             || plan.frontage == Frontage::Park
         {

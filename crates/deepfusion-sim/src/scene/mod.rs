@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 pub enum ObjectClass {
     /// A car, parked or moving.
     Car,
-    /// A lamp post, a sign, a bollard, a box at the roadside.
+    /// A lamp post, a sign, a bollard or a box at the roadside.
     Pole,
     /// A tree or a bush.
     Tree,
@@ -51,7 +51,7 @@ pub enum ObjectClass {
     Pedestrian,
     /// Someone on a bicycle or a motorbike.
     Cyclist,
-    /// A bicycle or a motorbike that nobody sits on.
+    /// A parked bicycle or motorbike.
     Bicycle,
     /// Anything else: furniture, goods, rails, banks.
     Misc,
@@ -60,9 +60,9 @@ pub enum ObjectClass {
 /// Something on the street, with its exact box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneObject {
-    /// Its identity, constant over frames.
+    /// Identity of the object, constant over frames.
     pub id: u64,
-    /// Its class.
+    /// Class of the object.
     pub class: ObjectClass,
     /// Centre of its box and its axes (x forward, y left, z up) in the world, metres.
     pub world_from_object: Se3,
@@ -82,9 +82,9 @@ pub(crate) struct World {
     pub stretch_of: Vec<u16>,
     /// Solids, in order of `s`.
     pub primitives: Vec<Primitive>,
-    /// Solids too large to be found by their `s`: hills, halls, bridges. A camera looks for them everywhere.
+    /// Solids too large to be found by their `s`: hills, halls, bridges. Every camera considers them.
     pub far: Vec<Primitive>,
-    /// Metres along the street of each solid, and its reach around that.
+    /// Position of each of the `primitives` along the street, metres.
     pub along: Vec<f32>,
     /// Convex solids that primitives refer to.
     pub hulls: Vec<Hull>,
@@ -92,13 +92,13 @@ pub(crate) struct World {
     pub materials: Vec<Material>,
     /// All static objects.
     pub objects: Vec<SceneObject>,
-    /// The models of cars, for the moving ones.
+    /// The models of cars, parked and moving.
     pub models: Vec<cars::CarModel>,
     /// Where traffic drives in a varied world: see [`World::lanes`].
     pub lanes: Vec<Lane>,
     /// Rooms of an indoor world.
     pub rooms: Vec<Room>,
-    /// Models of people on foot and on wheels, of varied worlds.
+    /// Models of people on foot and on wheels, in varied worlds.
     pub crowd: Vec<cars::CarModel>,
     /// The random table of every texture.
     pub noise: Noise,
@@ -108,32 +108,31 @@ pub(crate) struct World {
     pub sun: V3,
     /// Irradiance of the sun and of the sky.
     pub light: (Rgb, Rgb),
-    /// Lamps that burn.
+    /// Lamps that are on.
     pub lamps: Lamps,
     /// The kind of scene.
     pub scene: Scene,
-    /// The drive's seed, folded.
+    /// Seed of the drive, folded to 32 bits.
     pub seed: u32,
 }
 
-/// A room: a rectangle along the world's axes, and the height of its ceiling. A camera may be anywhere in it where
-/// nothing else is.
+/// A room: a rectangle along the world's axes, and the height of its ceiling. A camera may be anywhere in it that is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Room {
     /// Least x and y, metres.
     pub low: [f64; 2],
     /// Greatest x and y, metres.
     pub high: [f64; 2],
-    /// Metres.
+    /// Height of the ceiling, metres.
     pub height: f64,
 }
 
-/// Where vehicles drive.
+/// A lane of traffic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lane {
     /// Metres left of the centreline.
     pub lateral: f64,
-    /// As the camera drives, not against it.
+    /// Whether it leads the way that the camera drives.
     pub forward: bool,
 }
 
@@ -153,7 +152,7 @@ impl ObjectClass {
         )
     }
 
-    /// Its name in a file of tracklets: KITTI's for cars, capitalised like it for the others.
+    /// Name in a tracklet file: KITTI's for cars, in the same style for the others.
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
@@ -180,7 +179,7 @@ impl World {
         Self::furnish_varied(road, seed, scene, &Variety::none())
     }
 
-    /// Furnishes `road` for the drive of `seed` with as much variety as is asked for.
+    /// Furnishes `road` for the drive of `seed`, varied by `variety`.
     pub(crate) fn furnish_varied(road: Road, seed: u64, scene: Scene, variety: &Variety) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED_57AE_E700_0001);
         let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
@@ -236,7 +235,7 @@ impl World {
         world
     }
 
-    /// Models of the people who may ride and walk through it: a varied world's own crowd, others for a plain one.
+    /// Models of the people who may ride and walk through it: a varied world's own crowd; for a plain world they are made here.
     pub(crate) fn people(&mut self) -> Vec<cars::CarModel> {
         if self.crowd.is_empty() {
             variety::crowd(self)
@@ -255,13 +254,13 @@ impl World {
             .to_vec()
     }
 
-    /// Takes away what hangs lower than `headroom` metres over the camera's lane, for a camera higher than on most cars.
+    /// Removes what hangs lower than `headroom` metres over the camera's lane, for a camera higher than those on most cars.
     pub(crate) fn clear_lane(&mut self, headroom: f64) {
         variety::clear_lane(self, headroom);
         self.sort();
     }
 
-    /// Takes the day away where there is none.
+    /// Replaces daylight in scenes that have none.
     fn dim(&mut self) {
         match self.scene {
             Scene::Night => {
@@ -276,7 +275,7 @@ impl World {
         }
     }
 
-    /// Lights a lamp, where the scene is dark.
+    /// Adds a lamp if the scene is dark.
     fn light_lamp(&mut self, place: [f64; 3], strength: Rgb) {
         if self.scene == Scene::Night {
             let s = self.road.locate(place[0], place[1]).s;
@@ -284,7 +283,7 @@ impl World {
         }
     }
 
-    /// Sorts the solids along the street, so that a camera finds those around it.
+    /// Sorts the solids along the street, so that a camera can look up those around it.
     fn sort(&mut self) {
         let mut keyed: Vec<(f32, Primitive)> = self
             .primitives
@@ -296,13 +295,13 @@ impl World {
         self.primitives = keyed.into_iter().map(|k| k.1).collect();
     }
 
-    /// Index of a new material.
+    /// Adds a material and returns its index.
     fn material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
         (self.materials.len() - 1) as u32
     }
 
-    /// Index of a new hull.
+    /// Adds a hull and returns its index.
     fn hull(&mut self, hull: Hull) -> u32 {
         self.hulls.push(hull);
         (self.hulls.len() - 1) as u32
@@ -320,7 +319,7 @@ impl World {
         });
     }
 
-    /// Lists an object that stands still; `base` is the middle of its underside.
+    /// Adds a static object; `base` is the middle of its underside.
     fn object(&mut self, class: ObjectClass, base: [f64; 3], heading: f64, size: [f64; 3]) {
         self.objects.push(SceneObject {
             id: self.objects.len() as u64,
@@ -352,7 +351,7 @@ impl World {
     }
 }
 
-/// The pose of an upright box from the middle of its underside, its heading and its height.
+/// The pose of an upright box, given the middle of its underside, its heading and its height.
 pub(crate) fn upright(base: [f64; 3], heading: f64, height: f64) -> Se3 {
     Se3::from_axis_angle(
         Vector3::new(0.0, 0.0, heading),

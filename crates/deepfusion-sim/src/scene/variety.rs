@@ -40,7 +40,7 @@ pub struct Variety {
     pub wild: f64,
     /// How many of the places for parked cars are taken.
     pub parked: f64,
-    /// How many people are about.
+    /// How many people there are.
     pub people: f64,
     /// How much furniture stands on pavements and in rooms.
     pub clutter: f64,
@@ -59,7 +59,7 @@ impl Default for Variety {
 }
 
 impl Variety {
-    /// The plain worlds: nothing varied, nothing drawn.
+    /// The variety of plain worlds: nothing is varied.
     #[must_use]
     pub fn none() -> Self {
         Self {
@@ -74,7 +74,7 @@ impl Variety {
         }
     }
 
-    /// The variety of one world.
+    /// Draws the variety of one world.
     pub fn draw(rng: &mut impl Rng) -> Self {
         let mut part = |most: f64| most * rng.random_range(0.0f64..1.0);
         let (wild, parked, people) = (part(0.5), part(1.0), part(1.0));
@@ -99,21 +99,22 @@ impl Variety {
         }
     }
 
-    /// Whether worlds of it differ from the plain ones.
+    /// Whether its worlds differ from the plain ones.
     #[must_use]
     pub fn is_varied(&self) -> bool {
         self.varied
     }
 }
 
-/// People for a world that is not varied, drawn apart. Their materials come after the world's own, so that nothing else changes.
+/// People for a world that is not varied, drawn from a generator of their own. Their materials are appended to the world's own, so that
+/// nothing else changes.
 pub(super) fn crowd(world: &mut World) -> Vec<CarModel> {
     let mut rng = ChaCha8Rng::seed_from_u64(u64::from(world.seed) ^ 0xC40D_0000_0000);
     let kit = Kit::new(world, &mut rng, &Variety::none());
     people::models(world, &mut rng, &kit)
 }
 
-/// Takes away what hangs lower than `headroom` metres over the camera's lane.
+/// Removes what hangs lower than `headroom` metres over the camera's lane.
 pub(super) fn clear_lane(world: &mut World, headroom: f64) {
     let free = sweep::FreeLane {
         headroom,
@@ -139,7 +140,7 @@ pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety
         Scene::Country => country::furnish(&mut site),
         Scene::Indoor => indoor::furnish(&mut site),
         Scene::Garage => {
-            // Whatever is too long for a bay or too high for the ceiling stays out.
+            // Leave out vehicles that are too long for a bay or too high for the ceiling.
             let fits = |m: &CarModel| m.size[0] < 5.1 && m.size[2] < 2.2;
             site.world.models.retain(fits);
             super::garage::furnish(site.world, site.rng);

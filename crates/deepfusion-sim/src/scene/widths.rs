@@ -4,18 +4,18 @@ use super::World;
 use crate::road::STEP;
 use crate::texture::noise::{lerp, smoothstep};
 
-/// The widths of a section of a street, metres.
+/// The widths of a section of a street.
 pub(super) struct Widths {
-    /// Where it ends along the road.
+    /// End of the section, metres along the road.
     pub to: f64,
-    /// Half of the carriageway.
+    /// Half the width of the carriageway, metres.
     pub half_width: f32,
-    /// Pavement and verge, on the left and on the right.
+    /// Widths of pavement and verge, metres: right, left.
     pub sides: [(f32, f32); 2],
 }
 
 impl World {
-    /// Gives the road the sections' widths, each of which goes over into the next within the last `blend` metres.
+    /// Sets the widths of the road's samples. Each section blends into the next over its last `blend` metres.
     pub(super) fn apply_widths(&mut self, sections: &[Widths], blend: f64) {
         let start = self.road.start;
         let samples = self.road.samples_mut();

@@ -5,21 +5,21 @@ use super::pattern::Pattern;
 use super::{Patch, Rgb, mix, vary};
 use crate::primitive::FACE_TOP;
 
-/// What a wall is built of.
+/// Material of a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wall {
-    /// Rendered, with stains.
+    /// Render with stains.
     Plaster,
-    /// Courses of bricks.
+    /// Brick courses.
     Brick,
-    /// Large blocks.
+    /// Large blocks of stone.
     Stone,
 }
 
 /// How one house looks.
 #[derive(Debug, Clone)]
 pub(crate) struct Facade {
-    /// Half the house's extents along its x and y axes, metres.
+    /// Half extents of the house along its x and y axes, metres.
     pub half: [f32; 2],
     /// Height of the walls, metres.
     pub height: f32,
@@ -27,7 +27,7 @@ pub(crate) struct Facade {
     pub wall: Wall,
     /// Colour of the walls.
     pub colour: Rgb,
-    /// Colour of ledges, frames of windows and corner stones.
+    /// Colour of ledges, window frames and corner stones.
     pub trim: Rgb,
     /// Colour of doors and shutters.
     pub accent: Rgb,
@@ -37,15 +37,15 @@ pub(crate) struct Facade {
     pub pitch: f32,
     /// Width and height of a window, metres.
     pub window: [f32; 2],
-    /// Windows have shutters.
+    /// Whether windows have shutters.
     pub shutters: bool,
-    /// The ground floor is a shop.
+    /// Whether the ground floor is a shop.
     pub shop: bool,
-    /// A ledge between the floors.
+    /// Whether there is a ledge between the floors.
     pub ledges: bool,
     /// How dirty it is, 0 to 1.
     pub grime: f32,
-    /// What the walls are clad with, in the place of `wall` and `colour`.
+    /// Cladding of the walls, in place of `wall` and `colour`.
     pub skin: Option<Pattern>,
 }
 
@@ -58,7 +58,7 @@ impl Facade {
             return vary(&Rgb::new(0.2, 0.19, 0.18), grain, 0.4);
         }
         let across = usize::from(patch.face >= 2);
-        // Along the wall from its left corner, and its width.
+        // Position along the wall from its left corner, and the wall's width.
         let (u, fu, width) = if across == 1 {
             (p.x + self.half[0], patch.extent.x, 2.0 * self.half[0])
         } else {
@@ -188,7 +188,7 @@ impl Facade {
             )
         };
         *colour = mix(colour, &pane, window * inside);
-        // The recess is dark under the lintel; the sill is bright and its shadow dark.
+        // The recess is dark below the lintel, the sill is bright, and the wall below the sill is in its shadow.
         let lintel = band(x, -half, half, fu) * band(y, head - 0.12, head, fv);
         let ledge = band(x, -half - 0.12, half + 0.12, fu) * band(y, sill - 0.16, sill - 0.04, fv);
         let below = band(x, -half - 0.12, half + 0.12, fu) * band(y, sill - 0.3, sill - 0.16, fv);
@@ -208,7 +208,7 @@ impl Facade {
         }
     }
 
-    /// Panes with bars, curtains and what a room or a sky behind them looks like.
+    /// Panes with bars and curtains, and a room or a reflection of the sky in them.
     #[inline]
     fn glass(
         &self,
@@ -230,13 +230,13 @@ impl Facade {
         let mut pane = vary(&Rgb::new(0.8, 0.95, 1.15), blotch, 0.7) * sky;
         let kind = unit(cell, 2);
         if kind < 0.35 {
-            // Curtains, drawn to the sides by some width.
+            // Curtains, partly drawn.
             let open = half * (0.2 + 0.7 * unit(cell, 3));
             let cloth = beyond(x.abs(), open, fu);
             let folds = 0.45 + 0.12 * noise.wave(x * 5.0, 0.3, 0.4, fu);
             pane = mix(&pane, &Rgb::new(folds, folds * 0.95, folds * 0.85), cloth);
         } else if kind < 0.6 {
-            // A blind, let down by some length.
+            // A blind, partly lowered.
             let blind = beyond(y, head - (head - sill) * unit(cell, 3), fv);
             let slats = 0.42 + 0.14 * bands(y, 0.1, 0.0, 0.05, fv);
             pane = mix(&pane, &Rgb::new(slats, slats, slats * 0.92), blind);
@@ -249,7 +249,7 @@ impl Facade {
         mix(&pane, &(self.trim * 0.9), bars.max(edge))
     }
 
-    /// The board over a shop, with something like letters.
+    /// The sign of a shop, with marks like letters.
     #[inline]
     fn add_sign(
         &self,
@@ -301,7 +301,7 @@ pub(crate) fn courses(
     let joints =
         (bands(v, tile[1], 0.0, joint, fv) + bands(offset, tile[0], 0.0, joint, fu)).min(1.0);
     let code = hash((offset / tile[0]).floor() as i32, row as i32, seed);
-    // Single tiles are told apart only where a pixel is smaller than a tile.
+    // Tiles differ from each other only where a pixel is smaller than a tile.
     let seen = (1.6 - 1.2 * (fu / tile[0]).max(fv / tile[1])).clamp(0.0, 1.0);
     let tone = 1.0 + spread * seen * (unit(code, 0) - 0.5);
     let warm = 0.12 * seen * (unit(code, 1) - 0.5);
@@ -316,7 +316,7 @@ pub(crate) fn courses(
 /// Rows of tiles on a roof.
 pub(crate) fn roof(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
-    // Gables, the upright faces of a roof, are plain wall.
+    // Rows of tiles run along each face, also along gables.
     let along = if patch.normal.y.abs() > patch.normal.x.abs() {
         p.x
     } else {

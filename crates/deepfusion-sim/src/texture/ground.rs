@@ -5,12 +5,12 @@ use super::ground_style::GroundStyle;
 use super::noise::{Noise, band, bands, beyond, hash, length, lerp, smoothstep, unit};
 use super::{Rgb, mix, vary};
 
-/// A piece of ground that one pixel (or one sample of it) sees.
+/// A piece of ground that is visible in one pixel, or in one sample of it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroundPatch {
-    /// World position, metres.
+    /// World x, metres.
     pub x: f32,
-    /// World position, metres.
+    /// World y, metres.
     pub y: f32,
     /// Metres along the street.
     pub s: f32,
@@ -22,33 +22,33 @@ pub(crate) struct GroundPatch {
     pub kerb: f32,
     /// Size of the patch, metres.
     pub size: f32,
-    /// Its extents along s and along the lateral, metres.
+    /// Extents along `s` and along `lateral`, metres.
     pub extent: [f32; 2],
 }
 
-/// How a stretch of road is painted and what lies beside it.
+/// Markings of a stretch of road, and the ground beside it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Stretch {
     /// Dashes along the middle: their period and length, metres; 0: none.
     pub dashes: [f32; 2],
-    /// Lines along the edges.
+    /// Whether there are lines along the edges.
     pub edge_lines: bool,
     /// Zebra crossing at this s; NaN: none.
     pub zebra: f32,
     /// Tone of the asphalt.
     pub asphalt: f32,
-    /// Bays for parked cars are marked.
+    /// Whether bays for parked cars are marked.
     pub bays: bool,
-    /// What lies beyond the pavement: right, left.
+    /// Ground beyond the pavement: right, left.
     pub beyond: [Beyond; 2],
-    /// How the pavement is laid: right, left.
+    /// Surface of the pavement: right, left.
     pub paving: [Paving; 2],
-    /// The ground of a varied world, in the place of all of the above.
+    /// The ground of a varied world, in place of all of the above.
     pub style: Option<GroundStyle>,
 }
 
 impl Stretch {
-    /// A stretch of a varied world: its ground stands for all else.
+    /// A stretch of a varied world, where the style replaces all else.
     pub(crate) fn styled(style: GroundStyle) -> Self {
         Self {
             zebra: f32::NAN,
@@ -89,7 +89,7 @@ pub(crate) fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32)
         return style.carriageway(noise, p, seed);
     }
     let mut tone = stretch.asphalt;
-    // Whole stretches were laid at different times; patches were mended.
+    // The asphalt of whole stretches differs in age, and patches were mended.
     tone *= 1.0 + 0.18 * noise.wave(p.x, p.y, 23.0, p.size);
     let (cell_s, cell_l) = (7.3, 2.1);
     let drift = 1.7 * noise.at(p.s * 0.02, 0.5);
@@ -107,7 +107,7 @@ pub(crate) fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32)
         let new = if code & 1 == 0 { 0.68 } else { 1.3 };
         tone *= lerp(1.0, new, inside) * (1.0 - 0.5 * (inside - core));
     }
-    // Oil drips in the middle of the lanes, tyres polish their tracks.
+    // Oil drips on the middle of the lanes, and tyres polish their tracks.
     let lane = p.lateral.abs() - 0.5 * p.half_width.min(3.6);
     let track = (-(lane.abs() - 0.75).powi(2) * 9.0).exp();
     tone *= 1.0 - 0.1 * track - 0.1 * (-lane * lane * 7.0).exp();
@@ -185,7 +185,7 @@ fn markings(noise: &Noise, p: &GroundPatch, stretch: &Stretch) -> f32 {
     paint * kept * beyond(-p.kerb, 0.1, fl)
 }
 
-/// A manhole's lid, here and there.
+/// A manhole cover in some places.
 #[inline]
 pub(crate) fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
     let (cs, cl) = ((p.s / 11.0).floor(), (p.lateral / 2.9).floor());

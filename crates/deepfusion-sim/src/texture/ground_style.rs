@@ -19,7 +19,7 @@ pub(crate) struct Line {
 /// The material of a ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Even, with grain and stains.
+    /// Even, with grain and stains: asphalt or concrete.
     Asphalt,
     /// Stones, slabs, tiles or parquet with joints.
     Laid,
@@ -31,7 +31,7 @@ pub(crate) enum Kind {
     Field,
 }
 
-/// One ground.
+/// The look of one piece of ground.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surface {
     /// Its material.
@@ -48,14 +48,14 @@ pub(crate) struct Surface {
     pub stain: f32,
 }
 
-/// The ground of a stretch.
+/// The ground of a stretch of road.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroundStyle {
     /// The carriageway.
     pub road: Surface,
-    /// Pavement and what lies beyond it: right, left.
+    /// Pavement: right, left.
     pub pavement: [Surface; 2],
-    /// Beyond the pavement: right, left.
+    /// Ground beyond the pavement: right, left.
     pub beyond: [Surface; 2],
     /// The strip between kerb and pavement.
     pub verge: Surface,
@@ -63,26 +63,26 @@ pub(crate) struct GroundStyle {
     pub kerb: Rgb,
     /// Lines along the road.
     pub lines: [Option<Line>; 6],
-    /// Colour of the paint and how much of it is worn off.
+    /// Colour of the paint.
     pub paint: Rgb,
     /// How much of the paint is worn off, 0 to 1.
     pub wear: f32,
-    /// Zebra crossings, stop lines and arrows repeat after so many metres along the road; 0: none.
+    /// Distance after which zebra crossings, stop lines and arrows repeat along the road, metres; 0: none.
     pub crossing: f32,
     /// Share of the carriageway that was mended.
     pub mended: f32,
     /// Strength of cracks.
     pub cracks: f32,
-    /// Share of cells of 0.4 m with a fallen leaf: on the road, beside it.
+    /// Share of cells of 0.4 m that have a fallen leaf: on the road, beside it.
     pub leaves: [f32; 2],
-    /// A floor, without anything that only roads have.
+    /// Whether it is a floor, without anything that only roads have.
     pub indoors: bool,
-    /// A second carriageway beyond the kerb on the left: its edges, metres from the kerb; equal: none.
+    /// Edges of a second carriageway beyond the kerb on the left, metres from the kerb; equal: none.
     pub second: [f32; 2],
 }
 
 impl Surface {
-    /// Albedo at a patch; `u` and `v` are its coordinates in the joints' grid.
+    /// Albedo of a patch.
     #[inline]
     pub(crate) fn albedo(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
         let shift = (seed % 613) as f32;
@@ -159,7 +159,7 @@ impl GroundStyle {
         )
     }
 
-    /// Patches, wheel tracks, cracks and seams of asphalt: a factor.
+    /// Factor by which patches, wheel tracks, cracks and seams change the tone of asphalt.
     #[inline]
     fn worn(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> f32 {
         let mut tone = 1.0;
@@ -201,7 +201,6 @@ impl GroundStyle {
         let [fs, fl] = p.extent;
         let mut paint = 0.0f32;
         for line in self.lines.iter().flatten() {
-            // Lines near an edge follow it where the road widens.
             let mut across = band(p.lateral, line.at - line.half, line.at + line.half, fl);
             if across > 0.0 && line.dash[0] > 0.0 {
                 across *= bands(p.s, line.dash[0], 0.0, line.dash[1], fs);
@@ -245,7 +244,7 @@ impl GroundStyle {
         plain.component_mul(&self.kerb) * 3.0
     }
 
-    /// Beside the carriageway.
+    /// Albedo of the ground beside the carriageway.
     pub(crate) fn beside(
         &self,
         noise: &Noise,

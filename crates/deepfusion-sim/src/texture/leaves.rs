@@ -1,30 +1,30 @@
-//! Leaves of a crown: each clump has its own tone, the inner ones lie in the shade of the outer ones.
+//! Leaves of a crown: each clump has its own tone, and the inner ones are in the shade of the outer ones.
 
 use super::noise::{Noise, unit};
 use super::{Patch, Rgb, mix, vary};
 use crate::crown::{clump, shell_of};
 
-/// The leaves of one lobe; `cell` and `fill` are the lobe's own.
+/// The leaves of one lobe; `cell` and `fill` are those of the lobe.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leaves {
     /// Colour in the light.
     pub colour: Rgb,
-    /// Colour of single other clumps: blossom, dry leaves.
+    /// Colour of some clumps: blossom, dry leaves.
     pub other: Rgb,
-    /// Share of clumps of the other colour.
+    /// Share of clumps with the other colour.
     pub turned: f32,
-    /// Side of a clump's cell, metres.
+    /// Side of the cell of a clump, metres.
     pub cell: f32,
-    /// How full the cells are.
+    /// Density of the cells, 0 to 1.
     pub fill: f32,
 }
 
 impl Leaves {
-    /// Albedo of a patch; the solid's seed is the lobe's salt.
+    /// Albedo of a patch; the seed of the solid is the salt of the lobe.
     pub(crate) fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
         let p = &patch.point;
         let code = clump(p, self.cell, self.fill, patch.seed).unwrap_or(0);
-        // Single clumps are told apart only where a pixel is smaller than one.
+        // Clumps differ from each other only where a pixel is smaller than a clump.
         let seen = (1.5 - patch.size / self.cell).clamp(0.0, 1.0);
         let own = if unit(code, 1) < self.turned {
             self.other

@@ -16,20 +16,20 @@ use noise::Noise;
 /// A colour, linear red, green, blue.
 pub(crate) type Rgb = V3;
 
-/// A piece of a surface that one pixel (or one sample of it) sees.
+/// A piece of a surface that is visible in one pixel, or in one sample of it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Patch {
-    /// Its middle, in the solid's axes, metres.
+    /// Middle of the patch, in the solid's axes, metres.
     pub point: V3,
-    /// The solid's face.
+    /// Face of the solid.
     pub face: u8,
     /// Outward normal, in the solid's axes.
     pub normal: V3,
-    /// Its size, metres.
+    /// Size of the patch, metres.
     pub size: f32,
-    /// Its extent along each of the solid's axes, metres.
+    /// Extent along each of the solid's axes, metres.
     pub extent: V3,
-    /// Varies the texture from solid to solid.
+    /// Seed of the solid's texture.
     pub seed: u32,
 }
 
@@ -82,13 +82,13 @@ impl Material {
     }
 }
 
-/// A multiple of `colour` that noise of about ±1 moves by about ±`strength`; never below zero.
+/// `colour` scaled by noise: noise of about ±1 changes it by about ±`strength`. Never below zero.
 #[inline]
 pub(crate) fn vary(colour: &Rgb, noise: f32, strength: f32) -> Rgb {
     colour * (1.0 + strength * noise).max(0.05)
 }
 
-/// Two colours mixed.
+/// Two colours mixed: `a` at t = 0, `b` at t = 1.
 #[inline]
 pub(crate) fn mix(a: &Rgb, b: &Rgb, t: f32) -> Rgb {
     a + (b - a) * t

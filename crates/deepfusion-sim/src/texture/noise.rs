@@ -1,15 +1,15 @@
-//! Value noise, hashes and box-filtered patterns: the alphabet of every texture.
+//! Value noise, hashes and box-filtered patterns: the elements of every texture.
 //!
-//! Every function takes the size of the pixel's footprint on the surface, in metres, and leaves out
-//! what such a pixel cannot resolve, so that a texture seen from another place is the same texture.
+//! Every function takes the size of the pixel's footprint on the surface, in metres, and leaves out detail that such a pixel cannot
+//! resolve. So a texture is the same from every viewpoint.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Cells of the noise table along each axis; a power of two, so that wrapping is a mask.
+/// Cells of the noise table along each axis: a power of two, so that a mask wraps coordinates.
 const SIZE: usize = 256;
 
-/// Wavelength ratio of two octaves. Not 2, so that the table's repetitions never line up.
+/// Ratio of the wavelengths of two octaves. Not 1/2, so that repetitions of the table never line up.
 const LACUNARITY: f32 = 0.46;
 
 /// Two-dimensional value noise from a random table.
@@ -18,7 +18,7 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// The noise of a seed.
+    /// The noise with this seed.
     pub(crate) fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         Self {
@@ -45,7 +45,7 @@ impl Noise {
         lerp(a, b, sy)
     }
 
-    /// Noise of one wavelength in metres, faded out where a pixel of size `footprint` covers it.
+    /// Noise of one wavelength in metres, faded out for pixels of size `footprint` that cannot resolve it.
     #[inline]
     pub(crate) fn wave(&self, x: f32, y: f32, wavelength: f32, footprint: f32) -> f32 {
         let weight = visibility(wavelength, footprint);
@@ -55,8 +55,8 @@ impl Noise {
         weight * self.at(x / wavelength, y / wavelength)
     }
 
-    /// Several octaves, from `wavelength` (metres) down; each is `gain` times the one before.
-    /// Stops at what a pixel of size `footprint` cannot show.
+    /// Several octaves, from `wavelength` (metres) down; the amplitude of each is `gain` times that of the one before. Stops at octaves
+    /// that a pixel of size `footprint` cannot resolve.
     #[inline]
     pub(crate) fn fractal(
         &self,
@@ -81,8 +81,8 @@ impl Noise {
         sum
     }
 
-    /// Dark or bright thin lines where the noise changes sign: cracks, veins. 1 on a line, 0 off it;
-    /// `width` in metres. A line thinner than the footprint gets fainter instead of thinner.
+    /// Thin lines where the noise changes sign: cracks, veins. 1 on a line, 0 off it; `width` in metres. A line thinner than the footprint
+    /// gets fainter instead of thinner.
     #[inline]
     pub(crate) fn ridge(&self, x: f32, y: f32, wavelength: f32, width: f32, footprint: f32) -> f32 {
         let weight = visibility(wavelength, footprint);
@@ -95,7 +95,7 @@ impl Noise {
     }
 }
 
-/// How much of a wave of this length a pixel of this size still shows, in [0, 1].
+/// Share of the contrast of a wave of this length that remains in a pixel of this size, in [0, 1].
 #[inline]
 fn visibility(wavelength: f32, footprint: f32) -> f32 {
     ((wavelength / footprint.max(1e-4) - 1.0) * 0.9).clamp(0.0, 1.0)
@@ -113,7 +113,7 @@ pub(crate) fn smoothstep(a: f32, b: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// √(x² + y²), without the care for huge numbers that makes the library's slow.
+/// √(x² + y²), without the handling of huge numbers that makes `hypot` slow.
 #[inline]
 pub(crate) fn length(x: f32, y: f32) -> f32 {
     (x * x + y * y).sqrt()
@@ -132,7 +132,7 @@ pub(crate) fn hash(x: i32, y: i32, seed: u32) -> u32 {
     h ^ (h >> 15)
 }
 
-/// A number in [0, 1) from 8 bits of a hash; `byte` 0–3 gives four independent ones.
+/// A number in [0, 1) from 8 bits of a hash; the values 0 to 3 of `byte` give four independent ones.
 #[inline]
 pub(crate) fn unit(hash: u32, byte: u32) -> f32 {
     ((hash >> (8 * byte)) & 0xFF) as f32 / 256.0
@@ -145,14 +145,13 @@ pub(crate) fn band(x: f32, a: f32, b: f32, footprint: f32) -> f32 {
     (((x + 0.5 * f).min(b) - (x - 0.5 * f).max(a)) / f).clamp(0.0, 1.0)
 }
 
-/// Share of the pixel beyond `edge`.
+/// Share of the pixel [x − f/2, x + f/2] beyond `edge`.
 #[inline]
 pub(crate) fn beyond(x: f32, edge: f32, footprint: f32) -> f32 {
     ((x - edge) / footprint.max(1e-4) + 0.5).clamp(0.0, 1.0)
 }
 
-/// Share of the pixel inside bands [a, b] that repeat every `period` (0 ≤ a ≤ b ≤ period): exact for
-/// footprints of any size, the mean share for huge ones.
+/// Share of the pixel inside bands [a, b] that repeat every `period` (0 ≤ a ≤ b ≤ period): exact for footprints of any size.
 #[inline]
 pub(crate) fn bands(x: f32, period: f32, a: f32, b: f32, footprint: f32) -> f32 {
     let f = footprint.max(1e-4);

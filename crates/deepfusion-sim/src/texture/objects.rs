@@ -4,8 +4,8 @@ use super::facade::courses;
 use super::noise::{Noise, band, bands, beyond, hash, length, smoothstep, unit};
 use super::{Patch, Rgb, mix, vary};
 
-/// Where a patch is on a surface that has no coordinates of its own: two oblique views of space,
-/// so that no direction of the surface is without change.
+/// Noise for a surface without coordinates of its own: the sum of two oblique projections of space, so that it varies in every direction of
+/// the surface.
 #[inline]
 fn solid(noise: &Noise, patch: &Patch, wavelength: f32, octaves: u32, gain: f32) -> f32 {
     let p = &patch.point;
@@ -29,7 +29,7 @@ fn solid(noise: &Noise, patch: &Patch, wavelength: f32, octaves: u32, gain: f32)
     0.75 * (a + b)
 }
 
-/// Leaves: clumps, gaps that let the dark through, single bright leaves.
+/// Leaves: clumps, dark gaps, single bright leaves.
 pub(crate) fn foliage(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let clumps = solid(noise, patch, 0.4, 2, 0.7);
     let leaves = solid(noise, patch, 0.09, 2, 1.0);
@@ -49,7 +49,7 @@ pub(crate) fn bark(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     vary(colour, furrows + 0.6 * patches, 0.55)
 }
 
-/// Painted metal: scratches, stickers, a darker foot.
+/// Painted metal: scratches, stickers, darker at the bottom.
 pub(crate) fn metal(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
     let worn = solid(noise, patch, 0.4, 4, 0.7);
@@ -138,9 +138,9 @@ pub(crate) struct Paint {
     pub colour: Rgb,
     /// Length, width and height of the whole car, metres.
     pub size: [f32; 3],
-    /// Height of the part's own origin above the road, metres.
+    /// Height of the part's origin above the road, metres.
     pub base: f32,
-    /// This part is the cabin.
+    /// Whether this part is the cabin.
     pub cabin: bool,
 }
 
@@ -150,7 +150,7 @@ impl Paint {
         let p = &patch.point;
         let z = p.z + self.base;
         let f = &patch.extent;
-        // Dirt, and soft blotches in the place of reflections (fixed to the paint: no viewer here).
+        // Dirt, and soft blotches in place of reflections: they are fixed to the paint, since textures do not know the viewer.
         let dirt = solid(noise, patch, 0.5, 5, 0.7);
         let blotches = solid(noise, patch, 1.7, 2, 0.5);
         let paint = vary(&self.colour, 0.7 * dirt + blotches, 0.34);
@@ -178,7 +178,7 @@ impl Paint {
                 * band(z, 0.72, 0.77, f.z);
             colour *= (1.0 - 0.7 * doors.min(1.0)) * (1.0 - 0.4 * crease) * (1.0 - 0.3 * handles);
             colour = mix(&colour, &Rgb::new(0.03, 0.03, 0.03), skirt);
-            // The arches around the wheels.
+            // The wheel arches.
             for wheel in [0.3f32, -0.3] {
                 let away = length(p.x - wheel * self.size[0], z - 0.31);
                 let arch = 1.0 - beyond(away, 0.38, patch.size);

@@ -1,7 +1,7 @@
 //! Random surfaces: walls, boards, cloth and boxes of any colour, contrast and grain.
 //!
-//! A network should learn depth from geometry, not from a colour or the size of a grain; so both are random, over
-//! ranges wider than a street's.
+//! A network should learn depth from geometry, not from a colour or the size of a grain. So both are random, over wider ranges than on a
+//! real street.
 
 use super::facade::courses;
 use super::noise::{Noise, band, bands, beyond, hash, smoothstep, unit};
@@ -10,22 +10,22 @@ use crate::primitive::V3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// How the first two colours share the surface.
+/// How the two colours are distributed over the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Kind {
     /// The first colour alone.
     Plain,
     /// Cloudy patches.
     Blotches,
-    /// Bands of this share of the period.
+    /// Bands of the second colour, with this share of the period.
     Stripes(f32),
     /// A chequered board.
     Checks,
-    /// Bricks, stones or tiles: length over height, and the width of the joints as a share of the height.
+    /// Bricks, stones or tiles: length over height, and width of the joints as a share of the height.
     Courses(f32, f32),
     /// Boards with gaps; each has its own tone.
     Boards,
-    /// Sheet metal in waves.
+    /// Corrugated sheet metal.
     Corrugated,
     /// Fine dark and bright grains.
     Speckle,
@@ -33,37 +33,37 @@ pub(crate) enum Kind {
     Mosaic,
     /// Veins.
     Veins,
-    /// Wire or bars before something dark.
+    /// Wire or bars in front of something dark.
     Mesh,
 }
 
 /// A random surface.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pattern {
-    /// What is drawn.
+    /// Kind of the pattern.
     pub kind: Kind,
-    /// Its colours.
+    /// The two colours of the pattern.
     pub colours: [Rgb; 2],
-    /// Size of what is drawn, metres.
+    /// Size of the pattern, metres.
     pub scale: f32,
-    /// Cosine and sine of the turn of the pattern in the surface.
+    /// Cosine and sine of the rotation of the pattern in the surface.
     pub turn: (f32, f32),
     /// Wavelength (metres) and strength of fine noise.
     pub grain: [f32; 2],
     /// Wavelength (metres) and strength of coarse noise.
     pub blotch: [f32; 2],
-    /// Dirt that rises from the foot, 0 to 1.
+    /// Amount of dirt that rises from the bottom, 0 to 1.
     pub dirt: f32,
     /// Share of the surface under posters and paint, 0 to 1.
     pub posters: f32,
 }
 
-/// A random colour of albedo 0.02 to 0.85; `vivid` 0 is grey, 1 a child's toy.
+/// A random colour with an albedo of 0.02 to 0.85; at `vivid` 0 it is grey, at 1 as vivid as a toy.
 pub(crate) fn colour(rng: &mut ChaCha8Rng, vivid: f32) -> Rgb {
     let tone = if rng.random_bool(0.5) {
         rng.random_range(0.02..0.85f32)
     } else {
-        // As many dark surfaces as bright ones to the eye, which sees ratios.
+        // Uniform in the logarithm: the eye sees ratios, so dark and bright surfaces are equally frequent to it.
         0.02 * 40f32.powf(rng.random_range(0.0..1.0))
     };
     let hue = rng.random_range(0.0..std::f32::consts::TAU);
@@ -72,7 +72,7 @@ pub(crate) fn colour(rng: &mut ChaCha8Rng, vivid: f32) -> Rgb {
     (Rgb::new(wave(0.0), wave(2.094), wave(4.189)) * tone).map(|c| c.clamp(0.012, 0.9))
 }
 
-/// A colour of plaster, stone or wood: greys, creams, browns, and now and then a bold one.
+/// A colour of plaster, stone or wood: greys, creams, browns, and sometimes a bold one.
 pub(crate) fn wall_colour(rng: &mut ChaCha8Rng) -> Rgb {
     if rng.random_bool(0.18) {
         return colour(rng, 0.8);
@@ -133,7 +133,7 @@ impl Pattern {
         }
     }
 
-    /// What houses are clad with.
+    /// Cladding of houses.
     pub(crate) fn wall(rng: &mut ChaCha8Rng) -> Self {
         let base = wall_colour(rng);
         let mut pattern = Self::plain(rng, base);
@@ -216,7 +216,7 @@ impl Pattern {
         )
     }
 
-    /// Albedo at coordinates of a flat surface, metres; `height` above the solid's foot.
+    /// Albedo at coordinates of a flat surface, metres; `height` is above the bottom of the solid.
     #[inline]
     pub(crate) fn at(
         &self,
@@ -309,7 +309,7 @@ impl Pattern {
         )
     }
 
-    /// Posters, notices and sprayed letters within reach of a hand.
+    /// Posters, notices and graffiti at the height of people.
     #[inline]
     fn pasted(
         &self,
@@ -357,7 +357,7 @@ impl Pattern {
     }
 }
 
-/// Coordinates in a surface (metres) and a patch's extents along them.
+/// Coordinates of a patch on its surface (metres), and its extents along them.
 #[inline]
 pub(crate) fn unwrapped(patch: &Patch) -> (f32, f32, f32, f32) {
     let (p, n, f) = (&patch.point, patch.normal, &patch.extent);
@@ -370,7 +370,7 @@ pub(crate) fn unwrapped(patch: &Patch) -> (f32, f32, f32, f32) {
     }
 }
 
-/// Tiles of the first colour, each a little otherwise, with joints of the second.
+/// Tiles of the first colour, each with its own tone, with joints of the second.
 #[inline]
 fn laid(
     [a, b]: [&Rgb; 2],
@@ -386,12 +386,12 @@ fn laid(
     let offset = x + 0.5 * tile[0] * (row - 2.0 * (0.5 * row).floor());
     let joints =
         (bands(y, tile[1], 0.0, joint, fy) + bands(offset, tile[0], 0.0, joint, fx)).min(1.0);
-    // The tones of `courses`, without its joints.
+    // Uses the tones of `courses`, without its joints.
     let body: V3 = courses(a, x, y, tile, 0.0, fx, fy, seed, 0.5);
     mix(&body, b, joints)
 }
 
-/// Rectangles of mixed colours in a grid whose lines are not straight through.
+/// Rectangles of mixed colours in rows; the columns differ from row to row.
 #[inline]
 fn mosaic([a, b]: [&Rgb; 2], x: f32, y: f32, period: f32, fx: f32, fy: f32, seed: u32) -> Rgb {
     let row = (y / period).floor();

@@ -7,21 +7,21 @@ use crate::primitive::V3;
 /// The weather of a drive.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sky {
-    /// Colour at the horizon.
+    /// Radiance at the horizon.
     pub horizon: Rgb,
-    /// Colour overhead.
+    /// Radiance overhead.
     pub zenith: Rgb,
     /// Clouds, 0 (a few) to 1 (overcast); none at −1.
     pub clouds: f32,
 }
 
 impl Sky {
-    /// Radiance from a direction (need not be of unit length).
+    /// Radiance from a direction of any length.
     pub(crate) fn radiance(&self, noise: &Noise, direction: &V3) -> Rgb {
         let flat = length(direction.x, direction.y).max(1e-6);
         let up = (direction.z / flat).max(0.0);
         let clear = mix(&self.horizon, &self.zenith, 1.0 - (-2.6 * up).exp());
-        // Clouds lie on a plane above; towards the horizon they run together.
+        // Clouds lie on a plane above the viewer, so they merge towards the horizon.
         let height = up + 0.16;
         let (x, y) = (direction.x / flat / height, direction.y / flat / height);
         let heap = noise.fractal(x, y, 2.2, 5, 0.55, 0.03 / height);

@@ -1,4 +1,4 @@
-//! A world of the endless mode: a short stretch of street, its traffic, its sun.
+//! A world of the endless mode: a short stretch of street with its traffic and sun.
 
 use super::EndlessConfig;
 use super::draw::{generator, weighted};
@@ -19,23 +19,23 @@ use rand_chacha::ChaCha8Rng;
 const BEHIND: f64 = 110.0;
 const AHEAD: f64 = 190.0;
 
-/// Cameras stand along the way that a car drives in this time, seconds.
+/// Cameras are placed along the path that a car drives in this time, seconds.
 const DURATION_S: f64 = 9.0;
 
-/// Share of the worlds that are not varied, but seen in any weather and through any camera.
+/// Share of the worlds that are not varied, but viewed in any weather and through any camera.
 const UNVARIED: f64 = 0.12;
 
 /// A built world, ready to be viewed.
 pub(super) struct BuiltWorld {
-    /// The street and what stands on it.
+    /// The street and everything static on it.
     pub world: World,
     /// Light on its ground.
     pub light: GroundLight,
-    /// How dense its traffic is at most, in [0, 1]; none where nothing drives.
+    /// Greatest density of the traffic, in [0, 1].
     density: f64,
-    /// Whether its views are rendered as in [`crate::Simulation`].
+    /// Whether views are rendered as in [`crate::Simulation`].
     pub plain: bool,
-    /// Models of the people who may ride and walk there; none where nobody does.
+    /// Models of the people who may ride and walk there; empty if nobody does.
     pub people: Vec<CarModel>,
     /// Cameras are placed from 0 to here, metres along the street.
     pub length: f64,
@@ -44,7 +44,7 @@ pub(super) struct BuiltWorld {
 impl BuiltWorld {
     /// Builds world `number` of a stream.
     pub(super) fn build(config: &EndlessConfig, number: u64) -> Self {
-        // Drawn apart, so that the other worlds are the same whatever the share of the plain ones is.
+        // A generator of its own, so that the share of plain worlds does not change the other worlds.
         let mut rng = generator(config.seed, number, 0x91A1);
         let plain = rng.random_bool(config.plain);
         let plain_scene = one_of(&mut rng, &config.plain_scenes());
@@ -56,7 +56,7 @@ impl BuiltWorld {
         };
         let drawn_scene = match if plain { plain_scene } else { varied_scene } {
             Scene::Indoor if config.on_cars() => {
-                // Cars drive through no rooms.
+                // Cars do not drive through rooms.
                 let other = config.scenes.iter().find(|scene| **scene != Scene::Indoor);
                 other.copied().unwrap_or(Scene::Urban)
             }
@@ -74,7 +74,7 @@ impl BuiltWorld {
         let drive = Drive::simulate(&mut rng, &road, DURATION_S, scene.pace());
         let length = drive.progress(DURATION_S).0;
         road.truncate(length + AHEAD);
-        // Some worlds are the plain ones of `simulate`, where there is one of this kind.
+        // Some worlds are as in `simulate`, if the scene exists there.
         let unvaried = plain || (Scene::ALL.contains(&drawn_scene) && rng.random_bool(UNVARIED));
         let variety = if unvaried {
             Variety::none()
@@ -101,12 +101,12 @@ impl BuiltWorld {
         }
     }
 
-    /// Whether its views may have hills: in the open, where the world is varied.
+    /// Whether its views may have hills: those in the open may, unless the world is plain.
     pub(super) fn has_hills(&self) -> bool {
         !self.plain && !matches!(self.world.scene, Scene::Garage | Scene::Indoor)
     }
 
-    /// The traffic around a place on the street, metres along it. `nearest`: how far ahead of it the lane is free.
+    /// The traffic around a position on the street, metres along it. The lane is free for `nearest` metres ahead of it.
     pub(super) fn traffic(&self, rng: &mut ChaCha8Rng, s: f64, nearest: f64) -> Traffic {
         let speed = 9.0 * self.world.scene.pace();
         let density = self.density * rng.random_range(0.0..1.0);
@@ -114,7 +114,7 @@ impl BuiltWorld {
     }
 }
 
-/// Each as often as the others; the first where there is none.
+/// One of the scenes with equal probability; a street if there is none.
 fn one_of(rng: &mut ChaCha8Rng, scenes: &[Scene]) -> Scene {
     match scenes.len() {
         0 => Scene::Urban,
@@ -122,8 +122,7 @@ fn one_of(rng: &mut ChaCha8Rng, scenes: &[Scene]) -> Scene {
     }
 }
 
-/// By daylight mostly streets, then shopping streets, parks, country roads and motorways; else rooms, nights and
-/// garages.
+/// By day mostly streets, then shopping streets, country roads, parks and motorways; otherwise rooms, nights and garages.
 fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
     if rng.random_bool(daylight) {
         weighted(
@@ -148,7 +147,7 @@ fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
     }
 }
 
-/// Towards the sun: any azimuth; in a quarter of the worlds low (3° to 17°), else 17° to 65° high.
+/// Direction towards the sun, at any azimuth: in a quarter of the worlds it is low (3° to 17°), otherwise 17° to 65° high.
 pub(super) fn sun(rng: &mut ChaCha8Rng) -> V3 {
     let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
     let elevation: f32 = if rng.random_bool(0.25) {

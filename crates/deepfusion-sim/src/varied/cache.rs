@@ -3,24 +3,24 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Keeps the `capacity` most recently used objects. The lock is not held during a build: threads that want
-/// other objects proceed, and those that want the same one wait for it.
+/// Keeps the `capacity` most recently used objects. The lock is not held during a build: threads that want other objects proceed, and those
+/// that want the same one wait for it.
 pub(super) struct Cache<T> {
     capacity: usize,
     entries: Mutex<Entries<T>>,
 }
 
-/// The thing, once it is built.
+/// The object, once it is built.
 type Cell<T> = Arc<OnceLock<Arc<T>>>;
 
 struct Entries<T> {
     clock: u64,
-    /// The time of the last use, and the object.
+    /// For each key the time of the last use, and the object.
     of: HashMap<u64, (u64, Cell<T>)>,
 }
 
 impl<T> Cache<T> {
-    /// A cache of at least one thing.
+    /// A cache for at least one object.
     pub(super) fn new(capacity: usize) -> Self {
         Self {
             capacity: capacity.max(1),
@@ -31,10 +31,10 @@ impl<T> Cache<T> {
         }
     }
 
-    /// The object of a key, built if necessary.
+    /// The object of this key, built if necessary.
     pub(super) fn get(&self, key: u64, build: impl FnOnce() -> T) -> Arc<T> {
         let cell = {
-            // The map is never left half changed, so a panic elsewhere does not corrupt it.
+            // No code panics while the map is half changed, so a poisoned lock is safe to use.
             let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
             entries.clock += 1;
             let now = entries.clock;
@@ -51,7 +51,7 @@ impl<T> Cache<T> {
         cell.get_or_init(|| Arc::new(build())).clone()
     }
 
-    /// How many things it holds.
+    /// Number of objects in the cache.
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.entries
@@ -85,9 +85,17 @@ mod tests {
         get(3);
         assert_eq!(built.load(Ordering::Relaxed), 4);
         get(0);
-        assert_eq!(built.load(Ordering::Relaxed), 4, "0 was used last but one");
+        assert_eq!(
+            built.load(Ordering::Relaxed),
+            4,
+            "0 should be kept: it was used recently"
+        );
         get(1);
-        assert_eq!(built.load(Ordering::Relaxed), 5, "1 made room for 3");
+        assert_eq!(
+            built.load(Ordering::Relaxed),
+            5,
+            "1 should have made room for 3"
+        );
         (10..200).for_each(get);
     }
 

@@ -26,7 +26,7 @@ const CLEARANCE: f64 = 0.35;
 /// Solids within this distance decide whether a place is too cramped, metres.
 const NEARBY: f64 = 14.0;
 
-/// Tries before a camera goes where cars drive.
+/// Places that are tried before the camera is put where cars drive.
 const TRIES: usize = 40;
 
 /// The camera's pose in a world.
@@ -40,23 +40,23 @@ pub(super) struct Viewpoint {
     pub alone: bool,
 }
 
-/// A lens, and what was done to its picture.
+/// A lens, and the crop or squeeze of its picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lens {
     /// Horizontal field of view, radians.
     pub field: f64,
-    /// How much larger fy is than fx, as a share of it, before the squeeze.
+    /// Relative difference of fy from fx, before the squeeze.
     pub unequal: f64,
-    /// Multiplies fy.
+    /// Factor on fy.
     pub squeeze: f64,
-    /// The principal point from the middle, as a share of the width.
+    /// Offset of the principal point from the middle, as a share of the width.
     pub column: f64,
-    /// The principal point from the middle, as a share of the height.
+    /// Offset of the principal point from the middle, as a share of the height.
     pub row: f64,
 }
 
 impl Lens {
-    /// In pixels of a picture (width, height).
+    /// The intrinsics in pixels of a picture of this width and height.
     pub(super) fn intrinsics(&self, (width, height): (u32, u32)) -> Intrinsics {
         let (w, h) = (f64::from(width), f64::from(height));
         let fx = 0.5 * w / (0.5 * self.field).tan();
@@ -73,12 +73,11 @@ impl Lens {
 
 /// Draws a lens, and the crop or squeeze of its picture to the requested size.
 ///
-/// Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), in rooms around 64°; the rest uniform
-/// from 35° to 60° or from 90° to 110°. Half of the pictures, nine in ten of those of rooms, are ones of another aspect
-/// ratio that were squeezed to this size ([`squeeze`]). Apart from that fy is fx, within 1 % in two of three cameras
-/// and within 3 % in the others. The principal point is off the middle by normal draws of 1.5 % of the width and 5 % of
-/// the height. In one of five of the pictures that were not squeezed it is off by up to 20 % of the height, as where a
-/// picture was cut from a taller one.
+/// Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), in rooms around 64°; the rest uniform from 35° to 60° or
+/// from 90° to 110°. Half of the pictures, and nine in ten of those of rooms, had another aspect ratio and were squeezed to this size
+/// ([`squeeze`]). Apart from that fy equals fx within 1 % in two of three cameras, and within 3 % in the others. The offset of the
+/// principal point from the middle is normal: 1.5 % of the width and 5 % of the height. In one of five of the pictures that were not
+/// squeezed it is up to 20 % of the height, as in a crop from a taller picture.
 pub(super) fn lens(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: bool) -> Lens {
     let field = match rng.random_range(0..20) {
         0..=13 => normal(rng, if indoors { 64.0 } else { 78.0 }, 8.0, 1.78),
@@ -112,8 +111,8 @@ pub(super) fn lens(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: b
     }
 }
 
-/// fy / fx of a picture of a usual aspect ratio that was brought to another one: 16:9 as of dashcams and phones,
-/// 4:3 as of depth cameras, or anything between 5:4 and 3:1. 1 where the wanted one is not wider.
+/// fy / fx of a picture with a usual aspect ratio that was squeezed to the wanted one: 16:9 as of dashcams and phones, 4:3 as of depth
+/// cameras, or anything between 5:4 and 3:1. It is 1 if the wanted one is not wider.
 fn squeeze(rng: &mut ChaCha8Rng, wanted: f64) -> f64 {
     let aspect = match rng.random_range(0..20) {
         0..=8 => 16.0 / 9.0,
@@ -132,13 +131,13 @@ fn height(rng: &mut ChaCha8Rng) -> f64 {
     }
 }
 
-/// Height above the ground as on cars, metres.
+/// Height above the ground of a camera on a car, metres.
 fn on_a_car(rng: &mut ChaCha8Rng) -> f64 {
     normal(rng, 1.6, 0.17, 2.3)
 }
 
-/// Pitch, positive downwards, and roll, radians. Mostly a vehicle's (2.2° and 0.9° of deviation); at times anything
-/// up to 15° (from below 0.9 m of height mostly upwards) and 10°.
+/// Pitch, positive downwards, and roll, radians. Mostly that of a vehicle (deviations of 2.2° and 0.9°); sometimes any pitch up to 15°
+/// (below a height of 0.9 m mostly upwards) and any roll up to 10°.
 fn tilt(rng: &mut ChaCha8Rng, height: f64) -> (f64, f64) {
     let pitch = if rng.random_bool(if height < 0.9 { 0.4 } else { 0.12 }) {
         let down = if height < 0.9 { 8.0 } else { 15.0 };
@@ -154,21 +153,21 @@ fn tilt(rng: &mut ChaCha8Rng, height: f64) -> (f64, f64) {
     (f64::to_radians(pitch), f64::to_radians(roll))
 }
 
-/// How a camera relates to the street.
+/// Position and direction of a camera on the street.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
-    /// On its lane, looking where it drives.
+    /// In a lane, facing the way it drives.
     Driving,
     /// On the road, turned by up to 70°.
     Turning,
-    /// On the road, looking anywhere.
+    /// On the road, facing anywhere.
     Sideways,
-    /// Up to 13 m from the middle of the street, looking anywhere, mostly along it.
+    /// Up to 13 m from the middle of the street, facing anywhere, mostly along it.
     Beside,
 }
 
-/// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is where the traffic's own
-/// car drives.
+/// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is the position that traffic leaves free,
+/// metres along the street.
 fn spot(
     rng: &mut ChaCha8Rng,
     place: &BuiltWorld,
@@ -179,7 +178,7 @@ fn spot(
     if !place.world.rooms.is_empty() {
         return (in_room(rng, place, anchor), 0.8);
     }
-    // On any lane, with the traffic of that lane: at the anchor or among the cars before it.
+    // In any lane, with its traffic: at the anchor, or among the cars ahead of it.
     let lanes = place.world.lanes();
     let on = lanes[rng.random_range(0..lanes.len())];
     let s = if matches!(kind, Kind::Driving) && on.forward && rng.random_bool(0.7) {
@@ -189,7 +188,7 @@ fn spot(
     };
     let lane = on.lateral + normal(rng, 0.0, 0.35, 2.5);
     let along = if on.forward { 0.0 } else { PI };
-    // Drivers keep their distance, though not always.
+    // Drivers usually keep their distance.
     let ahead = match kind {
         Kind::Driving => rng.random_range(3.0..14.0),
         _ => 1.2,
@@ -215,12 +214,12 @@ fn spot(
     (spot, ahead)
 }
 
-/// A place in the room at `s` or near it, looking anywhere.
+/// A place in the room at `s`, facing anywhere.
 fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) {
     let rooms = &place.world.rooms;
     let number = rooms.partition_point(|room| room.high[0] < s);
     let room = &rooms[number.min(rooms.len() - 1)];
-    // The road of rooms is straight, along the world's x axis.
+    // Rooms lie along a straight line, the world's x axis.
     let x = rng.random_range(room.low[0]..room.high[0]);
     let y = rng.random_range(room.low[1]..room.high[1]);
     (x, y, rng.random_range(0.0..TAU))
@@ -229,9 +228,9 @@ fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) 
 /// How a view's camera is mounted.
 #[derive(Clone, Copy)]
 pub(super) struct Mount<'a> {
-    /// As on this vehicle; `None`: in any way.
+    /// The vehicle that carries it; `None`: any mounting.
     pub mounted: Option<&'a MountedCamera>,
-    /// What is left out of the ways it may be mounted.
+    /// Ingredients that are left out of the mounting.
     pub without: Without<'a>,
 }
 
@@ -245,14 +244,14 @@ impl Mount<'_> {
         let height = height(rng);
         let (mut pitch, roll) = tilt(rng, height);
         if indoors {
-            // Held by hand, or by a robot that looks at its floor.
+            // Held by hand, or on a robot that looks at the floor.
             pitch += normal(rng, 0.12, 0.2, 1.8);
         }
         let (pitch, roll) = self.without.tilt((pitch, roll));
         (self.without.height(height), pitch, roll)
     }
 
-    /// How it relates to the street, by weight.
+    /// Kinds of position, with weights.
     fn kinds(self) -> &'static [(f64, Kind)] {
         match self.mounted {
             Some(camera) if camera.is_on_a_car() => &[(0.85, Kind::Driving), (0.15, Kind::Turning)],
@@ -266,8 +265,8 @@ impl Mount<'_> {
     }
 }
 
-/// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid nor
-/// close to one, and not with most of its view within arm's length of one.
+/// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid or close to one, and
+/// without close solids in most of the view.
 pub(super) fn viewpoint(
     rng: &mut ChaCha8Rng,
     place: &BuiltWorld,
@@ -284,7 +283,7 @@ pub(super) fn viewpoint(
             return viewpoint;
         }
     }
-    // A lane is free of everything that stands, and from here on of dynamic objects.
+    // A lane has no static objects; the caller removes the dynamic ones.
     let lane = place.world.lanes().into_iter().find(|lane| lane.forward);
     let lateral = lane.map_or(-1.65, |lane| lane.lateral);
     Viewpoint {
@@ -350,8 +349,8 @@ fn is_free(
     }
     let indoors = !world.rooms.is_empty();
     let (arm, open) = if indoors { (0.5, 1.6) } else { (1.2, 4.0) };
-    // Rays over the picture: at most a quarter of them may end within 1.2 m, as many must go on for 4 m (in rooms
-    // 0.5 m and 1.6 m), and those in the middle for the distance ahead.
+    // Rays over the picture: at most a quarter of them may end within 1.2 m, at least a quarter must reach 4 m (in rooms 0.5 m and 1.6 m),
+    // and those in the middle must reach `ahead`.
     let (mut close, mut far, mut all) = (0, 0, 0);
     for row in [0.15, 0.4, 0.65] {
         for column in 0..7i32 {
@@ -406,7 +405,7 @@ mod tests {
         assert!((2900..3400).contains(&usual), "{usual}");
         assert!((2350..2650).contains(&square), "{square}");
         assert!(like_kitti > 190, "{like_kitti}");
-        // Asked for a picture of 4:3, nothing is squeezed by more than a phone's 5:4.
+        // For a picture of 4:3, the strongest squeeze is that from a 5:4 picture.
         let tall = lens(&mut rng, (320, 240), true).intrinsics((320, 240));
         assert!(tall.fy / tall.fx > 0.9, "{tall:?}");
     }

@@ -24,27 +24,27 @@ pub struct EndlessConfig {
     pub worlds_at_once: usize,
     /// Share of the views taken by a grey camera.
     pub grey: f64,
-    /// Share of the views by daylight in the open; the rest are of garages and of nights.
+    /// Share of the views by daylight in the open; the rest are in rooms, in garages and at night.
     pub daylight: f64,
     /// Whether the camera's image formation (exposure, noise, blur, JPEG and so on) is applied. Without it the
     /// pictures are as [`crate::Simulation`]'s, in varied light.
     pub formation: bool,
-    /// Share of the worlds, and of the views, that are as in [`crate::Simulation`]: varied only in the camera, in
-    /// plain weather, without image formation.
+    /// Share of the worlds, and of the views, that are as in [`crate::Simulation`]: only the camera varies, in plain weather and without
+    /// image formation.
     pub plain: f64,
     /// Share of the varied views in the open whose road rises and falls ahead of the camera.
     pub hills: f64,
-    /// Share of the varied views on streets, in parks and on country roads in which people ride bicycles ahead of the camera and towards
-    /// it, walk along pavements and cross the road, where there is room for them.
+    /// Share of the varied views on streets, in parks and on country roads that have people, if there is room for them. They ride bicycles
+    /// ahead of the camera and towards it, walk along pavements and cross the road.
     pub riders: f64,
-    /// The kinds of scene that worlds are of, each as often as the others; none: all, streets most often, `daylight` of them by day.
+    /// The scenes of the worlds, equally frequent. Empty: all scenes, streets most often, and `daylight` of them by day.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub scenes: Vec<Scene>,
-    /// What is left out of the varied views.
+    /// Ingredients that are left out of the varied views.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<Ingredient>,
-    /// Cameras of known vehicles that take all views, each as often as the others; none: any camera. Pictures are these
-    /// cameras' whole images, brought to the requested size.
+    /// Cameras of known vehicles that take all views, equally frequent. A view is the camera's whole image, resized to the requested size.
+    /// Empty: any camera.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<MountedCamera>,
 }
@@ -113,24 +113,24 @@ impl EndlessConfig {
         self.cameras.iter().try_for_each(MountedCamera::validate)
     }
 
-    /// The scenes of plain worlds.
+    /// The scenes of the plain worlds.
     pub(super) fn plain_scenes(&self) -> Vec<Scene> {
         let meant = |scene: &Scene| self.scenes.is_empty() || self.scenes.contains(scene);
         Scene::ALL.into_iter().filter(meant).collect()
     }
 
-    /// Whether all worlds are rooms.
+    /// Whether all worlds are indoors.
     fn is_indoors(&self) -> bool {
         !self.scenes.is_empty() && self.scenes.iter().all(|scene| *scene == Scene::Indoor)
     }
 
-    /// The camera of a view, where they are known.
+    /// The camera of a view, if the cameras are given.
     pub(super) fn camera_of(&self, index: u64) -> Option<&MountedCamera> {
         let count = self.cameras.len() as u64;
         (count > 0).then(|| &self.cameras[(mix(self.seed ^ mix(index)) % count) as usize])
     }
 
-    /// Whether every camera is on a car, which drives through no rooms.
+    /// Whether every camera is on a car: cars do not drive through rooms.
     pub(super) fn on_cars(&self) -> bool {
         !self.cameras.is_empty() && self.cameras.iter().all(MountedCamera::is_on_a_car)
     }

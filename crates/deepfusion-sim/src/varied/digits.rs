@@ -1,16 +1,17 @@
-//! Numbers of single precision as doubles that need no more digits: 0.3 stays 0.3, and does not become 0.30000001192092896.
+//! Single-precision numbers as doubles with equally few digits: 0.3 stays 0.3, and does not become 0.30000001192092896.
 
 use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
 use serde_json::{Number, Value};
 
-/// The double of the shortest decimal that stands for a number.
+/// The double nearest to the shortest decimal that represents a number.
 pub(super) fn widened(single: f32) -> f64 {
     let shortest = single.to_string();
     shortest.parse().unwrap_or(f64::from(single))
 }
 
-/// Serialises what has numbers of single precision alone, each [`widened`]: in a JSON value they are those of a JSON text.
+/// Serialises a value whose floats are all of single precision, with each of them [`widened`], so that a JSON value and a JSON text have
+/// the same digits.
 pub(super) fn in_few_digits<S: Serializer>(
     of: &impl Serialize,
     serializer: S,

@@ -16,7 +16,7 @@ pub(super) fn mix(number: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A normal draw (Box and Muller), cut at `most` standard deviations.
+/// A normal draw (Box–Muller), clamped to `most` standard deviations.
 pub(super) fn normal(rng: &mut ChaCha8Rng, mean: f64, deviation: f64, most: f64) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     let angle = std::f64::consts::TAU * rng.random::<f64>();
@@ -28,7 +28,7 @@ pub(super) fn log_uniform(rng: &mut ChaCha8Rng, least: f64, most: f64) -> f64 {
     (least.ln() + (most / least).ln() * rng.random::<f64>()).exp()
 }
 
-/// One of several, by weight.
+/// One of several choices, by weight.
 pub(super) fn weighted<T: Copy>(rng: &mut ChaCha8Rng, choices: &[(f64, T)]) -> T {
     let total: f64 = choices.iter().map(|c| c.0).sum();
     let mut left = total * rng.random::<f64>();
@@ -41,16 +41,16 @@ pub(super) fn weighted<T: Copy>(rng: &mut ChaCha8Rng, choices: &[(f64, T)]) -> T
     choices[choices.len() - 1].1
 }
 
-/// A fast stream of approximately normal numbers for noise in pixels: the sum of four uniform ones.
+/// A fast stream of approximately normal numbers, for pixel noise: each is the sum of four uniform ones.
 pub(super) struct FastNoise(u64);
 
 impl FastNoise {
-    /// The stream of a seed.
+    /// The stream with this seed.
     pub(super) fn new(seed: u64) -> Self {
         Self(mix(seed))
     }
 
-    /// Mean 0, deviation 1, within ±3.47.
+    /// The next number: mean 0, deviation 1, within ±3.47.
     #[inline]
     pub(super) fn next(&mut self) -> f32 {
         // A Weyl sequence through a multiply-xorshift mixer.

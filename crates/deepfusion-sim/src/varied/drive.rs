@@ -1,6 +1,7 @@
-//! A varied drive: one camera, one light and one weather for all of its frames, drawn from its seed as a view's are.
+//! A varied drive: one camera, one light and one weather for all of its frames, drawn from its seed as for a view.
 //!
-//! What belongs to a single view stays out: hills begin ahead of one camera's place, and the dense traffic around it drives nowhere.
+//! Parts of a view that suit a single image only are left out: hills, which begin ahead of one camera position, and the dense traffic
+//! around it, which does not drive anywhere.
 
 use super::built_world::sun;
 use super::camera::{self, HEIGHTS, Mount};
@@ -25,63 +26,64 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// The road begins to be seen at most so far ahead, at the lower edge of a level picture, metres.
+/// The lower edge of the picture must show the road no farther ahead than this, metres.
 const ROAD_WITHIN: f64 = 25.0;
 
-/// Nothing hangs over the lane lower than this above the camera, metres.
+/// Free height above the camera, metres.
 const HEADROOM: f64 = 0.4;
 
-/// Ceilings of garages are at 2.75 m, pipes and lamps below them: a camera there is no higher, metres.
+/// Greatest height of a camera in garages, metres: the ceiling is at 2.75 m, with pipes and lamps below it.
 const HIGHEST_IN_GARAGES: f64 = 2.0;
 
-/// Draws of a mounting before the camera looks level from a usual height.
+/// Mountings that are drawn before a level camera at the default height is used.
 const TRIES: usize = 60;
 
-/// What a varied drive ([`crate::SimConfig::varied`]) drew from its seed beside its street: the same in all of its frames.
+/// What a varied drive ([`crate::SimConfig::varied`]) drew from its seed besides its street. It is the same in all frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct DrawnDrive {
-    /// The camera as it is mounted on the car: its lens, in pixels of the pictures, its height above the road while the car is level, and its tilt.
+    /// The camera as mounted on the car: its lens, in pixels of the pictures, its height above the road while the car is level, and its
+    /// tilt.
     pub camera: MountedCamera,
     /// The light and the weather.
     pub light: DrawnLight,
     /// How the world is varied.
     pub world: Variety,
-    /// From light to an image: lens, sensor, processing, file.
+    /// Image formation: lens, sensor, processing, file.
     #[serde(serialize_with = "in_few_digits")]
     imaging: Formation,
 }
 
-/// The light and the weather of a varied drive. They change colours alone, and no depth. Light is relative: it has no unit.
+/// The light and the weather of a varied drive. They change only colours, not depth. Light is relative: it has no unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct DrawnLight {
     /// The weather.
     pub weather: Weather,
-    /// How high the sun stands (by night the moon), degrees. None in a garage, which has no sky.
+    /// Elevation of the sun (at night of the moon), degrees. None in a garage, which has no sky.
     pub sun_elevation_degrees: Option<f64>,
-    /// Where it stands, degrees from the world's x axis towards y. None in a garage.
+    /// Azimuth of the sun or moon, degrees from the world's x axis towards y. None in a garage.
     pub sun_azimuth_degrees: Option<f64>,
     /// Relative irradiance of the sun on a surface that faces it: linear red, green, blue.
     pub sun: [f64; 3],
     /// Relative irradiance of the sky, or of a garage's lamps, on the ground: linear red, green, blue.
     pub sky: [f64; 3],
-    /// Clouds, −1 (none) to 1; in overcast and fog only the structure of the cover. None in a garage.
+    /// Clouds, −1 (none) to 1; in overcast and fog they only give the cover its structure. None in a garage.
     pub clouds: Option<f64>,
-    /// How far things are seen through fog or haze, metres: contrast falls to 2 % there. None in clear air.
+    /// Visibility through fog or haze, metres: contrast falls to 2 % there. None in clear air.
     pub visibility_m: Option<f64>,
-    /// How wet the ground is, 0 to 1.
+    /// Wetness of the ground, 0 to 1.
     pub wetness: f64,
 }
 
 impl DrawnDrive {
-    /// As JSON, with a line's end.
+    /// As JSON, with a final newline.
     pub(crate) fn to_json(&self) -> String {
         format!("{:#}\n", serde_json::json!(self))
     }
 }
 
-/// How a varied drive looks.
+/// The look of a varied drive.
 pub(crate) struct DriveLook {
     drawn: DrawnDrive,
     air: Air,
@@ -89,13 +91,13 @@ pub(crate) struct DriveLook {
 }
 
 impl DriveLook {
-    /// How the world of a drive is varied.
+    /// The variety of the drive's world.
     pub(crate) fn variety(seed: u64) -> Variety {
         Variety::draw(&mut of_drive(seed, 0xD01))
     }
 
-    /// Draws the look of a drive through a world that is not lit yet. Puts the sun into its place, and makes the lane as free as a high
-    /// camera needs it.
+    /// Draws the look of a drive through a world whose light is not baked yet. Also sets the sun, and clears the lane up to the height of a
+    /// high camera.
     pub(crate) fn draw(config: &SimConfig, variety: &Variety, world: &mut World) -> Self {
         let seed = config.seed;
         let (intrinsics, (height, pitch, roll)) = draw_camera(config);
@@ -130,7 +132,7 @@ impl DriveLook {
         self.drawn.camera.height_m.unwrap_or(CAMERA_HEIGHT)
     }
 
-    /// The rig with the drawn camera in place of a level one of the same height, and the camera's intrinsics.
+    /// The rig with the drawn camera in place of the level one at the same height, and the camera's intrinsics.
     pub(crate) fn mount(&self, level: Rig) -> (Rig, Intrinsics) {
         let camera = &self.drawn.camera;
         let (pitch, roll) = (camera.pitch_degrees, camera.roll_degrees);
@@ -138,7 +140,7 @@ impl DriveLook {
         (rig, camera.intrinsics)
     }
 
-    /// What the camera sees at a frame; `moving` are the solids of `objects`. The noise is the frame's own.
+    /// What the camera sees at a frame; `moving` are the solids of `objects`. Each frame has its own noise.
     pub(crate) fn picture(
         &self,
         (world, light): (&World, &GroundLight),
@@ -175,7 +177,7 @@ impl DriveLook {
     }
 }
 
-/// The generator of what is drawn once for a drive.
+/// The generator for draws that are made once for a drive.
 fn of_drive(seed: u64, purpose: u64) -> ChaCha8Rng {
     generator(seed, 0, purpose)
 }
@@ -205,7 +207,7 @@ fn draw_camera(config: &SimConfig) -> (Intrinsics, (f64, f64, f64)) {
     )
 }
 
-/// Whether the lower edge of the picture shows a level road within [`ROAD_WITHIN`], of a camera so high (metres) and pitched (radians).
+/// Whether a camera at this height (metres) and pitch (radians) sees a level road within [`ROAD_WITHIN`] at the lower edge of its picture.
 fn sees_road(k: &Intrinsics, height: f64, pitch: f64) -> bool {
     let lowest = (f64::from(k.height) - 1.0 - k.cy) / k.fy;
     lowest.atan() + pitch > (height / ROAD_WITHIN).atan()

@@ -12,14 +12,14 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// No crease turns the ground by more, radians.
+/// Greatest angle of a crease, radians.
 const SHARPEST: f64 = 1.5 * PI / 180.0;
 
-/// Beyond this distance no further slope begins, metres.
+/// No slope begins beyond this distance, metres.
 const FARTHEST: f64 = 220.0;
 
-/// The hills of view `index`: none in most views, nor in rooms, garages and worlds that are not varied. The views that have
-/// some have the same whatever their share is.
+/// The hills of view `index`: none in rooms, in garages and in plain worlds. In the other worlds `hills` is the share of views that have
+/// some; a view that has some has the same ones for every share.
 pub(super) fn of_view(
     config: &EndlessConfig,
     index: u64,
@@ -37,9 +37,9 @@ pub(super) fn of_view(
 /// A pole or a trunk.
 #[derive(Debug, Clone, Copy)]
 struct Pole {
-    /// Its place, metres ahead of the camera.
+    /// Position, metres ahead of the camera.
     along: f64,
-    /// What a crease takes away on both sides of itself, where the pole is highest, and the pole's radius, metres.
+    /// Distance from a crease within which the crease would cut the pole, metres: its radius, and what is cut at its top.
     reach: f64,
 }
 
@@ -49,7 +49,7 @@ impl Pole {
     }
 }
 
-/// The poles and trunks near enough for a missing piece of them to be seen.
+/// The poles and trunks near enough that a missing piece would be visible.
 fn poles(world: &World, eye: &Vector3<f64>, heading: f64) -> Vec<Pole> {
     let (sin, cos) = heading.sin_cos();
     let lean = (0.5 * SHARPEST).tan();
@@ -75,10 +75,9 @@ fn poles(world: &World, eye: &Vector3<f64>, heading: f64) -> Vec<Pole> {
     world.primitives.iter().filter_map(pole).collect()
 }
 
-/// Draws one to three slopes, with crests and dips between them as curves of creases 8 to 20 m apart, the first one 6 to
-/// 40 m ahead. A crease that would cut a pole is put a little farther on. In the end the ground is about level again, so that it reaches the
-/// horizon. Slopes follow the road's
-/// direction, the way that the camera looks.
+/// Draws one to three slopes, with crests and dips between them: curves of creases 8 to 20 m apart, the first one 6 to 40 m ahead. A crease
+/// that would cut a pole is moved a little farther. The last piece of ground is about level, so that it reaches the horizon. Slopes follow
+/// the direction of the road, in the sense in which the camera looks.
 fn draw(rng: &mut ChaCha8Rng, world: &World, world_from_cam: &Se3) -> Folds {
     let eye = world_from_cam.translation();
     let index = world.road.locate(eye.x, eye.y).index;

@@ -1,4 +1,4 @@
-//! What makes the views varied, part by part, so that a table can show what each of them is worth.
+//! The ingredients that make the views varied. Each can be left out, so that a table can show its effect.
 
 use super::camera::Lens;
 use super::weather::{self, Weather};
@@ -10,32 +10,32 @@ use crate::scene::{Variety, World};
 use crate::{Error, ExpectedSetting, Result};
 use serde::{Deserialize, Serialize};
 
-/// One ingredient of the varied views. Left out ([`crate::EndlessConfig::without`]), its part of a view is as in
-/// [`crate::Simulation`]; what else is drawn for the view stays the same.
+/// One ingredient of the varied views. If it is left out ([`crate::EndlessConfig::without`]), its part of a view is as in
+/// [`crate::Simulation`], and everything else that is drawn for the view stays the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Ingredient {
-    /// Cameras at any height; else all are 1.65 m above the ground.
+    /// Cameras at any height; without it all are 1.65 m above the ground.
     CameraHeight,
-    /// Cameras that pitch and roll; else all look level.
+    /// Cameras that pitch and roll; without it all are level.
     CameraTilt,
-    /// Lenses of any field of view, a principal point off the middle, pixels that are not quite square; else the
-    /// horizontal field of view is KITTI's, 81°, around the middle of the picture.
+    /// Lenses with any field of view, an off-centre principal point, and pixels that are not quite square. Without it the horizontal field
+    /// of view is KITTI's, 81°, with the principal point in the middle.
     Lenses,
-    /// Pictures of another aspect ratio that were squeezed to the requested size; else none is.
+    /// Pictures with another aspect ratio that were squeezed to the requested size; without it none is.
     Squeeze,
-    /// The weather, and the sun's place; else a clear sky by day, and the plain light of night, garage and room.
+    /// The weather, and the sun's position; without it a clear sky by day, and the plain light of night, garage and room.
     Weather,
-    /// Worlds whose materials, plants, people and layout are random; else those of [`Variety::none`]. Country roads
-    /// become parks, motorways streets, and rooms garages, since there are no plain ones.
+    /// Worlds whose materials, plants, people and layout are random; without it those of [`Variety::none`]. Country roads then become
+    /// parks, motorways streets, and rooms garages, since these have no plain version.
     Variety,
-    /// Dynamic objects; else none.
+    /// Dynamic objects; without it there are none.
     Traffic,
 }
 
 impl Ingredient {
-    /// All of them.
+    /// All ingredients.
     pub const ALL: [Self; 7] = [
         Self::CameraHeight,
         Self::CameraTilt,
@@ -46,7 +46,7 @@ impl Ingredient {
         Self::Traffic,
     ];
 
-    /// Its name, as configuration files have it.
+    /// Its name in configuration files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -74,8 +74,8 @@ impl std::str::FromStr for Ingredient {
     }
 }
 
-/// Puts the simulator's own parts in place of those that were drawn, for each ingredient that is left out. Everything is
-/// drawn all the same, so that the rest of a view does not change.
+/// Replaces the drawn value of each ingredient that is left out by the simulator's own. The value is drawn all the same, so that the rest
+/// of a view does not change.
 #[derive(Clone, Copy)]
 pub(super) struct Without<'a>(pub &'a [Ingredient]);
 
@@ -122,7 +122,7 @@ impl Without<'_> {
         }
     }
 
-    /// The hour and the weather.
+    /// The time of day and the weather.
     pub(super) fn weather(self, drawn: (Weather, Air), world: &World) -> (Weather, Air) {
         if self.has(Ingredient::Weather) {
             drawn
@@ -131,7 +131,7 @@ impl Without<'_> {
         }
     }
 
-    /// Towards the sun; `plain`: where the world has it.
+    /// Direction towards the sun; `plain` is that of the world.
     pub(super) fn sun(self, drawn: V3, plain: V3) -> V3 {
         if self.has(Ingredient::Weather) {
             drawn
@@ -151,7 +151,7 @@ impl Without<'_> {
         }
     }
 
-    /// How a world is varied.
+    /// The variety of a world.
     pub(super) fn variety(self, drawn: Variety) -> Variety {
         if self.has(Ingredient::Variety) {
             drawn
@@ -160,7 +160,7 @@ impl Without<'_> {
         }
     }
 
-    /// Whether anything moves.
+    /// Whether there are dynamic objects.
     pub(super) fn moves(self) -> bool {
         self.has(Ingredient::Traffic)
     }

@@ -1,8 +1,8 @@
-//! The endless mode: views of ever new streets by ever new cameras, as training data for depth networks; and drives (`drive`)
-//! with such a camera, light and weather.
+//! The endless mode: views of ever new streets by ever new cameras, as training data for depth networks. Also drives (`drive`) with such a
+//! camera, light and weather.
 //!
-//! A view depends on the settings and its index alone, so that loaders may request any view, from any thread, in
-//! any order. The depth is exact whatever is done to the colours.
+//! A view depends on the settings and its index alone, so loaders may request any view, from any thread, in any order. The depth is exact,
+//! whatever is done to the colours.
 
 mod built_world;
 mod cache;
@@ -41,13 +41,13 @@ use rand::Rng;
 use schedule::Schedule;
 pub use weather::Weather;
 
-/// Worlds kept beyond those in use: as many threads may be behind or ahead of the others.
+/// Worlds kept beyond those in use, for threads that are ahead of or behind the others.
 const SPARE_WORLDS: usize = 6;
 
 /// One view, with its ground truth.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// H×W 8-bit RGB; three equal channels where the camera is grey.
+    /// H×W 8-bit RGB; the three channels are equal if the camera is grey.
     pub rgb: RgbImage,
     /// Exact camera z of each pixel's centre, metres; 0 = sky.
     pub depth: DepthMap,
@@ -57,7 +57,7 @@ pub struct View {
     pub moving: Vec<bool>,
     /// Camera (x right, y down, z forward) to world (z up), metres.
     pub world_from_cam: Se3,
-    /// Number of the world; views with the same number are of the same street.
+    /// Number of the world; views with the same number are of the same world.
     pub world: u64,
     /// The kind of scene.
     pub scene: Scene,
@@ -67,17 +67,16 @@ pub struct View {
     pub height_m: f64,
     /// Whether the camera is grey.
     pub grey: bool,
-    /// Whether the road rises or falls ahead of the camera. The ground below the camera is level, and the only one at the
-    /// world's z = 0.
+    /// Whether the road rises or falls ahead of the camera. Only the ground at the camera is then level and at the world's z = 0.
     pub hills: bool,
-    /// How many people ride and walk around the camera.
+    /// Number of people who ride and walk around the camera.
     pub riders: usize,
 }
 
 /// An endless stream of views.
 ///
-/// `W = worlds_at_once` worlds are in use at a time, and consecutive views are of different ones. At most
-/// `W + 6` built worlds are kept, of about 2 MB each.
+/// `W = worlds_at_once` worlds are in use at a time, and consecutive views are of different worlds. At most `W + 6` built worlds are kept,
+/// of about 2 MB each.
 pub struct Endless {
     config: EndlessConfig,
     schedule: Schedule,
@@ -85,10 +84,10 @@ pub struct Endless {
 }
 
 impl Endless {
-    /// A stream; nothing is built yet.
+    /// A stream; no world is built yet.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a setting is out of range.
+    /// [`crate::Error::Config`] for a setting out of range.
     pub fn new(config: EndlessConfig) -> Result<Self> {
         config.validate()?;
         Ok(Self {
@@ -104,15 +103,15 @@ impl Endless {
         &self.config
     }
 
-    /// View number `index`, the same at every call, from any thread, in any order. Works on the calling thread
-    /// alone; its world is built first if necessary.
+    /// View number `index`, the same at every call, from any thread, in any order. Works on the calling thread alone; builds the view's
+    /// world first if necessary.
     #[must_use]
     pub fn view(&self, index: u64) -> View {
         self.view_sized(index, (self.config.width, self.config.height))
     }
 
-    /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and position are drawn
-    /// for that size; of a camera that is known the whole image is brought to it.
+    /// The same place, seen by a camera with another image size (width, height; in pixels). Lens and position are drawn for that size; the
+    /// whole image of a given camera is resized to it.
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;

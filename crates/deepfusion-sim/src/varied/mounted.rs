@@ -1,4 +1,4 @@
-//! Cameras of known vehicles: every view through the lens, and from the height, that a network is to know best.
+//! Cameras of known vehicles: every view has the lens and the height of a camera that the network is meant for.
 
 use super::camera::HEIGHTS;
 use super::draw::normal;
@@ -7,26 +7,27 @@ use deepfusion_geometry::Intrinsics;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations of height (share), pitch and roll (degrees): the vehicle moves on its springs, and mountings are known to a degree.
+/// Standard deviations of height (share), pitch and roll (degrees): the vehicle moves on its springs, and a mounting is known to about a
+/// degree.
 const SPRINGS: (f64, f64, f64) = (0.012, 0.8, 0.6);
 
-/// Cameras below this are a robot's, which goes where cars do not, metres.
+/// Lower cameras are on robots, which also go where cars do not, metres.
 const LEAST_ON_CARS: f64 = 0.9;
 
 /// Greatest pitch and roll of a mounting, degrees.
 const MOST_TILT: f64 = 30.0;
 
-/// A camera as it is mounted on a vehicle or a robot.
+/// A camera mounted on a vehicle or a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MountedCamera {
-    /// Its lens, in pixels of its own image, which may be of any size and aspect ratio: a view shows the whole of it.
+    /// Its intrinsics, in pixels of its own image, which may have any size and aspect ratio: a view shows the whole of it.
     pub intrinsics: Intrinsics,
-    /// Its height above the ground, metres; `None`: any height that cameras on cars have.
+    /// Height above the ground, metres; `None`: any height of cameras on cars.
     pub height_m: Option<f64>,
-    /// How far it looks down, degrees.
+    /// Pitch downwards, degrees.
     pub pitch_degrees: f64,
-    /// How far it is turned about its axis, clockwise as it looks, degrees.
+    /// Roll about its axis, clockwise in the viewing direction, degrees.
     pub roll_degrees: f64,
 }
 
@@ -73,13 +74,13 @@ impl MountedCamera {
         Ok(())
     }
 
-    /// Whether it is so high that it drives on roads alone.
+    /// Whether it is high enough for a car, which drives on roads only.
     pub(super) fn is_on_a_car(&self) -> bool {
         self.height_m.is_none_or(|height| height >= LEAST_ON_CARS)
     }
 
-    /// Height above the ground, metres, pitch and roll, radians, as the vehicle moves on its springs. `drawn`: a height that is
-    /// taken where its own is not known.
+    /// Height above the ground, metres, pitch and roll, radians, as the vehicle moves on its springs. `drawn` is the height that is used if
+    /// the camera's own is unknown.
     pub(super) fn pose(&self, rng: &mut ChaCha8Rng, drawn: f64) -> (f64, f64, f64) {
         let (height, pitch, roll) = SPRINGS;
         let height = self.height_m.unwrap_or(drawn) * normal(rng, 1.0, height, 2.5);

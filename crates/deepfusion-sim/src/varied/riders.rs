@@ -1,4 +1,4 @@
-//! The people of a view who ride and walk.
+//! The people in a view who ride and walk.
 
 use super::EndlessConfig;
 use super::built_world::BuiltWorld;
@@ -8,8 +8,8 @@ use crate::scene::SceneObject;
 use deepfusion_geometry::Se3;
 use rand::Rng;
 
-/// Who rides and walks before the camera of view `index`, among its `vehicles`: nobody in rooms, in garages, on motorways and
-/// in worlds that are as `simulate` draws them. The views that have some have the same whatever their share is.
+/// The people who ride and walk ahead of the camera of view `index`, among its `vehicles`. There are none in rooms, in garages, on
+/// motorways and in plain worlds. A view that has some has the same ones for every share of such views.
 pub(super) fn of_view(
     config: &EndlessConfig,
     index: u64,

@@ -1,8 +1,7 @@
 //! The schedule of worlds over views.
 
-/// Views take turns over `worlds` slots, so that as many consecutive ones are of different worlds. Each slot's
-/// world is replaced after `views` views; the slots' replacements are spread evenly over time, so that never two
-/// worlds have to be built at once.
+/// Views take turns over `worlds` slots, so that this many consecutive views are of different worlds. The world of a slot is replaced after
+/// `views` views. Replacements are spread evenly over time, so that two worlds never have to be built at once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Schedule {
     worlds: u64,
@@ -14,12 +13,12 @@ pub(super) struct Schedule {
 pub(super) struct ScheduledView {
     /// Number of the world, from 0.
     pub world: u64,
-    /// Number of the view among those of its world.
+    /// Number of the view within its world.
     pub view: u64,
 }
 
 impl Schedule {
-    /// `worlds` at a time and `views` of each, both at least 1.
+    /// A schedule with `worlds` at a time and `views` of each, both at least 1.
     pub(super) fn new(worlds: usize, views: usize) -> Self {
         Self {
             worlds: (worlds as u64).max(1),
@@ -27,7 +26,7 @@ impl Schedule {
         }
     }
 
-    /// The world and the view of an index.
+    /// The world and the view at an index.
     pub(super) fn view_at(&self, index: u64) -> ScheduledView {
         let (slot, round) = (index % self.worlds, index / self.worlds);
         let shifted = round + slot * self.views / self.worlds;

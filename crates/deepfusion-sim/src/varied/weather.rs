@@ -1,4 +1,4 @@
-//! The hour and the weather of a view.
+//! The time of day and the weather of a view.
 
 use super::draw::{log_uniform, normal, weighted};
 use crate::config::Scene;
@@ -10,7 +10,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Koschmieder: over the visibility contrast falls to 2 %, or e to the power of minus this.
+/// Koschmieder: at the visibility contrast has fallen to 2 %, which is e^(−3.9).
 const TWO_PERCENT: f32 = 3.9;
 
 /// The weather of a view.
@@ -22,7 +22,7 @@ pub enum Weather {
     Clear,
     /// Sun between clouds.
     Cloudy,
-    /// No sun, and no shadows except from the sky's light.
+    /// No sun; the only shadows are those in the sky's light.
     Overcast,
     /// Visibility of 30 to 400 m.
     Fog,
@@ -33,7 +33,7 @@ pub enum Weather {
 }
 
 impl Weather {
-    /// Its name, as files have it.
+    /// Its name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -47,12 +47,12 @@ impl Weather {
     }
 }
 
-/// How far things are seen, metres; none where the air is clear.
+/// Visibility, metres; none in clear air.
 pub(super) fn visibility(air: &Air) -> Option<f32> {
     air.fog.map(|fog| TWO_PERCENT / fog.extinction)
 }
 
-/// The weather of a world without a random draw.
+/// The weather of a plain world.
 pub(super) fn plain(world: &World) -> Weather {
     match world.scene {
         Scene::Garage | Scene::Indoor => Weather::Indoor,
@@ -61,8 +61,8 @@ pub(super) fn plain(world: &World) -> Weather {
     }
 }
 
-/// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Haze (visibility of 0.8 to 20 km) in half of
-/// the pictures; the ground is wet in a third of those without sun and in one of ten others.
+/// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Without fog there is haze in 65 % of the views, with a
+/// visibility of 0.5 to 20 km. The ground is wet in a third of the views without sun, and in a tenth of the others.
 pub(super) fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     match world.scene {
         Scene::Garage | Scene::Indoor => (Weather::Indoor, indoor(rng, world)),
@@ -85,7 +85,7 @@ fn indoor(rng: &mut ChaCha8Rng, world: &World) -> Air {
 }
 
 fn night(rng: &mut ChaCha8Rng, world: &World) -> Air {
-    // From the last of dusk to the dark.
+    // From late dusk to darkness.
     let dusk = log_uniform(rng, 0.5, 8.0) as f32;
     let blue = Rgb::new(0.85, 0.95, 1.15);
     let (moon, sky) = world.light;
@@ -116,7 +116,7 @@ fn day(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
         ],
     );
     let sun = sunlight(world.sun.z) * rng.random_range(1.7..2.7);
-    // A low sun leaves less light in the sky, and warms its lower part.
+    // A low sun leaves less light in the sky and warms the sky's lower part.
     let day = (0.25 + 1.5 * world.sun.z.max(0.0)).min(1.0);
     let low = (1.0 - world.sun.z / 0.3).clamp(0.0, 1.0);
     let milky: f32 = rng.random();
@@ -138,9 +138,9 @@ fn day(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     let mut air = match weather {
         Weather::Overcast | Weather::Fog => {
             let level = rng.random_range(0.5..1.3f32) * day;
-            // Between houses less of the sky is seen than there is: it is brighter than what it lights.
+            // Between houses the ground sees only a part of the sky, so the sky is brighter than the light on the ground suggests.
             let bright = rng.random_range(1.2..2.6);
-            // A sun that still shows a little through a thin cover.
+            // Some sunlight passes a thin cover.
             let through = if rng.random_bool(0.3) {
                 rng.random_range(0.02..0.2f32)
             } else {
@@ -211,7 +211,7 @@ fn wetness(rng: &mut ChaCha8Rng, chance: f64) -> f32 {
     }
 }
 
-/// The sun's colour after its way through the air at the sine of its elevation: about 1 overhead, dim and red when low.
+/// The sun's colour after its path through the air, by the sine of its elevation: about 1 overhead, dim and red when low.
 fn sunlight(sine: f32) -> Rgb {
     // Air mass, and optical depths of red, green and blue in moderately hazy air.
     let mass = 1.0 / (sine.max(0.0) + 0.06);

@@ -6,14 +6,14 @@ use crate::texture::Rgb;
 use crate::texture::noise::smoothstep;
 use deepfusion_geometry::Se3;
 
-/// Reflectance of water at a right angle.
+/// Reflectance of water at perpendicular incidence.
 const STRAIGHT: f32 = 0.02;
 
-/// A rough wet road mirrors less than still water at grazing angles.
+/// Reflectance at grazing incidence: a rough wet road mirrors less than still water.
 const GRAZING: f32 = 0.55;
 
-/// Adds to the ground of a wet street what it mirrors: the picture's own colour in the mirrored direction, as if what
-/// is mirrored were far away, and the sky's where that is not in the picture. Depth is not touched.
+/// Adds reflections to the ground of a wet street. Their colour is that of the picture in the mirrored direction, as if the mirrored object
+/// were far away, or that of the sky if this is outside the picture. Depth does not change.
 pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
     let wet = input.air.wet;
     if wet <= 0.0 {
@@ -42,7 +42,7 @@ pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
             let (camera, cam_from_world, eye) = &views[usize::from(hit.segment)];
             let d = camera.ray(u as f32, v as f32);
             let place = (eye.x as f32 + d.x * hit.t, eye.y as f32 + d.y * hit.t);
-            // Puddles and films: where water stands, in the ground's own coordinates.
+            // Puddles and films of water, in coordinates of the ground.
             let minor = hit.t / k.fx as f32;
             let stands = input
                 .world
@@ -56,7 +56,7 @@ pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
             let in_cam = cam_from_world * up;
             let seen = mirrored(&source, &exposure.hits, (width, height), &in_cam, k)
                 .unwrap_or_else(|| {
-                    // The sky does not lean with a hill.
+                    // The sky does not tilt with a hill.
                     let up = if hit.segment == 0 {
                         up
                     } else {
@@ -73,8 +73,8 @@ pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
     }
 }
 
-/// The picture's colour in a direction (camera axes), smeared upwards and downwards as a rough mirror does; none where
-/// that is ground or outside.
+/// The picture's colour in a direction (camera axes), smeared upwards and downwards as by a rough mirror; `None` if that is ground or
+/// outside the picture.
 fn mirrored(
     light: &[Rgb],
     hits: &[crate::render::Hit],

@@ -27,7 +27,7 @@ pub(super) fn furnish(site: &mut Site) {
         site.world.stretches.push(Stretch::styled(style));
         from = to;
     }
-    // The road itself stays the same.
+    // All stretches share one road surface.
     let road = site.world.stretches[0].style.map(|style| style.road);
     for stretch in &mut site.world.stretches {
         if let (Some(style), Some(road)) = (&mut stretch.style, road) {

@@ -1,4 +1,4 @@
-//! Grounds at random: asphalt from nearly black to light grey, cobbles, paint, pavements, lawns, fields.
+//! Random grounds: asphalt from nearly black to light grey, cobbles, paint, pavements, lawns, fields.
 
 use super::site::Site;
 use crate::texture::Rgb;
@@ -7,7 +7,7 @@ use crate::texture::pattern::{colour, wall_colour};
 use rand::Rng;
 
 impl Site<'_> {
-    /// A grey of this tone, a little warm or cold.
+    /// A grey of this tone, with a random tint.
     fn grey(&mut self, low: f32, high: f32) -> Rgb {
         let tone = low * (high / low).powf(self.rng.random_range(0.0..1.0));
         let warm = self.rng.random_range(-0.05..0.12f32);
@@ -106,7 +106,7 @@ impl Site<'_> {
         }
     }
 
-    /// Any ground at all.
+    /// Any of these grounds.
     fn odd(&mut self) -> Surface {
         let mut surface = self.laid();
         surface.colour = colour(self.rng, 0.8);
@@ -114,7 +114,7 @@ impl Site<'_> {
         surface
     }
 
-    /// What lies beside a street.
+    /// Ground beside a street.
     pub(super) fn yard(&mut self) -> Surface {
         match self.rng.random_range(0..10) {
             0..=3 => self.grass(),
@@ -124,7 +124,7 @@ impl Site<'_> {
         }
     }
 
-    /// The ground of a stretch of street of this half width, painted as streets are.
+    /// The ground of a stretch of street with this half width, with road markings.
     pub(super) fn style(&mut self, half_width: f32) -> GroundStyle {
         let road = match self.rng.random_range(0..20) {
             0..=15 => self.asphalt(),

@@ -1,4 +1,4 @@
-//! Buildings of many kinds: rows, villas, blocks, halls, with the roofs and the things that hang on their walls.
+//! Buildings of many kinds: rows, villas, blocks, halls, with roofs and attachments to their walls.
 
 use super::site::{Site, Spot};
 use crate::primitive::{Hull, Shape, V3};
@@ -8,7 +8,7 @@ use crate::texture::pattern::{Pattern, colour, wall_colour};
 use crate::texture::{Material, Rgb};
 use rand::Rng;
 
-/// What kind of building.
+/// Kind of a building.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// In a closed row, two to five floors.
@@ -31,8 +31,8 @@ struct Storeys {
 }
 
 impl Site<'_> {
-    /// Builds a house around a spot: `size` along its heading and across it. The street is to its left where
-    /// `street_left`. Houses at the back are plainer.
+    /// Builds a house around a spot: `size` is along its heading and across it. The street is to its left if `street_left`. Houses at the
+    /// back are plainer.
     pub(super) fn house(
         &mut self,
         spot: &Spot,
@@ -84,7 +84,7 @@ impl Site<'_> {
         }
     }
 
-    /// The walls; returns their material, the distance between windows and the colour of doors.
+    /// Builds the walls; returns their material, the distance between windows and the colour of doors.
     fn walls(
         &mut self,
         spot: &Spot,
@@ -142,7 +142,7 @@ impl Site<'_> {
         (wall, f64::from(pitch), accent)
     }
 
-    /// A flat roof with what stands on it.
+    /// A flat roof with objects on it.
     fn parapet(&mut self, spot: &Spot, size: [f64; 2], height: f64, wall: u32) {
         if self.chance(0.5) {
             let (over, thick) = (self.draw(0.1, 0.5), self.draw(0.15, 0.6));
@@ -238,7 +238,7 @@ impl Site<'_> {
         }
     }
 
-    /// What hangs on the front: balconies, awnings, bays, steps, pipes.
+    /// Attachments to the front: balconies, awnings, bays, steps, pipes.
     fn front(
         &mut self,
         spot: &Spot,
@@ -286,7 +286,7 @@ impl Site<'_> {
             self.block(&at, [wide, 0.9, tall], material);
         }
         if kind == Kind::Block && self.chance(0.5) {
-            // An awning, sloped by two steps, or a canopy.
+            // An awning, approximated by two steps, or a canopy.
             let material = self.any(&kit.cloth);
             let wide = self.draw(0.3, 0.95) * size[0];
             let deep = self.draw(0.8, 1.8);
@@ -329,7 +329,7 @@ impl Site<'_> {
             }
         }
         if self.chance(0.3) {
-            // A sign or a lamp that stands out of the wall.
+            // A sign or a lamp that projects from the wall.
             let material = self.any(&kit.signs);
             let at = spot.spot(self.draw(-0.4, 0.4) * size[0], face + out * 0.5, 2.8, 0.0);
             self.block(&at, [0.1, 0.9, 0.8], material);

@@ -10,15 +10,15 @@ use crate::texture::{Material, Rgb};
 use rand::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Where doors and passages are, metres left of the centreline: a way through all rooms.
+/// Position of the doors, metres left of the centreline: a straight path leads through all rooms.
 const WAY: f64 = -1.65;
-/// Half the width of that way that furniture leaves free, metres.
+/// Half the width of that path, which furniture leaves free, metres.
 pub(super) const FREE: f64 = 0.62;
 
-/// Walls between rooms are as high as the highest ceiling and more, metres.
+/// Height of the walls between rooms, above the highest ceiling, metres.
 const TALL: f64 = 5.4;
 
-/// Furnishes a row of rooms along a straight line in the place of the road.
+/// Furnishes a row of rooms along a straight line, which takes the place of the road.
 pub(super) fn furnish(site: &mut Site) {
     let (start, end) = (site.world.road.start, site.world.road.end());
     site.world.road = Road::straight(start, end);
@@ -58,7 +58,7 @@ pub(super) fn furnish(site: &mut Site) {
         site.world.rooms.push(room);
         x += length + 0.12;
     }
-    // The first room and the last have one more wall.
+    // Outer walls at both ends of the row.
     let wall = wall_material(site);
     for x in [start + 0.94, x - 0.06] {
         let spot = Spot {
@@ -133,7 +133,7 @@ fn lay(site: &mut Site, room: &Room) {
     site.world.stretch_of[from..=to].fill(number);
 }
 
-/// Paint, paper, tiles, brick, wood.
+/// A random wall: paint, paper, tiles, brick or wood.
 fn wall_material(site: &mut Site) -> u32 {
     let colour = wall_colour(site.rng);
     let mut pattern = Pattern::plain(site.rng, colour);
@@ -243,19 +243,19 @@ fn build(site: &mut Site, room: &Room) {
     let depth = [WAY - FREE - y0, y1 - WAY - FREE];
     site.along(&at(x0, y0, 0.0), length, depth[0].min(1.1), h);
     site.along(&at(x1, y1, PI), length, depth[1].min(1.1), h);
-    // The walls with doors: on both sides of the door, from the room's side.
+    // Walls with doors, furnished on both sides of the door; x runs along the wall, seen from the room.
     let ends = [
         (at(x1, y0, FRAC_PI_2), WAY - FREE - 0.2 - y0),
         (at(x0, y1, -FRAC_PI_2), y1 - WAY - FREE - 0.2),
     ];
     for (origin, long) in &ends {
         if *long > 1.2 {
-            // Corners are taken already.
+            // The corners are occupied already.
             let inner = origin.spot(0.75, 0.0, 0.0, 0.0);
             site.along(&inner, long - 0.75, 0.7, h);
         }
     }
-    // In the open: tables, clutter, people.
+    // In the open: tables, small objects, people.
     for (low, high) in [(y0 + 1.1, WAY - FREE), (WAY + FREE, y1 - 1.1)] {
         if high - low < 0.7 {
             continue;
@@ -288,7 +288,7 @@ fn light(site: &mut Site, room: &Room) {
             z: room.height - 0.1,
             heading: [0.0, FRAC_PI_2][site.rng.random_range(0..2)],
         };
-        // Nobody runs into a lamp.
+        // Lamps hang above everyone's head.
         let longest = room.height - 2.4;
         match site.rng.random_range(0..3) {
             0 => site.block(&spot, [1.2, 0.15, 0.08], kit.pale),

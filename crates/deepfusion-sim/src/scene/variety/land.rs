@@ -1,4 +1,4 @@
-//! Large things: hills on the horizon, banks beside the road, bridges over it, wires.
+//! Large objects: hills on the horizon, banks beside the road, bridges over it, wires.
 
 use super::site::{Site, Spot};
 use crate::primitive::{Primitive, Shape};
@@ -9,7 +9,7 @@ use crate::texture::pattern::{Kind, Pattern};
 use rand::Rng;
 
 impl Site<'_> {
-    /// Hills far away on both sides and ahead, with this probability.
+    /// Adds distant hills on both sides and ahead, with this probability.
     pub(super) fn hills(&mut self, probability: f64) {
         if !self.chance(probability) {
             return;
@@ -44,7 +44,7 @@ impl Site<'_> {
             }
             s += self.draw(90.0, 260.0);
         }
-        // One across the end of the road.
+        // A hill across the end of the road.
         let beyond = self.world.road.end();
         let spot = self.beside(beyond, 0.0).spot(260.0, 0.0, 0.0, 0.0);
         self.world.far.push(Primitive {
@@ -113,7 +113,7 @@ impl Site<'_> {
         self.close(ObjectClass::Building, &middle, mark);
     }
 
-    /// A piece of bank beside the road: its foot, its height, the width of its slope and of its top.
+    /// A piece of bank beside the road, with this height and these widths of its slope and its top, metres.
     pub(super) fn bank(
         &mut self,
         spot: &Spot,
@@ -122,7 +122,7 @@ impl Site<'_> {
         [slope, top]: [f64; 2],
         material: u32,
     ) {
-        // The prism's x axis points away from the road: up the slope.
+        // The prism's x axis points away from the road, so the slope rises along it.
         let whole = slope + top;
         let outline = [
             [-0.5 * whole, 0.0],

@@ -10,7 +10,7 @@ use crate::texture::{Material, Rgb};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// White, silver, greys and black, as most cars are; any other colour for the rest.
+/// White, silver, greys and black for most cars; any other colour for the rest.
 fn paint(rng: &mut ChaCha8Rng) -> Rgb {
     let grey = |tone: f32| Rgb::new(tone, tone, tone * 1.02);
     match rng.random_range(0..20) {
@@ -24,7 +24,7 @@ fn paint(rng: &mut ChaCha8Rng) -> Rgb {
     }
 }
 
-/// Every kind of vehicle, cars most often.
+/// Models of every kind of vehicle; most are cars.
 pub(super) fn vehicles(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarModel> {
     let mut models = Vec::new();
     for number in 0..36 {
@@ -33,7 +33,7 @@ pub(super) fn vehicles(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Ve
         let (lower, upper) = (world.hull(lower), world.hull(upper));
         let colour = paint(rng);
         let mut model = cars::model(world, &body, lower, upper, kit.tyre, colour);
-        // Wheels stand out of the body a little.
+        // The wheels project a little from the body.
         model.size[1] += 0.04;
         if number % BODIES.len() == 4 {
             model.class = ObjectClass::Van;
@@ -82,7 +82,7 @@ fn varied(rng: &mut ChaCha8Rng, body: &Body) -> Body {
     body
 }
 
-/// A box with plumb sides and these bevels at the front: length at the top, height.
+/// A box with upright sides and a bevel at the upper front edge: its length along the top, and its height.
 fn shell(half: f32, wide: f32, top: f32, bevel: [f32; 2]) -> Hull {
     let mut planes = vec![
         (V3::x(), half),
@@ -228,7 +228,7 @@ fn lorry(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> CarModel {
     parts.block([l - 0.8, 0.9, 0.35], [-0.3, 0.0, 0.6], kit.dark);
     let top = match rng.random_range(0..5) {
         0 => {
-            // A flat bed with something on it.
+            // A flat bed with a load.
             parts.block([length, w, 0.5], [middle, 0.0, 0.95], plain);
             parts.block([0.6 * length, 0.8 * w, 1.0], [middle, 0.0, 1.45], load);
             2.45

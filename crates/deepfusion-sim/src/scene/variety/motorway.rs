@@ -56,7 +56,7 @@ fn paint(site: &mut Site, half: f64, [right, left]: [u8; 2]) {
             slot += 1;
         }
     };
-    // Between lanes, then the edges.
+    // First the lines between lanes, then those along the edges.
     for i in 0..(right + left) {
         let at = -1.65 - LANE * (f64::from(right) - 0.5) + LANE * f64::from(i);
         line(at, [18.0, 6.0]);
@@ -79,7 +79,7 @@ fn lanes(site: &mut Site, [right, left]: [u8; 2]) {
     }
 }
 
-/// A rail, a wall or nothing along an edge.
+/// A rail, a wall or nothing along an edge of the carriageway.
 fn rails(site: &mut Site, half: f64) {
     let kit = site.kit;
     for side in [-1.0, 1.0] {
@@ -109,7 +109,7 @@ fn rails(site: &mut Site, half: f64) {
                 }
                 3 => site.block(&spot, [long, 0.4, 0.9], stone),
                 4 => {
-                    // A wall against noise, some metres off.
+                    // A noise barrier, some metres away.
                     let wall = spot.spot(0.0, 2.0 * side, 0.0, 0.0);
                     site.block(&wall, [long, 0.25, height], stone);
                 }
@@ -121,7 +121,7 @@ fn rails(site: &mut Site, half: f64) {
     }
 }
 
-/// The spot halfway between two, headed from the first to the second.
+/// The spot halfway between two others, heading from the first to the second.
 pub(super) fn between(a: &Spot, b: &Spot) -> Spot {
     Spot {
         x: 0.5 * (a.x + b.x),
@@ -131,7 +131,7 @@ pub(super) fn between(a: &Spot, b: &Spot) -> Spot {
     }
 }
 
-/// Banks, bushes and woods beyond `from` metres from the centreline.
+/// Banks, bushes and woods more than `from` metres from the centreline.
 pub(super) fn verge(site: &mut Site, side: f64, from: f64) {
     let kit = site.kit;
     let end = site.world.road.end();
@@ -151,7 +151,7 @@ pub(super) fn verge(site: &mut Site, side: f64, from: f64) {
     let leafy = site.variety.trees;
     let apart = site.draw(1.2, 9.0);
     while s < end {
-        // The bank rises and falls.
+        // The bank begins and ends at random places.
         if site.chance(0.12) {
             height = if height > 0.3 || site.chance(0.4) {
                 0.0

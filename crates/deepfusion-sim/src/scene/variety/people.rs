@@ -1,4 +1,4 @@
-//! People on foot, on bicycles and motorbikes, and what they leave standing.
+//! People on foot, on bicycles and motorbikes, and parked bicycles and motorbikes.
 
 use super::site::Kit;
 use crate::primitive::Shape;
@@ -40,7 +40,7 @@ impl Figure {
         self.parts.push((shape, at, material));
     }
 
-    /// A wheel one can see through: a ring of rods in the plane y = `at[1]`.
+    /// A wheel with a hollow middle: a ring of rods in the plane y = `at[1]`.
     fn ring(&mut self, at: [f64; 3], radius: f64, thick: f64, material: u32) {
         let point = |i: usize| {
             let angle = i as f64 * std::f64::consts::TAU / 9.0;
@@ -55,7 +55,7 @@ impl Figure {
         }
     }
 
-    /// The model, with the least box around the origin that holds it.
+    /// The model, with the least box centred on the origin that contains it.
     fn model(self, class: ObjectClass) -> CarModel {
         let mut size = [0.0f32; 3];
         for (shape, at, _) in &self.parts {
@@ -84,7 +84,7 @@ impl Figure {
     }
 }
 
-/// Everyone who may be met in a world.
+/// Models of all people of a world.
 pub(super) fn models(_world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarModel> {
     let mut crowd = Vec::new();
     for _ in 0..14 {
@@ -116,7 +116,7 @@ fn one(rng: &mut ChaCha8Rng, of: &[u32]) -> u32 {
     of[rng.random_range(0..of.len())]
 }
 
-/// Someone who walks or stands, 1.1 to 1.95 m tall.
+/// A person who walks or stands, 1.1 to 1.95 m tall.
 fn walker(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
     let tall = if rng.random_bool(0.15) {
         rng.random_range(1.1..1.5)
@@ -148,7 +148,7 @@ fn walker(figure: &mut Figure, rng: &mut ChaCha8Rng, kit: &Kit) {
         figure.rod([0.0, y, hip], knee, 0.046 * tall * wide, legs);
         figure.rod(knee, foot, 0.035 * tall * wide, legs);
         figure.rod(foot, [step + 0.14, y, 0.04], 0.04, shoes);
-        // Arms swing against the legs.
+        // Arms swing in opposition to the legs.
         let out = side * 0.12 * tall * wide;
         let elbow = [-0.4 * step, out * 1.15, 0.62 * tall];
         let hand = [-0.7 * step + 0.08, out * 1.1, 0.48 * tall];

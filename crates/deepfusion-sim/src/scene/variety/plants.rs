@@ -6,7 +6,7 @@ use rand::Rng;
 use std::f64::consts::TAU;
 
 impl Site<'_> {
-    /// A tree `height` metres high with a crown of `radius`, on a spot; its lowest leaves at `clear` metres.
+    /// A tree `height` metres high on a spot, with a crown of `radius`; its lowest leaves are at `clear` metres.
     pub(super) fn tree(&mut self, spot: &Spot, height: f64, radius: f64, clear: f64) {
         let number = self.rng.random_range(0..self.kit.trees.len());
         let species = self.kit.trees[number];
@@ -43,7 +43,7 @@ impl Site<'_> {
         } else {
             (7.0 + 3.2 * radius).min(19.0) as usize
         };
-        // Behind the houses fewer and larger lobes do.
+        // Behind the houses fewer, larger lobes are enough.
         let away = self.world.road.locate(spot.x, spot.y).lateral.abs();
         let (count, larger) = if away > 22.0 {
             (count / 2 + 1, 1.3)
@@ -52,7 +52,7 @@ impl Site<'_> {
         };
         let twist = self.draw(0.0, TAU);
         for i in 0..count {
-            // Spread evenly over an upright ellipsoid, a few inside it.
+            // Spread evenly over an upright ellipsoid, some nearer its middle than others.
             let up = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
             let angle = twist + 2.4 * i as f64;
             let out = self.draw(0.42, 0.74);
@@ -163,7 +163,7 @@ impl Site<'_> {
         let species = self.kit.bushes[number];
         let mark = self.mark();
         let wide = self.draw(0.5, 1.0);
-        // A core that nobody sees through, and leaves around it.
+        // An opaque core with leaves around it.
         self.block(
             spot,
             [length, 0.55 * wide, 0.85 * height],

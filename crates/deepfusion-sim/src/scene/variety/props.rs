@@ -1,4 +1,4 @@
-//! What stands on pavements: lamps, signs, lights, bollards, bins, benches, shelters, building sites.
+//! Street furniture: lamps, signs, lights, bollards, bins, benches, shelters, building sites.
 
 use super::site::{Site, Spot};
 use crate::scene::ObjectClass;
@@ -6,7 +6,7 @@ use crate::texture::Rgb;
 use rand::Rng;
 
 impl Site<'_> {
-    /// A lamp post whose arm reaches `arm` metres along the spot's heading.
+    /// A lamp post with an arm that reaches `arm` metres along the spot's heading.
     pub(super) fn lamp(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
@@ -34,7 +34,7 @@ impl Site<'_> {
         self.close(ObjectClass::Pole, spot, mark);
     }
 
-    /// A traffic sign that faces along the spot's heading.
+    /// A traffic sign that faces the spot's heading.
     pub(super) fn sign(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
@@ -88,7 +88,7 @@ impl Site<'_> {
         self.close(ObjectClass::Pole, spot, mark);
     }
 
-    /// One of the many things that stand about on pavements.
+    /// A random object of those found on pavements.
     pub(super) fn thing(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
@@ -160,7 +160,7 @@ impl Site<'_> {
                 return;
             }
             11 => {
-                // Boxes, sacks and a ball somebody left.
+                // Boxes, sacks and a ball left behind.
                 for _ in 0..self.rng.random_range(1..5) {
                     let material = self.any(&kit.wild);
                     let at = spot.spot(
@@ -252,7 +252,7 @@ impl Site<'_> {
         }
     }
 
-    /// A chair whose back is to −x of the spot.
+    /// A chair with its back towards −x of the spot.
     pub(super) fn chair(&mut self, spot: &Spot, material: u32) {
         let metal = self.kit.metal[1];
         let seat = self.draw(0.42, 0.48);
@@ -327,7 +327,7 @@ impl Site<'_> {
                 self.close(ObjectClass::Fence, spot, mark);
             }
             _ => {
-                // Bars or pickets one can see through.
+                // Bars or pickets with gaps.
                 let mark = self.mark();
                 let metal = self.often(&kit.metal);
                 let foot = if self.chance(0.4) {

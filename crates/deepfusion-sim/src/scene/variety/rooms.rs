@@ -1,4 +1,4 @@
-//! Furniture: what stands along walls, in the middle of rooms, and on tables.
+//! Furniture along walls, in the middle of rooms, and on tables.
 
 use super::site::{Site, Spot};
 use crate::scene::ObjectClass;
@@ -8,7 +8,7 @@ use rand::Rng;
 use std::f64::consts::FRAC_PI_2;
 
 impl Site<'_> {
-    /// Things along a wall: x runs along it from the spot, y into the room. They are at most `deep` metres deep.
+    /// Objects along a wall: x runs along it from the spot, y into the room. They are at most `deep` metres deep.
     pub(super) fn along(&mut self, wall: &Spot, length: f64, deep: f64, height: f64) {
         let mut x = self.draw(0.05, 0.4);
         let full = 0.35 + 0.6 * self.variety.clutter;
@@ -89,7 +89,7 @@ impl Site<'_> {
         }
     }
 
-    /// What stands on the floor before a wall.
+    /// Furniture on the floor in front of a wall.
     fn standing(&mut self, wall: &Spot, wide: f64, deep: f64, height: f64) {
         let kit = self.kit;
         let kind = self.rng.random_range(0..12);
@@ -230,7 +230,7 @@ impl Site<'_> {
         }
     }
 
-    /// Boards with books and boxes between two sides.
+    /// Boards with books and boxes between two sides of a shelf.
     fn shelf(&mut self, at: &Spot, [wide, deep, height]: [f64; 3]) {
         let kit = self.kit;
         let wood = self.often(&[kit.wood[0], kit.wood[1], kit.pale, kit.dark, kit.metal[0]]);
@@ -267,7 +267,7 @@ impl Site<'_> {
                 x += self.draw(0.05, 0.4);
                 continue;
             }
-            // Several of a kind are one box.
+            // Several equal books are one box.
             let thick = self.draw(0.02, 0.22).min(0.5 * wide - x);
             let tall = high * self.draw(0.5, 0.98);
             let cover = if self.chance(0.5) {
@@ -282,7 +282,7 @@ impl Site<'_> {
         }
     }
 
-    /// A table of this top.
+    /// A table with a top of this size.
     fn table(&mut self, at: &Spot, [wide, deep]: [f64; 2], high: f64) {
         let kit = self.kit;
         let top = self.often(&[
@@ -310,7 +310,7 @@ impl Site<'_> {
         }
     }
 
-    /// Things on a surface of this size: cups, books, bottles, boxes, fruit.
+    /// Objects on a surface of this size: cups, books, bottles, boxes, fruit.
     pub(super) fn clutter(&mut self, at: &Spot, [wide, deep]: [f64; 2], tall: f64) {
         let kit = self.kit;
         let most = 1.0 + 9.0 * self.variety.clutter * wide.min(1.5);
@@ -346,7 +346,7 @@ impl Site<'_> {
         }
     }
 
-    /// What stands in the open, `room` metres wide.
+    /// Furniture in the open, where `room` metres are free.
     pub(super) fn island(&mut self, spot: &Spot, room: f64, height: f64) {
         let kit = self.kit;
         if !self.chance(0.3 + 0.6 * self.variety.clutter) {

@@ -1,4 +1,4 @@
-//! The stretches of a street: how wide it is, what stands along it, how cars park.
+//! The sections of a street: its width, the kind of each side, and how cars park.
 
 use super::site::Site;
 use crate::config::Scene;
@@ -10,10 +10,10 @@ use std::f64::consts::FRAC_PI_2;
 /// Over this length the widths of two sections blend, metres.
 const BLEND: f64 = 12.0;
 
-/// Half the width that a car parked along the kerb takes from the road on the camera's side, at least.
+/// Least distance from the centreline of a car parked on the camera's side, metres.
 pub(super) const ROOM: f64 = 2.85;
 
-/// What stands along a side.
+/// Kind of one side of a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Frontage {
     /// Houses wall to wall.
@@ -26,7 +26,7 @@ pub(super) enum Frontage {
     Works,
     /// Trees and lawns.
     Green,
-    /// A long wall or hedge, something behind.
+    /// A long wall or hedge with something behind it.
     Wall,
 }
 
@@ -50,17 +50,17 @@ pub(super) struct Side {
     pub frontage: Frontage,
     pub pavement: f32,
     pub verge: f32,
-    /// From the pavement to the houses, metres.
+    /// Distance from the pavement to the houses, metres.
     pub setback: f64,
     pub parking: Parking,
-    /// Share of the places that are taken, 0 to 1.
+    /// Share of the parking places that are taken, 0 to 1.
     pub parked: f64,
     /// Distance between the trees of an avenue, metres; 0: none.
     pub avenue: f64,
 }
 
 impl Side {
-    /// Nothing but land, without a pavement.
+    /// Open land without a pavement.
     pub(super) fn open() -> Self {
         Self {
             frontage: Frontage::Green,
@@ -95,7 +95,7 @@ impl Section {
     }
 }
 
-/// The stretches of a street, from its start to its end.
+/// Draws the sections of a street, from its start to its end.
 pub(super) fn sections(site: &mut Site) -> Vec<Section> {
     let (mut from, end) = (site.world.road.start, site.world.road.end());
     let scene = site.world.scene;
@@ -139,7 +139,7 @@ fn frontage(site: &mut Site, scene: Scene) -> Frontage {
 }
 
 fn plan(site: &mut Site, scene: Scene, home: Frontage, half_width: f32, side: usize) -> Side {
-    // Streets keep their character over some length.
+    // The character of a street persists over several sections.
     let frontage = if site.chance(0.55) {
         home
     } else {
@@ -195,7 +195,7 @@ fn plan(site: &mut Site, scene: Scene, home: Frontage, half_width: f32, side: us
     }
 }
 
-/// Gives the road its widths.
+/// Sets the widths of the road's samples.
 pub(super) fn apply_widths(site: &mut Site, sections: &[Section]) {
     let widths: Vec<Widths> = sections.iter().map(Section::widths).collect();
     site.world.apply_widths(&widths, BLEND);

@@ -1,4 +1,4 @@
-//! What the builders of varied worlds share: places, materials, and solids by their natural measures.
+//! Shared by the builders of varied worlds: spots, materials, and solids with sizes in metres.
 
 use super::Variety;
 use crate::crown::Crown;
@@ -11,21 +11,21 @@ use crate::texture::{Material, Rgb};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// A place and a heading in the world.
+/// A position and a heading in the world.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
-    /// World position, metres.
+    /// World x, metres.
     pub x: f64,
-    /// World position, metres.
+    /// World y, metres.
     pub y: f64,
-    /// World position, metres.
+    /// World z, metres.
     pub z: f64,
-    /// Heading of its x axis, radians.
+    /// Heading of the spot's x axis, radians.
     pub heading: f64,
 }
 
 impl Spot {
-    /// The world point at coordinates of the spot's axes (x along its heading, y left, z up).
+    /// The world point with these coordinates in the spot's axes (x along its heading, y left, z up).
     pub(super) fn at(&self, x: f64, y: f64, z: f64) -> [f64; 3] {
         let (sin, cos) = self.heading.sin_cos();
         [
@@ -35,7 +35,7 @@ impl Spot {
         ]
     }
 
-    /// A spot in this one's axes, turned by `turn`.
+    /// A spot given in this one's axes, turned by `turn`.
     pub(super) fn spot(&self, x: f64, y: f64, z: f64, turn: f64) -> Self {
         let [x, y, z] = self.at(x, y, z);
         Self {
@@ -52,15 +52,15 @@ impl Spot {
 pub(super) struct Species {
     /// The leaves' materials, from the shaded ones below to those in the light.
     pub leaves: [u32; 3],
-    /// Side of the cells of its clumps, metres.
+    /// Side of the cells that contain its clumps, metres.
     pub cell: f32,
-    /// How full its crown is.
+    /// Density of the crown, 0 to 1.
     pub fill: f32,
-    /// Without leaves.
+    /// Whether it has no leaves.
     pub bare: bool,
-    /// Needles, in tiers.
+    /// Whether it is a conifer, with needles in tiers.
     pub conifer: bool,
-    /// Width of the crown over its height.
+    /// Width of the crown divided by its height.
     pub spread: f32,
     /// Material of the trunk.
     pub bark: u32,
@@ -68,7 +68,7 @@ pub(super) struct Species {
 
 /// Materials of one world.
 pub(super) struct Kit {
-    /// Anything.
+    /// Materials with random patterns.
     pub wild: Vec<u32>,
     /// Painted and bare metal.
     pub metal: Vec<u32>,
@@ -302,21 +302,21 @@ fn species(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety, bush: boo
 pub(super) struct Site<'a> {
     /// The world.
     pub world: &'a mut World,
-    /// Where everything is drawn from.
+    /// Source of all random draws.
     pub rng: &'a mut ChaCha8Rng,
-    /// Its materials.
+    /// Materials of the world.
     pub kit: &'a Kit,
-    /// How it is varied.
+    /// Variety of the world.
     pub variety: &'a Variety,
 }
 
 impl Site<'_> {
-    /// One of some materials.
+    /// One of these materials.
     pub(super) fn any(&mut self, of: &[u32]) -> u32 {
         of[self.rng.random_range(0..of.len())]
     }
 
-    /// Now and then a wild material in the place of one of these.
+    /// One of these materials, or sometimes a wild one.
     pub(super) fn often(&mut self, of: &[u32]) -> u32 {
         if self.rng.random_bool(self.variety.wild) {
             let kit = self.kit;
@@ -331,12 +331,12 @@ impl Site<'_> {
         self.rng.random_range(from..to)
     }
 
-    /// Whether something that happens with this probability does.
+    /// True with this probability.
     pub(super) fn chance(&mut self, probability: f64) -> bool {
         self.rng.random_bool(probability.clamp(0.0, 1.0))
     }
 
-    /// The spot `out` metres left of the centreline at `s`, on the ground there.
+    /// The spot `lateral` metres left of the centreline at `s`, on the ground.
     pub(super) fn beside(&self, s: f64, lateral: f64) -> Spot {
         let (x, y, heading) = self.world.road.world(s, lateral);
         let p = self.world.road.locate(x, y);
@@ -402,7 +402,7 @@ impl Site<'_> {
         self.world.solid(shape, middle, 0.0, material, seed);
     }
 
-    /// A lobe of leaves around a point; `light` 0 to 2 chooses how bright.
+    /// A lobe of leaves around a point; `light` chooses its brightness, from 0 to 2.
     pub(super) fn lobe(&mut self, at: [f64; 3], radii: [f64; 3], species: &Species, light: usize) {
         let salt = self.rng.random();
         let crown = Crown {
@@ -423,7 +423,7 @@ impl Site<'_> {
         let mut planes: Vec<(V3, f32)> = (0..count)
             .map(|i| {
                 let (a, b) = (outline[i], outline[(i + 1) % count]);
-                // To the right of the way from a to b is outside.
+                // The outside is to the right of the way from a to b.
                 let normal = V3::new((b[1] - a[1]) as f32, 0.0, (a[0] - b[0]) as f32).normalize();
                 (normal, normal.x * a[0] as f32 + normal.z * a[1] as f32)
             })
@@ -451,12 +451,12 @@ impl Site<'_> {
         );
     }
 
-    /// How many solids there are: where a new object's begin.
+    /// Number of solids so far: the index of the next object's first solid.
     pub(super) fn mark(&self) -> usize {
         self.world.primitives.len()
     }
 
-    /// Lists the solids since `mark` as one object; its box, along the spot's axes, holds them.
+    /// Adds the solids since `mark` as one object; its box is along the spot's axes and contains them.
     pub(super) fn close(&mut self, class: ObjectClass, spot: &Spot, mark: usize) {
         let solids = &self.world.primitives[mark..];
         if let Some((base, size)) = boxed(self.world, spot, solids) {
@@ -474,7 +474,7 @@ impl Site<'_> {
         self.world.object(model.class, base, spot.heading, size);
     }
 
-    /// A vehicle of the world's models that `fits`.
+    /// A vehicle among the world's models for which `fits` is true.
     pub(super) fn vehicle(&mut self, fits: impl Fn(&CarModel) -> bool) -> Option<CarModel> {
         let count = self.world.models.len();
         let from = self.rng.random_range(0..count.max(1));
@@ -484,7 +484,7 @@ impl Site<'_> {
             .cloned()
     }
 
-    /// Someone of the world's crowd, of this class.
+    /// A person of this class from the world's crowd.
     pub(super) fn person(&mut self, class: ObjectClass) -> Option<CarModel> {
         let those: Vec<usize> = (0..self.world.crowd.len())
             .filter(|i| self.world.crowd[*i].class == class)
@@ -494,7 +494,7 @@ impl Site<'_> {
     }
 }
 
-/// Middle of the underside and size of the least box, along a spot's axes, that holds some solids.
+/// Middle of the underside and size of the least box along a spot's axes that contains these solids.
 pub(super) fn boxed(
     world: &World,
     spot: &Spot,

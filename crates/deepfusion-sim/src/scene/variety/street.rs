@@ -95,7 +95,7 @@ impl Row<'_, '_> {
         self.site.is_clear(&spot, [0.1, 0.1], clear).then_some(spot)
     }
 
-    /// Heading towards the road, against the road's own.
+    /// Direction towards the road, relative to the road's own heading.
     fn inward(&self) -> f64 {
         -self.sign() * FRAC_PI_2
     }
@@ -164,7 +164,7 @@ impl Row<'_, '_> {
         true
     }
 
-    /// What closes the view between and behind the houses.
+    /// Houses and trees that close the view between and behind the houses.
     fn background(&mut self) {
         let green = matches!(self.plan.frontage, Frontage::Green | Frontage::Wall);
         let mut s = self.section.from + self.site.draw(0.0, 10.0);
@@ -195,7 +195,7 @@ impl Row<'_, '_> {
         }
     }
 
-    /// Not in a junction.
+    /// False in a junction.
     fn may_park(&self, s: f64) -> bool {
         !self.site.world.road.side_streets().iter().any(|street| {
             street.side == self.side
@@ -238,7 +238,7 @@ impl Row<'_, '_> {
         }
     }
 
-    /// Parks a car at `s`, if it is wanted there; returns the length it takes.
+    /// Parks a car at `s` with the section's probability; returns the length of the place.
     fn park_one(&mut self, s: f64) -> f64 {
         let plan = self.plan;
         let large = self.site.chance(0.06);

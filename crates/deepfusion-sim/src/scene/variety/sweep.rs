@@ -1,15 +1,15 @@
-//! Keeps the lane of the camera free: whatever reaches into it is taken away.
+//! Keeps the camera's lane free: removes every solid that reaches into it.
 
 use super::site::Spot;
 use crate::primitive::{Primitive, Shape};
 use crate::scene::World;
 
-/// A lane that must be free.
+/// A lane that must stay free.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FreeLane {
-    /// Metres left of the centreline, from and to.
+    /// Its two edges, metres left of the centreline.
     pub lane: [f64; 2],
-    /// Nothing hangs lower over it, metres.
+    /// Nothing may hang lower over it, metres.
     pub headroom: f64,
 }
 
@@ -19,13 +19,13 @@ pub(super) const ROAD: FreeLane = FreeLane {
     headroom: 2.3,
 };
 
-/// The way through rooms and their doors.
+/// The path through rooms and their doors.
 pub(super) const ROOMS: FreeLane = FreeLane {
     lane: [-2.19, -1.11],
     headroom: 1.95,
 };
 
-/// Whether a solid reaches into a lane that must be free.
+/// Whether a solid reaches into a lane that must stay free.
 fn intrudes(world: &World, free: &FreeLane, solid: &Primitive) -> bool {
     let lane = free.lane;
     let (half_x, half_y, low, _) = solid.bounds(&world.hulls);
@@ -67,7 +67,7 @@ fn intrudes(world: &World, free: &FreeLane, solid: &Primitive) -> bool {
     })
 }
 
-/// Removes everything that reaches into a lane.
+/// Removes every solid that reaches into a lane.
 pub(super) fn clear(world: &mut World, free: &FreeLane) {
     let kept: Vec<Primitive> = world
         .primitives

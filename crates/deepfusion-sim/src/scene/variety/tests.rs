@@ -13,7 +13,7 @@ fn world(scene: Scene, seed: u64) -> World {
     World::furnish_varied(road, seed, scene, &variety)
 }
 
-/// Whether a point is in the box around a solid, or in the solid where it is an ellipsoid or a crown.
+/// Whether a point is in a solid; only cylinders and wheels are replaced by the box around them.
 fn holds(world: &World, solid: &Primitive, point: &Vector3<f64>) -> bool {
     let p = solid.local_point(point);
     let (hx, hy, low, high) = solid.bounds(&world.hulls);
@@ -41,8 +41,7 @@ fn holds(world: &World, solid: &Primitive, point: &Vector3<f64>) -> bool {
     }
 }
 
-/// A car's width around the middle of the camera's lane is free of everything that stands, up to the headroom; a
-/// person's width in rooms.
+/// A car's width around the middle of the camera's lane is free of solids, up to the headroom; in rooms a person's width.
 #[test]
 fn the_camera_s_way_is_free() {
     for scene in Scene::EVERY {
@@ -92,9 +91,9 @@ fn boxes_of_models_hold_their_solids() {
             heading: 0.7,
         };
         let solids = model.solids([spot.x, spot.y, spot.z], spot.heading, 1, false);
-        let (base, size) = boxed(&world, &spot, &solids).expect("a model has solids");
+        let (base, size) = boxed(&world, &spot, &solids).expect("a model should have solids");
         for (i, (length, least)) in model.size.iter().zip(size).enumerate() {
-            // Boxes of models are around their origin, so they may be larger than they must be.
+            // The box of a model is centred on its origin, so it may be larger than necessary.
             let off = (base[i] - [spot.x, spot.y, spot.z][i]).abs();
             assert!(
                 f64::from(*length) > least - 0.03,
@@ -150,8 +149,8 @@ fn boxes_hold_what_stands_in_them() {
     }
 }
 
-/// Hills are seen from everywhere, and nothing that is found by its place along the street is larger than the
-/// distance it is looked for at.
+/// Hills are visible from everywhere, and no solid that is looked up by its position along the street is larger than the distance within
+/// which it is looked up.
 #[test]
 fn large_things_are_found() {
     let mut hills = 0;
@@ -189,7 +188,7 @@ fn no_variety_draws_nothing() {
     assert!(plain.far.is_empty() && plain.crowd.is_empty());
 }
 
-/// Traffic around a camera keeps its distance and stands in nothing.
+/// Traffic around a camera keeps its distance and does not overlap it.
 #[test]
 fn traffic_around_a_camera_keeps_off() {
     let mut met = 0;

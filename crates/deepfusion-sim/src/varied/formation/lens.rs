@@ -6,26 +6,26 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// A lens, as it was focused and held.
+/// A lens and its errors, and how the camera was held.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Lens {
-    /// Deviation of its blur, pixels; 0: none.
+    /// Standard deviation of the blur, pixels; 0: none.
     #[serde(rename = "blur_px")]
     blur: f32,
-    /// The camera turned while the shutter was open: the length and direction (radians) of the smear, in pixels. Of one picture alone.
+    /// Length (pixels) and direction (radians) of the smear of one picture, if the camera turned while the shutter was open.
     #[serde(skip)]
     shake: Option<(f32, f32)>,
-    /// How much larger the red and the blue picture are than the green one.
+    /// Relative enlargement of the red and the blue image, compared with the green one.
     lateral: [f32; 2],
     /// Share of the light that is lost in the corners.
     vignette: f32,
-    /// Share of the picture's mean light that is spread over all of it: dust, glare.
+    /// Share of the picture's mean light that dust and glare spread over all of it.
     veil: f32,
 }
 
 impl Lens {
-    /// Softness: none in half of them, as in pictures that were made smaller; a bell of 0.25 to 0.6 pixels in three of
-    /// eight, of up to 1.6 in one of eight. One of twenty is smeared by 1.5 to 6 pixels, mostly sideways, as cameras turn.
+    /// Blur: none in half of the lenses, as in pictures that were reduced in size; a deviation of 0.25 to 0.6 pixels in three of eight, and
+    /// of up to 1.6 in one of eight. One picture of twenty is smeared by 1.5 to 6 pixels, mostly sideways, as cameras turn.
     pub(super) fn draw(rng: &mut ChaCha8Rng) -> Self {
         Self {
             blur: match rng.random_range(0..8) {
@@ -43,7 +43,7 @@ impl Lens {
         }
     }
 
-    /// The same lens, held for another picture.
+    /// The same lens for another picture, with a new smear.
     pub(super) fn of_another_picture(&self, rng: &mut ChaCha8Rng) -> Self {
         Self {
             shake: shake(rng),
@@ -57,7 +57,7 @@ impl Lens {
         self.shake.is_some()
     }
 
-    /// Light through the lens.
+    /// Applies the lens to the light.
     pub(super) fn pass(&self, planes: &mut Planes) {
         if self.lateral != [0.0; 2] {
             self.spread_colours(planes);
@@ -111,7 +111,7 @@ impl Lens {
     }
 }
 
-/// How a camera turned during a picture, in one of twenty: the length and direction of the smear.
+/// Length and direction of the smear, in one picture of twenty.
 fn shake(rng: &mut ChaCha8Rng) -> Option<(f32, f32)> {
     sometimes(rng, 0.05, None, |rng| {
         let direction = if rng.random_bool(0.7) {
@@ -123,8 +123,7 @@ fn shake(rng: &mut ChaCha8Rng) -> Option<(f32, f32)> {
     })
 }
 
-/// The mean along a line of this length. A turn of the camera moves near and far things alike, so this is exact for
-/// small ones.
+/// The mean along a line of this length. A turn of the camera moves near and far objects alike, so this is exact for small turns.
 fn smear(planes: &mut Planes, length: f32, direction: f32) {
     let (width, height) = (planes.width, planes.height);
     let steps = (1.5 * length).ceil() as i32;
@@ -206,7 +205,7 @@ mod tests {
             ..IDEAL
         };
         lens.spread_colours(&mut planes);
-        // At 40 pixels from the middle red comes from 0.4 pixels farther in.
+        // 40 pixels from the middle, red comes from a place 0.4 pixels nearer to it.
         let at = 25 * 101 + 90;
         assert!(
             (planes.of[0][at] - 89.6).abs() < 0.01,

@@ -1,7 +1,7 @@
 //! From the light in a picture to the bytes of an image: lens, sensor, processing, file.
 //!
-//! The order is a camera's: lateral colour, softness and vignetting of the lens; exposure, shot and read noise and
-//! clipping in the sensor; white balance, saturation, tone curve and sharpening in its processor; the file's JPEG.
+//! The order is that of a camera: lateral colour, softness and vignetting of the lens; exposure, shot and read noise and clipping in the
+//! sensor; white balance, saturation, tone curve and sharpening in its processor; the file's JPEG.
 
 mod lens;
 mod plane;
@@ -23,7 +23,7 @@ pub(super) struct Formation {
     lens: lens::Lens,
     sensor: sensor::Sensor,
     processing: processing::Processing,
-    /// JPEG quality, where the image went through a file.
+    /// JPEG quality, if the image was stored in a file.
     #[serde(rename = "jpeg_quality")]
     quality: Option<u8>,
 }
@@ -31,14 +31,14 @@ pub(super) struct Formation {
 /// Brightness of the scene, for the automatic exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Brightness {
-    /// Daylight: the exposure is what it should be, but for its error.
+    /// Daylight: the exposure is right, apart from its error.
     Day,
-    /// Lamps: the exposure stays too short, the gain high.
+    /// Lamps: the exposure stays too short, and the gain is high.
     Dark,
 }
 
 impl Brightness {
-    /// That of a weather.
+    /// The brightness in this weather.
     pub(super) fn of(weather: Weather) -> Self {
         match weather {
             Weather::Night | Weather::Indoor => Self::Dark,
@@ -48,20 +48,20 @@ impl Brightness {
 }
 
 impl Formation {
-    /// Draws one; `grey` is the share of cameras without colour.
+    /// Draws the image formation of a camera; `grey` is the share of cameras without colour.
     pub(super) fn draw(rng: &mut ChaCha8Rng, brightness: Brightness, grey: f64) -> Self {
         Self {
             lens: lens::Lens::draw(rng),
             sensor: sensor::Sensor::draw(rng, brightness),
             processing: processing::Processing::draw(rng, grey),
-            // Half of the pictures show the blocks of a JPEG file at their own size; others were made smaller since.
+            // Half of the pictures show JPEG blocks at their own size; the others were reduced in size after compression.
             quality: rng
                 .random_bool(0.5)
                 .then(|| normal(rng, 78.0, 14.0, 3.5).clamp(30.0, 95.0) as u8),
         }
     }
 
-    /// The same camera at another picture: whether and how it turned while the shutter was open is drawn anew.
+    /// The same camera for another picture: only the smear is drawn anew.
     pub(super) fn of_another_picture(&self, rng: &mut ChaCha8Rng) -> Self {
         Self {
             lens: self.lens.of_another_picture(rng),
@@ -69,12 +69,12 @@ impl Formation {
         }
     }
 
-    /// Whether the camera sees no colours.
+    /// Whether the camera has no colour.
     pub(super) fn is_grey(&self) -> bool {
         self.processing.grey.is_some()
     }
 
-    /// The image of the light of `width` × `height` pixels, row by row; `seed` is the noise's.
+    /// The image made from the light of `width` × `height` pixels, row by row; `seed` is that of the noise.
     pub(super) fn image(&self, light: &[Rgb], width: usize, height: usize, seed: u64) -> RgbImage {
         let mut planes = Planes::of(light, width, height);
         self.lens.pass(&mut planes);
@@ -87,7 +87,7 @@ impl Formation {
     }
 }
 
-/// A share of draws gets a value, the others `none`.
+/// A value for this share of draws, and `none` for the others.
 fn sometimes<T>(
     rng: &mut ChaCha8Rng,
     share: f64,
@@ -106,7 +106,7 @@ fn stops(rng: &mut ChaCha8Rng, deviation: f64, most: f64) -> f32 {
     normal(rng, 0.0, deviation, most).exp2() as f32
 }
 
-/// As [`log_uniform`], for pixels.
+/// As [`log_uniform`], in single precision.
 fn scale(rng: &mut ChaCha8Rng, least: f64, most: f64) -> f32 {
     log_uniform(rng, least, most) as f32
 }
@@ -136,7 +136,7 @@ mod tests {
         assert_ne!(image(3).as_raw(), image(4).as_raw());
     }
 
-    /// From picture to picture nothing of a camera changes but how it was held, which one of twenty shows.
+    /// Between pictures of a camera only the smear changes, which one of twenty has.
     #[test]
     fn one_camera_takes_many_pictures() {
         let formation = Formation::draw(&mut generator(1, 3, 2), Brightness::Day, 0.15);
@@ -151,7 +151,7 @@ mod tests {
         assert!((20..100).contains(&smeared), "{smeared}");
     }
 
-    /// Whatever is drawn, the image keeps the order of brightness of the scene and shows something.
+    /// Every image formation keeps the order of brightness of the scene and shows something.
     #[test]
     fn every_camera_makes_an_image() {
         let light = ramp(96, 48);
@@ -184,6 +184,6 @@ mod tests {
             }
         }
         assert!((35..90).contains(&grey), "{grey}");
-        assert!(clipped > 8, "some are overexposed: {clipped}");
+        assert!(clipped > 8, "only {clipped} are overexposed");
     }
 }

@@ -24,7 +24,7 @@ impl Planes {
     }
 }
 
-/// The taps of a normal bell of this deviation, from the middle to one side; they sum to 1 over both sides.
+/// The taps of a Gaussian with this deviation, from the middle to one side; over both sides they sum to 1.
 pub(super) fn bell(deviation: f32) -> Vec<f32> {
     let reach = (2.6 * deviation).ceil().max(1.0) as usize;
     let mut taps: Vec<f32> = (0..=reach)
@@ -43,7 +43,7 @@ pub(super) fn filter(plane: &mut [f32], work: &mut [f32], width: usize, taps: &[
     for (row, out) in plane.chunks(width).zip(work.chunks_mut(width)) {
         along_row(row, out, taps);
     }
-    // Column by column is row by row with whole rows as items.
+    // Along columns, whole rows are combined.
     for v in 0..height {
         let out = &mut plane[v * width..(v + 1) * width];
         let middle = &work[v * width..(v + 1) * width];
@@ -94,7 +94,7 @@ fn along_row(row: &[f32], out: &mut [f32], taps: &[f32]) {
     }
 }
 
-/// The plane at fractional coordinates within it, bilinear.
+/// The value of the plane at fractional coordinates within it, bilinear.
 #[inline]
 pub(super) fn sample(plane: &[f32], width: usize, x: f32, y: f32) -> f32 {
     let height = plane.len() / width;

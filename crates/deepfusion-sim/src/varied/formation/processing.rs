@@ -1,4 +1,4 @@
-//! From the sensor's numbers to an image: colours, tones, sharpening, the file.
+//! From the sensor's reading to an image: colours, tones, sharpening, the file.
 
 use super::plane::{Planes, bell, filter};
 use super::sensor::LUMA;
@@ -16,39 +16,39 @@ const TONES: usize = 2048;
 /// Unsharp masking.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Sharpen {
-    /// How much of what differs from the soft picture is added.
+    /// Factor on the difference from the blurred picture.
     strength: f32,
-    /// Deviation of the soft picture's blur, pixels.
+    /// Standard deviation of the blur, pixels.
     deviation_px: f32,
 }
 
 /// A camera's processor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Processing {
-    /// Weights of red, green and blue, where the camera sees no colours.
+    /// Weights of red, green and blue, if the camera has no colour.
     pub grey: Option<[f32; 3]>,
-    /// How vivid colours are: 1 leaves them, 0 takes them away.
+    /// Saturation of colours: 1 keeps them, 0 removes them.
     saturation: f32,
-    /// Exponent of the tone curve is 1 / `gamma`.
+    /// The exponent of the tone curve is 1 / `gamma`.
     gamma: f32,
-    /// How much of an S-shaped curve is added: darks deeper, lights brighter.
+    /// Share of an S-shaped tone curve: dark tones darker, bright tones brighter.
     contrast: f32,
-    /// Where the curve begins to bend to white, as a share of full scale; 1: it clips.
+    /// Where highlights begin to be compressed, as a share of full scale; 1: they clip.
     shoulder: f32,
-    /// The level of black, as a share of white.
+    /// Level of black, as a share of white.
     black: f32,
     /// Unsharp masking, if any.
     sharpen: Option<Sharpen>,
-    /// Levels of a channel, at most 256.
+    /// Levels per channel, at most 256.
     levels: f32,
 }
 
 impl Processing {
-    /// Draws one; `grey` is the share of cameras without colour.
+    /// Draws a processor; `grey` is the share of cameras without colour.
     pub(super) fn draw(rng: &mut ChaCha8Rng, grey: f64) -> Self {
         Self {
             grey: sometimes(rng, grey, None, |rng| {
-                // Some see near infrared through their red pixels.
+                // Some cameras see near infrared in their red pixels.
                 let weights: [f32; 3] = [
                     rng.random_range(0.15..0.5),
                     rng.random_range(0.4..0.8),
@@ -72,14 +72,14 @@ impl Processing {
         }
     }
 
-    /// The image of a sensor's reading.
+    /// The image made from a sensor's reading.
     pub(super) fn develop(&self, mut planes: Planes) -> RgbImage {
         self.colour(&mut planes);
         let tones = self.tones();
         let channels = if self.grey.is_some() { 1 } else { 3 };
         for plane in &mut planes.of[..channels] {
             for value in plane.iter_mut() {
-                // By the square root, which spreads the dark tones.
+                // By the square root, which gives dark tones more entries.
                 let at = value.clamp(0.0, 1.0).sqrt() * (TONES - 1) as f32;
                 let index = (at as usize).min(TONES - 2);
                 let part = at - index as f32;
@@ -119,7 +119,7 @@ impl Processing {
         RgbImage::from_raw(width, height, bytes).unwrap_or_else(|| RgbImage::new(width, height))
     }
 
-    /// Colours towards or away from grey; for a grey camera the first plane is all of it.
+    /// Moves colours towards grey or away from it. For a grey camera only the first plane is used.
     fn colour(&self, planes: &mut Planes) {
         let weights = self.grey.unwrap_or(LUMA);
         let [red, green, blue] = &mut planes.of;
@@ -148,7 +148,7 @@ impl Processing {
                     x
                 };
                 let value = x.powf(1.0 / self.gamma);
-                // Up to 1 a share of the curve, beyond that a share of the curve of the curve: it always rises.
+                // Up to 1 a share of the S-curve; beyond that also a share of the S-curve applied twice. Both are increasing.
                 let bend = |x: f32, share: f32| x + share * (x * x * (3.0 - 2.0 * x) - x);
                 let once = bend(value, self.contrast.min(1.0));
                 let toned = bend(once, (self.contrast - 1.0).max(0.0));
@@ -163,7 +163,7 @@ pub(super) fn through_jpeg(image: RgbImage, quality: u8) -> RgbImage {
     let (width, height) = image.dimensions();
     let mut file = Vec::new();
     let encoder = Encoder::new(&mut file, quality);
-    // A file of a valid size in memory is always written and read again; were it not, the image stays as it is.
+    // Encoding a valid image in memory and decoding it do not fail. If they did, the image would stay as it is.
     let stored = encoder
         .encode(image.as_raw(), width as u16, height as u16, ColorType::Rgb)
         .is_ok();

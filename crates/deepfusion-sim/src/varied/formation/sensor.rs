@@ -7,35 +7,35 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// Weights of red, green and blue in the light that an exposure is measured by (ITU-R BT.709).
+/// Weights of red, green and blue in the light that the exposure is measured by (ITU-R BT.709).
 pub(super) const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// A sensor and its automatic exposure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Sensor {
-    /// The mean the exposure aims at, as a share of full scale, its error included.
+    /// The mean that the exposure aims at, as a share of full scale, including its error.
     aim: f32,
-    /// How much more the lower half counts than the upper one while measuring.
+    /// Additional weight of the lower half of the picture in the measurement.
     below: f32,
-    /// Largest gain: places darker than that stay dark.
+    /// Greatest gain: darker scenes stay dark.
     gain: f32,
-    /// Variance of the noise per unit of signal, and of the noise without any.
+    /// Variance of the noise per unit of signal, and of the noise without signal.
     noise: [f32; 2],
-    /// Deviation of the blur of the noise, pixels, where a processor has smoothed it; 0: none.
+    /// Standard deviation of the blur of the noise, pixels, where a processor has smoothed it; 0: none.
     #[serde(rename = "grain_px")]
     grain: f32,
     /// Errors of the white balance: gains of red, green and blue.
     balance: [f32; 3],
-    /// How far the automatic white balance takes the picture's mean to grey: 0 not at all, 1 all the way.
+    /// How far the automatic white balance moves the picture's mean to grey: 0 not at all, 1 completely.
     greying: f32,
-    /// How much of the light of the darkest parts is taken off as glare: 0 nothing, 1 all of it.
+    /// Share of the light of the darkest parts that is subtracted as glare, 0 to 1.
     deepening: f32,
 }
 
 impl Sensor {
-    /// Aims at 0.16 to 0.26 of full scale on what is mostly ground (the sky may clip), with an error of 0.4 stops (one
-    /// of seven: over one stop). Noise of 0.1 to 1.6 % of full scale, more in the dark; in half of the cameras smoothed
-    /// to grains. Two of three take glare off the dark parts.
+    /// Aims at 0.16 to 0.26 of full scale, measured mostly on the ground (the sky may clip), with an error of 0.4 stops (in one of seven
+    /// cameras over one stop). The noise is 0.1 to 1.6 % of full scale, more in the dark, and smoothed to grains in half of the cameras.
+    /// Two of three cameras subtract glare from the dark parts.
     pub(super) fn draw(rng: &mut ChaCha8Rng, brightness: Brightness) -> Self {
         let error = if rng.random_bool(0.14) {
             stops(rng, 0.9, 1.3)
@@ -44,7 +44,7 @@ impl Sensor {
         };
         let dark = brightness == Brightness::Dark;
         let noise = scale(rng, 0.001, 0.016) * if dark { 2.0 } else { 1.0 };
-        // White balance: along the colours of black bodies, and a little off them.
+        // White balance: along the colours of black bodies, with a small deviation.
         let (warm, green) = (stops(rng, 0.14, 2.5), stops(rng, 0.05, 2.0));
         Self {
             aim: rng.random_range(0.16..0.26) * error * if dark { 0.5 } else { 1.0 },
@@ -61,7 +61,7 @@ impl Sensor {
         }
     }
 
-    /// Linear light to the sensor's reading, 0 to 1.
+    /// From linear light to the sensor's reading, 0 to 1.
     pub(super) fn expose(&self, planes: &mut Planes, stream: &mut FastNoise) {
         self.deepen(planes);
         let towards_grey = self.towards_grey(planes);
@@ -77,7 +77,7 @@ impl Sensor {
                 work.resize(count, 0.0);
                 let taps = bell(self.grain);
                 filter(&mut noise, &mut work, planes.width, &taps);
-                // What smoothing took from its deviation, half of it given back: smoothed noise is weaker too.
+                // Restore half of the deviation that smoothing removed: smoothed noise is also weaker.
                 let left: f32 =
                     taps[0].powi(2) + 2.0 * taps[1..].iter().map(|t| t * t).sum::<f32>();
                 let back = 0.5 + 0.5 / left;
@@ -94,7 +94,7 @@ impl Sensor {
         }
     }
 
-    /// Takes off part of the light that even the darkest hundredth has.
+    /// Subtracts a part of the light of the darkest hundredth.
     fn deepen(&self, planes: &mut Planes) {
         if self.deepening <= 0.0 {
             return;
@@ -120,7 +120,7 @@ impl Sensor {
         means.map(|mean| (grey / mean).clamp(0.4, 2.5).powf(self.greying))
     }
 
-    /// The light that the automatic exposure measures; a very bright spot counts no more than a bright one.
+    /// The light that the automatic exposure measures; very bright spots count as bright ones.
     fn measured(&self, planes: &Planes) -> f32 {
         let (mut sum, mut weights) = (0.0, 0.0);
         let rows = planes.height;
@@ -204,7 +204,7 @@ mod tests {
         assert!(planes.of[0].iter().copied().fold(1.0, f32::min) < 0.01);
     }
 
-    /// Shot noise: the variance grows with the signal.
+    /// The variance of shot noise grows with the signal.
     #[test]
     fn noise_has_its_variance() {
         let sensor = Sensor {

@@ -1,18 +1,18 @@
-//! The depth of hills against a profile that is folded here, in two dimensions and double precision.
+//! The depth of hills, compared with a profile that is folded here, in two dimensions and double precision.
 
 use super::*;
 use crate::primitive::V3;
 use crate::render::{Air, Cores, Edges, Eye, FrameSolid, RenderInput, expose};
 use crate::varied::{Endless, View};
 
-/// A straight part of the ground's profile: where it begins, and its slope.
+/// A straight piece of the ground's profile.
 struct Piece {
-    /// Along the flat ground, metres from the camera's foot.
+    /// Where it begins along the flat ground, metres from the point below the camera.
     flat: f64,
-    /// The same place after folding: ahead of the foot, and up, metres.
+    /// Where it begins after folding, metres: ahead of the point below the camera, and up.
     ahead: f64,
     up: f64,
-    /// Radians.
+    /// Slope, radians.
     slope: f64,
 }
 
@@ -36,19 +36,19 @@ fn profile(folds: &Folds) -> Vec<Piece> {
     pieces
 }
 
-/// A point of the folded world, unfolded.
+/// A point of the folded world after unfolding.
 struct Unfolded {
-    /// Along the flat ground, metres from the camera's foot.
+    /// Position along the flat ground, metres from the point below the camera.
     flat: f64,
-    /// Above that ground, metres.
+    /// Height above that ground, metres.
     above: f64,
-    /// What its slope was, radians.
+    /// Slope of its piece, radians.
     slope: f64,
-    /// How far it is from the nearest crease, along the ground, metres.
+    /// Distance from the nearest crease, along the ground, metres.
     from_crease: f64,
 }
 
-/// In the first piece that ends beyond the point.
+/// Unfolds a point by the first piece that ends beyond it.
 fn unfold(pieces: &[Piece], ahead: f64, up: f64) -> Unfolded {
     let ends = pieces[1..].iter().map(|p| p.flat).chain([f64::MAX]);
     let own = |(number, (piece, end)): (usize, (&Piece, f64))| {
@@ -95,7 +95,7 @@ fn hilly(count: usize) -> Vec<(View, BuiltWorld, Folds)> {
         .collect()
 }
 
-/// The rays of a view with their depths: ahead of the camera along the road, to the left and up, for a metre of depth.
+/// The rays of a view with their depths. A ray is ahead along the road, left and up, per metre of depth.
 fn rays(view: &View, folds: &Folds) -> impl Iterator<Item = (usize, Vector3<f64>, f64)> {
     let (sin, cos) = folds.heading.sin_cos();
     (0..view.depth.data.len()).map(move |i| {
@@ -125,7 +125,7 @@ fn the_ground_is_where_its_profile_has_it() {
                     raised += usize::from(up.abs() > 1.0);
                 }
             } else if d.x > 0.1 {
-                // No hole: the ray stays above the profile for as far as ground is drawn.
+                // The ray of a sky pixel stays above the profile as far as ground is drawn: there is no hole.
                 let farthest = 590.0 * d.x;
                 let last = &pieces[pieces.len() - 1];
                 let end = last.up + (farthest - last.ahead) * last.slope.tan();
@@ -144,7 +144,7 @@ fn the_ground_is_where_its_profile_has_it() {
     assert!(beyond > 20_000 && raised > 4_000 && sky > 40_000);
 }
 
-/// Each point that is seen, unfolded, is on a surface of the flat world.
+/// Each visible point, unfolded, is on a surface of the flat world.
 #[test]
 fn what_is_seen_stands_in_the_flat_world() {
     const BEFORE: f64 = 0.2;
@@ -160,7 +160,7 @@ fn what_is_seen_stands_in_the_flat_world() {
                 continue;
             }
             let at = unfold(&pieces, d.x * depth, eye.z + d.z * depth);
-            // The planes at the creases lean by less than a degree.
+            // The planes at the creases are tilted by less than a degree.
             let near = 0.02 * at.above + 1.5 * BEFORE;
             if at.flat < folds.creases[0].distance || at.from_crease < near {
                 continue;
@@ -186,7 +186,7 @@ fn what_is_seen_stands_in_the_flat_world() {
                 solids,
             };
             let d: V3 = d.map(|x| x as f32);
-            // It may begin below the kerb's height, over the road.
+            // The ray may begin below the kerb's height, over the road.
             let ends = eye.trace_between(&candidates, &d, (1e-3, f32::INFINITY));
             let found = f64::from(ends.t);
             all += 1;
@@ -194,7 +194,7 @@ fn what_is_seen_stands_in_the_flat_world() {
         }
     }
     println!("{right} of {all} points beyond a crease");
-    // The last digit decides where a leaf ends.
+    // The last digit decides where a leaf ends, so a few points may differ.
     assert!(all > 2400 && right * 500 > all * 499, "{right} of {all}");
 }
 
@@ -227,7 +227,7 @@ fn creases_of_no_angle_change_nothing() {
         let flat = render(&Folds::default());
         let pairs = creased.depth.data.iter().zip(&flat.depth.data);
         let other = pairs.filter(|(a, b)| (*a - *b).abs() > 1e-4 * *a).count();
-        // Leaves' edges are decided by the last digit.
+        // The last digit decides where a leaf ends, so a few pixels may differ.
         assert!(other < 20, "{other} of {}", flat.depth.data.len());
     }
 }
