@@ -1,4 +1,4 @@
-//! One frame at 640×192 and one scan, on all cores, and views of the endless mode, on one:
+//! One frame at 640×192 and one scan, on all cores, and views of the endless mode, on one core:
 //! `cargo bench -p deepfusion-sim`.
 
 use criterion::Criterion;
@@ -16,7 +16,7 @@ fn frames(c: &mut Criterion) {
     };
     let mut group = c.benchmark_group("simulator");
     group.sample_size(20);
-    // Frames all along the drive, so that no one place decides.
+    // Frames from the whole drive, so that the result does not depend on a single place.
     let mut number = 0;
     let mut next = move || {
         number = (number + 13) % 64;
@@ -47,7 +47,7 @@ fn views(c: &mut Criterion) {
         let Ok(endless) = Endless::new(config) else {
             return;
         };
-        // Every world is built before anything is measured.
+        // Build every world before measuring.
         for index in 0..16 {
             let _ = endless.view(index);
         }
@@ -69,7 +69,7 @@ fn views(c: &mut Criterion) {
     let Ok(endless) = Endless::new(config) else {
         return;
     };
-    // Every view is of a new world, and has few pixels.
+    // Every view is of a new world and has few pixels.
     let mut number = 0;
     group.bench_function("world", |b| {
         b.iter(|| {

@@ -1,4 +1,4 @@
-//! A grid of endless views, each above its depth, and what they took:
+//! A grid of endless views, each above its depth, and the time they took:
 //! `cargo run --release -p deepfusion-sim --example contact_sheet -- OUT.png [FIRST] [COLUMNS] [ROWS] [WIDTHxHEIGHT] [SEED]`
 
 use deepfusion_sim::{Endless, EndlessConfig, View};

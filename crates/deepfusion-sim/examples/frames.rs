@@ -1,4 +1,4 @@
-//! Renders some frames of a drive into a folder, with their depth, and says how long each took:
+//! Renders some frames of a drive into a folder, with their depth, and prints how long each took:
 //! `cargo run --release -p deepfusion-sim --example frames -- DIR [SEED] [FRAMES] [EVERY] [WIDTHxHEIGHT] [CARS]`
 
 use deepfusion_sim::{SimConfig, Simulation};

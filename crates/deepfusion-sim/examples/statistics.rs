@@ -1,8 +1,8 @@
-//! How the pictures of the endless mode compare with real ones, in numbers:
+//! Compares the pictures of the endless mode with real ones, in numbers:
 //! `cargo run --release -p deepfusion-sim --example statistics -- [VIEWS] [FOLDER OF PICTURES]...`
 //!
-//! Real pictures are cut to the views' shape about their middle and made as small. Each line gives the 10th, 50th and
-//! 90th percentile over the pictures.
+//! Real pictures are cropped about their middle to the aspect ratio of the views and reduced to their size. Each line gives the 10th, 50th
+//! and 90th percentile over the pictures.
 
 use deepfusion_sim::{Endless, EndlessConfig};
 use image::imageops::{FilterType, crop_imm, resize};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 96;
 
-/// What is measured of a picture, and how it is called.
+/// Names of the quantities measured of a picture.
 const NAMES: [&str; 12] = [
     "mean",
     "deviation",

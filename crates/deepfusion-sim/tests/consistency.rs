@@ -1,5 +1,5 @@
-//! The promises a photometric learner relies on: warping a frame by the true depth and pose gives
-//! the other frame, drives repeat byte for byte, and every sensor sees the same world.
+//! What a photometric loss relies on: warping a frame by the true depth and pose gives the other frame, drives repeat byte for byte, and
+//! every sensor sees the same world.
 
 use deepfusion_sim::{ObjectClass, SimConfig, SimFrame, Simulation};
 use nalgebra::Vector3;
@@ -20,8 +20,8 @@ fn sample(frame: &SimFrame, u: f64, v: f64) -> [f64; 3] {
     })
 }
 
-/// Mean absolute error of frame `b` warped onto frame `a` over visible static pixels, their share of
-/// all pixels with a depth, and the error without any warp on the same pixels.
+/// Mean absolute error of frame `b` warped onto frame `a` over visible static pixels, their share of all pixels with a depth, and the error
+/// without warping on the same pixels.
 fn warp_error(simulation: &Simulation, a: &SimFrame, b: &SimFrame) -> (f64, f64, f64) {
     let k = simulation.intrinsics();
     let b_from_a = b.world_from_cam.inverse() * a.world_from_cam;
@@ -122,7 +122,7 @@ fn one_seed_gives_one_drive_and_another_a_different_one() {
     assert!(differing > x.rgb.as_raw().len() / 2);
 }
 
-/// Scan points through the calibration land on the camera's depth.
+/// The points of a scan, transformed by the calibration, agree with the camera's depth.
 #[test]
 fn the_scan_agrees_with_the_camera_s_depth() {
     let simulation = drive(SimConfig {
@@ -147,7 +147,7 @@ fn the_scan_agrees_with_the_camera_s_depth() {
             if u < 0.0 || v < 0.0 || p.z < 1.0 {
                 continue;
             }
-            // Points that pass behind an edge for the camera disagree rightly.
+            // Points behind an edge, as seen from the camera, rightly disagree.
             if let Some(depth) = frame.depth.get(u as usize, v as usize) {
                 all += 1;
                 let tolerance = 0.12 + 0.02 * p.z;
@@ -184,7 +184,7 @@ fn oxts_integrates_to_the_poses() {
         path += step.xy().norm();
         assert!(
             (a[16] - 9.81).abs() < 1.5,
-            "gravity is felt upwards: {}",
+            "gravity should be measured upwards: {}",
             a[16]
         );
         let acceleration = (b[8] - a[8]) / dt;
@@ -199,7 +199,7 @@ fn oxts_integrates_to_the_poses() {
     assert!(path > 60.0);
 }
 
-/// The camera's displacement includes the lever arm from the IMU, and the camera keeps its height.
+/// The camera's displacement includes the lever arm from the IMU, and its height stays the same.
 #[test]
 fn the_camera_rides_at_its_height() {
     let simulation = drive(SimConfig {
@@ -209,12 +209,15 @@ fn the_camera_rides_at_its_height() {
     for i in 0..100 {
         let pose = simulation.world_from_cam(i);
         assert!((pose.translation().z - 1.65).abs() < 0.06);
-        assert!(pose.rotate(&Vector3::z()).z.abs() < 0.05, "looks level");
-        assert!(pose.rotate(&Vector3::y()).z < -0.99, "y is down");
+        assert!(
+            pose.rotate(&Vector3::z()).z.abs() < 0.05,
+            "should look level"
+        );
+        assert!(pose.rotate(&Vector3::y()).z < -0.99, "y should point down");
     }
 }
 
-/// Depth looks like a street's: little sky, most of it near, no constant layout.
+/// Depths are as on a street: little sky, mostly near, and with a layout that changes.
 #[test]
 fn depths_are_those_of_a_street() {
     for seed in 20..26 {
@@ -232,7 +235,7 @@ fn depths_are_those_of_a_street() {
             let sky = 1.0 - known.len() as f64 / depth.data.len() as f64;
             assert!(sky < 0.4, "seed {seed}, frame {i}: {sky} sky");
             known.sort_by(f32::total_cmp);
-            assert!(known[0] > 0.8, "something is at {} m", known[0]);
+            assert!(known[0] > 0.8, "an object is only {} m away", known[0]);
             medians.push(known[known.len() / 2]);
         }
         println!("seed {seed}: median depths {medians:?}");
@@ -243,7 +246,7 @@ fn depths_are_those_of_a_street() {
     }
 }
 
-/// The camera never drives through anything, and moving boxes move by their velocity.
+/// The camera never drives through an object, and moving boxes move by their velocity.
 #[test]
 fn nothing_is_driven_through() {
     for seed in [31, 32, 33] {
@@ -260,7 +263,7 @@ fn nothing_is_driven_through() {
             for object in &objects {
                 let p = object.world_from_object.inverse().transform(&eye);
                 let inside = (0..2).all(|k| p[k].abs() < 0.5 * object.size[k] + 0.4);
-                // Crowns of trees and lamps may reach over the road.
+                // Tree crowns and lamp arms may reach over the road.
                 let low = object.size[2] < 2.5 || object.class == ObjectClass::Building;
                 assert!(!(inside && low), "seed {seed}, frame {i}: {object:?}");
             }
@@ -271,7 +274,7 @@ fn nothing_is_driven_through() {
                     let moved = (b.world_from_object.translation()
                         - a.world_from_object.translation())
                         / dt;
-                    // The next list is shorter where a car has left the street.
+                    // The next list is shorter if a car has left the street.
                     if next.len() == objects.len() {
                         assert!((moved - a.velocity).norm() < 0.35, "{moved} {a:?}");
                     }
@@ -282,7 +285,7 @@ fn nothing_is_driven_through() {
     }
 }
 
-/// The mask and the depth of a moving car are those of its box.
+/// The pixels of a moving car's mask, at their depth, are in its box.
 #[test]
 fn moving_pixels_lie_in_moving_boxes() {
     let simulation = drive(SimConfig {
@@ -306,7 +309,7 @@ fn moving_pixels_lie_in_moving_boxes() {
             let world = frame.world_from_cam.transform(&point);
             let inside = boxes.iter().any(|object| {
                 let p = object.world_from_object.inverse().transform(&world);
-                // Wheels stand a centimetre out of the box.
+                // Wheels project by a centimetre from the box.
                 (0..3).all(|axis| p[axis].abs() <= 0.5 * object.size[axis] + 0.03)
             });
             assert!(inside, "frame {i}, pixel {u}, {v}");

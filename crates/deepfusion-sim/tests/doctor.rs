@@ -1,4 +1,4 @@
-//! The doctor is silent on clean drives, and names every fault that is planted into one.
+//! The doctor finds nothing in clean drives, and finds every fault that is planted into one.
 
 use crate::doctor_faults::{Drive, oxts};
 use deepfusion_data::OpenOptions;
@@ -10,7 +10,7 @@ use nalgebra::{Rotation3, Vector3};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// What disturbs: errors and warnings.
+/// Errors and warnings, without notes.
 fn complaints(diagnosis: &Diagnosis) -> Vec<&Finding> {
     let found = diagnosis.findings().into_iter().map(|(_, finding)| finding);
     found.filter(|f| f.severity > Severity::Note).collect()
@@ -21,7 +21,7 @@ fn outcome<'a>(diagnosis: &'a Diagnosis, check: &str) -> &'a Outcome {
     outcomes.iter().find(|o| o.check == check).unwrap()
 }
 
-/// The finding of a check whose figure measures `quantity`.
+/// The finding of a check with a figure for `quantity`.
 fn found<'a>(diagnosis: &'a Diagnosis, check: &str, quantity: &str) -> &'a Finding {
     let fits = |f: &&Finding| {
         let figure = f.figure.as_ref();
@@ -70,7 +70,7 @@ fn bag_of(folder: &Path, config: &SimConfig, settings: BagSettings) -> PathBuf {
         ..config.clone()
     };
     let simulation = Simulation::new(&config).unwrap();
-    // A quarter of the sensor's columns: rays are most of what a bag takes to write.
+    // A quarter of the sensor's columns: casting rays takes most of the time of writing a bag.
     let settings = BagSettings {
         true_depth: false,
         lidar_step_deg: 0.4,
@@ -97,7 +97,7 @@ fn every_place_is_clean() {
             "{scene:?}: {:#?}",
             complaints(&diagnosis)
         );
-        // Silence says something: these were measured.
+        // These checks were run, and not skipped.
         for check in [
             "timing",
             "duplicates",
@@ -129,7 +129,7 @@ fn every_place_is_clean_as_a_bag() {
             "{scene:?}: {:#?}",
             complaints(&diagnosis)
         );
-        // The road begins 14 m ahead for such a LiDAR: too far to be distinguished from a slope ("ground" is left open).
+        // For this LiDAR the road begins 14 m ahead, too far to distinguish it from a slope, so the check "ground" may be skipped.
         for check in ["lidar-speed", "speed", "parallax"] {
             let outcome = outcome(&diagnosis, check);
             assert!(outcome.skipped.is_none(), "{scene:?} {outcome:?}");
@@ -137,8 +137,8 @@ fn every_place_is_clean_as_a_bag() {
     }
 }
 
-/// Four seconds, in which a LiDAR that looks ahead sees roofs and kerbs rather than the road, and a sky over houses
-/// stands still: these gave false warnings once.
+/// In drives of four seconds, a LiDAR that looks ahead may see roofs and kerbs rather than the road, and the sky over houses may stand
+/// still. Both once gave false warnings.
 #[test]
 fn short_drives_are_clean_as_bags() {
     for (scene, seed) in [
@@ -210,7 +210,7 @@ fn a_scaled_focal_length_is_measured_by_the_turns() {
 #[test]
 fn a_matrix_of_another_size_is_named() {
     let drive = Drive::clean();
-    // 320x96 is what the images are; these are the numbers of 640x192, which still lie in the image.
+    // The images have 320x96 pixels. These intrinsics are for 640x192, but still lie in the image.
     drive.camera(|k| {
         for i in [0, 2, 4, 5] {
             k[i] *= 1.9;
@@ -245,7 +245,7 @@ fn kilometres_an_hour_are_found_by_the_road() {
     assert!(finding.hint.contains("km/h"), "{finding:?}");
 }
 
-/// Without roll and pitch rates eight seconds of bends do not place a clock: it is said, not guessed.
+/// Without roll and pitch rates, eight seconds of bends do not determine the clock offset. The check is then skipped rather than guessing.
 #[test]
 fn a_clock_that_bends_alone_cannot_place_is_left_open() {
     let drive = Drive::clean();
@@ -266,7 +266,7 @@ fn mirrored_images_turn_the_other_way() {
     assert!(finding.hint.contains("mirror"), "{finding:?}");
 }
 
-/// What training checks by itself.
+/// The checks that training runs by itself.
 #[test]
 fn a_wrong_camera_and_wrong_turns_are_found_before_training() {
     let drive = Drive::clean();
@@ -339,7 +339,7 @@ fn a_jumping_exposure_is_counted() {
     });
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "exposure", "jump");
-    // Up and down again: two jumps in ten neighbours.
+    // Brighter and darker again: two jumps among ten pairs of frames.
     assert!((value(finding) - 20.0).abs() < 4.0, "{finding:?}");
     assert!(finding.what.to_string().contains("frame 5"), "{finding:?}");
     assert!(finding.hint.contains("exposure"), "{finding:?}");
@@ -389,7 +389,7 @@ fn a_black_frame_is_measured_and_cut() {
         let finding = found(&diagnosis, "bonnet", side);
         assert!(value(finding) > 50.0, "{finding:?}");
         assert!(finding.hint.contains(kept), "{finding:?}");
-        // The rim itself may belong to either.
+        // The edge itself may belong to either.
         let what = finding.what.to_string();
         let named = what.starts_with("12 ") || what.starts_with("13 ");
         assert!(named, "{finding:?}");
@@ -420,7 +420,7 @@ fn cameras_that_are_swapped_are_reported() {
 #[test]
 fn frames_between_which_hardly_anything_moves_are_reported() {
     let drive = Drive::clean();
-    // Everything far away: from frame to frame the picture grows by a fifth of a thousandth.
+    // All objects are far away: from frame to frame the image grows by a fifth of a thousandth.
     let far = std::sync::Mutex::new(None);
     drive.images(|i, image| {
         let mut far = far.lock().unwrap();
@@ -536,7 +536,7 @@ fn a_bag_whose_camera_clock_is_off_is_reported() {
         let path = bag(folder.path(), Scene::Urban, 200, settings);
         let diagnosis = doctor(&path, None);
         let finding = found(&diagnosis, "clock", "offset");
-        // `data inspect` shows the same, as a figure.
+        // `data inspect` shows the same estimate as a figure.
         let seen = deepfusion_doctor::inspect(&path, &OpenOptions::default()).unwrap();
         let offset = seen.drives[0].time_offset.unwrap();
         assert_eq!(offset.vehicle_minus_camera_s, value(finding));
@@ -552,7 +552,7 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
     drive.remove_oxts(40..56);
     let diagnosis = drive.diagnose();
     let finding = found(&diagnosis, "timing", "time without a motion");
-    // From the last packet before the gap to the first after it, less what a track is held on at both ends.
+    // From the last packet before the gap to the first after it, without the time at both ends for which a track is extrapolated.
     assert!((14.0..18.0).contains(&value(finding)), "{finding:?}");
     assert!(
         finding.what.to_string().contains("in 1 stretch,"),
@@ -564,7 +564,7 @@ fn a_gap_in_the_speed_is_reported_with_its_frame() {
     );
 }
 
-/// A recorder that drops nothing: its log merely ends before the images do.
+/// A recorder without drops: its log ends before the images do.
 #[test]
 fn a_log_that_ends_early_is_told_from_one_with_gaps() {
     let drive = Drive::clean();
@@ -583,7 +583,7 @@ fn a_wrong_wheelbase_is_found_by_the_gyro() {
     let folder = tempfile::tempdir().unwrap();
     let config = SimConfig {
         frames: 300,
-        // No image says anything of this.
+        // No image matters for this check.
         width: 96,
         height: 72,
         scene: Scene::Garage,

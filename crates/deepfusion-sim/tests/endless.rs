@@ -1,5 +1,5 @@
-//! The guarantees of the endless mode: a view depends on the settings and its index alone, and its depth is
-//! exact whatever the weather and the camera do to its colours.
+//! The guarantees of the endless mode: a view depends on the settings and its index alone, and its depth is exact, whatever weather and
+//! camera do to its colours.
 
 use deepfusion_geometry::Intrinsics;
 use deepfusion_sim::{Endless, EndlessConfig, Ingredient, MountedCamera, Scene, View, Weather};
@@ -66,7 +66,7 @@ fn the_seed_and_the_index_change_the_view() {
     assert_ne!(a.view(3).depth, b.view(3).depth);
 }
 
-/// Plain worlds are seen as `simulate` draws them; the others are the same as without plain ones among them.
+/// Views of plain worlds are as in `simulate`; the others are the same as without plain worlds.
 #[test]
 fn plain_worlds_are_put_among_the_others() {
     let few = |plain| {
@@ -77,7 +77,7 @@ fn plain_worlds_are_put_among_the_others() {
             ..small()
         })
     };
-    // A share of exactly 1 draws no number, and so other scenes.
+    // A share of exactly 1 would draw no random number, which would change the scenes.
     let (without, half, only) = (few(0.0), few(0.5), few(1.0 - 1e-9));
     let mut kept = 0;
     for index in 0..24 {
@@ -91,10 +91,10 @@ fn plain_worlds_are_put_among_the_others() {
             assert!(!matches!(view.weather, Weather::Fog | Weather::Overcast));
         }
     }
-    assert!((6..=18).contains(&kept), "{kept} of 24 are varied");
+    assert!((6..=18).contains(&kept), "{kept} of 24 views are varied");
 }
 
-/// The world does not change with the camera's size.
+/// The world does not depend on the size of the camera's image.
 #[test]
 fn a_view_comes_in_any_size() {
     let stream = endless(small());
@@ -118,7 +118,7 @@ fn eight_neighbours_show_eight_worlds() {
     }
 }
 
-/// Nothing lies below the ground or beyond it, and where a ray goes down the ground ends it.
+/// No point lies below the ground or beyond it, and every ray that goes down ends at the ground.
 #[test]
 fn depth_is_the_ground_s_where_nothing_stands() {
     let stream = endless(small());
@@ -137,7 +137,7 @@ fn depth_is_the_ground_s_where_nothing_stands() {
             all += 1;
             if ray.z < -0.01 {
                 level += 1;
-                // Depth of the road's plane and, nearer, that of the pavements'.
+                // Depth of the road's plane and of the nearer plane of the pavements.
                 let (road, pavement) = (-eye.z / ray.z, (0.13 - eye.z) / ray.z);
                 let tolerance = 1e-4 * road + 1e-3;
                 assert!(
@@ -160,7 +160,7 @@ fn depth_is_the_ground_s_where_nothing_stands() {
     assert!(on_ground * 3 > level, "{on_ground} of {level}");
 }
 
-/// What one view sees, another one of the same world does not see through.
+/// A point seen in one view is not seen through in another view of the same world.
 #[test]
 fn two_views_of_a_world_agree() {
     let stream = endless(EndlessConfig {
@@ -189,13 +189,13 @@ fn two_views_of_a_world_agree() {
     assert!(contradict * 100 < agree, "{contradict} of {agree}");
 }
 
-/// Pixels of `a` that `b` sees at the same depth, and those that `b` sees through. What `b` hides is neither.
+/// Number of pixels of `a` that `b` sees at the same depth, and of those that `b` sees through. Pixels hidden from `b` count as neither.
 fn compare(a: &View, b: &View) -> (usize, usize) {
     let b_from_a = b.world_from_cam.inverse() * a.world_from_cam;
     let (w, h) = (a.depth.width as i64, a.depth.height as i64);
     let (mut same, mut through) = (0, 0);
     for (i, depth) in a.depth.data.iter().enumerate() {
-        // The traffic is elsewhere in the other view.
+        // The traffic differs between views.
         if *depth <= 0.0 || *depth > 60.0 || a.moving[i] {
             continue;
         }
@@ -212,7 +212,7 @@ fn compare(a: &View, b: &View) -> (usize, usize) {
         if point.z < 0.3 || x < 2 || y < 2 || x >= w - 2 || y >= h - 2 {
             continue;
         }
-        // Thin and slanted things cover other pixels of the other picture: the nearest around it counts.
+        // Thin and slanted objects may cover other pixels of the other view, so the nearest and the farthest depth around the pixel count.
         let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
         let depths = around.map(|(x, y)| f64::from(b.depth.data[(y * w + x) as usize]));
         let (mut nearest, mut farthest) = (f64::INFINITY, 0.0f64);
@@ -256,7 +256,7 @@ fn views_are_of_many_kinds_and_none_is_stuck() {
         let view = stream.view(index);
         let field = 2.0 * (80.0 / view.intrinsics.fx).atan().to_degrees();
         assert!((34.9..110.1).contains(&field), "{field}");
-        // 5:4 squeezed to 10:3 is the most.
+        // The strongest squeeze is from 5:4 to 10:3.
         let ratio = view.intrinsics.fy / view.intrinsics.fx;
         assert!((0.36..=1.0301).contains(&ratio), "{ratio}");
         assert_eq!(view.intrinsics.implausible(), None);
@@ -271,7 +271,7 @@ fn views_are_of_many_kinds_and_none_is_stuck() {
         known.sort_by(f32::total_cmp);
         assert!(
             known[0] > 0.15,
-            "view {index} touches something: {}",
+            "view {index} touches an object: {}",
             known[0]
         );
         let far = known[known.len() * 9 / 10];
@@ -299,11 +299,11 @@ fn a_bad_setting_is_named() {
         ..small()
     })
     .err();
-    let error = error.expect("three rows are too few").to_string();
+    let error = error.expect("three rows should be too few").to_string();
     assert!(error.contains("`height`") && error.contains('3'), "{error}");
 }
 
-/// The first views of a stream, without some ingredients.
+/// The first views of a stream without these ingredients.
 fn views_without(ingredients: &[Ingredient]) -> Vec<View> {
     let stream = endless(EndlessConfig {
         formation: false,
@@ -314,13 +314,13 @@ fn views_without(ingredients: &[Ingredient]) -> Vec<View> {
     (0..24).map(|i| stream.view(i)).collect()
 }
 
-/// Share of pairs that `same` holds for.
+/// Share of pairs for which `same` is true.
 fn share(pairs: &[(&View, View)], same: impl Fn(&View, &View) -> bool) -> f64 {
     let count = pairs.iter().filter(|(a, b)| same(a, b)).count();
     count as f64 / pairs.len() as f64
 }
 
-/// Each ingredient that is left out leaves the others as they were.
+/// Leaving out one ingredient does not change the others.
 #[test]
 fn an_ingredient_is_left_out_alone() {
     let heading = |view: &View| {
@@ -334,7 +334,7 @@ fn an_ingredient_is_left_out_alone() {
     let without = |one: Ingredient| -> Vec<(&View, View)> {
         with.iter().zip(views_without(&[one])).collect()
     };
-    // Where a place is free depends on height, tilt and lens: some cameras go elsewhere.
+    // Whether a place is free depends on height, tilt and lens, so some cameras are elsewhere.
     let mostly = 0.7;
 
     let pairs = without(Ingredient::CameraHeight);
@@ -373,7 +373,7 @@ fn an_ingredient_is_left_out_alone() {
 
     let pairs = without(Ingredient::Variety);
     assert!(pairs.iter().all(|(_, b)| Scene::ALL.contains(&b.scene)));
-    // Other lanes have other traffic, and what is drawn after it is other, too.
+    // Other lanes have other traffic, so the draws after it also differ.
     assert!(share(&pairs, |a, b| lens(a).cy == lens(b).cy) > 0.5);
     assert!(share(&pairs, |a, b| a.depth == b.depth) < 0.5);
 
@@ -381,12 +381,12 @@ fn an_ingredient_is_left_out_alone() {
     assert!(!pairs.iter().any(|(_, b)| b.moving.contains(&true)));
     let pose = |view: &View| view.world_from_cam;
     assert_eq!(share(&pairs, |a, b| pose(a) == pose(b)), 1.0);
-    // What nothing moves in is the same.
+    // Views without dynamic objects do not change.
     let still = |view: &View| !view.moving.contains(&true);
     assert_eq!(share(&pairs, |a, b| still(a) && a.depth != b.depth), 0.0);
 }
 
-/// Hills are where they are asked for, and leave the other views alone.
+/// Only the requested share of views has hills, and the other views do not change.
 #[test]
 fn a_share_of_the_views_in_the_open_has_hills() {
     let stream = |hills| {
@@ -418,7 +418,7 @@ fn a_share_of_the_views_in_the_open_has_hills() {
     assert!((0.25..0.55).contains(&(f64::from(hilly as u32) / f64::from(open as u32))));
 }
 
-/// People ride and walk where they are asked for, and leave everything but what they hide as it is.
+/// Only the requested share of views has people, and only the pixels that they cover change.
 #[test]
 fn a_share_of_the_views_has_people_who_ride_and_walk() {
     let stream = |riders| {
@@ -457,12 +457,12 @@ fn a_share_of_the_views_has_people_who_ride_and_walk() {
         half += usize::from(b.riders > 0);
         seen += usize::from(hidden > 2);
     }
-    println!("{half} of {with} views have people, {seen} of the latter show some");
+    println!("{half} of {with} views have people; people are visible in {seen} of the {with}");
     assert!(with > 15 && seen > 4, "{with} {seen}");
     assert!((0.15..0.65).contains(&(half as f64 / with as f64)));
 }
 
-/// Two cars' cameras: every view is one's whole image, from where it hangs.
+/// The cameras of two cars: every view is the whole image of one of them, from its height.
 #[test]
 fn known_cameras_take_all_views() {
     let kitti = MountedCamera::level(
@@ -482,7 +482,7 @@ fn known_cameras_take_all_views() {
     let (mut of_kitti, mut below) = (0, 0);
     for index in 0..64 {
         let view = stream.view(index);
-        assert_ne!(view.scene, Scene::Indoor, "cars drive through no rooms");
+        assert_ne!(view.scene, Scene::Indoor, "cars do not drive through rooms");
         let camera = if view.height_m < 2.0 { &kitti } else { &lorry };
         of_kitti += usize::from(view.height_m < 2.0);
         assert_eq!(view.intrinsics, camera.intrinsics.resized(160, 48));
@@ -491,7 +491,7 @@ fn known_cameras_take_all_views() {
         let ahead = view.world_from_cam.rotate(&Vector3::z());
         let pitch = (-ahead.z).asin().to_degrees() - camera.pitch_degrees;
         assert!(pitch.abs() < 2.1, "{pitch}");
-        // What lies at the bottom of the picture is the road, or stands on it.
+        // The pixel at the bottom of the picture shows the road or an object on it.
         let at = 47 * 160 + 80;
         let metres = f64::from(view.depth.data[at]);
         if metres > 0.0 {

@@ -1,4 +1,4 @@
-//! What is written is a KITTI drive: the project's own reader opens it and finds the same truth.
+//! A written drive is a KITTI drive: the project's own reader opens it and finds the same ground truth.
 
 use deepfusion_data::{Dataset, GtKind, OpenOptions, load_rgb, read_depth_png};
 use deepfusion_fs::PartialFolder;
@@ -75,7 +75,7 @@ fn the_reader_finds_what_the_simulator_knows() {
         assert!(error.translation().norm() < 0.02 * distance + 0.01);
     }
 
-    // The dense depth is exact to its 1/256 m, and the scans agree with it.
+    // The dense depth is exact to its resolution of 1/256 m, and the scans agree with it.
     let stored = drive.join("proj_depth/groundtruth/image_02/0000000002.png");
     let stored = read_depth_png(&stored).expect("the depth");
     let frame = simulation.frame(2);
@@ -103,7 +103,7 @@ fn the_reader_finds_what_the_simulator_knows() {
     assert_eq!(leftovers(&out), 0);
 }
 
-/// Files and folders with a temporary name anywhere below `folder`.
+/// Number of temporary files and folders anywhere below `folder`.
 fn leftovers(folder: &Path) -> usize {
     fs::read_dir(folder)
         .expect("a folder")
@@ -148,7 +148,7 @@ fn a_folder_with_something_in_it_is_refused() {
     assert!(matches!(&error, Error::OutputNotEmpty { path } if path == folder.path()));
     assert!(error.hint().is_some());
     let kept = fs::read_dir(folder.path()).expect("the folder").count();
-    assert_eq!(kept, 1, "nothing was added");
+    assert_eq!(kept, 1, "nothing should be added");
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn where_nothing_can_be_written_the_path_is_named() {
 fn a_failure_half_way_leaves_nothing_behind() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out");
-    // Another process takes the final name while the drive is written.
+    // Another process takes the final name while the drive is being written.
     let blocked = out.join("2026_01_01/taken");
     let error = write_kitti(&small(1), &out, &mut |_, _| {
         fs::create_dir_all(&blocked).expect("a folder");
@@ -218,7 +218,7 @@ fn a_drive_that_is_stopped_at_its_last_frame_is_done() {
     assert_eq!(leftovers(&out), 0);
 }
 
-/// The folder that was written aside is gone when its error is read.
+/// The error names the final path: the temporary folder is gone by then.
 #[test]
 fn what_cannot_be_written_is_named_by_its_place() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -250,7 +250,7 @@ fn what_another_writes_is_named() {
     assert!(another.path().exists());
 }
 
-/// What a process left that was killed while it wrote is not in the way of the next one.
+/// Files left by a killed process do not block the next one.
 #[test]
 fn what_a_killed_writer_left_is_removed() {
     let folder = tempfile::tempdir().expect("a temporary folder");

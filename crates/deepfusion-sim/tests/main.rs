@@ -1,4 +1,4 @@
-//! The simulator: exact against itself, and against what reads its files.
+//! Tests of the simulator: its outputs are exact, consistent, and readable by the readers of its formats.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! People who ride and walk: in pictures, depth, masks and labels as moving cars are, where there is room for them.
+//! People who ride and walk, where there is room for them. They appear in pictures, depth, masks and labels as moving cars do.
 
 use deepfusion_sim::{ObjectClass, Scene, SceneObject, SimConfig, Simulation, Variety};
 use nalgebra::Vector3;
@@ -32,7 +32,7 @@ fn holds(object: &SceneObject, point: &Vector3<f64>, margin: f64) -> bool {
     (0..3).all(|i| p[i].abs() <= 0.5 * object.size[i] + margin)
 }
 
-/// They hide what is behind them, and nothing else changes: what a pixel of the mask shows is in the box of whoever is there.
+/// People hide what is behind them, and nothing else changes. Each pixel that they cover shows a point in somebody's box.
 #[test]
 fn people_are_seen_where_their_labels_say() {
     let (mut riding, mut walking) = (0, 0);
@@ -69,7 +69,7 @@ fn people_are_seen_where_their_labels_say() {
     assert!(riding > 20 && walking > 20, "{riding} {walking}");
 }
 
-/// From frame to frame everyone moves by their speed.
+/// From frame to frame everyone moves by their velocity.
 #[test]
 fn people_move_by_their_velocity() {
     let (mut steps, mut riding) = (0, 0);
@@ -85,12 +85,12 @@ fn people_move_by_their_velocity() {
                 assert_eq!(a.class, b.class);
                 let rides = b.class == ObjectClass::Cyclist;
                 let speed = b.velocity.xy().norm();
-                // In a bend the outside is faster than the middle of the street.
+                // In a bend, speed differs between the outside and the middle of the street.
                 let range = if rides { 2.3..8.7 } else { 0.5..2.3 };
                 assert!(range.contains(&speed), "{speed} m/s: {b:?}");
                 let turned = (b.velocity - a.velocity).xy().norm() > 0.15 * speed;
                 if turned {
-                    // A corner.
+                    // A turn at a corner.
                     assert!(!rides);
                     continue;
                 }
@@ -106,7 +106,7 @@ fn people_move_by_their_velocity() {
     assert!(steps > 80 && riding > 20, "{steps} {riding}");
 }
 
-/// At the start nobody is in a house or in a vehicle, whatever the world.
+/// In every world, nobody starts in a house or in a vehicle.
 #[test]
 fn nobody_is_in_a_house_or_in_a_car() {
     let mut met = 0;

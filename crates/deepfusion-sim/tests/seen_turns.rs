@@ -1,4 +1,4 @@
-//! How the vehicle turned, by its images, against how it did.
+//! The turns of the vehicle estimated from its images, compared with the true ones.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -7,7 +7,7 @@ use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_doctor::{Severity, doctor, seen_turns};
 use deepfusion_sim::{Scene, SimConfig, Simulation, write_kitti};
 
-/// A drive of 60 frames with traffic, whose oxts know every turn.
+/// A drive of 60 frames with traffic, whose OXTS records every turn.
 fn drive(folder: &Path, scene: Scene) -> Dataset {
     let simulation = Simulation::new(&SimConfig {
         seed: 7,
@@ -26,13 +26,13 @@ fn drive(folder: &Path, scene: Scene) -> Dataset {
         .remove(0)
 }
 
-/// Root of the mean square, in degrees.
+/// Root mean square, in degrees.
 fn rms(values: &[f64]) -> f64 {
     let squares: f64 = values.iter().map(|v| v.powi(2)).sum();
     (squares / values.len() as f64).sqrt().to_degrees()
 }
 
-/// The same drive as a folder of images with a speed alone.
+/// The same drive as a folder of images with a table of speeds.
 fn with_speed_alone(drive: &Dataset, folder: &Path) -> Dataset {
     let images = folder.join("images");
     std::fs::rename(drive.folder().join("image_02/data"), &images).unwrap();
@@ -59,7 +59,7 @@ fn with_speed_alone(drive: &Dataset, folder: &Path) -> Dataset {
         .remove(0)
 }
 
-/// In every place the images tell roll and pitch to a fraction of what they are, and without a yaw rate the turns to the side as well.
+/// In every scene, images determine roll and pitch to a fraction of their size, and without a yaw rate also the yaw.
 #[test]
 fn images_show_how_the_vehicle_turned() {
     for scene in Scene::ALL {
@@ -89,7 +89,7 @@ fn images_show_how_the_vehicle_turned() {
             assert!(off < 0.6 * real, "{scene:?} {yaw_known}: {off} of {real}");
             assert!(yaw_off < 0.06, "{scene:?} {yaw_known}: {yaw_off}");
         }
-        // The camera then moves between images as it did.
+        // With these turns, the camera's motion between images is the true one.
         alone.take_turns(&without_yaw);
         assert!(alone.yaw_known() && !alone.tilt_unknown());
         let said: Vec<String> = alone.warnings().iter().map(ToString::to_string).collect();
@@ -111,7 +111,7 @@ fn images_show_how_the_vehicle_turned() {
     }
 }
 
-/// Images that show nothing leave a drive as it was.
+/// If the images show nothing, the drive does not change.
 #[test]
 fn turns_that_nothing_shows_are_not_made_up() {
     let at = tempfile::tempdir().unwrap();
@@ -136,7 +136,7 @@ fn turns_that_nothing_shows_are_not_made_up() {
     assert!(!alone.yaw_known() && alone.tilt_unknown());
 }
 
-/// A speed without a yaw rate, as GPS and OBD give it: the images show the turns, and the road then shows a wrong unit.
+/// A speed without a yaw rate, as from GPS and OBD: the images show the turns, and then the road reveals a wrong unit.
 #[test]
 fn a_wrong_unit_is_found_without_a_yaw_rate() {
     let at = tempfile::tempdir().unwrap();
@@ -165,7 +165,7 @@ fn a_wrong_unit_is_found_without_a_yaw_rate() {
         matches!(&hints[..], [hint] if hint.contains("km/h")),
         "{hints:?}"
     );
-    // Where the images show nothing, that it was not checked is said.
+    // If the images show nothing, a note says that the unit was not checked.
     let grey = image::RgbImage::from_pixel(320, 96, image::Rgb([90; 3]));
     for frame in alone.frames() {
         grey.save(frame.image.path()).unwrap();
@@ -177,7 +177,7 @@ fn a_wrong_unit_is_found_without_a_yaw_rate() {
     assert!(note.what.to_string().contains("km/h"), "{note:?}");
 }
 
-/// A stretch of a drive has the images and the motion of its frames, and no others.
+/// A part of a drive has the images and the motion of its own frames only.
 #[test]
 fn a_part_of_a_drive_is_one() {
     let at = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A drive written as a bag: what is in it, and that it is the drive.
+//! A drive written as a bag contains the drive's data.
 
 use deepfusion_fs::PartialFolder;
 use deepfusion_rosbag::msg::{CameraInfo, CompressedImage, Imu, PointCloud2, TwistStamped};
@@ -98,7 +98,7 @@ fn equal_drives_make_equal_bags_and_nothing_is_overwritten() {
     assert!(error.to_string().contains("not empty"), "{error}");
 }
 
-/// Stopped at its last frame it is whole, and what a killed writer left is not in its way.
+/// A bag that is stopped at its last frame is complete, and files of a killed writer do not block it.
 #[test]
 fn a_bag_that_is_stopped_at_its_last_frame_is_done() {
     let simulation = simulation();
@@ -125,7 +125,7 @@ fn a_bag_that_is_stopped_at_its_last_frame_is_done() {
     assert_eq!(names, ["commercial_0011.bag", "commercial_0011.toml"]);
 }
 
-/// A name that is taken while the bag is written stays another's, and nothing is beside it.
+/// If another process takes the bag's name meanwhile, its file stays as it is, and no file is left beside it.
 #[test]
 fn a_bag_takes_nobodys_place() {
     let simulation = simulation();

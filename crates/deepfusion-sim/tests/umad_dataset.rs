@@ -39,7 +39,7 @@ fn bag(simulation: &Simulation, folder: &Path, settings: &BagSettings) -> PathBu
     .unwrap()
 }
 
-/// Images, a table of CAN speeds and one of the inertial unit, and four numbers for the camera.
+/// Images, tables of CAN speeds and of IMU readings, and the camera's intrinsics.
 fn write_folder(simulation: &Simulation, out: &Path) {
     std::fs::create_dir_all(out.join("images")).unwrap();
     let mut times = String::new();
@@ -66,7 +66,7 @@ fn write_folder(simulation: &Simulation, out: &Path) {
     }
     std::fs::write(out.join("imu.csv"), table).unwrap();
     let k = simulation.intrinsics();
-    // The camera of UMAD's head: 1.6 m ahead of the rear axle, 0.72 m above the unit that stands for it.
+    // UMAD's camera: 1.6 m ahead of the rear axle, 0.72 m above the IMU there.
     let text = format!(
         "intrinsics = [{}, {}, {}, {}]\n[mount]\nforward_m = 1.6\nup_m = 0.72\n\
          [vehicle_from_imu]\ntranslation = [1.55, 0.0, 0.64]\n",
@@ -104,7 +104,7 @@ fn bag_kitti_and_folder_give_the_same_snippets() {
         for (ours, exact) in snippets.iter().zip(exact) {
             let (ours, exact) = (&ours.sources[0].motion, &exact.sources[0].motion);
             assert!((ours.dt_s - exact.dt_s).abs() < 1e-6);
-            // The CAN speed has a step of 0.014 m/s and noise; the rest is the same arc.
+            // The CAN speed has a resolution of 0.014 m/s and noise; both drives are the same arc.
             let off = (ours.distance_m - exact.distance_m).abs();
             assert!(
                 off < 0.03 * exact.distance_m + 1e-3,
@@ -118,7 +118,7 @@ fn bag_kitti_and_folder_give_the_same_snippets() {
                 exact.source_from_target.unwrap(),
             );
             let turned = (a * b.inverse()).angle();
-            // A yaw bias of at most 0.008 rad/s over 0.04 s, and what two seconds leave of roll's and pitch's.
+            // A yaw bias of at most 0.008 rad/s over 0.04 s, and the remaining errors of roll and pitch after two seconds.
             assert!(turned < 6e-4, "{turned}");
         }
         assert!((sum / whole - 1.0).abs() < 5e-3, "{}", sum / whole);
@@ -148,11 +148,11 @@ fn the_lidar_s_depth_is_the_exact_depth() {
             }
         }
     }
-    // 10 scans a second, 25 frames: a scan is within 25 ms of every frame but some.
+    // At 10 scans and 25 frames a second, most frames have a scan within 25 ms.
     assert!((18..=30).contains(&with_scan), "{with_scan}");
     errors.sort_by(f32::total_cmp);
     let at = |share: f64| errors[(share * errors.len() as f64) as usize];
-    // Half a pixel of rounding on slanted ground, and what the LiDAR sees over an edge 8 cm below the camera.
+    // Half a pixel of rounding on slanted ground, and points that the LiDAR, 8 cm below the camera, sees past an edge.
     assert!(at(0.5) < 0.01 && at(0.9) < 0.08, "{} {}", at(0.5), at(0.9));
     assert!(matches!(
         set.ground_truth(0, GtKind::Velodyne),
@@ -216,7 +216,7 @@ fn a_bag_s_moving_pixels_are_those_of_the_masks() {
             }
         }
     }
-    // At the rims of moving things, and where up to 25 ms pass between scan and frame, they differ.
+    // They differ at the edges of dynamic objects, and because up to 25 ms pass between scan and frame.
     assert!(of_masks > 200, "{of_masks}");
     assert!(
         f64::from(right as u32) > 0.85 * f64::from(of_labels as u32),
@@ -252,11 +252,11 @@ fn a_clock_that_is_ahead_is_set_back() {
         off = off.max((speed_at(&crooked, frame) - exact).abs());
     }
     assert!(straight < 0.1, "{straight}");
-    // Where it accelerates, 0.3 s are some decimetres a second.
+    // Where the vehicle accelerates, 0.3 s change the speed by some decimetres per second.
     assert!(off > 0.25, "{off} {straight}");
 }
 
-/// Bag → KITTI → bag: images, times, motions and depths stay.
+/// Bag → KITTI → bag keeps images, times, motions and depths.
 #[test]
 fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
     let simulation = simulation(Scene::Urban, 20, 2);
@@ -282,7 +282,7 @@ fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
         for (a, b) in snippets_of.iter().zip(&snippets[0]) {
             let (a, b) = (&a.sources[0].motion, &b.sources[0].motion);
             assert!((a.dt_s - b.dt_s).abs() < 1e-6);
-            // Speeds are sampled at the frames now: the noise between them is no longer averaged.
+            // Speeds are now sampled at the frames, so the noise between them is not averaged.
             assert!((a.distance_m - b.distance_m).abs() < 0.03 * b.distance_m);
             let (a, b) = (a.source_from_target.unwrap(), b.source_from_target.unwrap());
             assert!((a * b.inverse()).angle() < 3e-4);

@@ -1,11 +1,11 @@
-//! The motion that a bag's speed, steering and inertial unit give, against where the camera was.
+//! The motion from a bag's speed, steering and IMU, compared with the camera's true poses.
 
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_geometry::Se3;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag};
 use std::ops::ControlFlow;
 
-/// Ten seconds; pictures and scans do not matter here.
+/// A drive of ten seconds; pictures and scans are not needed here.
 fn drive(scene: Scene, seed: u64) -> (tempfile::TempDir, Dataset) {
     let config = SimConfig {
         frames: 250,
@@ -38,8 +38,8 @@ fn drive(scene: Scene, seed: u64) -> (tempfile::TempDir, Dataset) {
     (folder, dataset)
 }
 
-/// Root mean squares over pairs four metres apart, degrees: pitch, yaw, roll of the camera; and the median of measured over
-/// true distance.
+/// Root mean square errors over pairs four metres apart: pitch, yaw and roll of the camera, degrees. Also the median of measured over true
+/// distance.
 struct Errors {
     degrees: [f64; 3],
     distance: f64,
@@ -69,7 +69,8 @@ fn errors(dataset: &Dataset, motion: impl Fn(usize, usize) -> Se3) -> Errors {
     }
 }
 
-/// The gyro's bias of up to 0.5 degrees a second has no standstill to show in, and the body rocks by some tenths.
+/// The gyro's bias of up to 0.5 degrees per second cannot be measured, since the vehicle never stops; the body rocks by some tenths of a
+/// degree.
 #[test]
 fn four_metres_are_known_to_a_tenth_of_a_degree() {
     for (scene, seed) in [

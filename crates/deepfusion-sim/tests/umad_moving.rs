@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 const FRAMES: usize = 60;
-/// Frames that are taken when a scan is: 25 Hz and 10 Hz.
+/// Every fifth frame is taken at the time of a scan: frames come at 25 Hz, scans at 10 Hz.
 const SCANNED: usize = 5;
 
 fn simulation() -> Simulation {
@@ -56,7 +56,7 @@ fn describe(bag: &Path, change: impl Fn(String) -> String) {
     std::fs::write(&sidecar, change(text)).unwrap();
 }
 
-/// Gives the clouds' field of the velocity an unknown name, so that the LiDAR has none.
+/// Renames the velocity field of the clouds to an unknown name, so that the LiDAR has no velocities.
 fn without_velocities(bag: &Path) {
     let bytes = std::fs::read(bag).unwrap();
     let (field, other) = (b"\x08\0\0\0velocity", b"\x08\0\0\0reserved");
@@ -73,7 +73,7 @@ fn without_velocities(bag: &Path) {
     });
 }
 
-/// Which pixels with depth move, in the frames that have a scan.
+/// Which pixels with a depth are dynamic, in the frames that have a scan.
 fn moving(set: &Dataset) -> Vec<Vec<bool>> {
     let labels = set.moving_labels().unwrap().unwrap();
     let of_frame = |frame: usize| {
@@ -104,7 +104,7 @@ fn a_pixel_has_the_velocity_of_what_is_seen_there() {
             set.ground_truth(frame, GtKind::Z).unwrap().as_ref()
         );
         let velocity = truth.velocity_mps.unwrap();
-        // The simulator's own points through its own camera, the nearest in each pixel.
+        // The simulator's own points projected by its own camera, the nearest in each pixel.
         let scan = simulation.fmcw(simulation.time_s(frame));
         let cam_from_lidar =
             simulation.world_from_cam(frame).inverse() * simulation.world_from_velo(frame);
@@ -130,7 +130,7 @@ fn a_pixel_has_the_velocity_of_what_is_seen_there() {
                 continue;
             }
             all += 1;
-            // Five standard deviations of the noise, and the sensor's own velocity by the scan.
+            // Five standard deviations of the noise, plus the error of the sensor's own velocity, which is estimated from the scan.
             off += usize::from((measured - exact).abs() > 0.3);
             driving += usize::from(exact.abs() > 1.0);
             if exact == 0.0 {
@@ -141,7 +141,7 @@ fn a_pixel_has_the_velocity_of_what_is_seen_there() {
     let rms = (square / f64::from(standing)).sqrt();
     println!("{all} pixels, {off} off, {driving} driving, {standing} standing: rms {rms:.4} m/s");
     assert!(all > 20_000 && driving > 200, "{all} {driving}");
-    // A pixel at a rim can have another point: poses stand rounded in the file beside the bag.
+    // At an edge, a pixel can contain another point, because the poses in the file beside the bag are rounded.
     assert!(off * 500 < all, "{off} of {all}");
     assert!((0.02..0.12).contains(&rms), "{rms}");
 }
@@ -171,7 +171,7 @@ fn without_velocities_the_topic_of_dynamic_points_decides() {
         count(&listed)
     );
     assert!(both > 200, "{both}");
-    // The two thresholds are equal but for the noise.
+    // Both thresholds are the same; they differ only by the noise.
     assert!(20 * both > 19 * count(&listed).max(count(&fast)), "{both}");
 }
 
@@ -188,7 +188,7 @@ fn the_topic_of_dynamic_points_agrees_with_the_velocities() {
     assert!(agreement.recall() > 0.9, "{agreement:?}");
     assert_eq!(open(&path).dynamic_agreement(5).unwrap().unwrap().scans, 5);
 
-    // With the sensor's own velocity left in, everything moves.
+    // If the sensor's own velocity is not subtracted, all points are dynamic.
     describe(&path, |text| {
         text.replace("[lidar]\n", "[lidar]\nover_ground = true\n")
     });

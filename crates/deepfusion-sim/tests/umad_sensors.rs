@@ -17,7 +17,7 @@ fn drive(moving_cars: usize, frames: usize) -> Simulation {
     Simulation::new(&config).unwrap()
 }
 
-/// v_r of what stands still is the sensor's own velocity along the ray, but for the noise.
+/// For a static point, the radial velocity is the sensor's own velocity along the ray, apart from noise.
 #[test]
 fn standing_points_come_nearer_as_fast_as_the_sensor_moves() {
     let simulation = drive(8, 60);
@@ -36,7 +36,7 @@ fn standing_points_come_nearer_as_fast_as_the_sensor_moves() {
         let own = -in_sensor.dot(&ray);
         let expected = own + f64::from(scan.ground_radial_mps[i]);
         let error = f64::from(radial[i]) - expected;
-        // Six standard deviations of the noise, and what the range noise turns the ray by: nothing.
+        // Six standard deviations of the noise. Range noise does not change the direction of the ray.
         assert!(error.abs() < 0.35, "{error} at {point:?}");
         (sum, n) = (sum + error * error, n + 1);
         assert!(scan.moving[i] || scan.ground_radial_mps[i] == 0.0);
@@ -63,7 +63,7 @@ fn moving_points_have_their_car_s_velocity() {
         {
             let ray = world_from_velo.rotate(&Vector3::from(point.map(f64::from)).normalize());
             let place = world_from_velo.transform(&Vector3::from(point.map(f64::from)));
-            // Within its box, give or take the noise of the range.
+            // In its box, apart from range noise.
             let inside = |o: &&SceneObject| {
                 let local = o.world_from_object.inverse().transform(&place);
                 (0..3).all(|k| local[k].abs() < 0.5 * o.size[k] + 0.2)
@@ -71,16 +71,16 @@ fn moving_points_have_their_car_s_velocity() {
             let mut driving = objects.iter().filter(|o| o.velocity.norm() > 0.0);
             let car = driving.find(inside).unwrap();
             let expected = car.velocity.dot(&ray);
-            // In a bend a car's ends move otherwise than its middle.
+            // In a bend the ends of a car move differently from its middle.
             let error = (f64::from(scan.ground_radial_mps[i]) - expected).abs();
             assert!(error < 0.15 * car.velocity.norm(), "{error} of {expected}");
             seen += 1;
         }
     }
-    assert!(seen > 500, "{seen} points on moving cars");
+    assert!(seen > 500, "only {seen} points on moving cars");
 }
 
-/// The readings integrate to the distance and the turn that the poses say.
+/// The integrals of the readings agree with the distance and the turn of the poses.
 #[test]
 fn speed_gyro_and_steering_agree_with_the_poses() {
     let simulation = drive(0, 500);
@@ -114,7 +114,7 @@ fn speed_gyro_and_steering_agree_with_the_poses() {
         .windows(2)
         .map(|w| 0.5 * dt * (w[0].angular_rate.z + w[1].angular_rate.z))
         .sum();
-    // The bias is at most 0.008 rad/s an axis.
+    // The bias is at most 0.008 rad/s per axis.
     assert!(
         (gyro - exact_turn).abs() < 0.009 * end + 0.02,
         "{gyro} {exact_turn}"

@@ -1,5 +1,5 @@
-//! Drives of a configuration are what they were in every version: pictures, depths and boxes, byte for byte. So are
-//! the endless mode's views where nothing newer is asked for.
+//! The drives of a configuration are the same in every version: pictures, depths and boxes, byte for byte. So are views of the endless mode
+//! whose settings use nothing newer.
 
 use deepfusion_sim::{Endless, EndlessConfig, Scene, Sensors, SimConfig, Simulation};
 
@@ -10,7 +10,7 @@ fn fold(hash: u64, bytes: impl IntoIterator<Item = u8>) -> u64 {
     })
 }
 
-/// Hash of three frames of a drive and of what stands there.
+/// Hash of three frames of a drive and of the objects in them.
 fn digest(config: &SimConfig) -> u64 {
     let simulation = Simulation::new(config).expect("a valid configuration");
     let mut hash = 0xcbf2_9ce4_8422_2325;
@@ -26,7 +26,7 @@ fn digest(config: &SimConfig) -> u64 {
     hash
 }
 
-/// The figures were computed before worlds could be varied.
+/// The hashes were computed before worlds could be varied.
 #[test]
 fn the_five_scenes_are_what_they_always_were() {
     let known = [
@@ -53,7 +53,7 @@ fn the_five_scenes_are_what_they_always_were() {
     }
 }
 
-/// The figure was computed before views could have hills, and before an ingredient could be left out.
+/// The hash was computed before views could have hills, and before an ingredient could be left out.
 #[test]
 fn views_are_what_they_were_before_there_were_hills() {
     let stream = Endless::new(EndlessConfig {

@@ -1,4 +1,4 @@
-//! Varied drives: they repeat, other seeds have other cameras, and what is written of a camera is what its pictures were seen by.
+//! Varied drives repeat, other seeds have other cameras, and the written calibration is that of the pictures.
 
 use deepfusion_data::{Dataset, GtKind, OpenOptions, read_depth_png};
 use deepfusion_geometry::Se3;
@@ -13,7 +13,7 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// The height of the unit that stands for the car above the road, metres.
+/// Height of the IMU above the road, metres.
 const IMU_HEIGHT: f64 = 0.93;
 
 fn config(scene: Scene, seed: u64) -> SimConfig {
@@ -40,7 +40,7 @@ fn open(path: &Path) -> Dataset {
     all.remove(0)
 }
 
-/// Every file below a folder, by its path in it.
+/// The bytes of every file below a folder, by its path in the folder.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let (mut found, mut folders) = (BTreeMap::new(), vec![folder.to_owned()]);
     while let Some(here) = folders.pop() {
@@ -121,8 +121,8 @@ fn cam_from_imu(date: &Path) -> Se3 {
     cam2_from_cam0 * rigid("calib_velo_to_cam.txt") * rigid("calib_imu_to_velo.txt")
 }
 
-/// Whatever is seen below the horizon is no farther than the road's plane by the camera that is written, and where the road is seen it is there. It is so to the
-/// half step of a depth file, and what single precision makes of a ray that nearly misses.
+/// Below the horizon no point is farther than the road's plane, as seen by the written camera; pixels of the road are on it. The tolerance
+/// is half a step of a depth file, and the rounding of single precision for nearly parallel rays.
 #[test]
 fn the_road_lies_where_the_written_camera_sees_it() {
     for (scene, seed) in [(Scene::Urban, 1), (Scene::Country, 2), (Scene::Garage, 3)] {
@@ -146,7 +146,7 @@ fn the_road_lies_where_the_written_camera_sees_it() {
             assert!((a - b).abs() < 1e-8, "{a} {b}");
         }
 
-        // The mount, of a car that stands level.
+        // The mount, for a car that stands level.
         let imu_from_cam = cam_from_imu(path.parent().expect("the date")).inverse();
         let above = imu_from_cam.translation().z + IMU_HEIGHT;
         assert!((above - of("height_m")).abs() < 1e-6, "{above}");
@@ -172,7 +172,7 @@ fn the_road_lies_where_the_written_camera_sees_it() {
                 }
                 let found = depth.get(u as usize, v as usize).map_or(0.0, f64::from);
                 let tolerance = 0.003 + 2e-4 * plane;
-                assert!(found > 0.0, "no sky below the horizon: {u}, {v}");
+                assert!(found > 0.0, "sky below the horizon: {u}, {v}");
                 assert!(found < plane + tolerance, "{u}, {v}: {found} {plane}");
                 below += 1;
                 road += usize::from(found > plane - tolerance);
@@ -183,7 +183,7 @@ fn the_road_lies_where_the_written_camera_sees_it() {
     }
 }
 
-/// The reader's motion of the camera, from OXTS through the calibration, is the true one of the drawn camera.
+/// The camera's motion from OXTS and the calibration is the true motion of the drawn camera.
 #[test]
 fn the_reader_s_motion_is_the_drawn_camera_s() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -212,7 +212,7 @@ fn the_reader_s_motion_is_the_drawn_camera_s() {
     }
 }
 
-/// A bag's camera, and the mount in the file beside it: its LiDAR's points land on the exact depth.
+/// A bag's camera, and the mount in the file beside it: the points of its LiDAR agree with the exact depth.
 #[test]
 fn a_bag_has_the_drawn_camera_and_its_mount() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -242,7 +242,7 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
     let truth = set.ground_truth(0, GtKind::Z).expect("readable");
     let truth = truth.expect("the first frame has a scan");
     let exact = simulation.frame(0).depth;
-    // In rows of pixels, as the road from the camera's height shows them: half a pixel of rounding, whatever the height.
+    // Errors in rows of pixels, for a road seen from the camera's height: half a pixel of rounding at any height.
     let rows = k.fy
         * simulation
             .drawn()
@@ -260,7 +260,7 @@ fn a_bag_has_the_drawn_camera_and_its_mount() {
     assert!(median < 0.75, "{median}");
 }
 
-/// No car comes or goes within sight, though varied streets are too narrow for some.
+/// No car appears or disappears within sight, although varied streets are too narrow for some.
 #[test]
 fn no_car_vanishes_before_the_camera() {
     let mut met = 0;
@@ -297,7 +297,7 @@ fn no_car_vanishes_before_the_camera() {
         }
     }
     println!("{met} cars in frames");
-    assert!(met > 20, "{met}");
+    assert!(met > 20, "only {met} cars in frames");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Varied worlds: they repeat, they differ, their depth is exact, and their sensors agree.
+//! Varied worlds repeat, differ from seed to seed, have exact depth, and look the same to all sensors.
 
 use deepfusion_sim::{ObjectClass, Scene, SimConfig, Simulation, Variety};
 use nalgebra::Vector3;
@@ -38,7 +38,7 @@ fn one_seed_gives_one_world_and_another_a_different_one() {
     }
 }
 
-/// Every pixel has a finite depth or is sky; worlds are neither empty nor walls before the lens.
+/// Every pixel has a finite depth or is sky; worlds are neither empty nor blocked in front of the camera.
 #[test]
 fn depths_are_finite_and_of_many_sizes() {
     for scene in Scene::EVERY {
@@ -60,7 +60,7 @@ fn depths_are_finite_and_of_many_sizes() {
     }
 }
 
-/// The camera's depth and the scanner's ranges are of one world, leaves and hills included.
+/// The camera's depth and the scanner's ranges agree, also on leaves and hills.
 #[test]
 fn the_scan_agrees_with_the_depth() {
     for (scene, seed) in [
@@ -88,12 +88,12 @@ fn the_scan_agrees_with_the_depth() {
         }
         let share = f64::from(agree as u32) / f64::from(all);
         println!("{}: {share:.3} of {all}", scene.name());
-        // Crowns and railings are full of edges, which the two see from places 0.3 m apart.
+        // Crowns and railings are full of edges, and the two sensors are 0.3 m apart.
         assert!(all > 2000 && share > 0.75, "{}: {share}", scene.name());
     }
 }
 
-/// Streets hold what streets hold.
+/// Streets have enough cars, people, trees, bicycles and houses.
 #[test]
 fn streets_are_crowded() {
     let mut counts = [0usize; 5];

@@ -22,7 +22,7 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
-    /// Simulated once, copied for each test.
+    /// The drive is simulated once and copied for each test.
     pub(crate) fn clean() -> Self {
         static CLEAN: OnceLock<tempfile::TempDir> = OnceLock::new();
         let clean = CLEAN.get_or_init(|| {
@@ -96,7 +96,7 @@ impl Drive {
         std::fs::write(&path, lines.collect::<String>()).unwrap();
     }
 
-    /// Turns the vehicle's axes nose down against the sensors', degrees.
+    /// Pitches the vehicle's axes nose down against the sensors', in degrees.
     pub(crate) fn pitch_vehicle(&self, degrees: f64) {
         let path = self.date().join("calib_imu_to_velo.txt");
         let text = std::fs::read_to_string(&path).unwrap();
@@ -121,7 +121,7 @@ impl Drive {
         std::fs::write(&path, lines.collect::<String>()).unwrap();
     }
 
-    /// Changes every oxts packet's values.
+    /// Changes the values of every OXTS packet.
     pub(crate) fn oxts(&self, change: impl Fn(usize, &mut [f64])) {
         for number in 0..SimConfig::default().frames {
             let path = self.drive().join(format!("oxts/data/{number:010}.txt"));
@@ -141,7 +141,7 @@ impl Drive {
         }
     }
 
-    /// Sets the camera's clock ahead of the vehicle's.
+    /// Moves the camera's clock ahead of the vehicle's.
     pub(crate) fn camera_clock_ahead(&self, seconds: f64) {
         let path = self.drive().join("image_02/timestamps.txt");
         let text = std::fs::read_to_string(&path).unwrap();
@@ -169,8 +169,8 @@ impl Drive {
         }
     }
 
-    /// A second camera, beside the first, that sees all of it so many pixels farther to the right: to the left of it (negative)
-    /// if it is the right one.
+    /// Adds a second camera beside the first. It sees everything `shift` pixels farther to the right; a camera to the right of the first
+    /// sees it farther to the left (negative).
     pub(crate) fn second_camera(&self, shift: i64) {
         let second = self.drive().join("image_03");
         std::fs::create_dir(&second).unwrap();
@@ -208,14 +208,14 @@ impl Drive {
         }
     }
 
-    /// Each of these is there once more instead of the next.
+    /// Repeats each of these images in place of the next one.
     pub(crate) fn repeat_images(&self, numbers: &[usize]) {
         for number in numbers {
             std::fs::copy(self.image(*number), self.image(*number + 1)).unwrap();
         }
     }
 
-    /// Leaves half of an image's file.
+    /// Truncates an image's file to half of its length.
     pub(crate) fn cut_image(&self, number: usize) {
         let bytes = std::fs::read(self.image(number)).unwrap();
         std::fs::write(self.image(number), &bytes[..bytes.len() / 2]).unwrap();
