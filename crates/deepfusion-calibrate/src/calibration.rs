@@ -1,4 +1,4 @@
-//! What a calibration is made of, and what it says.
+//! The input of a calibration, and its result.
 
 use crate::{Coverage, LensModel};
 use deepfusion_geometry::{Distortion, Intrinsics, NoDistortion};
@@ -14,20 +14,20 @@ pub struct View {
     pub corners: Vec<Vector2<f64>>,
 }
 
-/// A camera, and how sure it is.
+/// A camera with its uncertainty.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibration {
-    /// fx, fy, cx, cy in pixels, of the images as the camera gives them.
+    /// fx, fy, cx, cy in pixels of the images as the camera gives them.
     pub intrinsics: Intrinsics,
-    /// Which lens was fitted.
+    /// The lens model that was fitted.
     pub model: LensModel,
-    /// Its coefficients, in the order of [`LensModel::coefficients`].
+    /// The lens's coefficients, in the order of [`LensModel::coefficients`].
     pub coefficients: Vec<f64>,
-    /// Root mean square distance between corners as seen and as the camera explains them, over the views used, in pixels.
+    /// Root mean square distance between detected corners and their projections by the camera, over the views used, in pixels.
     pub rms_px: f64,
-    /// One standard deviation of every number, if the corners' errors are independent.
+    /// The standard error of every parameter, if the errors of the corners are independent.
     pub standard_errors: StandardErrors,
-    /// From the image's left edge to its right at the principal point's height; none where the lens model shows nothing there.
+    /// Horizontal field of view at the principal point's height, in degrees; none if the lens model has no ray at an edge of the image.
     pub hfov_deg: Option<f64>,
     /// Every view in the order given, used or not.
     pub views: Vec<ViewFit>,
@@ -36,7 +36,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// The lens as the rest of the program takes it.
+    /// The lens as a distortion of `deepfusion-geometry`.
     ///
     /// # Errors
     /// [`NoDistortion`], for coefficients that are not finite.
@@ -47,39 +47,39 @@ impl Calibration {
         }
     }
 
-    /// How many views were used.
+    /// Number of views used.
     #[must_use]
     pub fn used(&self) -> usize {
         self.views.iter().filter(|v| v.used).count()
     }
 }
 
-/// Standard errors: σ̂ √diag (JᵀJ)⁻¹, with σ̂² the squared errors over the degrees of freedom.
+/// Standard errors: σ̂ √diag (JᵀJ)⁻¹, where σ̂² is the sum of squared errors over the degrees of freedom.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StandardErrors {
-    /// Of fx, in pixels.
+    /// Standard error of fx, in pixels.
     pub fx: f64,
-    /// Of fy, in pixels.
+    /// Standard error of fy, in pixels.
     pub fy: f64,
-    /// Of cx, in pixels.
+    /// Standard error of cx, in pixels.
     pub cx: f64,
-    /// Of cy, in pixels.
+    /// Standard error of cy, in pixels.
     pub cy: f64,
-    /// Of the lens's coefficients.
+    /// Standard errors of the lens's coefficients.
     pub coefficients: Vec<f64>,
 }
 
-/// A view under the camera that was found.
+/// How well a view fits the camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ViewFit {
     /// The picture's name.
     pub name: String,
-    /// Whether it was used; else its corners disagree with all others.
+    /// Whether the view was used; otherwise its corners disagree with all other views.
     pub used: bool,
-    /// Root mean square distance of its corners, in pixels; none where the board's pose is unknown.
+    /// Root mean square error of its corners, in pixels; none if the board's pose is unknown.
     pub rms_px: Option<f64>,
-    /// The board's distance from the camera, in metres; none where its pose, or the side of its squares, is unknown.
+    /// Distance of the board from the camera, in metres; none if its pose, or the side of its squares, is unknown.
     pub distance_m: Option<f64>,
-    /// The angle between the board's normal and the camera's axis, in degrees: 0 is parallel to the image.
+    /// Angle between the board's normal and the camera's axis, in degrees: 0 is parallel to the image. None if the pose is unknown.
     pub tilt_deg: Option<f64>,
 }

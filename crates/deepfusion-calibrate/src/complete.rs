@@ -1,19 +1,19 @@
-//! Corners of the board that the detector missed, looked for where their neighbours put them.
+//! Corners of the board that the detector missed, searched where their neighbours predict them.
 
 use crate::corners::{Corner, grey, place};
 use crate::grid::{Grid, extent};
 use image::GrayImage;
 use nalgebra::Vector2;
 
-/// How far a corner may lie from where its neighbours put it, as a share of a step.
+/// Greatest distance of a corner from its predicted position, as a share of a step.
 const REACH: f64 = 0.3;
-/// Least difference between dark and bright squares about it, in grey values.
+/// Least difference between the dark and bright squares around a corner, in grey values.
 const LEAST_CONTRAST: f64 = 12.0;
-/// Rounds: a corner that was found may put its neighbour.
+/// Greatest number of rounds: a corner that was found may predict its neighbours.
 const ROUNDS: usize = 4;
 
-/// Fills gaps in a grid that is to have this many columns and rows, in either direction: places between and beside corners that are
-/// there. New corners come at the end of `corners`.
+/// Fills gaps in a grid that should have this many columns and rows, in either order: positions between and beside known corners. New
+/// corners are appended to `corners`.
 pub(crate) fn complete(
     image: &GrayImage,
     corners: &mut Vec<Corner>,
@@ -27,7 +27,7 @@ pub(crate) fn complete(
             return;
         }
         let mut found = Vec::new();
-        // One place beyond, too: a whole row may be missing.
+        // Also one position beyond the grid: a whole row may be missing.
         for row in r0 - 1..=r0 + down as i32 {
             for column in c0 - 1..=c0 + across as i32 {
                 let at = (column, row);
@@ -55,7 +55,7 @@ pub(crate) fn complete(
     }
 }
 
-/// The corner at a place, if the image has one there.
+/// The corner at a position of the grid, if the image has one there.
 fn corner_at(
     image: &GrayImage,
     corners: &[Corner],
@@ -63,7 +63,7 @@ fn corner_at(
     (column, row): (i32, i32),
 ) -> Option<Corner> {
     let at = |c: i32, r: i32| Some(corners[*grid.get(&(column + c, row + r))?].at);
-    // Each side's two neighbours go on as they come; those across are halved.
+    // Two neighbours on the same side are extrapolated; two on opposite sides are averaged.
     let mut guesses = Vec::new();
     let mut steps = [Vector2::zeros(); 2];
     for (side, (dc, dr)) in [(1, 0), (0, 1)].into_iter().enumerate() {
@@ -76,14 +76,14 @@ fn corner_at(
             if let (Some(near), Some(far)) =
                 (at(sign * dc, sign * dr), at(2 * sign * dc, 2 * sign * dr))
             {
-                // Steps change as they did before.
+                // The steps keep changing as they did before.
                 let third = at(3 * sign * dc, 3 * sign * dr);
                 guesses.push(third.map_or(near * 2.0 - far, |third| (near - far) * 3.0 + third));
                 steps[side] = (far - near) * f64::from(sign);
             }
         }
     }
-    // Both directions must say it.
+    // There must be a prediction in both directions.
     if steps.iter().any(|s| s.norm() < 3.0) {
         return None;
     }
@@ -107,7 +107,7 @@ fn corner_at(
     })
 }
 
-/// Whether opposite squares about a point are alike, and neighbouring ones are not.
+/// Whether opposite squares around a point are alike, and neighbouring ones are not.
 fn crosswise(image: &GrayImage, at: Vector2<f64>, [right, down]: [Vector2<f64>; 2]) -> bool {
     let square = |a: f64, b: f64| {
         let p = at + (right * a + down * b) * 0.3;

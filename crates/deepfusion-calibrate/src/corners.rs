@@ -1,39 +1,39 @@
-//! Points where four squares meet: found by the ChESS response (Bennett and Lasenby, CVIU 118, 2014), then placed to fractions of a pixel.
+//! Points where four squares meet: found by the ChESS response (Bennett and Lasenby, CVIU 118, 2014), then refined to fractions of a pixel.
 
 use chess_corners::{Detector, DetectorConfig, UpscaleConfig};
 use image::GrayImage;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::PI;
 
-/// Least response of a corner. Grain and leaves give some, too: the grid sorts them out.
+/// Least response of a corner. Grain and leaves also respond; the grid leaves them out.
 const LEAST_RESPONSE: f32 = 15.0;
-/// Pixels about the image for the detector.
+/// Border around the image for the detector, in pixels.
 const BORDER_PX: u32 = 24;
-/// Steps of a placement, and the step in pixels that ends it.
+/// Greatest number of steps of a refinement, and the step in pixels that ends it.
 const MAX_STEPS: usize = 40;
 const TOLERANCE_PX: f64 = 1e-3;
 
-/// A corner where dark and bright squares meet crosswise.
+/// A corner where two dark and two bright squares meet.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Corner {
-    /// Where, in pixels.
+    /// Position, in pixels.
     pub(crate) at: Vector2<f64>,
-    /// Directions of the two edges, in radians; the dark squares lie between the first and the second, x turning to y.
+    /// Directions of the two edges, in radians; from the first to the second, turning from x to y, the square is dark.
     pub(crate) edges: [f64; 2],
-    /// How much it looks like one.
+    /// Response of the detector.
     pub(crate) response: f64,
 }
 
-/// The corners of an image, the clearest first. `doubled` looks at it enlarged twice, for squares of less than some ten pixels.
+/// The corners of an image, strongest first. `doubled` enlarges the image twice, for squares of less than some ten pixels.
 pub(crate) fn find(image: &GrayImage, doubled: bool) -> Vec<Corner> {
     let mut config = DetectorConfig::chess_multiscale().with_threshold(LEAST_RESPONSE);
     if doubled {
         config = config.with_upscale(UpscaleConfig::Fixed(2));
     }
-    // The detector leaves the image's border out: give it another.
+    // The detector leaves out the border of an image, so add a border.
     let image = bordered(image);
     let (width, height) = image.dimensions();
-    // The settings are constants that the detector takes, and the buffer is an image's: it cannot fail.
+    // The settings are constants that the detector accepts, and the buffer fits the image: this cannot fail.
     let found = Detector::new(config)
         .and_then(|mut detector| detector.detect_u8(image.as_raw(), width, height))
         .unwrap_or_default();
@@ -53,7 +53,7 @@ pub(crate) fn find(image: &GrayImage, doubled: bool) -> Vec<Corner> {
     corners
 }
 
-/// The image with its outermost pixels repeated about it.
+/// The image with its outermost pixels repeated around it.
 fn bordered(image: &GrayImage) -> GrayImage {
     let (width, height) = image.dimensions();
     GrayImage::from_fn(width + 2 * BORDER_PX, height + 2 * BORDER_PX, |x, y| {
@@ -69,9 +69,9 @@ pub(crate) fn between(a: f64, b: f64) -> f64 {
     turned.min(PI - turned)
 }
 
-/// Places a corner: the point q to which all gradients g of its neighbourhood are at right angles, in a window of `half` pixels to each
-/// side. That is Σ w g gᵀ (p − q) = 0 over the pixels p (Förstner and Gülch, 1987; what OpenCV's `cornerSubPix` solves). `None` where it
-/// moves out of that window.
+/// Refines a corner: the point q for which all image gradients g around it are perpendicular to the lines towards it, in a window of `half`
+/// pixels to each side. It solves Σ w g gᵀ (p − q) = 0 over the pixels p (Förstner and Gülch, 1987; as OpenCV's `cornerSubPix`). `None` if
+/// q moves out of the window.
 pub(crate) fn place(image: &GrayImage, start: Vector2<f64>, half: i32) -> Option<Vector2<f64>> {
     let mut at = start;
     let reach = f64::from(half);
@@ -102,7 +102,7 @@ pub(crate) fn place(image: &GrayImage, start: Vector2<f64>, half: i32) -> Option
     Some(at)
 }
 
-/// The grey value between pixels, bilinear; beyond the border that of the border.
+/// The grey value between pixels, bilinear; beyond the image that of its border.
 pub(crate) fn grey(image: &GrayImage, x: f64, y: f64) -> f64 {
     let (width, height) = image.dimensions();
     let x = x.clamp(0.0, f64::from(width - 1));
@@ -127,7 +127,7 @@ mod tests {
         assert!((between(0.1, PI - 0.1) - 0.2).abs() < 1e-12);
     }
 
-    /// Four squares with a soft edge, whose corner lies between pixels.
+    /// Four squares with a soft edge, whose corner is between pixels.
     #[test]
     fn a_corner_is_placed_between_pixels() {
         let (cx, cy) = (20.3, 17.8);
@@ -139,7 +139,7 @@ mod tests {
         let start = Vector2::new(21.0, 17.0);
         let at = place(&image, start, 5).unwrap();
         assert!((at - Vector2::new(cx, cy)).norm() < 0.02, "{at}");
-        // A plain image has none, and nowhere to move to.
+        // A plain image has no corner, and a refinement finds none.
         let plain = GrayImage::from_pixel(40, 36, Luma([90]));
         assert!(find(&plain, false).is_empty());
         assert_eq!(place(&plain, start, 5), None);
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn corners_know_their_edges_and_on_which_side_it_is_dark() {
-        // Squares of 16 pixels along the axes, corners at 24 + 16 i; dark where both numbers are even.
+        // Squares of 16 pixels along the axes, with corners at 24 + 16 i; dark where both indices are even.
         let image = GrayImage::from_fn(128, 96, |x, y| {
             let dark = (x + 8) / 16 % 2 == (y + 8) / 16 % 2;
             Luma([if dark { 40 } else { 210 }])
@@ -158,7 +158,7 @@ mod tests {
             found.iter().find(|c| (c.at - at).norm() < 1.0).unwrap()
         };
         let (here, next) = (near(39.5, 39.5), near(55.5, 39.5));
-        // To the lower right of the first it is dark, of the next bright.
+        // The square to the lower right of the first corner is dark, that of the next one bright.
         assert!(between(here.edges[0], 0.0) < 0.1, "{here:?}");
         assert!(between(here.edges[1], PI / 2.0) < 0.1, "{here:?}");
         assert!(between(next.edges[0], PI / 2.0) < 0.1, "{next:?}");

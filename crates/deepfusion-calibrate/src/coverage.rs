@@ -3,24 +3,24 @@
 use nalgebra::Vector2;
 use serde::Serialize;
 
-/// Parts of the image that a share is counted in, across and down.
+/// Cells of the image for the covered share, across and down.
 const CELLS: (usize, usize) = (8, 6);
-/// Margins above this share are warned of.
+/// Margins wider than this share cause a warning.
 const WIDE_MARGIN: f64 = 0.15;
 
-/// How corners are spread over the image.
+/// Distribution of the corners over the image.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coverage {
-    /// Corners in each ninth of the image: rows from the top, in each from the left.
+    /// Number of corners in each ninth of the image: rows from the top, each from the left.
     pub ninths: [[usize; 3]; 3],
-    /// Share of the image that has a corner, in cells of an eighth of its width by a sixth of its height.
+    /// Share of the image's cells that contain a corner; a cell is an eighth of the width by a sixth of the height.
     pub share: f64,
-    /// Share of the image's width or height beyond the outermost corners: at the left, top, right, bottom.
+    /// Strips of the image beyond the outermost corners, as shares of its width or height: left, top, right, bottom.
     pub margins: [f64; 4],
 }
 
 impl Coverage {
-    /// Of these corners, in an image of this size.
+    /// The coverage by these corners of an image of this size.
     pub(crate) fn of<'a>(
         corners: impl Iterator<Item = &'a Vector2<f64>>,
         (width, height): (u32, u32),
@@ -51,7 +51,7 @@ impl Coverage {
         }
     }
 
-    /// Edges of the image near which no corner was seen, and how wide that strip is, as a share of the image.
+    /// Edges of the image without corners near them, each with the width of the strip as a share of the image.
     #[must_use]
     pub fn wide_margins(&self) -> Vec<(&'static str, f64)> {
         let named = ["left", "top", "right", "bottom"].into_iter();
@@ -59,7 +59,7 @@ impl Coverage {
         named.filter(|(_, share)| *share > WIDE_MARGIN).collect()
     }
 
-    /// Names of the image's corner regions in which no corner was seen.
+    /// Names of the corner regions of the image without any board corner.
     #[must_use]
     pub fn empty_corners(&self) -> Vec<&'static str> {
         let named = [
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn corners_are_counted_where_they_are() {
-        // Left of the middle, from the top to the bottom edge.
+        // Left of the middle, from the top edge to the bottom edge.
         let corners = [(10.0, 0.0), (30.0, 50.0), (40.0, 99.0)].map(|(x, y)| Vector2::new(x, y));
         let coverage = Coverage::of(corners.iter(), (120, 100));
         assert_eq!(coverage.ninths, [[1, 0, 0], [1, 0, 0], [0, 1, 0]]);

@@ -7,19 +7,19 @@ use crate::grid::{self, Grid};
 use image::{GrayImage, Luma};
 use nalgebra::Vector2;
 
-/// Longer side that corners are looked for at first, in pixels.
+/// Longer side to which an image is reduced at first for the detector, in pixels.
 const LOOKED_AT: u32 = 1280;
-/// Half the window that a corner is placed by: as a share of the way to the next corner, at least and at most in pixels, and at most as
-/// a share of the image's longer side. Large images are seldom as sharp as their pixels.
+/// Half the window of a refinement: as a share of the distance to the next corner, at least and at most in pixels, and at most as a share
+/// of the image's longer side. Large images are rarely sharp at the level of their pixels.
 const WINDOW: f64 = 0.3;
 const HALF_WINDOW_PX: (f64, f64) = (3.0, 11.0);
 const HALF_WINDOW: f64 = 0.01;
 
-/// What was seen in a picture.
+/// What was found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BoardDetection {
-    /// The whole board: its inner corners in pixels, row after row as [`Board::points`] has them. Where the board looks the same turned,
-    /// as every board does by half a turn, it may begin at another corner; x to y turns as in the image.
+    /// The whole board: its inner corners in pixels, row after row as in [`Board::points`]. Where the board looks the same after a rotation
+    /// (every board does after half a turn), the first corner may be another one. x turns to y as in the image.
     Board(Vec<Vector2<f64>>),
     /// A grid of another size, or a part of the board.
     Other {
@@ -27,14 +27,14 @@ pub enum BoardDetection {
         columns: usize,
         /// Rows of corners.
         rows: usize,
-        /// How many corners of that rectangle were seen.
+        /// Number of corners found in that rectangle.
         corners: usize,
     },
-    /// No grid at all.
+    /// No grid.
     Nothing,
 }
 
-/// Finds the board's inner corners, to some hundredths of a pixel. The whole board must be seen.
+/// Finds the board's inner corners to some hundredths of a pixel. The whole board must be visible.
 #[must_use]
 pub fn find_board(image: &GrayImage, board: &Board) -> BoardDetection {
     let (width, height) = image.dimensions();
@@ -42,7 +42,7 @@ pub fn find_board(image: &GrayImage, board: &Board) -> BoardDetection {
         return BoardDetection::Nothing;
     }
     let first = width.max(height).div_ceil(LOOKED_AT).max(1);
-    // Smaller for what is blurred, larger for small squares.
+    // Reduced further for blurred images, enlarged for small squares.
     let mut tries = vec![(first, false), (2 * first, false)];
     if first > 1 {
         tries.push((1, false));
@@ -71,7 +71,7 @@ pub fn find_board(image: &GrayImage, board: &Board) -> BoardDetection {
     best
 }
 
-/// The mean of squares of `factor` pixels.
+/// The image reduced by this factor: each pixel is the mean of a square.
 fn reduced(image: &GrayImage, factor: u32) -> GrayImage {
     if factor == 1 {
         return image.clone();
@@ -87,7 +87,7 @@ fn reduced(image: &GrayImage, factor: u32) -> GrayImage {
     })
 }
 
-/// From the reduced image to the whole one.
+/// From the reduced image to the original one.
 fn back(mut corners: Vec<Corner>, factor: u32) -> Vec<Corner> {
     let f = f64::from(factor);
     for corner in &mut corners {
@@ -96,13 +96,13 @@ fn back(mut corners: Vec<Corner>, factor: u32) -> Vec<Corner> {
     corners
 }
 
-/// The board's corners in the grid in its own order: right-handed, columns along its longer or shorter side as the board has them.
+/// The board's corners among those of the grid, in the board's order. The number of columns may be that of its longer or its shorter side.
 fn whole(grid: &Grid, board: &Board) -> Option<Vec<usize>> {
     let (columns, rows) = (board.columns, board.rows);
     let (_, all_columns, all_rows) = grid::extent(grid);
     let upright = grid::full_window(grid, columns, rows);
     let turned = || {
-        // Its columns are the grid's rows.
+        // The board's columns are the grid's rows.
         let found = grid::full_window(grid, rows, columns)?;
         let at = |i: usize| found[(i % columns) * rows + i / columns];
         Some((0..columns * rows).map(at).collect())
@@ -112,14 +112,14 @@ fn whole(grid: &Grid, board: &Board) -> Option<Vec<usize>> {
         None if columns != rows => turned()?,
         None => return None,
     };
-    // A stray corner beside the board is no matter; most of a further row is another board.
+    // A stray corner beside the board is ignored; most of another row means another board.
     let around = all_columns * all_rows;
     let strays = grid.len() - order.len();
     let another = strays * 2 >= columns.min(rows) && grid.len() * 10 > around * 9;
     (!another).then_some(order)
 }
 
-/// Sub-pixel positions, ordered so that x turns to y as in the image.
+/// Refined positions, in an order in which x turns to y as in the image.
 fn placed(image: &GrayImage, start: &[Vector2<f64>], board: &Board) -> Option<Vec<Vector2<f64>>> {
     let (columns, rows) = (board.columns, board.rows);
     let at = |column: usize, row: usize| start[row * columns + column];
@@ -147,7 +147,7 @@ fn placed(image: &GrayImage, start: &[Vector2<f64>], board: &Board) -> Option<Ve
         last(0, rows - 1) - last(0, 0),
     );
     if along.perp(&down) < 0.0 {
-        // Seen in a mirror: begin at the other end of each row.
+        // The order is mirrored: reverse each row.
         for row in placed.chunks_mut(columns) {
             row.reverse();
         }

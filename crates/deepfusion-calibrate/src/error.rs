@@ -2,102 +2,102 @@ use crate::Board;
 use deepfusion_geometry::NoDistortion;
 use deepfusion_hint::{Hint, count_of};
 
-/// Why there is no calibration.
+/// Why a calibration failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A board that cannot be used.
+    /// The board is not usable.
     #[error(
         "a board of {}x{} inner corners{}: expected {} to {} corners along each side, and squares above 0 m",
         board.columns, board.rows, board.of_squares(), Board::LEAST, Board::MOST
     )]
     Board {
-        /// What was asked for.
+        /// The board that was given.
         board: Board,
     },
     /// No picture shows the board.
-    #[error("no board of {}x{} inner corners in any of {}{}", board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen))]
+    #[error("no board of {}x{} inner corners found in {}{}", board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen))]
     NoBoard {
-        /// What was looked for.
+        /// The board that was searched.
         board: Board,
-        /// How many pictures were looked at.
+        /// Number of pictures searched.
         pictures: usize,
-        /// Columns and rows of the whole grid that was seen most often instead, and in how many pictures.
+        /// Columns and rows of the grid that was found most often instead, and the number of pictures with it.
         seen: Option<(usize, usize, usize)>,
     },
-    /// Too few pictures show the board.
+    /// Too few pictures show the whole board.
     #[error(
-        "the board of {}x{} inner corners is whole in {found} of {}, and {needed} are needed{}",
+        "the whole board of {}x{} inner corners is in {found} of {}, at least {needed} are needed{}",
         board.columns, board.rows, count_of(*pictures, "picture"), instead(*seen)
     )]
     TooFewViews {
-        /// What was looked for.
+        /// The board that was searched.
         board: Board,
-        /// Pictures that show it.
+        /// Number of pictures that show it.
         found: usize,
-        /// Pictures that were looked at.
+        /// Number of pictures searched.
         pictures: usize,
-        /// How many views a calibration needs.
+        /// Number of views that a calibration needs.
         needed: usize,
         /// As in [`Error::NoBoard`].
         seen: Option<(usize, usize, usize)>,
     },
-    /// Pictures of several sizes.
+    /// The pictures have different sizes.
     #[error("{picture}: {}x{} pixels, but {}x{} in {first}", size.0, size.1, first_size.0, first_size.1)]
     MixedSizes {
         /// The picture.
         picture: String,
-        /// Its width and height.
+        /// Width and height of the picture.
         size: (u32, u32),
         /// The first picture.
         first: String,
-        /// Its width and height.
+        /// Width and height of the first picture.
         first_size: (u32, u32),
     },
-    /// Pictures that the camera was held differently for.
+    /// The camera was held differently for some pictures.
     #[error("{picture}: EXIF turns it by {turned}, but {first} by {first_turned}")]
     MixedOrientations {
         /// The picture.
         picture: String,
-        /// How it is turned to be upright.
+        /// The rotation that turns it upright, by EXIF.
         turned: &'static str,
         /// The first picture.
         first: String,
-        /// How that is turned.
+        /// The rotation that turns the first picture upright.
         first_turned: &'static str,
     },
-    /// A view whose corners are not those of the board.
-    #[error("{name}: {}, the board has {expected}", count_of(*corners, "corner"))]
+    /// A view has another number of corners than the board.
+    #[error("{name}: {}, expected the board's {expected}", count_of(*corners, "corner"))]
     Corners {
-        /// The view.
+        /// Name of the view.
         name: String,
-        /// How many it has.
+        /// Number of its corners.
         corners: usize,
-        /// How many it should have.
+        /// Number of the board's corners.
         expected: usize,
     },
     /// Many cameras explain the views equally well.
     #[error("the views do not determine the camera: {problem}")]
     Undetermined {
-        /// In what respect.
+        /// What remains open.
         problem: Undetermined,
     },
 }
 
-/// What the views leave open.
+/// What the views do not determine.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Undetermined {
-    /// No camera's numbers fit them.
+    /// No camera fits the views.
     #[error("no camera explains them")]
     NoCamera,
-    /// The camera that fits them would have a board behind it.
+    /// In the best fit a board is behind the camera.
     #[error("a board would be behind the camera")]
     Behind,
-    /// A longer lens farther away would show the same.
-    #[error("the focal length and the boards' distances explain each other")]
+    /// A longer lens farther away fits as well.
+    #[error("a longer lens and more distant boards explain them as well")]
     Distance,
-    /// The lens that fits them is none.
+    /// The best fit has no valid lens.
     #[error(transparent)]
     Lens(#[from] NoDistortion),
 }
@@ -107,19 +107,18 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 fn instead(seen: Option<(usize, usize, usize)>) -> String {
     match seen {
-        Some((columns, rows, 1)) => format!("; a grid of {columns}x{rows} is in one"),
-        Some((columns, rows, n)) => format!("; a grid of {columns}x{rows} is in {n}"),
+        Some((columns, rows, 1)) => format!("; one of them shows a grid of {columns}x{rows}"),
+        Some((columns, rows, n)) => format!("; {n} of them show a grid of {columns}x{rows}"),
         None => String::new(),
     }
 }
 
-const INNER: &str =
-    "a board's size counts inner corners, where four squares meet: one of 10x7 squares has 9x6";
+const INNER: &str = "count inner corners, where four squares meet: a board of 10x7 squares has 9x6";
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         Some(match self {
-            Self::Board { .. } => format!("{INNER}; measure the side of a square in metres: 0.025"),
+            Self::Board { .. } => format!("{INNER}; give the side of a square in metres, such as 0.025"),
             Self::NoBoard {
                 seen: Some((c, r, _)),
                 ..
@@ -127,18 +126,18 @@ impl Hint for Error {
             | Self::TooFewViews {
                 seen: Some((c, r, _)),
                 ..
-            } => format!("{INNER}; if the board that was seen is yours, its size is {c}x{r}"),
+            } => format!("{INNER}; if the detected grid is your board, its size is {c}x{r}"),
             Self::NoBoard { .. } => format!(
-                "{INNER}; the whole board must be seen, sharp, evenly lit, with a white margin about it"
+                "show the whole board, sharp and evenly lit, with a white margin around it; {INNER}"
             ),
             Self::TooFewViews { .. } => {
                 "film the whole board from more sides: sharp, tilted, near, and in every corner of the image".into()
             }
             Self::MixedSizes { .. } => {
-                "a calibration is of one image size: keep the pictures of one size, not zoomed or cut".into()
+                "keep the pictures of one size, neither zoomed nor cropped: a calibration is for one image size".into()
             }
             Self::MixedOrientations { .. } => {
-                "keep the pictures for which the camera was held one way: turned by half, its principal point lies elsewhere".into()
+                "keep the pictures with the camera held one way: upside down, its principal point lies elsewhere".into()
             }
             Self::Corners { .. } => "give every corner of the board, row after row".into(),
             Self::Undetermined { .. } => {

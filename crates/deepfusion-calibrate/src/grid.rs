@@ -1,22 +1,22 @@
-//! Corners to a grid: from one corner to its neighbours, step by step, so that a lens may bend the whole as it likes.
+//! Joins corners to a grid, from each corner to its neighbours, step by step, so that any lens distortion is allowed.
 
 use crate::corners::{Corner, between};
 use nalgebra::Vector2;
 use std::collections::{HashMap, HashSet, VecDeque};
 
-/// How far a corner may lie from where its neighbours put it, as a share of a step.
+/// Greatest distance of a corner from the position that its neighbour predicts, as a share of a step.
 const REACH: f64 = 0.35;
-/// How far edges may turn from a corner to the next, in radians.
+/// Greatest turn of the edges from one corner to the next, in radians.
 const TURN: f64 = 0.45;
-/// How far from an edge's direction a seed's neighbour may lie, in radians.
+/// Greatest angle between an edge of a seed and the direction to its neighbour, in radians.
 const ASIDE: f64 = 0.35;
-/// How many corners a grid is begun from, at most.
+/// Greatest number of corners that a grid is started from.
 const SEEDS: usize = 60;
 
-/// Places in the grid (column, row) and the corners there, by their index.
+/// For each position of the grid (column, row) the index of its corner.
 pub(crate) type Grid = HashMap<(i32, i32), usize>;
 
-/// The largest grid that grows in the corners; none of fewer than nine.
+/// The largest grid among the corners, of at least nine. The search stops at a grid of `enough` corners.
 pub(crate) fn grow(corners: &[Corner], enough: usize) -> Option<Grid> {
     let mut best: Option<Grid> = None;
     let mut seen = HashSet::new();
@@ -38,7 +38,7 @@ pub(crate) fn grow(corners: &[Corner], enough: usize) -> Option<Grid> {
     best.filter(|grid| grid.len() >= 9)
 }
 
-/// A corner in the grid, with the steps to its right and lower neighbours as its own neighbours have them.
+/// A corner of the grid, with the steps to its right and lower neighbours as measured nearby.
 struct GridCorner {
     corner: usize,
     steps: [Vector2<f64>; 2],
@@ -98,12 +98,12 @@ fn moved((column, row): (i32, i32), side: usize, sign: i32) -> (i32, i32) {
     }
 }
 
-/// Along an edge dark and bright change sides at every corner: the first edge of one is the second of the next.
+/// Along an edge, dark and bright swap sides at every corner: the first edge of one is the second of the next.
 fn alternates(a: &Corner, b: &Corner) -> bool {
     between(a.edges[0], b.edges[1]) < TURN && between(a.edges[1], b.edges[0]) < TURN
 }
 
-/// The step to the nearest neighbour along an edge.
+/// The step to the nearest neighbour in the direction of an edge.
 fn seed_step(corners: &[Corner], seed: &Corner, side: usize) -> Option<Vector2<f64>> {
     let (sin, cos) = seed.edges[side].sin_cos();
     let direction = Vector2::new(cos, sin);
@@ -119,7 +119,7 @@ fn seed_step(corners: &[Corner], seed: &Corner, side: usize) -> Option<Vector2<f
         .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
 }
 
-/// Columns and rows of the smallest rectangle about the grid, and its first place.
+/// First position, columns and rows of the smallest rectangle around the grid.
 pub(crate) fn extent(grid: &Grid) -> ((i32, i32), usize, usize) {
     let columns = grid.keys().map(|p| p.0);
     let rows = grid.keys().map(|p| p.1);
@@ -131,7 +131,7 @@ pub(crate) fn extent(grid: &Grid) -> ((i32, i32), usize, usize) {
     ((c0, r0), (c1 - c0 + 1) as usize, (r1 - r0 + 1) as usize)
 }
 
-/// The only window of this many columns and rows that is full; `None` where there are several or none.
+/// The corners of the only complete window with this many columns and rows; `None` if there are several or none.
 pub(crate) fn full_window(grid: &Grid, columns: usize, rows: usize) -> Option<Vec<usize>> {
     let ((c0, r0), all_columns, all_rows) = extent(grid);
     if columns > all_columns || rows > all_rows {

@@ -1,9 +1,9 @@
-//! Homographies from the board's plane to points of z = 1.
+//! Homographies from the board's plane to points at z = 1.
 
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 
-/// H with p' ~ H (x, y, 1)ᵀ by the direct linear transformation, both sides normalised first (Hartley and Zisserman, 4.4); `None` for
-/// fewer than four pairs, or points on a line.
+/// H with p' ~ H (x, y, 1)ᵀ by the direct linear transformation, both sides normalised first (Hartley and Zisserman, 4.4). `None` for fewer
+/// than four pairs, or if the points are on a line.
 pub(crate) fn homography(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matrix3<f64>> {
     if pairs.len() < 4 {
         return None;
@@ -24,7 +24,7 @@ pub(crate) fn homography(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<Matri
     }
     let eigen = normal.symmetric_eigen();
     let least = eigen.eigenvalues.imin();
-    // A second direction that explains the pairs as well: they are on a line.
+    // If another direction explains the pairs as well, the points are on a line.
     let mut values: Vec<f64> = eigen.eigenvalues.iter().copied().collect();
     values.sort_by(f64::total_cmp);
     if values[1] < 1e-10 * values[8] {
@@ -46,13 +46,13 @@ fn normaliser(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<Matr
         .then(|| Matrix3::new(s, 0.0, -s * mean.x, 0.0, s, -s * mean.y, 0.0, 0.0, 1.0))
 }
 
-/// The board's pose cam_from_board of a homography to z = 1: rotation, and translation in the board's unit.
+/// The board's pose cam_from_board from a homography to z = 1: rotation, and translation in the board's unit.
 pub(crate) fn pose(h: &Matrix3<f64>) -> Option<(nalgebra::Rotation3<f64>, Vector3<f64>)> {
     let scale = 2.0 / (h.column(0).norm() + h.column(1).norm());
     if !scale.is_finite() {
         return None;
     }
-    // The board is before the camera.
+    // The board is in front of the camera.
     let scale = if h[(2, 2)] < 0.0 { -scale } else { scale };
     let (first, second) = (h.column(0) * scale, h.column(1) * scale);
     let third = first.cross(&second);

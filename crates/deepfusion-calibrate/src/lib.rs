@@ -1,14 +1,14 @@
 //! A camera's intrinsics and lens from pictures of a checkerboard.
 //!
 //! [`find_board`] finds the board's inner corners in a picture, [`pick`] chooses among a video's frames, and [`calibrate`] fits the camera:
-//! Zhang's closed form from the board's homographies (IEEE TPAMI 22(11), 2000), then all parameters together by Levenberg and
-//! Marquardt's method, with standard errors. The lens is Brown and Conrady's or, of a fisheye, Kannala and Brandt's, as OpenCV has them.
+//! Zhang's closed form from the board's homographies (IEEE TPAMI 22(11), 2000), then all parameters together by the Levenberg–Marquardt
+//! method, with standard errors. The lens model is Brown–Conrady or, for a fisheye, Kannala–Brandt, as in OpenCV.
 //!
 //! ```
 //! use deepfusion_calibrate::{Board, LensModel, View, calibrate};
 //! use nalgebra::{Rotation3, Vector2, Vector3};
 //!
-//! // Corners as a camera of f = 500 px sees them, from six sides.
+//! // Corners as seen by a camera with f = 500 px, from six sides.
 //! let board = Board::new(9, 6, 0.025)?;
 //! let views: Vec<View> = (0..6)
 //!     .map(|i| {
@@ -25,7 +25,7 @@
 //! # Ok::<(), deepfusion_calibrate::Error>(())
 //! ```
 //!
-//! Pixel centres are at whole numbers. The board's first inner corner is its origin, x along its columns, y along its rows, in metres.
+//! Pixel centres are at whole numbers. The board's first inner corner is its origin; x is along a row, y along a column, in metres.
 
 mod board;
 mod calibration;

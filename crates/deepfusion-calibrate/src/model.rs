@@ -5,14 +5,14 @@ use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// How the lens bends.
+/// The lens model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LensModel {
-    /// Brown and Conrady's: k₁, k₂, p₁, p₂, k₃.
+    /// Brown–Conrady: k₁, k₂, p₁, p₂, k₃.
     #[default]
     BrownConrady,
-    /// Kannala and Brandt's for fisheye lenses: k₁, k₂, k₃, k₄.
+    /// Kannala–Brandt, for fisheye lenses: k₁, k₂, k₃, k₄.
     Fisheye,
 }
 
@@ -26,7 +26,7 @@ impl LensModel {
         }
     }
 
-    /// Its name, for people.
+    /// Its name for people to read.
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
@@ -35,28 +35,28 @@ impl LensModel {
         }
     }
 
-    /// How many numbers the camera has: fx, fy, cx, cy and the coefficients.
+    /// Number of the camera's parameters: fx, fy, cx, cy and the coefficients.
     pub(crate) fn numbers(self) -> usize {
         4 + self.coefficients().len()
     }
 }
 
-/// Most numbers of a camera.
+/// Greatest number of parameters of a camera.
 pub(crate) const MOST: usize = 9;
-/// Rays nearer to the axis than this (x² + y² at z = 1) are on it: its slopes are a limit.
+/// Rays nearer to the axis than this (x² + y² at z = 1) count as on it: there the derivatives are limits.
 const ON_AXIS: f64 = 1e-16;
 
-/// A camera as what is estimated: fx, fy, cx, cy, coefficients; unused ones are 0.
+/// The parameters to be estimated: fx, fy, cx, cy, coefficients; unused ones are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Camera {
     pub(crate) model: LensModel,
     pub(crate) numbers: [f64; MOST],
 }
 
-/// A pixel and its slopes.
+/// A pixel and its derivatives.
 pub(crate) struct Projected {
     pub(crate) pixel: Vector2<f64>,
-    /// ∂ pixel / ∂ numbers of the camera.
+    /// ∂ pixel / ∂ parameters of the camera.
     pub(crate) by_camera: SMatrix<f64, 2, MOST>,
     /// ∂ pixel / ∂ point of the camera frame.
     pub(crate) by_point: Matrix2x3<f64>,
@@ -78,7 +78,7 @@ impl Camera {
         Intrinsics::from_numbers([fx, fy, cx, cy], size)
     }
 
-    /// The lens; `None` for numbers that are not finite.
+    /// The lens; `None` for coefficients that are not finite.
     pub(crate) fn distortion(&self) -> Option<Distortion> {
         let k = self.coefficients();
         match self.model {
@@ -87,7 +87,7 @@ impl Camera {
         }
     }
 
-    /// Where a point of the camera frame is seen; `None` where it is not: behind the camera.
+    /// The pixel of a point of the camera frame; `None` if the camera does not see it, because it is behind the camera.
     pub(crate) fn project(&self, point: &Vector3<f64>) -> Option<Projected> {
         let [fx, fy, cx, cy, ..] = self.numbers;
         let (seen, by_coefficients, by_point) = match self.model {
@@ -113,7 +113,7 @@ impl Camera {
         })
     }
 
-    /// Brown and Conrady's normalised image point, and its slopes by coefficients and by the point.
+    /// The normalised image point by Brown–Conrady, and its derivatives by the coefficients and by the point.
     fn brown(
         &self,
         point: &Vector3<f64>,
@@ -158,7 +158,7 @@ impl Camera {
         Some((seen, by_coefficients, by_point))
     }
 
-    /// Kannala and Brandt's; of rays beside and behind the camera, too.
+    /// The same by Kannala–Brandt, also for rays beside and behind the camera.
     fn fisheye(
         &self,
         point: &Vector3<f64>,
@@ -194,7 +194,7 @@ impl Camera {
             by_coefficients[(0, i)] = power * point.x / r;
             by_coefficients[(1, i)] = power * point.y / r;
         }
-        // ∂ scale: by x and y through r, by z through θ alone; ∂θ/∂r = z/ρ², ∂θ/∂z = −r/ρ².
+        // ∂ scale: by x and y through r and θ, by z through θ alone; ∂θ/∂r = z/ρ², ∂θ/∂z = −r/ρ².
         let by_r = (slope * z / rho2 - scale) / r;
         let by_z = -slope / rho2;
         let (x, y) = (point.x, point.y);
@@ -209,8 +209,8 @@ impl Camera {
         Some((point.xy() * scale, by_coefficients, by_point))
     }
 
-    /// The angle from the axis of what is seen this far to the right of the principal point, in units of the focal length; `None` where
-    /// nothing is.
+    /// The angle between the axis and the ray whose image is this far to the right of the principal point, in units of the focal length;
+    /// `None` if there is none.
     fn angle(&self, right: f64) -> Option<f64> {
         match self.model {
             LensModel::BrownConrady => {
@@ -229,7 +229,7 @@ impl Camera {
                 let steps = 720;
                 let at = |i: usize| PI * i as f64 / steps as f64;
                 let above = (1..=steps).find(|i| shown(at(*i)) >= seen)?;
-                // Behind its fold the lens shows nothing.
+                // Beyond the angle at which it folds over, the lens model is invalid.
                 if (1..above).any(|i| shown(at(i)) < shown(at(i - 1))) {
                     return None;
                 }
@@ -247,7 +247,7 @@ impl Camera {
         }
     }
 
-    /// The field of view from the left edge of an image of this width to its right, at the principal point's height, in degrees.
+    /// Horizontal field of view of an image of this width, at the principal point's height, in degrees.
     pub(crate) fn hfov_deg(&self, width: u32) -> Option<f64> {
         let [fx, _, cx, ..] = self.numbers;
         let left = self.angle(-(cx + 0.5) / fx)?;
@@ -268,8 +268,8 @@ mod tests {
     }
 
     proptest! {
-        /// All slopes by central differences. Their error is h² times the third derivative, which is some 1e4 pixels here, 1e-8, and that
-        /// of rounding, 1e-13 / h.
+        /// All derivatives, compared with central differences. Their truncation error is h² times the third derivative, which is some 1e4
+        /// pixels here: 1e-8. Rounding adds 1e-13 / h.
         #[test]
         fn slopes_are_derivatives(
             fisheye: bool, k in proptest::collection::vec(-0.1..0.1f64, 5),
@@ -298,7 +298,7 @@ mod tests {
             }
         }
 
-        /// The same lens as everything else in the program has.
+        /// The lens is the same as that of `deepfusion-geometry`.
         #[test]
         fn the_lens_is_that_of_the_geometry(
             fisheye: bool, k in proptest::collection::vec(-0.1..0.1f64, 5), x in -0.6..0.6f64, y in -0.6..0.6f64,
@@ -317,10 +317,10 @@ mod tests {
         let pinhole =
             Camera::without_distortion(LensModel::BrownConrady, [320.0, 320.0, 319.5, 239.5]);
         assert!((pinhole.hfov_deg(640).unwrap() - 90.0).abs() < 1e-9);
-        // 320 px from the middle at 160 px a radian: 2 rad to each side.
+        // 320 px from the middle at 160 px per radian: 2 rad to each side.
         let wide = Camera::without_distortion(LensModel::Fisheye, [160.0, 160.0, 319.5, 239.5]);
         assert!((wide.hfov_deg(640).unwrap() - 4.0_f64.to_degrees()).abs() < 1e-6);
-        // Beside the camera a fisheye sees, and a pinhole does not.
+        // A fisheye sees points beside the camera, and a pinhole does not.
         let aside = Vector3::new(1.0, 0.0, -0.2);
         assert!(wide.project(&aside).is_some() && pinhole.project(&aside).is_none());
         let straight = wide.project(&Vector3::new(0.0, 0.0, 1.0)).unwrap();

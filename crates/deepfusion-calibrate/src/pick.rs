@@ -1,21 +1,21 @@
-//! Which of a video's frames are worth a place in the calibration.
+//! Chooses the frames of a video that are used for the calibration.
 
 use image::GrayImage;
 use nalgebra::Vector2;
 
-/// Boards nearer to each other than this share of the image's diagonal are the same view.
+/// Boards count as the same view if they are nearer than this share of the image's diagonal.
 const SAME: f64 = 0.02;
 
-/// A frame that shows the board.
+/// A frame that shows the whole board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// The board's inner corners, in pixels.
     pub corners: Vec<Vector2<f64>>,
-    /// As [`sharpness`] says.
+    /// Sharpness of the frame, by [`sharpness`].
     pub sharpness: f64,
 }
 
-/// How sharp a picture is, for comparison with others of the same scene: the mean square of its Laplacian, in grey values².
+/// Sharpness of a picture, for comparison with others of the same scene: the mean square of its Laplacian, in grey values².
 #[must_use]
 pub fn sharpness(image: &GrayImage) -> f64 {
     let (width, height) = (image.width() as usize, image.height() as usize);
@@ -35,8 +35,8 @@ pub fn sharpness(image: &GrayImage) -> f64 {
     sum / ((width - 2) * (height - 2)) as f64
 }
 
-/// At most so many of the candidates, each farthest from all those before it: the sharpest first, none that shows the board where another
-/// has it already. In the order of the candidates, as their indices.
+/// Indices of at most `most` of the candidates, in ascending order. The first choice is the sharpest candidate, and each next one the
+/// farthest from all chosen before. None shows the board at the same place as another.
 #[must_use]
 pub fn pick(candidates: &[Candidate], image_size: (u32, u32), most: usize) -> Vec<usize> {
     let diagonal = f64::from(image_size.0).hypot(f64::from(image_size.1));
@@ -69,7 +69,7 @@ pub fn pick(candidates: &[Candidate], image_size: (u32, u32), most: usize) -> Ve
     picked
 }
 
-/// How far a board's corner moves at most from one view to another, in pixels; a board turned by half a turn is the same.
+/// Greatest distance by which a board's corner moves from one view to the other, in pixels; a board turned by half a turn is the same.
 fn apart(a: &Candidate, b: &Candidate) -> f64 {
     let farthest = |pairs: &mut dyn Iterator<Item = (&Vector2<f64>, &Vector2<f64>)>| {
         pairs.map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
@@ -97,10 +97,10 @@ mod tests {
         assert_eq!(
             pick(&candidates, (400, 300), 9),
             [1, 2, 3],
-            "the first is the second again"
+            "the first and the second are the same view"
         );
         assert!(pick(&[], (400, 300), 9).is_empty());
-        // From the other end, it is the same view.
+        // The same view, with corners from the other end.
         let mut turned = at(1.0, 0.1);
         turned.corners.reverse();
         assert_eq!(pick(&[at(1.0, 1.0), turned], (400, 300), 9), [0]);

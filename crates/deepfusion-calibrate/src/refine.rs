@@ -1,38 +1,38 @@
-//! All numbers together: Levenberg and Marquardt's method over the camera and every board's pose.
+//! Refines all parameters together: the Levenberg–Marquardt method over the camera and every board's pose.
 
 use crate::model::{Camera, MOST};
 use nalgebra::{DMatrix, DVector, Matrix6, Rotation3, SMatrix, Vector2, Vector3, Vector6};
 
-/// Steps at most; some ten are usual.
+/// Greatest number of steps; about ten are usual.
 const MAX_STEPS: usize = 200;
-/// A step that lowers the cost by less than this share is the last.
+/// A step that reduces the cost by less than this share is the last.
 const SMALL: f64 = 1e-13;
-/// Damping beyond which nothing moves.
+/// Greatest damping: beyond it no step changes anything.
 const MOST_DAMPING: f64 = 1e12;
 
 /// A board's pose cam_from_board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     pub(crate) turn: Rotation3<f64>,
-    /// In metres.
+    /// Translation, in the board's unit.
     pub(crate) shift: Vector3<f64>,
 }
 
-/// A camera, and where the boards are.
+/// A camera and the poses of the boards.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fit {
     pub(crate) camera: Camera,
     pub(crate) poses: Vec<Pose>,
 }
 
-/// A view's part of the normal equations: by the camera's numbers, by its pose, and between them.
+/// A view's part of the normal equations: coupling of camera and pose, the pose's own part, and the pose's right side.
 struct Block {
     mixed: SMatrix<f64, MOST, 6>,
     pose: Matrix6<f64>,
     right: Vector6<f64>,
 }
 
-/// The normal equations JᵀJ δ = −Jᵀr, whose poses know nothing of each other.
+/// The normal equations JᵀJ δ = −Jᵀr; the poses are not coupled with each other.
 struct Normal {
     camera: DMatrix<f64>,
     right: DVector<f64>,
@@ -40,14 +40,14 @@ struct Normal {
 }
 
 impl Fit {
-    /// Sum of squared errors in px²; `None` where a corner would be behind the camera.
+    /// Sum of squared errors in px²; `None` if a corner is behind the camera.
     pub(crate) fn cost(&self, views: &[&[Vector2<f64>]], board: &[Vector3<f64>]) -> Option<f64> {
         let costs = views.iter().zip(&self.poses);
         let cost = costs.map(|(view, pose)| self.cost_of(view, pose, board));
         cost.sum()
     }
 
-    /// A view's sum of squared errors in px².
+    /// Sum of squared errors of a view in px².
     pub(crate) fn cost_of(
         &self,
         view: &[Vector2<f64>],
@@ -62,7 +62,7 @@ impl Fit {
         errors.sum()
     }
 
-    /// The fit of least squares that is reached from this one, and its cost in px²; `None` where none is.
+    /// The least-squares fit reached from this one, and its cost in px²; `None` if none is reached.
     pub(crate) fn refined(
         mut self,
         views: &[&[Vector2<f64>]],
@@ -74,7 +74,7 @@ impl Fit {
         for _ in 0..most_steps.unwrap_or(MAX_STEPS) {
             let normal = self.normal(views, board)?;
             let before = cost;
-            // Shorter steps until one helps.
+            // Increase the damping until a step reduces the cost.
             while damping < MOST_DAMPING {
                 let tried = normal
                     .solved(damping)
@@ -97,14 +97,14 @@ impl Fit {
         Some((self, cost))
     }
 
-    /// (JᵀJ)⁻¹ of the camera's numbers, the poses free; `None` where the views do not determine them.
+    /// (JᵀJ)⁻¹ of the camera's parameters, with free poses; `None` if the views do not determine them.
     pub(crate) fn camera_covariance(
         &self,
         views: &[&[Vector2<f64>]],
         board: &[Vector3<f64>],
     ) -> Option<DMatrix<f64>> {
         let (reduced, _) = self.normal(views, board)?.reduced(0.0)?;
-        // Of one size each, so that pixels and coefficients of r⁶ can be compared.
+        // Scaled to a unit diagonal, so that pixels and coefficients of r⁶ are comparable.
         let scales = reduced.diagonal().map(|d| 1.0 / d.sqrt());
         let scaled = DMatrix::from_fn(reduced.nrows(), reduced.ncols(), |i, j| {
             reduced[(i, j)] * scales[i] * scales[j]
@@ -180,7 +180,7 @@ fn by_pose(by_point: &nalgebra::Matrix2x3<f64>, turned: &Vector3<f64>) -> SMatri
 }
 
 impl Normal {
-    /// The equations of the camera's numbers alone, the poses eliminated (Schur's complement), with damping on the diagonals.
+    /// The equations of the camera's parameters alone: the poses are eliminated (Schur complement), with damping on the diagonals.
     fn reduced(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let n = self.camera.nrows();
         let mut matrix = self.camera.clone();
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
     use crate::model::LensModel;
 
-    /// The slope by a pose, by central differences.
+    /// The derivatives by a pose, compared with central differences.
     #[test]
     fn slopes_by_the_pose_are_derivatives() {
         let mut camera =

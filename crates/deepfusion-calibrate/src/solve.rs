@@ -1,4 +1,4 @@
-//! From views to a camera.
+//! Fits a camera to views.
 
 use crate::model::Camera;
 use crate::refine::{Fit, Pose};
@@ -9,23 +9,23 @@ use crate::{
 };
 use nalgebra::{Vector2, Vector3};
 
-/// Fewest views. Three have as many equations as the camera has numbers; with five, a bad one can be found.
+/// Fewest views. Three have as many equations as a camera has parameters; with five, a bad one can be found.
 pub const LEAST_VIEWS: usize = 5;
-/// Beginnings that are tried, and for how many steps before the best goes on.
+/// Greatest number of starting points, and the steps of each before only the best continues.
 const TRIED: usize = 4;
 const TRIED_STEPS: usize = 25;
-/// A view is left out whose error is above this many times the middle view's, and above this many pixels.
+/// A view is left out if its error is above this many times the median view's, and above this many pixels.
 const OUTLYING: f64 = 3.0;
 const OUTLYING_PX: f64 = 0.3;
-/// Rounds of leaving out, and the largest part of the views that goes in each.
+/// Rounds of leaving out views; in each at most one in this many views is left out.
 const ROUNDS: usize = 4;
 const PART: usize = 4;
 
 /// Fits a camera to views of a board. Views whose corners disagree with those of all others are left out.
 ///
 /// # Errors
-/// [`Error::Corners`] for a view of another board, [`Error::TooFewViews`] for fewer than [`LEAST_VIEWS`], [`Error::Undetermined`] where
-/// the views leave the camera open: the board was parallel to the image in all of them.
+/// [`Error::Corners`] for a view of another board; [`Error::TooFewViews`] for fewer than [`LEAST_VIEWS`]; [`Error::Undetermined`] if the
+/// views do not determine the camera, because the board was parallel to the image in all of them.
 pub fn calibrate(
     views: &[View],
     board: &Board,
@@ -64,7 +64,7 @@ pub fn calibrate(
     }
     let mut found = calibration(&fitted, views, &used, &points, image_size)?;
     if board.square_m.is_none() {
-        // In squares, whose side nobody measured.
+        // In squares, since their side was not measured.
         found
             .views
             .iter_mut()
@@ -77,7 +77,7 @@ fn chosen<'a>(views: &'a [View], used: &[usize]) -> Vec<&'a [Vector2<f64>]> {
     used.iter().map(|i| views[*i].corners.as_slice()).collect()
 }
 
-/// The fit of least squares that the beginnings lead to.
+/// The best least-squares fit reached from the starting points.
 fn fit(
     views: &[&[Vector2<f64>]],
     board: &[Vector3<f64>],
@@ -97,7 +97,7 @@ fn fit(
         .ok_or_else(|| undetermined(Undetermined::NoCamera))
 }
 
-/// Numbers that a camera of this image size can have, with room to spare.
+/// Whether a camera of this image size can have these parameters; the limits are wide.
 fn plausible(camera: &Camera, size: (u32, u32)) -> bool {
     let [fx, fy, cx, cy, ..] = camera.numbers;
     let side = f64::from(size.0.max(size.1));
@@ -116,7 +116,7 @@ fn rms(fit: &Fit, view: &[Vector2<f64>], pose: &Pose, board: &[Vector3<f64>]) ->
     Some((cost / view.len() as f64).sqrt())
 }
 
-/// The views whose errors are out of all proportion, the worst first, at most a quarter of all.
+/// The views whose errors are far above those of the others, the worst first, at most a quarter of all.
 fn outlying(fit: &Fit, views: &[&[Vector2<f64>]], board: &[Vector3<f64>]) -> Vec<usize> {
     let of = |(view, pose): (&&[Vector2<f64>], &Pose)| {
         rms(fit, view, pose, board).unwrap_or(f64::INFINITY)
@@ -169,7 +169,7 @@ fn calibration(
     })
 }
 
-/// Every view, also those left out, under the camera of those used.
+/// Every view, also those left out, with the camera fitted to the views used.
 fn view_fits(fit: &Fit, views: &[View], used: &[usize], board: &[Vector3<f64>]) -> Vec<ViewFit> {
     let mut all = Vec::with_capacity(views.len());
     for (i, view) in views.iter().enumerate() {
@@ -193,7 +193,7 @@ fn view_fits(fit: &Fit, views: &[View], used: &[usize], board: &[Vector3<f64>]) 
     all
 }
 
-/// The pose of a view that the camera was not fitted to: by corners as a lens without distortion would show them.
+/// The pose of a view that the camera was not fitted to, from its undistorted corners.
 fn alone(fit: &Fit, view: &[Vector2<f64>], board: &[Vector3<f64>]) -> Option<Pose> {
     use crate::homography::{homography, pose};
     let [fx, fy, cx, cy, ..] = fit.camera.numbers;

@@ -1,75 +1,74 @@
-//! What makes a calibration less sure than it could be.
+//! Warnings about a calibration that could be more accurate.
 
 use crate::Calibration;
 use deepfusion_hint::count_of;
 
-/// Below this tilt, in degrees, a board says little of the focal length.
+/// A board with less tilt than this, in degrees, says little about the focal length.
 const TILTED_DEG: f64 = 12.0;
-/// Views that should be tilted more.
+/// Number of views that should have more tilt.
 const TILTED_VIEWS: usize = 3;
-/// Standard error of the focal length, as a share of it, that is warned of.
+/// A greater relative standard error of the focal length causes a warning.
 const UNSURE: f64 = 0.005;
-/// Root mean square error that is warned of, in pixels per 1000 of the image's longer side, and at least in pixels.
+/// A greater root mean square error causes a warning: in pixels per 1000 of the image's longer side, and in pixels.
 const ROUGH_PX: (f64, f64) = (0.5, 0.5);
-/// Views that are enough.
+/// Enough views.
 const GOOD_VIEWS: usize = 10;
 
-/// What makes a calibration less sure than it could be.
+/// A warning about a calibration that could be more accurate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationWarning {
     /// The board was seen from few sides.
     #[error(
-        "{} {} few: {enough} to 30, from many sides, are better",
-        count_of(*used, "view"),
-        if *used == 1 { "is" } else { "are" }
+        "only {}: {enough} to 30, from many sides, are better",
+        count_of(*used, "view")
     )]
     FewViews {
-        /// Views that were used.
+        /// Number of views used.
         used: usize,
-        /// How many are enough.
+        /// Number of views that is enough.
         enough: usize,
     },
     /// The boards were held nearly parallel to the image.
     #[error(
-        "the boards are all but parallel to the image (tilted by {most_deg:.0} degrees at most): the focal length is unsure; tilt the board by 20 to 45 degrees"
+        "the boards are nearly parallel to the image (tilted by at most {most_deg:.0} degrees): the focal length is uncertain; tilt the board by 20 to 45 degrees"
     )]
     NotTilted {
         /// The largest tilt of a board, degrees.
         most_deg: f64,
     },
-    /// The board was never in these of the image's corners.
+    /// The board was never in these corners of the image.
     #[error(
-        "no corner was seen in the image's {}: the lens is guessed there; show the board there, too",
+        "no board corner was seen in the image's {}: the lens is extrapolated there; show the board there too",
         .0.join(", ")
     )]
     EmptyCorners(Vec<&'static str>),
-    /// The board was never near these of the image's edges; how wide the strip without it is, as a share of the image.
+    /// The board was never near these edges of the image; each with the width of the strip, as a share of the image.
     #[error(
-        "no corner was seen in {} of the image: the lens is guessed there; show the board there, too",
+        "no board corner was seen in {} of the image: the lens is extrapolated there; show the board there too",
         strips(.0)
     )]
     WideMargins(Vec<(&'static str, f64)>),
     /// The focal length has a large standard error.
     #[error(
-        "the focal length is known to {:.1} % only: more tilted views, and nearer ones, make it surer",
+        "the standard error of the focal length is {:.1} %: add views from nearer and with more tilt",
         100.0 * share
     )]
     UnsureFocalLength {
         /// The standard error, as a share of the focal length.
         share: f64,
     },
-    /// The camera explains the corners badly.
+    /// The corners fit the camera badly.
     #[error(
-        "the corners are {rms_px:.2} px off (root mean square): is the board flat, the picture sharp and unmoved, and the lens model right (fisheye or not)?"
+        "the corners are off by {rms_px:.2} px (root mean square): check that the board is flat, the pictures are sharp, and the lens model is right (fisheye or not)"
     )]
     LargeError {
-        /// Root mean square distance, pixels.
+        /// Root mean square error of the corners, pixels.
         rms_px: f64,
     },
-    /// The lens model ends before the image does.
+    /// The lens model has no rays at an edge of the image.
     #[error(
-        "the lens model shows nothing at the image's left or right edge: show the board there, too"
+        "the lens model has no rays at the image's left or right edge: show the board there too"
     )]
     NothingAtEdge,
 }
@@ -81,7 +80,7 @@ fn strips(margins: &[(&str, f64)]) -> String {
 }
 
 impl Calibration {
-    /// What makes it less sure than it could be.
+    /// The warnings about this calibration.
     #[must_use]
     pub fn warnings(&self) -> Vec<CalibrationWarning> {
         let mut warnings = Vec::new();
@@ -134,33 +133,30 @@ mod tests {
     fn a_warning_is_said_in_words() {
         let few = |used| CalibrationWarning::FewViews { used, enough: 10 };
         for (warning, said) in [
-            (
-                few(1),
-                "1 view is few: 10 to 30, from many sides, are better",
-            ),
+            (few(1), "only 1 view: 10 to 30, from many sides, are better"),
             (
                 few(6),
-                "6 views are few: 10 to 30, from many sides, are better",
+                "only 6 views: 10 to 30, from many sides, are better",
             ),
             (
                 CalibrationWarning::NotTilted { most_deg: 4.4 },
-                "the boards are all but parallel to the image (tilted by 4 degrees at most): the focal length is unsure; tilt the board by 20 to 45 degrees",
+                "the boards are nearly parallel to the image (tilted by at most 4 degrees): the focal length is uncertain; tilt the board by 20 to 45 degrees",
             ),
             (
                 CalibrationWarning::EmptyCorners(vec!["top left", "bottom right"]),
-                "no corner was seen in the image's top left, bottom right: the lens is guessed there; show the board there, too",
+                "no board corner was seen in the image's top left, bottom right: the lens is extrapolated there; show the board there too",
             ),
             (
                 CalibrationWarning::WideMargins(vec![("left", 0.2), ("top", 0.256)]),
-                "no corner was seen in the left 20 %, the top 26 % of the image: the lens is guessed there; show the board there, too",
+                "no board corner was seen in the left 20 %, the top 26 % of the image: the lens is extrapolated there; show the board there too",
             ),
             (
                 CalibrationWarning::UnsureFocalLength { share: 0.0123 },
-                "the focal length is known to 1.2 % only: more tilted views, and nearer ones, make it surer",
+                "the standard error of the focal length is 1.2 %: add views from nearer and with more tilt",
             ),
             (
                 CalibrationWarning::LargeError { rms_px: 0.806 },
-                "the corners are 0.81 px off (root mean square): is the board flat, the picture sharp and unmoved, and the lens model right (fisheye or not)?",
+                "the corners are off by 0.81 px (root mean square): check that the board is flat, the pictures are sharp, and the lens model is right (fisheye or not)",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

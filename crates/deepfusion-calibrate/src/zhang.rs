@@ -1,18 +1,18 @@
-//! Where the refinement begins: a camera without distortion and each board's pose.
+//! Starting points of the refinement: a camera without distortion, and each board's pose.
 
 use crate::homography::{homography, pose};
 use crate::model::{Camera, LensModel};
 use crate::refine::{Fit, Pose};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Rays farther from the axis than this, in radians, are left out of a beginning: z = 1 is far away there.
+/// Rays farther from the axis than this, in radians, are left out of a starting point: their point at z = 1 is too far away.
 const WIDEST: f64 = 1.35;
-/// Focal lengths to begin from where the closed form gives none or a bad one, in widths of the image: 100 to 20 degrees.
+/// Focal lengths to start from if the closed form gives none or a bad one, in widths of the image: 100 to 20 degrees.
 const PINHOLE_WIDTHS: [f64; 5] = [0.42, 0.7, 1.0, 1.6, 2.8];
-/// Fields of view to begin from of a fisheye lens, in radians over the image's width: 70 to 230 degrees.
+/// Fields of view to start from for a fisheye lens, in radians over the image's width: 70 to 230 degrees.
 const FISHEYE_VIEWS: [f64; 6] = [1.2, 1.75, 2.3, 2.8, 3.3, 4.0];
 
-/// Beginnings, the best first: cameras whose principal point is the image's middle, and poses.
+/// Starting points, the best first: cameras with the principal point in the middle of the image, and poses.
 pub(crate) fn beginnings(
     views: &[&[Vector2<f64>]],
     board: &[Vector3<f64>],
@@ -44,8 +44,8 @@ pub(crate) fn beginnings(
     fits.into_iter().map(|(_, fit)| fit).collect()
 }
 
-/// Zhang's constraints with a known principal point and no skew: of every homography H = [h₁ h₂ h₃] from the board to the image,
-/// h₁ᵀ B h₂ = 0 and h₁ᵀ B h₁ = h₂ᵀ B h₂ with B = diag(1/fx², 1/fy², 1), linear in the first two.
+/// Zhang's constraints with a known principal point and no skew. For every homography H = [h₁ h₂ h₃] from the board to the image, h₁ᵀ B h₂
+/// = 0 and h₁ᵀ B h₁ = h₂ᵀ B h₂ with B = diag(1/fx², 1/fy², 1). They are linear in 1/fx² and 1/fy².
 fn closed_form(
     views: &[&[Vector2<f64>]],
     board: &[Vector3<f64>],
@@ -61,7 +61,7 @@ fn closed_form(
             .collect();
         let h = centre * homography(&pairs)?;
         let (a, b) = (h.column(0), h.column(1));
-        // Both constraints of one weight: along the board's diagonals they are one another.
+        // Both constraints have the same weight: along the board's diagonals each becomes the other.
         let scale = a.norm() * b.norm();
         let (d1, d2) = ((a + b) / 2.0_f64.sqrt(), (a - b) / 2.0_f64.sqrt());
         for (p, q) in [(a.into_owned(), b.into_owned()), (d1, d2)] {
@@ -75,7 +75,7 @@ fn closed_form(
     f.iter().all(|f| f.is_finite()).then_some(f)
 }
 
-/// Every board's pose under a camera.
+/// The pose of every board, given a camera.
 fn with_poses(camera: Camera, views: &[&[Vector2<f64>]], board: &[Vector3<f64>]) -> Option<Fit> {
     let poses: Option<Vec<Pose>> = views
         .iter()
@@ -94,7 +94,7 @@ fn with_poses(camera: Camera, views: &[&[Vector2<f64>]], board: &[Vector3<f64>])
     })
 }
 
-/// The point of z = 1 of a pixel, of a lens without coefficients.
+/// The point at z = 1 of a pixel, for a lens without distortion.
 fn ray(camera: &Camera, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
     let [fx, fy, cx, cy, ..] = camera.numbers;
     let seen = Vector2::new((pixel.x - cx) / fx, (pixel.y - cy) / fy);

@@ -1,5 +1,5 @@
-//! Cameras of all kinds from exact corners: the beginnings must lead to the one minimum, from a telephoto lens to a fisheye.
-//! Corners are projected by `deepfusion-geometry`, not by this crate.
+//! Cameras of all kinds, from exact corners: the starting points must lead to the same minimum, from a telephoto lens to a fisheye. Corners
+//! are projected by `deepfusion-geometry`, not by this crate.
 
 use deepfusion_calibrate::{Board, LensModel, View, calibrate};
 use deepfusion_geometry::{Distortion, Intrinsics};
@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 const SIZE: (u32, u32) = (800, 600);
 
-/// Views of a board with all corners in the image, tilted by up to 40 degrees, with errors of `grain` pixels.
+/// Views of a board with all corners in the image, tilted by up to 40 degrees. The corners have errors of up to `grain` pixels.
 fn views(board: &Board, k: &Intrinsics, lens: &Distortion, seed: u64, grain: f64) -> Vec<View> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let middle = (board.points()[0] + board.points()[board.corners() - 1]) / 2.0;
@@ -17,7 +17,7 @@ fn views(board: &Board, k: &Intrinsics, lens: &Distortion, seed: u64, grain: f64
     for _ in 0..100_000 {
         let tilt = Vector3::from_fn(|_, _| random.random_range(-0.5..0.5));
         let turn = Rotation3::new(tilt);
-        // Towards some pixel, at a distance at which the board is a third to all of the image.
+        // Towards a random pixel, at a distance at which the board fills a third to all of the image.
         let pixel = [0.0, 0.0].map(|_: f64| random.random_range(0.15..0.85));
         let seen = k.back_project(pixel[0] * 800.0, pixel[1] * 600.0, 1.0).xy();
         let Some(ray) = lens.undistort(&seen) else {
@@ -34,7 +34,7 @@ fn views(board: &Board, k: &Intrinsics, lens: &Distortion, seed: u64, grain: f64
                 let seen = lens.distort(&(p.z > 0.01).then(|| p.xy() / p.z)?);
                 let pixel = Vector2::new(k.fx * seen.x + k.cx, k.fy * seen.y + k.cy);
                 let inside = (0.0..800.0).contains(&pixel.x) && (0.0..600.0).contains(&pixel.y);
-                // What is seen through the lens only once.
+                // Only points that the lens shows once.
                 let once = lens.undistort(&seen)? - p.xy() / p.z;
                 (inside && once.norm() < 1e-6).then_some(pixel)
             })
@@ -58,7 +58,7 @@ fn views(board: &Board, k: &Intrinsics, lens: &Distortion, seed: u64, grain: f64
 fn lenses() -> Vec<([f64; 4], LensModel, Vec<f64>)> {
     let brown = LensModel::BrownConrady;
     vec![
-        // Telephoto, usual, wide, wide with a strong lens, and off the middle with pixels that are not square.
+        // Telephoto, normal, wide, wide with strong distortion, and off-centre with pixels that are not square.
         (
             [3000.0, 3000.0, 400.0, 300.0],
             brown,
@@ -84,7 +84,7 @@ fn lenses() -> Vec<([f64; 4], LensModel, Vec<f64>)> {
             brown,
             vec![-0.1, 0.02, 0.0, 0.0, 0.0],
         ),
-        // Fisheyes of some 90, 140 and 170 degrees.
+        // Fisheyes of about 90, 140 and 170 degrees.
         (
             [500.0, 500.0, 400.0, 300.0],
             LensModel::Fisheye,
@@ -130,8 +130,8 @@ fn exact_corners_give_the_exact_camera() {
     }
 }
 
-/// Of many sets of corners with equal errors, results scatter by the standard errors that each says: of sixty values per number, the
-/// root mean square of (found − truth) / error is 1 within 30 % (three times 1/√(2·60)).
+/// Over many sets of corners with equal errors, results scatter as the reported standard errors predict: for sixty values per parameter,
+/// the root mean square of (found − truth) / error is 1 within 30 % (three times 1/√(2·60)).
 #[test]
 fn standard_errors_are_those_of_the_results() {
     let board = Board::new(8, 6, 0.03).unwrap();

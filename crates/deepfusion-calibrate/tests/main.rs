@@ -1,4 +1,4 @@
-//! The camera from pictures of a board.
+//! Calibration of a camera from pictures of a board.
 
 #![allow(
     clippy::unwrap_used,

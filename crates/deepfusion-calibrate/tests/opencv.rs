@@ -1,4 +1,4 @@
-//! Beside OpenCV's corners and calibrations of the same pictures, and beside the truth (`reference/boards.py`).
+//! Compared with OpenCV's corners and calibrations of the same pictures, and with the truth (`reference/boards.py`).
 
 use deepfusion_calibrate::{
     Board, BoardDetection, Calibration, CalibrationWarning, Error, LensModel, View, calibrate,
@@ -35,7 +35,7 @@ fn board() -> Board {
     Board::new(9, 6, 0.025).unwrap()
 }
 
-/// Of corners in either order, the distances: the largest and the root mean square, in pixels.
+/// Greatest and root mean square distance of corners in the same or the opposite order, in pixels.
 fn apart(found: &[Vector2<f64>], expected: &[Vector2<f64>]) -> (f64, f64) {
     assert_eq!(found.len(), expected.len());
     let of = |found: Vec<&Vector2<f64>>| {
@@ -65,8 +65,8 @@ fn views(camera: &Value) -> Vec<View> {
     camera["views"].as_array().unwrap().iter().map(of).collect()
 }
 
-/// Every board is found, also those at the border of a fisheye image. OpenCV's corners themselves are up to 0.18 px from the truth here
-/// (noise, blur and JPEG); ours are to be as near to both.
+/// Every board is found, also at the border of a fisheye image. OpenCV's own corners are up to 0.18 px from the truth here (noise, blur and
+/// JPEG); ours must be as near to both.
 #[test]
 fn corners_are_opencvs() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
@@ -110,8 +110,8 @@ fn k(found: &Calibration) -> [f64; 4] {
     [k.fx, k.fy, k.cx, k.cy]
 }
 
-/// On OpenCV's corners the least squares are OpenCV's: one cost, one minimum. The corners are stored to 0.001 px and OpenCV computed on
-/// single precision; 1e-4 of the focal length is 0.03 px.
+/// For OpenCV's corners the least-squares fit is OpenCV's: same cost, same minimum. The corners are stored to 0.001 px, and OpenCV computed
+/// in single precision; 1e-4 of the focal length is 0.03 px.
 #[test]
 fn the_fit_is_opencvs() {
     for (name, camera) in reference()["cameras"].as_object().unwrap() {
@@ -139,7 +139,7 @@ fn the_fit_is_opencvs() {
         ];
         ours.extend(&found.standard_errors.coefficients);
         for (i, c) in numbers(&theirs["distortion"]).iter().enumerate() {
-            // A twentieth of what it is known to.
+            // A twentieth of its standard error.
             let close = 0.05 * ours[4 + i];
             assert!(
                 (found.coefficients[i] - c).abs() < close,
@@ -206,7 +206,7 @@ fn the_camera_is_the_true_one() {
     }
 }
 
-/// A view with corners that are not the board's is left out, and changes nothing.
+/// A view whose corners do not fit the board is left out and does not change the result.
 #[test]
 fn a_bad_view_is_left_out() {
     let reference = reference();
@@ -228,7 +228,7 @@ fn a_bad_view_is_left_out() {
     assert!((found.intrinsics.fx - good.intrinsics.fx).abs() < 1e-6);
 }
 
-/// Boards that are all parallel to the image leave the focal length open, and it is said so.
+/// If all boards are parallel to the image, the focal length is undetermined, and an error or a warning says so.
 #[test]
 fn boards_parallel_to_the_image_do_not_determine_the_focal_length() {
     let board = board();
@@ -237,7 +237,7 @@ fn boards_parallel_to_the_image_do_not_determine_the_focal_length() {
         let points = board.points();
         let corners = points.iter().enumerate().map(|(i, p)| {
             let p = turned * p + nalgebra::Vector3::new(x, y, z);
-            // Grain of a twentieth of a pixel.
+            // Noise of a twentieth of a pixel.
             let grain = 0.05 * ((i as f64 * 12.9898 + x * 78.233).sin() * 43758.5).fract();
             Vector2::new(
                 500.0 * p.x / p.z + 320.0 + grain,
@@ -268,7 +268,7 @@ fn boards_parallel_to_the_image_do_not_determine_the_focal_length() {
 #[test]
 fn another_board_is_an_error() {
     let image = picture("brown/00.jpg");
-    // A part of the board is not the board.
+    // A part of the board is not accepted as the board.
     for (columns, rows) in [(8, 6), (9, 7), (7, 5)] {
         let asked = Board::new(columns, rows, 0.025).unwrap();
         let look = find_board(&image, &asked);
@@ -279,7 +279,7 @@ fn another_board_is_an_error() {
         };
         assert_eq!(look, expected, "{columns}x{rows}");
     }
-    // Its rows and columns may be called the other way.
+    // Rows and columns may be swapped.
     let BoardDetection::Board(turned) = find_board(&image, &Board::new(6, 9, 0.025).unwrap())
     else {
         panic!("not found");
@@ -297,7 +297,7 @@ fn another_board_is_an_error() {
     );
 }
 
-/// Large pictures are looked at reduced, and their corners placed in full size; and a board lying on its side.
+/// Large pictures are searched at reduced size and refined at full size. A board may also lie on its side.
 #[test]
 fn large_and_turned_pictures() {
     use image::imageops::{FilterType, resize, rotate90};
@@ -354,7 +354,7 @@ fn what_cannot_be_is_refused() {
             ..
         }
     ));
-    // Corners in one point are no board.
+    // Corners in a single point do not form a board.
     let five = vec![view; 5];
     let error = calibrate(&five, &board(), (640, 480), LensModel::default()).unwrap_err();
     assert!(matches!(error, Error::Undetermined { .. }), "{error}");

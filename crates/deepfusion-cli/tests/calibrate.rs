@@ -183,7 +183,7 @@ fn what_goes_wrong_is_an_error_with_a_hint() {
     fails(
         at,
         "calibrate pictures --board 10x7 --square 0.025 --out c.yaml",
-        &["10x7", "9x6 is in 4", "--board 9x6"],
+        &["10x7", "4 of them show a grid of 9x6", "--board 9x6"],
     );
     fails(
         at,
@@ -198,7 +198,7 @@ fn what_goes_wrong_is_an_error_with_a_hint() {
     fails(
         at,
         &format!("calibrate walls {BOARD} --out c.yaml"),
-        &["any of 6 pictures", "10x7 squares has 9x6"],
+        &["found in 6 pictures", "10x7 squares has 9x6"],
     );
     // Another size, and a picture that EXIF turns.
     fs::copy(boards().join("plain/00.jpg"), at.join("pictures/small.jpg")).unwrap();

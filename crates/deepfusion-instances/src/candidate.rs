@@ -1,6 +1,6 @@
-//! Boxes that a model proposes, and non-maximum suppression among them.
+//! Boxes proposed by a model, and non-maximum suppression among them.
 
-/// A box that a model proposes, in the pixels of its input.
+/// A box proposed by a model, in pixels of the model's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// Left, top, right, bottom.
@@ -25,7 +25,7 @@ impl Candidate {
     }
 }
 
-/// Drops candidates that a better one of the same class overlaps by more than `overlap` (intersection over union).
+/// Drops each candidate that a better one of the same class overlaps by more than `overlap` (intersection over union).
 /// The result is sorted by descending score and has at most `most` entries.
 #[must_use]
 pub fn suppress(mut candidates: Vec<Candidate>, overlap: f32, most: usize) -> Vec<Candidate> {

@@ -3,9 +3,9 @@
 use crate::layout::STRIDES;
 use crate::{Candidate, Kind, Layout};
 
-/// The candidates of at least `least` score, in the order of the model; numbers that are not finite give none.
+/// The candidates with a score of at least `least`, in the order of the model. A candidate with numbers that are not finite is left out.
 ///
-/// `input` is the height and width of the model's input, `values` the output that [`Layout::of`] took for the candidates.
+/// `input` is the height and width of the model's input, `values` the output in which [`Layout::of`] found the candidates.
 #[must_use]
 pub fn decode(layout: &Layout, input: [usize; 2], values: &[f32], least: f32) -> Vec<Candidate> {
     let count = layout.candidates;
@@ -58,7 +58,7 @@ pub fn decode(layout: &Layout, input: [usize; 2], values: &[f32], least: f32) ->
     candidates
 }
 
-/// The class of the largest score, of those from field `first` on.
+/// The class with the highest of the scores, which begin at field `first`.
 fn best(field: &impl Fn(usize) -> f32, first: usize, classes: usize) -> Option<(usize, f32)> {
     (0..classes)
         .map(|class| (class, field(first + class)))
@@ -74,7 +74,7 @@ fn corners([x, y, width, height]: [f32; 4]) -> [f32; 4] {
     ]
 }
 
-/// Column and row of each cell of the three grids, the finest first, and its grid's stride.
+/// Column and row of each cell of the three grids, and the stride of its grid; the finest grid comes first.
 fn cells([height, width]: [usize; 2]) -> Vec<([f32; 2], f32)> {
     let grid = |stride: usize| {
         (0..height / stride).flat_map(move |y| {

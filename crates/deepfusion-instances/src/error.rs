@@ -3,42 +3,42 @@ use std::path::PathBuf;
 
 use crate::ShapeProblem;
 
-/// What can go wrong with a model of instances.
+/// Why a model cannot be used, or fails.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The file cannot be read.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the model.
         path: PathBuf,
-        /// Why.
+        /// Why it cannot be read.
         source: std::io::Error,
     },
-    /// The library is missing, or refuses the model.
+    /// The ONNX Runtime library is missing, or it refuses the model.
     #[error("{}: {source}", path.display())]
     Runtime {
-        /// The model.
+        /// Path of the model.
         path: PathBuf,
-        /// What it says.
+        /// The error of the library.
         source: deepfusion_onnx::Error,
     },
-    /// Inputs or outputs that no known kind of model has.
-    #[error("{}: no model of instances that is known: {reason}", path.display())]
+    /// The inputs and outputs match no known kind of model.
+    #[error("{}: not a known kind of instance model: {reason}", path.display())]
     Shape {
-        /// The model.
+        /// Path of the model.
         path: PathBuf,
-        /// What it has.
+        /// What does not match.
         reason: ShapeProblem,
     },
-    /// A class that the model does not know.
+    /// The model has no class of this name.
     #[error("{}: no class `{class}`", path.display())]
     Class {
-        /// The model.
+        /// Path of the model.
         path: PathBuf,
-        /// The class that was asked for.
+        /// The class that was requested.
         class: String,
-        /// Those it knows.
+        /// Names of the model's classes.
         known: Vec<String>,
     },
 }
@@ -49,15 +49,13 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::File { .. } => {
-                Some("a model is a file that a training framework exported as ONNX".into())
-            }
+            Self::File { .. } => Some("give an ONNX file, as training frameworks export it".into()),
             Self::Runtime { source, .. } => source.hint(),
             Self::Shape { reason, .. } => reason.hint(),
             Self::Class { known, .. } if known.is_empty() => {
-                Some("the file names no classes: ask for none, and all are taken".into())
+                Some("the model has no class names: select no classes, and all are used".into())
             }
-            Self::Class { known, .. } => Some(format!("it knows {}", known.join(", "))),
+            Self::Class { known, .. } => Some(format!("choose among {}", known.join(", "))),
         }
     }
 }

@@ -3,63 +3,62 @@
 use deepfusion_hint::{Hint, count_of};
 use deepfusion_onnx::runtime::TensorInfo;
 
-/// Pixels of the input that a cell of each of the three grids covers.
+/// Strides of the three grids: pixels of the input per cell.
 pub(crate) const STRIDES: [usize; 3] = [8, 16, 32];
-/// Most rows of a model that has suppressed its candidates itself.
+/// Greatest number of rows of a model that suppresses its candidates itself.
 const MOST_FINAL_ROWS: usize = 1000;
 
-/// Why a model's inputs and outputs are none that are known.
+/// Why a model's inputs and outputs match no known kind of model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeProblem {
-    /// Several inputs, or none.
-    #[error("{}, expected one picture", count_of(*found, "input"))]
+    /// The model has several inputs, or none.
+    #[error("{}, expected one", count_of(*found, "input"))]
     Inputs {
-        /// How many.
+        /// Number of inputs.
         found: usize,
     },
-    /// An input that is no picture.
-    #[error("input `{}` is {}{}", input.name, sizes(&input.shape), if input.f32 { "" } else { ", no 32-bit float" })]
+    /// The input is not one image.
+    #[error("input `{}` is {}{}, expected 1x3xHxW of 32-bit floats", input.name, sizes(&input.shape), if input.f32 { "" } else { " of another type" })]
     Input {
-        /// As the model describes it.
+        /// The input, as the model describes it.
         input: TensorInfo,
     },
-    /// An output of other numbers.
-    #[error("output `{name}` is no 32-bit float")]
+    /// An output is not of 32-bit floats.
+    #[error("output `{name}` is not of 32-bit floats")]
     OutputNumbers {
-        /// Its name.
+        /// Name of the output.
         name: String,
     },
-    /// Outputs of no known kind of model.
-    #[error("outputs {} of an input {}x{}", shapes(outputs), input[1], input[0])]
+    /// The shapes of the outputs match no known kind of model.
+    #[error("outputs {} for an input of {}x{}", shapes(outputs), input[1], input[0])]
     Outputs {
         /// Height and width of the input.
         input: [usize; 2],
         /// The dimensions of each output.
         outputs: Vec<Vec<usize>>,
     },
-    /// Outputs of another kind than those of the image before.
-    #[error("the shapes of its outputs change from image to image")]
+    /// The outputs have another layout than those of the previous image.
+    #[error("the shapes of the outputs change from image to image")]
     Changing,
 }
 
 impl Hint for ShapeProblem {
     fn hint(&self) -> Option<String> {
         Some(
-            "known are exports of one picture (1x3xHxW, f32) with the outputs of YOLO-seg (v5, v8 and later, with or without NMS), of YOLO boxes, \
-             and of YOLOX"
+            "export a model for one image (1x3xHxW, f32) with the outputs of YOLO-seg (v5, v8 and later, with or without NMS), YOLO boxes or YOLOX"
                 .into(),
         )
     }
 }
 
-/// Dimensions in a line, `?` for one that is left open.
+/// Dimensions joined by `x`; `?` for one that the model leaves open.
 fn sizes(shape: &[Option<usize>]) -> String {
     let size = |d: &Option<usize>| d.map_or("?".into(), |d| d.to_string());
     shape.iter().map(size).collect::<Vec<String>>().join("x")
 }
 
-/// The same of several arrays.
+/// The dimensions of several arrays.
 fn shapes(all: &[Vec<usize>]) -> String {
     let shape = |shape: &Vec<usize>| {
         let open: Vec<_> = shape.iter().copied().map(Some).collect();
@@ -181,7 +180,7 @@ mod tests {
         for (outputs, expected) in cases {
             assert_eq!(of(outputs), Ok(expected));
         }
-        // Depth, a classifier, a detector of another input's grid, one without classes, three heads.
+        // Depth, a classifier, a detector for another input size, one without classes, one with three heads, no outputs.
         let strangers: [&[&[usize]]; 6] = [
             &[&[1, 1, 640, 640]],
             &[&[1, 1000]],

@@ -3,7 +3,7 @@
 use deepfusion_kernels::{Filter, Resizer};
 use image::RgbImage;
 
-/// The grey of what the image does not fill.
+/// Grey value of the parts that the image does not fill.
 const GREY: u8 = 114;
 
 /// A model's colour format.
@@ -22,8 +22,8 @@ pub struct Letterbox {
     pub input: [usize; 2],
     /// Size of the image.
     pub image: [usize; 2],
-    /// Pixels of the input per pixel of the image, to the right and down; they differ by the rounding of the image's size
-    /// within the input.
+    /// Pixels of the input per pixel of the image, to the right and down. They may differ a little, because the image's size in the input
+    /// is rounded.
     pub scale: [f32; 2],
     /// The image's upper left corner in the input.
     pub offset: [f32; 2],
@@ -43,7 +43,7 @@ impl Letterbox {
             size.clamp(1, input[i].max(1))
         });
         let offset = [0, 1].map(|i| match colours {
-            // The odd pixel goes to the right and below.
+            // An odd pixel is added to the right and below.
             Colours::RgbToOne => ((input[i] - inner[i]) / 2) as f32,
             Colours::Bgr => 0.0,
         });
@@ -68,14 +68,14 @@ impl Letterbox {
         [0, 1].map(|i| place[i] * self.scale[i] + self.offset[i])
     }
 
-    /// The first and the last of the cells (of this width in pixels of the input) that lie on the image, along an axis.
+    /// The first and the last cell along an axis that lie on the image; `cell` is the cells' width in pixels of the input.
     pub(crate) fn cells_of_image(&self, axis: usize, cell: f32) -> [f32; 2] {
         let first = (self.offset[axis] / cell).ceil();
         let after = ((self.offset[axis] + self.inner[axis] as f32) / cell).floor();
         [first, (after - 1.0).max(first)]
     }
 
-    /// The input: 3×H×W numbers.
+    /// The model's input: 3×H×W values.
     #[must_use]
     pub fn fill(&self, image: &RgbImage, colours: Colours) -> Vec<f32> {
         let [width, height] = self.input;
@@ -102,7 +102,7 @@ impl Letterbox {
         input
     }
 
-    /// The image at its size within the input; bilinear without a filter, as these models were trained.
+    /// The image at its size in the input, bilinear without antialiasing, as in the training of these models.
     fn resized(&self, image: &RgbImage) -> Vec<u8> {
         let [width, height] = self.inner.map(|s| s as u32);
         let mut small = vec![0; 3 * width as usize * height as usize];

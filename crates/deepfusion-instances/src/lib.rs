@@ -1,12 +1,11 @@
-//! Instances in an image, each with its pixels, from a third-party segmentation or detection model in ONNX, run in
-//! an ONNX Runtime library.
+//! Instances in an image, each with its pixels, from a third-party segmentation or detection model in ONNX. An ONNX Runtime library runs
+//! it.
 //!
-//! The path of an image: [`Letterbox`] fits it into the model's input; [`Layout`] recognises the kind of model from the
-//! outputs' shapes; [`decode`] turns outputs into candidates, [`suppress`] is non-maximum suppression; [`Prototypes`] turn
-//! coefficients into masks. [`InstanceModel`] does all of it.
+//! The steps for an image: [`Letterbox`] fits it into the model's input. [`Layout`] recognises the kind of model from the outputs' shapes.
+//! [`decode`] turns outputs into candidates, and [`suppress`] applies non-maximum suppression. [`Prototypes`] turn coefficients into masks.
+//! [`InstanceModel`] does all of this.
 //!
-//! Pixels are of the image that was given: x to the right, y down, pixel centres at whole numbers plus one half, as
-//! detectors count them.
+//! Pixels are those of the given image: x to the right, y down, pixel centres at whole numbers plus one half, as is usual for detectors.
 
 mod candidate;
 mod decode;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::{Candidate, Letterbox};
 
-/// A model's prototypes of masks, which cover its whole input.
+/// A model's mask prototypes, which cover its whole input.
 #[derive(Debug, Clone, Copy)]
 pub struct Prototypes<'a> {
     /// Number, height and width.
@@ -16,7 +16,7 @@ pub struct Prototypes<'a> {
 /// The pixels of one instance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Mask {
-    /// Row, first column, and the column after the last of each run of pixels, from the top row down.
+    /// For each run of pixels its row, its first column, and the column after its last; from the top row down.
     pub runs: Vec<[u32; 3]>,
 }
 
@@ -30,7 +30,7 @@ impl Mask {
             .sum()
     }
 
-    /// The pixels of an image of `size` (width, height) whose centres lie in `bounds` and for which `inside` holds.
+    /// The pixels of an image of `size` (width, height) with centres in `bounds` for which `inside` is true.
     fn within(bounds: [f32; 4], size: [usize; 2], inside: impl Fn(f32, f32) -> bool) -> Self {
         let [left, top, right, bottom] = bounds;
         let pixels = |low: f32, high: f32, size: usize| {
@@ -68,8 +68,8 @@ impl Mask {
 }
 
 impl Prototypes<'_> {
-    /// The mask of a candidate in an image of `size` (width, height), which shows the same as the letterbox's image: where
-    /// the weighted sum is above 0, within the candidate's box.
+    /// The mask of a candidate: the pixels in the candidate's box where the weighted sum of the prototypes is above 0. It is for an image
+    /// of `size` (width, height) with the same content as the letterbox's image.
     #[must_use]
     pub fn mask(&self, candidate: &Candidate, letterbox: &Letterbox, size: [usize; 2]) -> Mask {
         let [count, height, width] = self.shape;
@@ -78,7 +78,7 @@ impl Prototypes<'_> {
             letterbox.input[0] as f32 / width.max(1) as f32,
             letterbox.input[1] as f32 / height.max(1) as f32,
         ];
-        // Only the box's part of the prototypes is summed, and one cell about it to interpolate.
+        // Sum only the part of the prototypes inside the box, and one cell around it for interpolation.
         let [left, top, right, bottom] = candidate.bounds;
         let range = |low: f32, high: f32, cell: f32, size: usize| {
             let first = (low / cell - 1.5).floor().clamp(0.0, size as f32) as usize;
@@ -105,7 +105,7 @@ impl Prototypes<'_> {
                     .for_each(|(sum, value)| *sum += weight * value);
             }
         }
-        // Bilinear, cells' centres at a half; of cells beside the image, which show nothing, none counts.
+        // Bilinear, with cell centres at a half. Cells outside the image contain nothing and are not used.
         let of_image = [0, 1].map(|i| letterbox.cells_of_image(i, cell[i]));
         let at = |place: f32, range: &Range<usize>, [first, last]: [f32; 2]| {
             let p = (place - 0.5).max(first).min(last) - range.start as f32;
@@ -127,7 +127,7 @@ impl Prototypes<'_> {
     }
 }
 
-/// A candidate's box, clipped to an image of `size` that shows the same as the letterbox's image.
+/// A candidate's box, clipped to an image of `size` (width, height) with the same content as the letterbox's image.
 #[must_use]
 pub fn in_size(bounds: [f32; 4], letterbox: &Letterbox, size: [usize; 2]) -> [f32; 4] {
     let [left, top] = letterbox.to_image([bounds[0], bounds[1]]);

@@ -10,9 +10,9 @@ use crate::{
     suppress,
 };
 
-/// Height and width of the input where a model leaves them open.
+/// Height and width of the input if a model leaves them open.
 const OPEN_SIZE: usize = 640;
-/// Most things in one image.
+/// Greatest number of instances in one image.
 const MOST: usize = 300;
 
 /// An instance in an image.
@@ -22,22 +22,22 @@ pub struct Instance {
     pub class: String,
     /// The model's score, 0 to 1.
     pub score: f32,
-    /// Left, top, right, bottom, at the requested size.
+    /// Left, top, right, bottom, in pixels of the requested size.
     pub bounds: [f32; 4],
-    /// Its pixels; the whole box if the model has no masks.
+    /// Pixels of the instance; the whole box if the model has no masks.
     pub mask: Mask,
-    /// Whether the mask is the model's, rather than the box.
+    /// Whether the mask is from the model; otherwise it is the box.
     pub drawn: bool,
 }
 
 /// Limits on the instances found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
-    /// Least score.
+    /// Least score of an instance.
     pub score: f32,
     /// Overlap (intersection over union) above which two boxes of one class are the same instance.
     pub overlap: f32,
-    /// Names of the classes that count; empty for all.
+    /// Names of the classes to find; empty for all.
     pub classes: Vec<String>,
 }
 
@@ -64,12 +64,12 @@ pub struct InstanceModel {
 }
 
 impl InstanceModel {
-    /// Loads a file; the ONNX Runtime `library` is searched for if none is given. `threads` is the number
-    /// of CPU threads of a run; 0 leaves it to the library.
+    /// Loads a model. The ONNX Runtime `library` is searched for if none is given. `threads` is the number of CPU threads per run; 0 lets
+    /// the library choose.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Runtime`] if there is no library or it refuses the model; [`Error::Shape`] if
-    /// inputs and outputs match no known kind; [`Error::Class`] for a class that the model does not have.
+    /// [`Error::File`]; [`Error::Runtime`] if there is no library or it refuses the model; [`Error::Shape`] if inputs and outputs match no
+    /// known kind; [`Error::Class`] for a class that the model does not have.
     pub fn load(
         path: &Path,
         library: Option<&Path>,
@@ -95,7 +95,7 @@ impl InstanceModel {
                 name: output.name.clone(),
             }));
         }
-        // Exports often leave dimensions open: only a run says them.
+        // Exports often leave dimensions open, so only a run shows the shapes.
         let grey = vec![0.5; 3 * input[0] * input[1]];
         let outputs = model
             .run(&[1, 3, input[0], input[1]], &grey)
@@ -123,14 +123,13 @@ impl InstanceModel {
         })
     }
 
-    /// The meaning of the model's outputs.
+    /// The layout of the model's outputs.
     #[must_use]
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The instances in an image, by descending score; boxes and masks are for an image of `size` (width, height)
-    /// that shows the same.
+    /// The instances in an image, by descending score. Boxes and masks are for an image of `size` (width, height) with the same content.
     ///
     /// # Errors
     /// [`Error::Runtime`]; [`Error::Shape`] if the outputs' shapes depend on the image's content.
@@ -150,7 +149,7 @@ impl InstanceModel {
                 source,
             })?;
         let shapes: Vec<Vec<usize>> = outputs.iter().map(|tensor| tensor.shape.clone()).collect();
-        // A model that suppresses itself may give fewer rows for another image.
+        // A model that suppresses candidates itself may return fewer rows for another image.
         let layout = Layout::of(self.input, &shapes)
             .ok()
             .filter(|layout| layout.kind == self.layout.kind)
@@ -194,7 +193,7 @@ impl InstanceModel {
     }
 }
 
-/// Height and width of the one input, a picture of three planes.
+/// Height and width of the only input, an image of three planes.
 fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], ShapeProblem> {
     let [input] = inputs else {
         return Err(ShapeProblem::Inputs {

@@ -8,7 +8,7 @@ spoon,bowl,banana,apple,sandwich,orange,broccoli,carrot,hot dog,pizza,donut,cake
 table,toilet,tv,laptop,mouse,remote,keyboard,cell phone,microwave,oven,toaster,sink,refrigerator,book,clock,vase,scissors,\
 teddy bear,hair drier,toothbrush";
 
-/// The names in a model's metadata, `{0: 'car', 1: "driver's cab"}`, in the order of their numbers; `None` for other texts.
+/// The names in a model's metadata, such as `{0: 'car', 1: "driver's cab"}`, in the order of their numbers; `None` for any other text.
 pub(crate) fn of_note(note: &str) -> Option<Vec<String>> {
     let mut rest = note.trim().strip_prefix('{')?.strip_suffix('}')?.trim();
     let mut names: Vec<String> = Vec::new();
@@ -30,7 +30,7 @@ pub(crate) fn of_note(note: &str) -> Option<Vec<String>> {
     Some(names)
 }
 
-/// The name of class `number` out of `classes`: the model's own, COCO's if there are eighty, else its number.
+/// The name of class `number` of `classes`: the model's own, COCO's if there are eighty, otherwise its number.
 pub(crate) fn name_of(own: &[String], classes: usize, number: usize) -> String {
     let own = own.get(number).filter(|name| !name.is_empty()).cloned();
     let coco = || (classes == 80).then(|| COCO.split(',').nth(number).map(str::to_owned));

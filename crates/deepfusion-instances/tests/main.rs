@@ -1,4 +1,4 @@
-//! Instance masks.
+//! Tests of instance masks.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! Whole models in an ONNX Runtime library, where this machine has one.
+//! Whole models in an ONNX Runtime library, if this machine has one.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ fn fixture(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/reference/{name}.onnx"))
 }
 
-/// Without a library nothing can be run; the shapes and masks are tested without one.
+/// Without a library no model can be run; shapes and masks have tests that need none.
 fn library_is_there() -> bool {
     let there = find(None).is_ok();
     if !there {
@@ -20,7 +20,7 @@ fn library_is_there() -> bool {
     there
 }
 
-/// Grey, with something red to the left and to the right.
+/// Grey, with a red rectangle to the left and one to the right.
 fn picture() -> RgbImage {
     RgbImage::from_fn(320, 160, |x, y| {
         let red = (40..120).contains(&x) && (40..120).contains(&y)

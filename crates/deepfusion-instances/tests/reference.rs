@@ -1,4 +1,4 @@
-//! Against what detectors' own programs make of the same numbers (tests/reference/generate.py).
+//! Compared with the results of the detectors' own programs for the same numbers (tests/reference/generate.py).
 
 use deepfusion_instances::{
     Colours, Kind, Layout, Letterbox, Prototypes, decode, in_size, suppress,
@@ -28,7 +28,7 @@ impl Fixture {
     }
 }
 
-/// Compares everything of one kind of model; gives the number of things.
+/// Compares the results for one kind of model; returns the number of instances.
 fn check(name: &str, kind: Kind, colours: Colours) -> usize {
     let mut fixture = Fixture::open();
     let (input, image) = (fixture.size("input"), fixture.size("image"));
@@ -60,7 +60,7 @@ fn check(name: &str, kind: Kind, colours: Colours) -> usize {
     });
     assert_eq!(found.len(), boxes.nrows());
     for (i, expected) in boxes.rows().into_iter().enumerate() {
-        // YOLOX's program gives class by class: the nearest box is the one that is meant.
+        // YOLOX's program returns its results class by class, so match each box with the nearest one.
         let off = |bounds: [f32; 4]| {
             let [l, t, ..] = expected.to_vec()[..] else {
                 unreachable!()
@@ -71,7 +71,7 @@ fn check(name: &str, kind: Kind, colours: Colours) -> usize {
             if with_masks {
                 in_size(bounds, &letterbox, size)
             } else {
-                // Its program divides by one ratio and does not cut boxes at the image's edge.
+                // YOLOX's program divides by one ratio and does not clip boxes at the edge of the image.
                 bounds.map(|b| b / ratio)
             }
         };
@@ -104,7 +104,7 @@ fn check(name: &str, kind: Kind, colours: Colours) -> usize {
                 ours[[v as usize, u as usize]] = 1;
             }
         }
-        // Theirs is cut at whole cells and whole pixels: the edge may be a pixel off.
+        // The reference masks are clipped to whole cells and whole pixels, so edges may differ by a pixel.
         let theirs = masks.index_axis(ndarray::Axis(0), i);
         let count = |f: fn(u8, u8) -> bool| {
             ours.iter().zip(theirs).filter(|(a, b)| f(**a, **b)).count() as f32

@@ -1,4 +1,4 @@
-"""Pictures of checkerboards under known cameras, and what OpenCV makes of them.
+"""Pictures of checkerboards by known cameras, and OpenCV's results for them.
 
     pip install "opencv-python-headless<5" numpy
     python boards.py
@@ -118,7 +118,7 @@ def picture(camera, rotation, translation, generator):
                 & (depth > 0)
             )
             black = inside & ((column + row) % 2 == 0)
-            # A room: a soft gradient, and a few stripes that end in corners of their own.
+            # The background: a soft gradient, and a few stripes that also have corners.
             room = 90 + 40 * np.sin(columns / 37.0) + 25 * np.sin((rows + columns) / 23.0)
             total += np.where(black, 35.0, np.where(paper, 215.0, room))
     total /= RAYS * RAYS
@@ -144,7 +144,7 @@ def pixels(camera, rotation, translation):
 
 
 def poses(camera):
-    """Poses whose board with its margin lies in the image, tilted this way and that, all over the image."""
+    """Poses, tilted in all directions and spread over the image, with the board and its margin inside the image."""
     generator = np.random.default_rng(camera["seed"])
     width, height = camera["size"]
     centre = np.array([(BOARD[0] - 1) / 2 * SQUARE, (BOARD[1] - 1) / 2 * SQUARE, 0])
@@ -203,7 +203,7 @@ def calibrated(camera, corners):
         "rms": float(rms),
         "k": [float(k[0, 0]), float(k[1, 1]), float(k[0, 2]), float(k[1, 2])],
         "distortion": [float(c) for c in d.ravel()[: len(camera["distortion"])]],
-        # Of fx, fy, cx, cy, k1, k2, p1, p2, k3.
+        # Standard deviations of fx, fy, cx, cy, k1, k2, p1, p2, k3.
         "standard_errors": errors,
     }
 
@@ -228,7 +228,7 @@ def main():
             if ok:
                 criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-4)
                 seen = cv2.cornerSubPix(grey, seen, (4, 4), (-1, -1), criteria).reshape(-1, 2)
-                # OpenCV may begin at the other end.
+                # OpenCV may start at the opposite corner.
                 if np.abs(seen - truth).max() > 3:
                     seen = seen[::-1]
                 print(file, "corners off by", np.linalg.norm(seen - truth, axis=1).max().round(3), "px at most")

@@ -70,7 +70,7 @@ mod tests {
         for (warning, said) in [
             (
                 BoardWarning::from(few),
-                "6 views are few: 10 to 30, from many sides, are better",
+                "only 6 views: 10 to 30, from many sides, are better",
             ),
             (
                 BoardWarning::Turned { orientation, size },
