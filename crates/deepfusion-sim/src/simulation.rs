@@ -151,7 +151,7 @@ impl Simulation {
         &self.config
     }
 
-    /// What a varied drive drew from its seed: camera, light, weather, world and imaging; `None` of a plain one.
+    /// What a varied drive drew from its seed: camera, light, weather, world and imaging; `None` for a plain one.
     #[must_use]
     pub fn drawn(&self) -> Option<&DrawnDrive> {
         self.look.as_ref().map(DriveLook::drawn)

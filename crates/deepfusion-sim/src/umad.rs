@@ -75,7 +75,7 @@ impl Default for BagSettings {
 }
 
 /// Writes the drive as `out/<scene>_<seed>.bag` and, beside it, `<scene>_<seed>.toml` with the mounts of the sensors
-/// and the vehicle's wheelbase, which a bag does not contain; of a varied drive also `<scene>_<seed>.varied.json` with what it drew
+/// and the vehicle's wheelbase, which a bag does not contain; for a varied drive also `<scene>_<seed>.varied.json` with what it drew
 /// ([`Simulation::drawn`]). `out` must be new or empty. Returns the bag's path.
 ///
 /// The stamps of camera and LiDAR include [`BagSettings::clock_offset_s`]; those of IMU, speed, steering and truth do not.

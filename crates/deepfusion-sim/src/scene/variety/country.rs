@@ -96,7 +96,7 @@ fn roadside(site: &mut Site, section: &Section, half: f64, side: f64) {
         3 => rail(site, section, half + 0.7, side),
         4 => fields(site, section, half + 3.0, side),
         5..=6 => {
-            // A bank as on a motorway, but only here.
+            // A bank as on a motorway. It is built along the whole road, so in the first section only.
             if (section.from - site.world.road.start).abs() < 1.0 {
                 verge(site, side, half + 1.5);
             } else {
