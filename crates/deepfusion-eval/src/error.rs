@@ -204,7 +204,7 @@ pub enum IntervalsProblem {
         /// The shares found.
         found: [f64; 3],
     },
-    /// They are for ranges of depth other than [`ENDS_M`].
+    /// They are for other ranges of depth.
     #[error("the ranges do not end at {:?} m", ENDS_M)]
     Ranges,
     /// A factor is negative or NaN.
