@@ -476,7 +476,7 @@ def test_predictions_are_measured_as_they_come(drive, model):
         deepfusion.evaluate(model.predict_many(images[:2], camera, stretch=True), truths)
     with pytest.raises(deepfusion.DeepFusionError, match="no image has") as refused:
         deepfusion.evaluate(images[:1], [None])
-    assert "no frame has ground truth" in refused.value.hint
+    assert "have ground truth of the kind" in refused.value.hint
 
 
 def test_errors_say_what_to_do(drive, model, tmp_path):

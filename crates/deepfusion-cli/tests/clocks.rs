@@ -199,7 +199,7 @@ fn an_offset_that_cannot_be_found_is_refused() {
     fails(
         at,
         "data inspect straight --clock-offset auto",
-        &["nothing measured changes", "--clock-offset MS"],
+        &["the motion does not change", "--clock-offset MS"],
     );
     // A log whose clock cannot be measured becomes no drive.
     fs::create_dir(at.join("drive")).unwrap();
@@ -207,13 +207,13 @@ fn an_offset_that_cannot_be_found_is_refused() {
     fails(
         at,
         "data import straight/speed.csv --images images --hfov 80 --clock-offset auto --out drive",
-        &["nothing measured changes", "--clock-offset MS"],
+        &["the motion does not change", "--clock-offset MS"],
     );
     // Nor does the current folder.
     fails(
         &at.join("drive"),
         "data import ../straight/speed.csv --images ../images --hfov 80 --clock-offset auto --out .",
-        &["nothing measured changes", "--clock-offset MS"],
+        &["the motion does not change", "--clock-offset MS"],
     );
     let left: Vec<_> = fs::read_dir(at.join("drive")).unwrap().collect();
     assert_eq!(left.len(), 1, "{left:?}");

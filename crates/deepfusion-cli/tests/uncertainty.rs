@@ -159,7 +159,7 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
     }
     let table = ok(at, eval).stdout;
     assert!(
-        table.contains("the 80 % intervals hold") && table.contains("(calibrated)"),
+        table.contains("the 80 % intervals contain") && table.contains("(calibrated)"),
         "{table}"
     );
 

@@ -262,7 +262,7 @@ fn a_signal_that_cannot_be_is_refused_by_its_field() {
         (by_name, ["can.speed names WHEELS.SPEED", "can.dbc"]),
         (
             BY_DBC.replace("WHEELS.SPEED", "WHEELS.SPED"),
-            ["SPED", "`WHEELS` has SPEED"],
+            ["SPED", "`WHEELS`, which has SPEED"],
         ),
         (
             BY_DBC.replace("vehicle.dbc", "gone.dbc"),

@@ -307,7 +307,7 @@ fn a_camera_is_never_made_up() {
     .unwrap();
     let text = refusal(root.path());
     assert!(
-        text.contains("dataset.toml: cx is 300.0 in an image of 62 pixels"),
+        text.contains("dataset.toml: cx is 300.0, outside an image of 62 pixels"),
         "{text}"
     );
     let other = OpenOptions {

@@ -1,5 +1,5 @@
-//! How sharp the truth of simulated streets itself is, seen at a half, a quarter, … of its size and enlarged again, as a
-//! network of that size would at best be.
+//! Sharpness of the ground truth of simulated streets itself, shrunk to a half, a quarter, … of its size and enlarged again: the best that
+//! a network of that output size could reach.
 //!
 //! ```text
 //! cargo run -p deepfusion-eval --example enlarged_truth
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             ..SimConfig::default()
         })?;
         for frame in (0..31).step_by(10) {
-            // 0 is the sky.
+            // 0 means sky.
             let depth = street.frame(frame).depth;
             let depths = depth.data.iter().map(|d| match f64::from(*d) {
                 0.0 => f64::INFINITY,
@@ -60,7 +60,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Disparity, averaged over blocks; the sky is seen 300 m away.
+/// Disparity, averaged over blocks; the sky is put at 300 m.
 fn reduced(truth: &Grid, factor: usize) -> Result<Grid, deepfusion_eval::Error> {
     let (width, height) = (truth.width() / factor, truth.height() / factor);
     let block = |i: usize| {

@@ -12,11 +12,11 @@ use zip::result::ZipError;
 use crate::error::first_names;
 use crate::{ArrayName, ArrayProblem, Error, ExpectedShape, Grid, Result};
 
-/// Before the names of the velocities that `data export-gt` writes beside depths: they are no depths.
+/// Prefix of the names of the velocities that `data export-gt` writes beside the depths.
 const VELOCITY: &str = "velocity_mps/";
 
-/// A file of H×W arrays, read one at a time: a NumPy `.npz` (arrays with names), or an N×H×W (or H×W) `.npy`, whose
-/// arrays have no name but an order. `float32` and `float64`. Velocities beside depths (`velocity_mps/…`) are left out.
+/// A file of H×W arrays of `float32` or `float64`, read one at a time: a NumPy `.npz` (named arrays), or an N×H×W (or H×W) `.npy`, whose
+/// arrays have an order but no names. Velocities stored beside the depths (`velocity_mps/…`) are left out.
 #[derive(Debug)]
 pub struct ArraySet {
     path: PathBuf,
@@ -27,10 +27,10 @@ enum Source {
     Npz {
         reader: Box<ZipArchive<BufReader<File>>>,
         names: Vec<String>,
-        /// Each name's place in the archive.
+        /// For each name, the array's index in the archive.
         places: Vec<usize>,
     },
-    /// N×H×W.
+    /// The arrays of an `.npy` file, N×H×W.
     Stack(ArrayD<f64>),
 }
 
@@ -44,10 +44,10 @@ impl std::fmt::Debug for Source {
 }
 
 impl ArraySet {
-    /// Opens a file; what it is is recognised by its content, not its name.
+    /// Opens a file. Its type is recognised by its content, not its name.
     ///
     /// # Errors
-    /// [`Error::Io`] where it cannot be read, [`Error::ArrayFile`] where it is no such file.
+    /// [`Error::Io`] if it cannot be read, [`Error::ArrayFile`] if it is neither kind of file.
     pub fn open(path: &Path) -> Result<Self> {
         let io = |source| Error::Io {
             path: path.to_owned(),
@@ -95,13 +95,13 @@ impl ArraySet {
         Ok(set)
     }
 
-    /// The file.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Names in the file's order; `None` for an N×H×W stack.
+    /// The arrays' names in the file's order; `None` for an N×H×W stack.
     #[must_use]
     pub fn names(&self) -> Option<&[String]> {
         match &self.source {
@@ -110,7 +110,7 @@ impl ArraySet {
         }
     }
 
-    /// How many arrays it has.
+    /// Number of arrays.
     #[must_use]
     pub fn len(&self) -> usize {
         match &self.source {
@@ -119,7 +119,7 @@ impl ArraySet {
         }
     }
 
-    /// Whether it has none.
+    /// Whether the file has no arrays.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -128,7 +128,8 @@ impl ArraySet {
     /// Reads the array at `index`, in the file's order. Axes of length 1 beside H×W are dropped.
     ///
     /// # Errors
-    /// [`Error::ArrayFile`] naming the array: no such index, not two-dimensional, neither `float32` nor `float64`, damaged.
+    /// [`Error::ArrayFile`], naming the array, if the index is out of range, or the array is not two-dimensional, neither `float32` nor
+    /// `float64`, or damaged.
     pub fn read(&mut self, index: usize) -> Result<Grid> {
         let len = self.len();
         if index >= len {
@@ -149,7 +150,7 @@ impl ArraySet {
                 places,
             } => {
                 let (name, index) = (names[index].clone(), places[index]);
-                // By index, not by name: an archive may hold a name twice.
+                // By index, not by name: an archive may contain the same name twice.
                 let entry = reader.by_index(index);
                 let mut entry = entry.map_err(|e| unreadable_archive(&self.path, e))?;
                 let mut bytes = Vec::new();
@@ -164,12 +165,12 @@ impl ArraySet {
     }
 }
 
-/// Which array of `predictions` belongs to which of `ground_truth`: by name where both have names, else by order.
-/// Triples of (name, index in `predictions`, index in `ground_truth`), in the ground truth's order.
+/// Pairs the arrays of `predictions` with those of `ground_truth`: by name if both have names, else by order. Returns triples of (name,
+/// index in `predictions`, index in `ground_truth`) in the ground truth's order.
 ///
 /// # Errors
-/// [`Error::UnmatchedNames`] where either has an array that the other has not; [`Error::Count`] where arrays in split
-/// order are more or fewer than their counterpart's.
+/// [`Error::UnmatchedNames`] if one file has an array that the other lacks; [`Error::Count`] if files in split order have different numbers
+/// of arrays.
 pub fn match_names(
     predictions: &ArraySet,
     ground_truth: &ArraySet,
@@ -198,7 +199,7 @@ pub fn match_names(
         .collect())
 }
 
-/// Fails where one of `wanted` (the names in `from`) is not among `present` (those in `path`).
+/// Fails if one of the names `wanted` (which come from the file `from`) is not among the names `present` in the file `path`.
 fn require(wanted: &[String], from: &Path, present: &[String], path: &Path) -> Result<()> {
     let set: HashSet<_> = present.iter().collect();
     let missing: Vec<_> = wanted.iter().filter(|name| !set.contains(name)).collect();
@@ -214,13 +215,13 @@ fn require(wanted: &[String], from: &Path, present: &[String], path: &Path) -> R
     })
 }
 
-/// The array in a file's bytes.
+/// Reads one array from the bytes of an `.npy` file.
 fn array(path: &Path, name: ArrayName, bytes: &[u8]) -> Result<ArrayD<f64>> {
     let wrong = |reason| Error::ArrayFile {
         path: path.to_owned(),
         reason,
     };
-    // The reader allocates for as many numbers, and as long a header, as the file says that there are.
+    // The reader allocates what the file's header claims, however much that is.
     match NpyHeader::parse(bytes) {
         Ok(header) if header.item_bytes().is_none() || header.fits(bytes.len() as u64) => {}
         Err(NpyHeaderProblem::NotNpy) => return Err(wrong(ArrayProblem::NotArrays)),
@@ -235,7 +236,7 @@ fn array(path: &Path, name: ArrayName, bytes: &[u8]) -> Result<ArrayD<f64>> {
     doubles.map_err(|error| unreadable(path, name, error))
 }
 
-/// N×H×W of an array that is that, or a single H×W.
+/// The array as N×H×W; a single H×W array becomes 1×H×W.
 fn stack(path: &Path, array: ArrayD<f64>) -> Result<ArrayD<f64>> {
     match array.ndim() {
         2 => Ok(array.insert_axis(Axis(0))),

@@ -5,125 +5,125 @@ mod arrays;
 
 pub use self::arrays::{ArrayName, ArrayProblem, ExpectedShape};
 
-/// Shares of the pixels that intervals are to hold.
+/// Shares of the pixels that the intervals should contain.
 pub const LEVELS: [f64; 3] = [0.5, 0.8, 0.95];
 
-/// Where the ranges of predicted depth end, metres; the last goes on.
+/// Upper ends of the ranges of predicted depth, in metres; the last range is open.
 pub(crate) const ENDS_M: [f64; 3] = [10.0, 20.0, 40.0];
 
-/// What can go wrong while arrays are read and compared.
+/// What can go wrong when arrays are read and compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A prediction holds values that cannot be a depth or disparity.
+    /// A prediction contains values that are not a valid depth or disparity.
     #[error(
-        "prediction `{name}` has {count} of {} that {} no {kind}: {} {value} at column {x}, row {y} \
+        "prediction `{name}` has {count} of {} that {} not a valid {kind}: {} {value} at column {x}, row {y} \
          (expected finite and above 0)",
         count_of(*total, "value"),
         if *count == 1 { "is" } else { "are" },
         if *count == 1 { "it is" } else { "the first is" }
     )]
     InvalidPrediction {
-        /// Name of the array.
+        /// Name of the prediction's array.
         name: String,
         /// "depth" or "disparity".
         kind: &'static str,
         /// The first such value.
         value: f64,
-        /// Its column.
+        /// The value's column.
         x: usize,
-        /// Its row.
+        /// The value's row.
         y: usize,
-        /// How many there are.
+        /// Number of such values.
         count: usize,
-        /// How many values the array has.
+        /// Number of values in the array.
         total: usize,
     },
-    /// Width × height and the number of values differ, or one of them is zero.
+    /// The number of values is not width × height, or is zero.
     #[error("`{name}` is {width}×{height} but has {}", count_of(*len, "value"))]
     Shape {
-        /// What the array is.
+        /// Name of the array.
         name: String,
-        /// Its width, in pixels.
+        /// Width given, in pixels.
         width: usize,
-        /// Its height, in pixels.
+        /// Height given, in pixels.
         height: usize,
-        /// How many values were given.
+        /// Number of values given.
         len: usize,
     },
-    /// A protocol that nothing can be measured with.
+    /// A protocol that cannot measure anything.
     #[error("{field} is {value}: expected {expected}")]
     Protocol {
         /// The field of [`crate::Protocol`].
         field: &'static str,
-        /// Its value.
+        /// The field's value.
         value: String,
-        /// What it must be.
+        /// What the value must be.
         expected: ExpectedProtocolSetting,
     },
     /// No image had a single pixel to compare.
     #[error("{}", nothing_compared(*skipped, names))]
     NothingToEvaluate {
-        /// How many images were skipped.
+        /// Number of skipped images.
         skipped: usize,
-        /// The first few names.
+        /// The names of the first few skipped images.
         names: String,
     },
-    /// Factors of intervals that are none of this program's.
-    #[error("factors of intervals: {reason}")]
+    /// Interval factors that this version cannot use.
+    #[error("interval factors: {reason}")]
     Intervals {
-        /// What is wrong.
+        /// What is wrong with them.
         reason: IntervalsProblem,
     },
     /// A file that cannot be opened or read.
     #[error("cannot read {path}")]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// An array file whose content is not what was expected.
+    /// An array file with unexpected content.
     #[error("{path}: {reason}")]
     ArrayFile {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is wrong, and with which array.
         #[source]
         reason: ArrayProblem,
     },
-    /// Ground truth without prediction, or the other way round.
+    /// Ground truth without a prediction, or the other way round.
     #[error("{path} has no array for {count} of {of}: {names}")]
     UnmatchedNames {
-        /// The file in which arrays are missing.
+        /// The file that lacks arrays.
         path: PathBuf,
-        /// How many are missing.
+        /// Number of missing arrays.
         count: usize,
         /// Where the names come from ("the 25 in gt.npz").
         of: String,
         /// The first few missing names.
         names: String,
-        /// A name that the file has instead.
+        /// A name that the file contains instead.
         instead: Option<String>,
     },
-    /// A stack of arrays in split order that is longer or shorter than its counterpart.
+    /// Two files in split order have different numbers of arrays.
     #[error(
         "{path} has {}, {other} has {expected}: arrays in split order need the same number",
         count_of(*count, "array")
     )]
     Count {
-        /// The prediction file.
+        /// Path of the prediction file.
         path: PathBuf,
-        /// How many arrays it has.
+        /// Number of arrays in it.
         count: usize,
-        /// The ground-truth file.
+        /// Path of the ground-truth file.
         other: PathBuf,
-        /// How many that has.
+        /// Number of arrays in that file.
         expected: usize,
     },
 }
 
-/// A result of this crate.
+/// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// What a field of a protocol must be.
@@ -133,15 +133,15 @@ pub enum ExpectedProtocolSetting {
     /// A depth, in metres.
     #[error("metres above 0")]
     Metres,
-    /// A depth beyond the smallest that is compared, in metres.
+    /// A depth above the minimum depth, in metres.
     #[error("metres above the minimum depth")]
     MetresAboveMinimum,
-    /// A factor of all depths.
+    /// A factor by which all depths are multiplied.
     #[error("a factor above 0")]
     Factor,
 }
 
-/// Whether there is no ground truth at all, or none that counts.
+/// States whether there is no ground truth at all, or none inside the mask.
 fn nothing_compared(skipped: usize, names: &str) -> String {
     if names.is_empty() {
         "nothing to compare with: no image has ground truth".into()
@@ -154,24 +154,24 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
-                "a network's {kind} is positive everywhere; where these values mean \"no prediction\", allow holes: \
+                "a network's {kind} is positive everywhere; if these values mean \"no prediction\", allow holes: \
                  they are left out and counted as missing_rate"
             )),
-            Self::Shape { .. } => Some("arrays are H×W, row by row".into()),
+            Self::Shape { .. } => Some("give height × width values, row by row".into()),
             Self::Protocol { field, expected, .. } => Some(format!("set {field} to {expected}")),
-            Self::NothingToEvaluate { skipped: 0, .. } => Some("no frame has ground truth of the kind asked for".into()),
+            Self::NothingToEvaluate { skipped: 0, .. } => Some("use frames that have ground truth of the kind asked for".into()),
             Self::NothingToEvaluate { .. } => Some(
                 "check that the ground truth is in metres and 0 where there is none, and that crop and cap leave pixels"
                     .into(),
             ),
             Self::Intervals { .. } => {
-                Some("calibrate the network's uncertainty anew".into())
+                Some("calibrate the network's uncertainty again".into())
             }
             Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
             Self::ArrayFile { reason, .. } => reason.hint().map(str::to_owned),
             Self::UnmatchedNames { instead, .. } => Some(match instead {
                 Some(name) => format!(
-                    "arrays are matched by name, and this file names its arrays like `{name}`; the same names are needed in both"
+                    "arrays are matched by name, but this file has names like `{name}`; use the same names in both files"
                 ),
                 None => "arrays are matched by name; write both files from the same list of frames".into(),
             }),
@@ -194,23 +194,23 @@ pub(crate) fn first_names<'a>(names: impl IntoIterator<Item = &'a String>) -> St
     format!("{}{more}", shown.join(", "))
 }
 
-/// Why factors are none of this program's.
+/// Why interval factors cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IntervalsProblem {
-    /// They are for other shares of the pixels than [`LEVELS`].
+    /// They are for shares of pixels other than [`LEVELS`].
     #[error("levels {found:?}, expected {:?}", LEVELS)]
     Levels {
-        /// The shares.
+        /// The shares found.
         found: [f64; 3],
     },
-    /// They are for other ranges of depths.
-    #[error("ranges other than those ending at {:?} m", ENDS_M)]
+    /// They are for other ranges of depth.
+    #[error("the ranges do not end at {:?} m", ENDS_M)]
     Ranges,
-    /// One that is negative or NaN.
-    #[error("a factor of {factor}")]
+    /// A factor is negative or NaN.
+    #[error("a factor is {factor}, expected 0 or more")]
     Factor {
-        /// The factor.
+        /// The factor found.
         factor: f64,
     },
 }

@@ -10,51 +10,51 @@ use crate::resample::{Axis, sample};
 use crate::statistics::{Reservoir, bootstrap_mean_ci95, mean, median, standard_deviation};
 use crate::{Error, Grid, Holes, ImageSharpness, Prediction, Protocol, Result, Scaling, Sharpness};
 
-/// Borders of the range bins, in metres.
+/// Limits of the depth ranges, in metres.
 const RANGES_M: [u32; 5] = [0, 10, 20, 40, 80];
 
-/// An image to evaluate, with what is only known for some.
+/// An image to evaluate. The optional parts are known only for some images.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample<'a> {
-    /// Its name in messages.
+    /// The image's name, for messages and the report.
     pub name: &'a str,
-    /// What the method says, at any size.
+    /// The prediction, at any size.
     pub prediction: &'a Prediction,
-    /// Depth in metres, 0 = none. Its size is the one at which is compared.
+    /// Depth in metres, 0 = none. Images are compared at its size.
     pub ground_truth: &'a Grid,
-    /// Which pixels of the ground truth move, H×W row by row, where labels or FMCW velocities tell.
+    /// Which pixels of the ground truth are dynamic, H×W row by row, if labels or FMCW velocities show it.
     pub moving: Option<&'a [bool]>,
-    /// The camera at the ground truth's size: the point statistics then are distances in space, else along z.
+    /// The camera at the ground truth's size. With it, point statistics are distances in space; without it, along z.
     pub intrinsics: Option<&'a Intrinsics>,
-    /// Dense depth in metres, where there is such beside a sparse ground truth: 0 = unknown, infinity = sky. Only how sharp
-    /// the prediction is follows from it; `None` takes the ground truth itself, where that is dense.
+    /// Dense depth in metres beside a sparse ground truth: 0 = unknown, infinity = sky. Used only to measure sharpness; with `None`, the
+    /// ground truth is used for that if it is dense.
     pub dense: Option<&'a Grid>,
 }
 
-/// What one image scored.
+/// Scores of one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageScore {
-    /// Its name.
+    /// The image's name.
     pub name: String,
-    /// How many pixels were compared.
+    /// Number of pixels compared.
     pub pixels: usize,
-    /// Metrics of the prediction as it is.
+    /// Metrics of the unchanged prediction.
     pub unscaled: Metrics,
     /// Metrics of the prediction times `ratio`.
     pub median_scaled: Metrics,
-    /// Metrics of the prediction times the fixed factor, where the protocol has one.
+    /// Metrics of the prediction times the fixed factor, if the protocol has one.
     pub fixed_scaled: Option<Metrics>,
     /// median(gt) / median(prediction) over the compared pixels, before clamping: 1 for a metric method.
     pub ratio: f64,
-    /// Unscaled metrics of the pixels that do not move, where known.
+    /// Unscaled metrics of the static pixels, if known.
     pub still: Option<Metrics>,
-    /// Unscaled metrics of those that do, where known.
+    /// Unscaled metrics of the dynamic pixels, if known.
     pub moving: Option<Metrics>,
-    /// How sharp the prediction is, where dense truth is known.
+    /// Sharpness of the prediction, if dense ground truth is known.
     pub sharpness: Option<ImageSharpness>,
 }
 
-/// Compares predictions with ground truth, image by image, and sums up.
+/// Compares predictions with ground truth, image by image, and summarises them.
 ///
 /// ```
 /// use deepfusion_eval::{Evaluator, Grid, Prediction, Protocol};
@@ -74,21 +74,21 @@ pub struct Evaluator {
     points: Reservoir<DrawnPoint>,
     /// Whether every image came with its camera.
     in_space: bool,
-    /// Of the ground truth that counts, in the order in which it came.
+    /// Hash of the compared ground truth, in the order of the images.
     truth: Sha256,
-    /// Pixels with ground truth inside the mask, and those of them without prediction.
+    /// Pixels with ground truth inside the mask (`masked`), and how many of them lack a prediction (`missing`).
     masked: usize,
     missing: usize,
-    /// Hole rates of the images that have near pixels, and of their dynamic pixels.
+    /// Hole rates of the images with near pixels, over all pixels and over dynamic pixels.
     hole_rates: Vec<f64>,
     moving_hole_rates: Vec<f64>,
 }
 
 impl Evaluator {
-    /// An evaluator that has seen nothing yet.
+    /// An evaluator without images.
     ///
     /// # Errors
-    /// [`Error::Protocol`] for a protocol that nothing can be measured with.
+    /// [`Error::Protocol`] for a protocol that cannot measure anything.
     pub fn new(protocol: Protocol) -> Result<Self> {
         protocol.validate()?;
         Ok(Self {
@@ -106,10 +106,10 @@ impl Evaluator {
         })
     }
 
-    /// Compares one image; its score, or `None` where the image has no pixel to compare (it is then named in the report).
+    /// Compares one image. Returns its score, or `None` if the image has no pixel to compare (the report then lists it as skipped).
     ///
     /// # Errors
-    /// [`Error::InvalidPrediction`] where the prediction holds values that are no depth and holes are refused.
+    /// [`Error::InvalidPrediction`] if the prediction contains values that are not valid depths and holes are not allowed.
     pub fn add(
         &mut self,
         name: &str,
@@ -126,10 +126,10 @@ impl Evaluator {
         })
     }
 
-    /// As [`Evaluator::add`], with what is only known for some images.
+    /// Like [`Evaluator::add`], with data known only for some images.
     ///
     /// # Errors
-    /// As [`Evaluator::add`]; [`Error::Shape`] where the moving labels are of another size than the ground truth.
+    /// As for [`Evaluator::add`]; [`Error::Shape`] if the moving labels differ in size from the ground truth.
     pub fn add_sample(&mut self, image: &Sample<'_>) -> Result<Option<&ImageScore>> {
         let truth = image.ground_truth;
         if let Some(labels) = image.moving
@@ -207,22 +207,22 @@ impl Evaluator {
         Ok(self.images.last())
     }
 
-    /// Scores of the images so far, in the order in which they came.
+    /// Scores of the images so far, in the order they were added.
     #[must_use]
     pub fn images(&self) -> &[ImageScore] {
         &self.images
     }
 
-    /// The points drawn so far: at most as many as the protocol asks for.
+    /// The points drawn so far: at most the protocol's number.
     #[must_use]
     pub fn drawn_points(&self) -> &[DrawnPoint] {
         &self.points.items
     }
 
-    /// Sums up.
+    /// Summarises all images.
     ///
     /// # Errors
-    /// [`Error::NothingToEvaluate`] where no image had a pixel to compare.
+    /// [`Error::NothingToEvaluate`] if no image had a pixel to compare.
     pub fn report(&self) -> Result<Report> {
         let nothing = || Error::NothingToEvaluate {
             skipped: self.skipped.len(),
@@ -268,7 +268,7 @@ impl Evaluator {
 
     fn scale(&self) -> Option<Scale> {
         let ratios: Vec<f64> = self.images.iter().map(|i| i.ratio).collect();
-        // ln(median(pred) / median(gt)): positive where the method sees things too far away.
+        // ln(median(pred) / median(gt)): positive if predictions are too far.
         let biases: Vec<f64> = ratios.iter().map(|r| -r.ln()).collect();
         let middle = median(&ratios)?;
         Some(Scale {
@@ -337,8 +337,8 @@ impl Evaluator {
         }
     }
 
-    /// The first two steps of the protocol (docs/concepts/evaluation.md): the pixels inside the mask, with the prediction resized as disparity and inverted. Only
-    /// these are resized: ground truth is sparse.
+    /// The first two steps of the protocol (docs/concepts/evaluation.md): the pixels inside the mask, with the prediction resized as
+    /// disparity and inverted. Only predictions are resized, since the ground truth is sparse.
     fn compared_pixels(&mut self, image: &Sample<'_>, disparities: &[Option<f64>]) -> Vec<Pixel> {
         let (truth, grid) = (image.ground_truth, image.prediction.grid());
         let columns = Axis::new(grid.width(), truth.width());
@@ -380,10 +380,10 @@ impl Evaluator {
     }
 }
 
-/// A compared pixel: depths in metres.
+/// A compared pixel with its depths in metres.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    /// Where it is in the ground truth, row by row.
+    /// The pixel's index in the ground truth, row by row.
     index: usize,
     gt: f64,
     pred: f64,

@@ -3,7 +3,7 @@ use deepfusion_geometry::DepthMap;
 use crate::resample::{Axis, sample};
 use crate::{Error, Result};
 
-/// H×W numbers, row by row: depth in metres or disparity in 1/m, as the place it stands in says.
+/// H×W numbers, row by row: depth in metres or disparity in 1/m, depending on where it is used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     width: usize,
@@ -12,10 +12,10 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// From `width * height` values, row by row.
+    /// Makes a grid from `width * height` values, row by row.
     ///
     /// # Errors
-    /// [`Error::Shape`] if the number of values is another one, or zero.
+    /// [`Error::Shape`] if the number of values is different, or zero.
     pub fn new(width: usize, height: usize, values: Vec<f64>) -> Result<Self> {
         if width == 0 || height == 0 || values.len() != width * height {
             return Err(Error::Shape {
@@ -32,7 +32,7 @@ impl Grid {
         })
     }
 
-    /// From single-precision values, as networks give them.
+    /// Makes a grid from single-precision values, as networks produce them.
     ///
     /// # Errors
     /// As [`Grid::new`].
@@ -73,7 +73,7 @@ impl From<&DepthMap> for Grid {
     }
 }
 
-/// What a method predicts for an image, at any size: both kinds score the same.
+/// The prediction for an image, at any size. Depth and the equivalent disparity get the same scores.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Prediction {
     /// Camera z in metres.
@@ -83,7 +83,7 @@ pub enum Prediction {
 }
 
 impl Prediction {
-    /// The array as it was given.
+    /// The array as given.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         match self {
@@ -91,7 +91,7 @@ impl Prediction {
         }
     }
 
-    /// Depth at another size, in metres: resized as disparity, as the protocol does; 0 where there is none.
+    /// Depth in metres at another size: resized as disparity, as in the protocol; 0 where there is no prediction.
     #[must_use]
     pub fn depth_at(&self, width: usize, height: usize) -> DepthMap {
         let mut map = DepthMap::empty(width, height);
@@ -114,7 +114,7 @@ impl Prediction {
         }
     }
 
-    /// Disparity of every pixel in 1/m, `None` where the prediction is not finite and positive, or its inverse is not.
+    /// Disparity of every pixel in 1/m; `None` where the prediction or its inverse is not finite and positive.
     pub(crate) fn disparities(&self) -> Vec<Option<f64>> {
         let usable = |v: f64| v.is_finite() && v > 0.0 && (1.0 / v).is_finite();
         let invert = matches!(self, Self::Depth(_));

@@ -1,18 +1,17 @@
-//! Holes: near things that a method sees far away.
+//! Holes: near things that are predicted far away.
 //!
-//! Depth learned from motion has a failure of its own. An object that moves along with the camera keeps its place in
-//! the image, which is what infinitely far things do, and the photometric loss rewards the network for
-//! saying so. The seven metrics blur that: a car ahead is a few hundred pixels, each as wrong as the clamp
-//! allows. The hole rate counts it.
+//! Depth learned from motion fails in its own way. An object that moves along with the camera keeps its place in the image, like infinitely
+//! distant things, and the photometric loss rewards the network for predicting it far away. The seven metrics hide that: a car ahead is a
+//! few hundred pixels, and clamping limits each one's error. The hole rate counts these pixels.
 
-/// Ground truth nearer than this share of the cap is near (40 m under the usual cap of 80 m).
+/// Ground truth nearer than this share of the cap is near (40 m for the usual cap of 80 m).
 const NEAR: f64 = 0.5;
-/// Predictions from this share of the cap on are at the far limit (72 m).
+/// Predictions at or beyond this share of the cap are at the far limit (72 m).
 const FAR: f64 = 0.9;
-/// Near pixels predicted more than so many times too far are holes, wherever the far limit is.
+/// Near pixels predicted more than this many times too far are holes, whatever the far limit.
 const TIMES: f64 = 3.0;
 
-/// Near pixels of an image, and those of them that are holes.
+/// Near pixels of an image, and the holes among them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Holes {
     near: usize,
@@ -20,8 +19,8 @@ pub(crate) struct Holes {
 }
 
 impl Holes {
-    /// One pixel: depths in metres before clamping and without any scaling; `None` where the method says
-    /// nothing, which is a hole too.
+    /// Adds one pixel: depths in metres before clamping and without any scaling; `None` if there is no prediction, which also counts as a
+    /// hole.
     pub(crate) fn push(&mut self, gt_m: f64, pred_m: Option<f64>, cap_m: f64) {
         if gt_m < NEAR * cap_m {
             self.near += 1;
@@ -30,7 +29,7 @@ impl Holes {
         }
     }
 
-    /// Holes over near pixels; `None` without any.
+    /// Number of holes divided by that of near pixels; `None` without near pixels.
     pub(crate) fn rate(&self) -> Option<f64> {
         (self.near > 0).then(|| self.holes as f64 / self.near as f64)
     }
@@ -56,9 +55,9 @@ mod tests {
         // Three times too far.
         assert_eq!(rate(&[(10.0, Some(30.1))]), Some(1.0));
         assert_eq!(rate(&[(10.0, Some(29.9))]), Some(0.0));
-        // Nothing said.
+        // No prediction.
         assert_eq!(rate(&[(10.0, None)]), Some(1.0));
-        // Too near is an error, and no hole.
+        // Too near is an error, but not a hole.
         assert_eq!(rate(&[(10.0, Some(1.0))]), Some(0.0));
     }
 

@@ -1,27 +1,27 @@
-//! Intervals around a depth, from how sure a network says it is, and whether they hold what they promise.
+//! Intervals around a depth, from a network's own uncertainty, and whether they contain the truth as often as promised.
 //!
-//! A network that errs by b in ln D̂ promises the interval D̂·exp(±q·b). Of a Laplace distribution q = −ln(1 − level);
-//! what a network says is seldom that exact, so q is found on drives that it has not learned from (split conformal
-//! prediction, for each range of depths on its own), and its coverage is measured on others.
+//! A network that predicts the error b of ln D̂ promises the interval D̂·exp(±q·b). For a Laplace distribution q = −ln(1 − level).
+//! Predicted uncertainty is seldom that exact, so q is found on drives that training has not seen (split conformal prediction, separately
+//! for each range of depths), and its coverage is measured on other drives.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::ENDS_M;
 use crate::{Error, IntervalsProblem, LEVELS, Result};
 
-/// A range with fewer pixels than this takes the factors of all ranges together.
+/// A range with fewer pixels than this gets the factors of all ranges together.
 const FEWEST: usize = 200;
 
-/// A pixel of known depth.
+/// A pixel with known depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntervalSample {
-    /// Predicted depth D̂, metres.
+    /// Predicted depth D̂, in metres.
     pub depth_m: f64,
-    /// b, as the network says.
+    /// b, as predicted by the network.
     pub scale: f64,
     /// |ln D̂ − ln D|.
     pub error: f64,
-    /// Number of the drive.
+    /// Index of the drive.
     pub drive: usize,
 }
 
@@ -31,34 +31,34 @@ impl IntervalSample {
     }
 }
 
-/// The factors q of a network.
+/// The interval factors q of a network.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntervalFactors {
-    /// What the factors are for: [`LEVELS`].
+    /// The levels that the factors are for: [`LEVELS`].
     pub levels: [f64; 3],
-    /// By predicted depth, near to far.
+    /// Factors by range of predicted depth, near to far.
     pub ranges: Vec<FactorRange>,
-    /// Drives they were found on.
+    /// Number of drives they were found on.
     pub drives: usize,
-    /// Pixels of them.
+    /// Number of pixels they were found on.
     pub pixels: usize,
 }
 
-/// The factors of a range of predicted depths.
+/// The factors for one range of predicted depths.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FactorRange {
-    /// Its end, metres; absent of the last.
+    /// The range's far end, in metres; absent for the last range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_m: Option<f64>,
     /// q for each level.
     pub factors: [f64; 3],
-    /// Pixels.
+    /// Number of pixels in the range.
     pub pixels: usize,
 }
 
-/// Number of the range of a predicted depth.
+/// Index of the range that a predicted depth belongs to.
 fn range_of(depth_m: f64) -> usize {
     ENDS_M.partition_point(|end| depth_m >= *end)
 }
@@ -67,8 +67,8 @@ fn ends() -> impl Iterator<Item = Option<f64>> {
     ENDS_M.into_iter().map(Some).chain([None])
 }
 
-/// The smallest score that a share `level` of drives' pixels does not exceed, every drive counting as much. Of one drive of n
-/// pixels: the ⌈(n + 1)·level⌉-th smallest, or the greatest where there is none such.
+/// The smallest score that a share `level` of the drives' pixels does not exceed, with equal weight for every drive. For one drive with n
+/// pixels this is the ⌈(n + 1)·level⌉-th smallest score, or the largest one if n is too small.
 fn conformal(samples: &[&IntervalSample], level: f64) -> f64 {
     let mut counts = std::collections::BTreeMap::<usize, usize>::new();
     for sample in samples {
@@ -84,7 +84,7 @@ fn conformal(samples: &[&IntervalSample], level: f64) -> f64 {
     let mut sum = 0.0;
     for (score, weight) in &scores {
         sum += weight;
-        // Weights of many drives do not add up to whole numbers exactly.
+        // The weights of many drives do not add up exactly to whole numbers.
         if sum >= wanted - 1e-9 * n {
             return *score;
         }
@@ -93,7 +93,7 @@ fn conformal(samples: &[&IntervalSample], level: f64) -> f64 {
 }
 
 impl IntervalFactors {
-    /// Those of a Laplace distribution: the network is taken at its word.
+    /// The factors of a Laplace distribution: the network's uncertainty is taken as it is.
     #[must_use]
     pub fn uncalibrated() -> Self {
         let factors = LEVELS.map(|level| -(1.0 - level).ln());
@@ -111,7 +111,7 @@ impl IntervalFactors {
         }
     }
 
-    /// Found on drives that the network has not learned from; `None` without a pixel.
+    /// Finds the factors on drives that training has not seen; `None` without any pixel.
     #[must_use]
     pub fn calibrate(samples: &[IntervalSample]) -> Option<Self> {
         let all: Vec<&IntervalSample> = samples.iter().filter(|s| s.score().is_finite()).collect();
@@ -143,16 +143,16 @@ impl IntervalFactors {
         })
     }
 
-    /// Whether they were found on data.
+    /// Whether the factors were found on data.
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
         self.pixels > 0
     }
 
-    /// Checks what was read from a file.
+    /// Checks factors read from a file.
     ///
     /// # Errors
-    /// [`Error::Intervals`] for other levels or ranges than this program's, or factors that are no positive numbers.
+    /// [`Error::Intervals`] for levels or ranges other than this version's, or for factors that are negative or not finite.
     pub fn validate(&self) -> Result<()> {
         let fail = |reason| Err(Error::Intervals { reason });
         if self.levels != LEVELS {
@@ -168,20 +168,20 @@ impl IntervalFactors {
         }
     }
 
-    /// q of a predicted depth, for each level.
+    /// The factors q for a predicted depth, one per level.
     #[must_use]
     pub fn at(&self, depth_m: f64) -> [f64; 3] {
         let range = range_of(depth_m).min(self.ranges.len().saturating_sub(1));
         self.ranges.get(range).map_or([0.0; 3], |r| r.factors)
     }
 
-    /// How much wider or narrower than the network says the 80 % interval of a predicted depth is.
+    /// How much wider the 80 % interval of a predicted depth is than the network's own (below 1: narrower).
     #[must_use]
     pub fn stretch(&self, depth_m: f64) -> f64 {
         self.at(depth_m)[1] / -(1.0 - LEVELS[1]).ln()
     }
 
-    /// What the intervals hold of these pixels, every drive counting as much; `None` without a pixel.
+    /// Coverage and width of the intervals on these pixels, with equal weight for every drive; `None` without any pixel.
     #[must_use]
     pub fn measure(&self, samples: &[IntervalSample]) -> Option<Intervals> {
         let of = |samples: &[&IntervalSample]| -> Vec<IntervalRow> {
@@ -238,44 +238,44 @@ impl IntervalFactors {
     }
 }
 
-/// Whether intervals hold what they promise.
+/// Coverage and width of a network's intervals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Intervals {
-    /// Whether the network's word was corrected on held-out drives first.
+    /// Whether the network's uncertainty was calibrated on held-out drives first.
     pub calibrated: bool,
-    /// Whether that was done on these very pixels: they then hold what they promise, whatever others do.
+    /// Whether it was calibrated on these very pixels. Then the coverage is right by construction and proves nothing.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub in_sample: bool,
-    /// Pixels.
+    /// Number of pixels.
     pub n: usize,
-    /// For each level.
+    /// Results for each level.
     pub levels: Vec<IntervalRow>,
-    /// The same by predicted depth.
+    /// Results by range of predicted depth.
     pub ranges: Vec<IntervalRange>,
 }
 
-/// What the intervals of a level hold.
+/// Coverage and width of the intervals of one level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct IntervalRow {
-    /// The share that they promise.
+    /// The share of pixels that the intervals should contain.
     pub level: f64,
-    /// The share of the pixels whose true depth is within; the mean over drives.
+    /// The share of pixels whose true depth is inside; the mean over drives.
     pub coverage: f64,
-    /// Width over predicted depth, the mean.
+    /// Mean of the interval's width divided by the predicted depth.
     pub width_rel: f64,
 }
 
-/// The same of a range of predicted depths.
+/// Results for one range of predicted depths.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IntervalRange {
-    /// From, metres.
+    /// Near end of the range, in metres.
     pub from_m: f64,
-    /// To, metres; absent of the last.
+    /// Far end of the range, in metres; absent for the last range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_m: Option<f64>,
-    /// Pixels.
+    /// Number of pixels.
     pub n: usize,
-    /// For each level.
+    /// Results for each level.
     pub levels: Vec<IntervalRow>,
 }
 
@@ -283,7 +283,7 @@ pub struct IntervalRange {
 mod tests {
     use super::*;
 
-    /// Errors of a Laplace distribution of scale `true_scale`, by its quantiles, of a network that says `said`.
+    /// Quantiles of a Laplace distribution with scale `true_scale` as errors, from a network that predicts the scale `said`.
     fn samples(
         n: usize,
         true_scale: f64,
@@ -314,7 +314,7 @@ mod tests {
             })
             .collect();
         let all: Vec<&IntervalSample> = drive.iter().collect();
-        // ⌈(9 + 1)·level⌉-th smallest: the 5th, the 8th, and of 10 there is none.
+        // ⌈(9 + 1)·level⌉-th smallest: the 5th, the 8th, and the 10th does not exist.
         for (level, expected) in [(0.5, 0.5), (0.8, 0.8), (0.95, 0.9), (0.41, 0.5)] {
             assert_eq!(conformal(&all, level), expected, "{level}");
         }
@@ -332,12 +332,12 @@ mod tests {
             assert!((found.at(15.0)[i] / said.at(15.0)[i] - 1.0).abs() < 2e-3);
         }
         assert!((found.stretch(15.0) - 1.0).abs() < 2e-3);
-        // Half of all errors are below b·ln 2: the interval is 2·sinh of that wide.
+        // Half of all errors are below b·ln 2: the interval's relative width is 2·sinh(b·ln 2).
         let width = 2.0 * (0.2 * 2f64.ln()).sinh();
         assert!((measured.levels[0].width_rel - width).abs() < 1e-9);
     }
 
-    /// Too sure near, too unsure far: each range is corrected on its own, and other drives of the kind are covered.
+    /// Overconfident near, underconfident far: each range is corrected separately, and other drives of the same kind are covered.
     #[test]
     fn each_range_is_corrected_and_each_drive_counts_as_much() {
         let drive = |number| {
@@ -358,7 +358,7 @@ mod tests {
         for row in measured.ranges.iter().flat_map(|r| &r.levels) {
             assert!((row.coverage - row.level).abs() < 2e-3, "{row:?}");
         }
-        // A long drive that errs twice as much as a short one weighs no more than it.
+        // A long drive with twice the errors has the same weight as a short one.
         let mut uneven = samples(9_000, 0.2, 0.1, 5.0, 0);
         uneven.extend(samples(500, 0.1, 0.1, 5.0, 1));
         let measured = IntervalFactors::uncalibrated().measure(&uneven).unwrap();
@@ -366,7 +366,7 @@ mod tests {
         assert!((measured.levels[0].coverage - expected).abs() < 5e-3);
     }
 
-    /// The key is there only where it says something; files of before are without it.
+    /// The key is written only if it is true; older files lack it.
     #[test]
     fn the_pixels_of_the_calibration_are_marked() {
         let drive = samples(500, 0.2, 0.1, 5.0, 0);

@@ -2,13 +2,13 @@
 //!
 //! For each image, pass a [`Prediction`] (depth or disparity, of any size) and a ground-truth [`Grid`] to [`Evaluator::add`].
 //! [`Evaluator::report`] then gives the [`Report`]: its JSON is for scripts, its `Display` is a table for people. [`MeanDepthBaseline`]
-//! makes the row that any useful network must beat: the mean depth of each pixel over the training scans. Where the ground truth is dense,
-//! [`Sharpness`] measures how sharp boundaries are. [`odometry`] compares the camera's trajectories, [`verdict`] evaluates what a drive shows
-//! without ground truth, and [`compare`] puts evaluations side by side, and next to the field's published tables.
+//! gives the score that any useful network must beat: that of the mean depth of each pixel over the training scans. If the ground truth is
+//! dense, [`Sharpness`] measures how sharp boundaries are. [`odometry`] compares the camera's trajectories, [`verdict`] evaluates depth
+//! without ground truth, and [`compare`] puts evaluations next to each other and to the field's published tables.
 //!
 //! # Conventions
-//! Depth is camera z in metres. Ground truth of 0 (or NaN, or negative) means none, infinity means beyond every range. Disparity is
-//! 1/depth in 1/m. Arrays are H×W, row by row. All arithmetic is in `f64`, whatever type the files have.
+//! Depth is camera z in metres. Ground truth of 0 (or NaN, or negative) means none, infinity means beyond every range. Disparity is 1/depth
+//! in 1/m. Arrays are H×W, row by row. All arithmetic is in `f64`, whatever number type the files contain.
 
 mod array_set;
 pub mod compare;

@@ -3,11 +3,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::{Error, Grid, Result};
 
-/// Depth where no scan of the training data ever saw anything on a row, in metres: the usual cap.
+/// Depth for rows in which no training scan has a point, in metres: the usual cap.
 const EMPTY_ROW_M: f64 = 80.0;
 
-/// The mean-depth baseline: the mean depth of each pixel over the training data's scans, a pixel without any taking
-/// its row's mean, a row without any 80 m. An image that is itself among the scans is evaluated without its own scan.
+/// The mean-depth baseline: the mean depth of each pixel over the training scans. A pixel without any depth gets its row's mean, a row
+/// without any depth gets 80 m. An image that is itself among the scans is evaluated without its own scan.
 #[derive(Debug, Clone, Default)]
 pub struct MeanDepthBaseline {
     size: Option<(usize, usize)>,
@@ -17,14 +17,14 @@ pub struct MeanDepthBaseline {
 }
 
 impl MeanDepthBaseline {
-    /// A baseline without any scan.
+    /// A baseline without any scans.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a scan: depth in metres, 0 = none. Its size is the first scan's or another one, which is then brought to the
-    /// first scan's (drives differ by a few pixels): each pixel goes where its centre lies.
+    /// Adds a scan: depth in metres, 0 = none. A scan of another size than the first one (drives differ by a few pixels) is converted to
+    /// that size: each pixel goes to the pixel that contains its centre.
     pub fn add_scan(&mut self, scan: &Grid) {
         let (width, height) = *self.size.get_or_insert((scan.width(), scan.height()));
         if self.count.is_empty() {
@@ -39,17 +39,17 @@ impl MeanDepthBaseline {
         }
     }
 
-    /// How many different scans it has.
+    /// Number of distinct scans.
     #[must_use]
     pub fn scans(&self) -> usize {
         self.scans.len()
     }
 
-    /// The baseline's depth in metres, at the first scan's size, for the image whose ground truth is `own`: where that
-    /// very scan was added, it is left out.
+    /// The baseline's depth in metres, at the first scan's size, for the image whose ground truth is `own`: if the same scan was added, it
+    /// is left out.
     ///
     /// # Errors
-    /// [`Error::NothingToEvaluate`] where no scan was added.
+    /// [`Error::NothingToEvaluate`] if no scan was added.
     pub fn depth_for(&self, own: Option<&Grid>) -> Result<Grid> {
         let (width, height) = self.size.ok_or(Error::NothingToEvaluate {
             skipped: 0,
@@ -76,9 +76,9 @@ impl MeanDepthBaseline {
     }
 }
 
-/// Calls `f` with the index in a map of `size` (width, height) and the depth of every pixel that has one.
+/// Calls `f` with the depth of every pixel that has one, and its index in a map of `size` (width, height).
 fn for_each_depth(scan: &Grid, (width, height): (usize, usize), mut f: impl FnMut(usize, f64)) {
-    // (i + ½)·to/from, rounded down, in whole numbers: the pixel in which the centre lies.
+    // (i + ½)·to/from, rounded down, in integer arithmetic: the pixel that contains the centre.
     let place = |i: usize, from: usize, to: usize| (2 * i + 1) * to / (2 * from);
     for (index, &depth_m) in scan.values().iter().enumerate() {
         if depth_m > 0.0 && depth_m.is_finite() {
@@ -89,7 +89,7 @@ fn for_each_depth(scan: &Grid, (width, height): (usize, usize), mut f: impl FnMu
     }
 }
 
-/// Tells scans apart by their content, so that a scan is recognised whatever its file or frame is called.
+/// Identifies scans by their content, so that a scan is recognised whatever its file or frame is called.
 fn fingerprint(scan: &Grid) -> u64 {
     let mut hasher = DefaultHasher::new();
     (scan.width(), scan.height()).hash(&mut hasher);

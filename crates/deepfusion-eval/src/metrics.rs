@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-/// The field's seven numbers. Errors: lower is better; accuracies a1…a3: higher is.
+/// The field's seven metrics. Errors: lower is better; accuracies a1…a3: higher is better.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Metrics {
     /// mean |gt − pred| / gt.
@@ -13,15 +13,15 @@ pub struct Metrics {
     pub rmse_log: f64,
     /// Share of pixels with max(gt/pred, pred/gt) < 1.25.
     pub a1: f64,
-    /// … < 1.25².
+    /// Share of pixels with max(gt/pred, pred/gt) < 1.25².
     pub a2: f64,
-    /// … < 1.25³.
+    /// Share of pixels with max(gt/pred, pred/gt) < 1.25³.
     pub a3: f64,
 }
 
 impl Metrics {
-    /// Metrics of pixels: `ground_truth[i]` and `prediction[i]` are depths in metres, all above 0. `None` without any
-    /// pixel; the longer slice is cut to the shorter.
+    /// Metrics over pixels: `ground_truth[i]` and `prediction[i]` are depths in metres, all above 0. `None` without any pixel. If the
+    /// slices differ in length, the longer one is cut.
     #[must_use]
     pub fn of(ground_truth: &[f64], prediction: &[f64]) -> Option<Self> {
         let mut sums = Sums::default();
@@ -31,7 +31,7 @@ impl Metrics {
         sums.metrics()
     }
 
-    /// The mean of several images' metrics, which is what the field's tables print; `None` of none.
+    /// The mean of several images' metrics, which the field's tables print; `None` without images.
     #[must_use]
     pub fn mean<'a>(images: impl IntoIterator<Item = &'a Metrics>) -> Option<Self> {
         let mut total = [0.0; 7];
@@ -45,7 +45,7 @@ impl Metrics {
         (n > 0).then(|| Self::from_array(total.map(|sum| sum / n as f64)))
     }
 
-    /// In the order of the field's tables: abs_rel, sq_rel, rmse, rmse_log, a1, a2, a3.
+    /// The values in the order of the field's tables: abs_rel, sq_rel, rmse, rmse_log, a1, a2, a3.
     #[must_use]
     pub fn to_array(&self) -> [f64; 7] {
         [
@@ -59,7 +59,7 @@ impl Metrics {
         ]
     }
 
-    /// Their names, in the same order.
+    /// The names in the same order.
     pub const NAMES: [&'static str; 7] =
         ["abs_rel", "sq_rel", "rmse", "rmse_log", "a1", "a2", "a3"];
 
@@ -88,7 +88,7 @@ pub(crate) struct Sums {
 }
 
 impl Sums {
-    /// One pixel: depths in metres, both above 0.
+    /// Adds one pixel: depths in metres, both above 0.
     pub(crate) fn push(&mut self, gt: f64, pred: f64) {
         let difference = gt - pred;
         self.n += 1;

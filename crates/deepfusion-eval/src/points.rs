@@ -5,27 +5,27 @@ use deepfusion_geometry::Intrinsics;
 
 use crate::statistics::{mean, standard_deviation};
 
-/// A point that was drawn at random among the compared pixels, in the camera's axes (x right, y down, z forward), metres.
+/// A point drawn at random among the compared pixels, in the camera frame (x right, y down, z forward), in metres.
 ///
-/// All three places lie on the ray through the pixel's centre, for the ground truth is known by its depth at the pixel.
-/// Where in the pixel the LiDAR's beam met the scene is not kept (half a pixel is 0.06 m at 80 m with KITTI's camera).
-/// Predictions are clamped to the protocol's range, as for the metrics. Without a camera x and y are 0.
+/// All three positions lie on the ray through the pixel's centre, because the ground truth is known only as a depth per pixel. Where in the
+/// pixel the LiDAR's beam hit is not stored (half a pixel is 0.06 m at 80 m with KITTI's camera). Predictions are clamped to the protocol's
+/// range, as for the metrics. Without a camera, x and y are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawnPoint {
-    /// The number of its image, in the order in which images came.
+    /// Index of the image, in the order they were added.
     pub image: usize,
-    /// Its column and row.
+    /// The pixel's column and row.
     pub pixel: [usize; 2],
-    /// The true place.
+    /// True position.
     pub truth: [f64; 3],
-    /// The predicted place.
+    /// Predicted position.
     pub predicted: [f64; 3],
-    /// The predicted place after the image's depth was multiplied by median(gt) / median(prediction).
+    /// Predicted position after the image's depth was multiplied by median(gt) / median(prediction).
     pub median_scaled: [f64; 3],
 }
 
 impl DrawnPoint {
-    /// At pixel (`u`, `v`), from depths in metres: P = D·K⁻¹·(u, v, 1)ᵀ (the paper's Eq. 3).
+    /// The point at pixel (`u`, `v`), from depths in metres: P = D·K⁻¹·(u, v, 1)ᵀ (the paper's Eq. 3).
     pub(crate) fn new(
         image: usize,
         camera: Option<&Intrinsics>,
@@ -45,13 +45,13 @@ impl DrawnPoint {
         }
     }
 
-    /// Euclidean distance of the predicted place from the true one, in metres.
+    /// Euclidean distance between the predicted and the true position, in metres.
     #[must_use]
     pub fn distance_m(&self) -> f64 {
         distance(&self.predicted, &self.truth)
     }
 
-    /// The same after median scaling.
+    /// The same distance after median scaling.
     #[must_use]
     pub fn median_scaled_distance_m(&self) -> f64 {
         distance(&self.median_scaled, &self.truth)
@@ -62,10 +62,10 @@ fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (Vector3::from(*a) - Vector3::from(*b)).norm()
 }
 
-/// Distances in metres between drawn predicted points and their true places (the paper's Fig. 11).
+/// Distances in metres between the predicted and true positions of drawn points (the paper's Fig. 11).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PointErrors {
-    /// How many points.
+    /// Number of points.
     pub n: usize,
     /// Mean distance; `None` without points.
     pub mean_m: Option<f64>,
@@ -73,14 +73,14 @@ pub struct PointErrors {
     pub std_m: Option<f64>,
     /// Standard error of the mean, `std_m` / √n, as if the points were independent; `None` for fewer than two points.
     pub sem_m: Option<f64>,
-    /// Standard error that takes images as the independent units: the points of an image err together. √(G/(G−1) Σ_g
-    /// (Σ_{i∈g} (d_i − mean))²) / n over G images; `None` for fewer than two.
+    /// Standard error with images as the independent units, since the errors within an image are correlated: √(G/(G−1) Σ_g (Σ_{i∈g} (d_i −
+    /// mean))²) / n over G images. `None` for fewer than two images.
     #[serde(default)]
     pub sem_images_m: Option<f64>,
 }
 
 impl PointErrors {
-    /// Of distances, each with the number of its image.
+    /// The statistics of distances, each with the index of its image.
     #[must_use]
     pub fn of(distances: &[(usize, f64)]) -> Self {
         let values: Vec<f64> = distances.iter().map(|(_, d)| *d).collect();
@@ -109,43 +109,43 @@ fn error_by_image(distances: &[(usize, f64)], mean: f64) -> Option<f64> {
     })
 }
 
-/// Point statistics of true depths in [`from_m`, `to_m`).
+/// Point statistics for true depths in [`from_m`, `to_m`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PointRange {
-    /// From, in metres of depth.
+    /// Lower limit of the true depth, in metres.
     pub from_m: u32,
-    /// Up to, in metres of depth.
+    /// Upper limit of the true depth, in metres.
     pub to_m: u32,
-    /// The predictions as they are.
+    /// Statistics of the unchanged predictions.
     #[serde(flatten)]
     pub unscaled: PointErrors,
-    /// After median scaling.
+    /// Statistics after median scaling.
     pub median_scaled: PointErrors,
 }
 
-/// What the drawn points say (the paper's Fig. 10–11 and Table 2). Drawn uniformly over all compared pixels: ranges hold
-/// as many points as they have ground truth.
+/// Results of the drawn points (the paper's Fig. 10–11 and Table 2). Points are drawn uniformly from all compared pixels, so each range
+/// contains them in proportion to its ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Points {
-    /// The predictions as they are.
+    /// Statistics of the unchanged predictions.
     #[serde(flatten)]
     pub unscaled: PointErrors,
-    /// After each image's depth was multiplied by median(gt) / median(prediction).
+    /// Statistics after each image's depth was multiplied by median(gt) / median(prediction).
     #[serde(default)]
     pub median_scaled: PointErrors,
-    /// Whether the camera was known for all, so that distances are those in space; else along z.
+    /// Whether all cameras were known, so that distances are in space; otherwise they are along z.
     #[serde(default)]
     pub in_space: bool,
-    /// The seed they were drawn with.
+    /// The seed of the random draw.
     #[serde(default)]
     pub seed: u64,
-    /// By true depth.
+    /// Statistics by true depth.
     #[serde(default)]
     pub ranges: Vec<PointRange>,
 }
 
 impl Points {
-    /// Statistics of drawn points; `edges_m` are the borders of the range bins. `None` without points.
+    /// Statistics of drawn points; `edges_m` are the limits of the depth ranges. `None` without points.
     pub(crate) fn of(
         points: &[DrawnPoint],
         edges_m: &[u32],

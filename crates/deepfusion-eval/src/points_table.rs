@@ -1,10 +1,10 @@
-//! The drawn points as a table, for figures of one's own: the paper's Table 2 and Fig. 10.
+//! The drawn points as a table, for making one's own figures: the paper's Table 2 and Fig. 10.
 
 use crate::compare::Result;
 use crate::{DrawnPoint, ImageScore};
 
-/// Columns of a drawn pixel. Places are in the camera's axes (x right, y down, z forward), metres; `scaled` is after each image's depth
-/// was multiplied by median(gt) / median(prediction).
+/// The columns. Positions are in the camera frame (x right, y down, z forward), in metres. `scaled` is after each image's depth was
+/// multiplied by median(gt) / median(prediction).
 const HEADER: [&str; 16] = [
     "image",
     "u",
@@ -24,11 +24,11 @@ const HEADER: [&str; 16] = [
     "scaled_abs_rel",
 ];
 
-/// Drawn points as CSV, a row each in the order in which they were drawn; `images` are those they are of. Without the camera (`in_space` is
-/// false) x and y are empty and errors are those along z.
+/// Drawn points as CSV, one row each, in the order they were drawn. `images` are the images they come from. Without a camera (`in_space` is
+/// false), x and y are empty and errors are along z.
 ///
 /// # Errors
-/// What the CSV writer says.
+/// The CSV writer's errors.
 pub fn points_csv(points: &[DrawnPoint], images: &[ImageScore], in_space: bool) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(HEADER)?;

@@ -1,21 +1,21 @@
-//! Test-time augmentation: one depth of several predictions of an image.
+//! Test-time augmentation: one depth from several predictions of an image.
 
 use serde::{Deserialize, Serialize};
 
-/// Several predictions of each image, whose disparities become one.
+/// Test-time augmentation: the disparities of several predictions of an image are averaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PostProcess {
-    /// The image and the mirrored image, as Monodepth2's post-processed rows have it; at twice the time.
+    /// The image and the mirrored image, as in Monodepth2's post-processed rows; takes twice the time.
     Flip,
-    /// A smaller input and a larger one; at two to two and a half times the time.
+    /// A smaller and a larger input; takes two to two and a half times the time.
     MultiScale,
-    /// The same, each mirrored as well; at four to five times the time.
+    /// A smaller and a larger input, both also mirrored; takes four to five times the time.
     MultiScaleFlip,
 }
 
 impl PostProcess {
-    /// All of them.
+    /// All variants.
     pub const ALL: [Self; 3] = [Self::Flip, Self::MultiScale, Self::MultiScaleFlip];
 
     /// Its name on the command line and in files.
@@ -28,18 +28,18 @@ impl PostProcess {
         }
     }
 
-    /// What it does, and what that takes, for the reader of a table.
+    /// What it does and costs, for the reader of a table.
     #[must_use]
     pub fn explained(self) -> &'static str {
         match self {
             Self::Flip => {
-                "the mean with the mirrored image's prediction, which takes two passes of the network"
+                "averaged with the mirrored image's prediction, which takes two passes of the network"
             }
             Self::MultiScale => {
-                "the mean of a smaller input's and a larger one's prediction, which takes two passes of the network"
+                "average of predictions at a smaller and a larger input size, which takes two passes of the network"
             }
             Self::MultiScaleFlip => {
-                "the mean of a smaller input's and a larger one's prediction and of the mirrored images', which takes four passes of the network"
+                "average of predictions at a smaller and a larger input size, also mirrored, which takes four passes of the network"
             }
         }
     }

@@ -9,7 +9,7 @@ pub enum Crop {
     /// The whole image.
     #[default]
     None,
-    /// Garg et al.'s window, the field's default for KITTI raw.
+    /// The crop of Garg et al., the field's default for KITTI raw.
     Garg,
 }
 
@@ -23,8 +23,8 @@ impl Crop {
         }
     }
 
-    /// Rows and columns that are compared in an image of `width` × `height`: half-open ranges of whole pixels, the
-    /// fractions truncated as the field's scripts do.
+    /// The rows and columns compared in an image of `width` × `height`: half-open ranges of whole pixels. Fractions are truncated, as in
+    /// the field's scripts.
     #[must_use]
     pub fn window(
         self,
@@ -44,43 +44,43 @@ impl Crop {
     }
 }
 
-/// Which scaling heads the report. Unscaled and median-scaled metrics are always both reported.
+/// The scaling of the headline metrics. Unscaled and median-scaled metrics are always both reported.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Scaling {
     /// Metres as predicted: the headline of a metric method.
     #[default]
     None,
-    /// Each prediction times median(gt) / median(prediction).
+    /// Each prediction is multiplied by median(gt) / median(prediction).
     Median,
-    /// Each prediction times this factor; reported as a row of its own.
+    /// Each prediction is multiplied by this factor; reported as an additional row.
     Fixed(f64),
 }
 
-/// What to do with predicted values that are no depth (NaN, infinite, zero or negative).
+/// What to do with predicted values that are not valid depths (NaN, infinite, zero or negative).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Holes {
-    /// An error that names the array: the default, since a network has no holes.
+    /// Report an error that names the image: the default, since networks produce no holes.
     #[default]
     Refuse,
-    /// They mean "no prediction here": left out of the metrics and counted in `missing_rate`.
+    /// Treat them as "no prediction": left out of the metrics and counted in `missing_rate`.
     Skip,
 }
 
-/// Which depth the ground truth holds.
+/// The kind of depth in the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum GroundTruth {
     /// Camera z.
     #[default]
     Z,
-    /// The velodyne's forward distance, as in the field's `eigen` files.
+    /// Forward distance from the velodyne, as in the field's `eigen` files.
     Velodyne,
-    /// KITTI's annotated depth (camera z, eleven scans gathered and checked against stereo): the field's `eigen_benchmark`.
+    /// KITTI's annotated depth (camera z, accumulated over eleven scans and checked against stereo): the field's `eigen_benchmark`.
     Annotated,
 }
 
 impl GroundTruth {
-    /// What it is, in words.
+    /// A description in words.
     #[must_use]
     pub fn meaning(self) -> &'static str {
         match self {
@@ -96,19 +96,19 @@ impl GroundTruth {
 pub struct Protocol {
     /// The part of the image that is compared.
     pub crop: Crop,
-    /// Ground truth at or beyond this is left out, predictions are clamped to it. Metres.
+    /// Ground truth at or beyond this depth is left out, and predictions are clamped to it. In metres.
     pub cap_m: f64,
-    /// Ground truth at or below this is left out, predictions are clamped to it. Metres, above 0.
+    /// Ground truth at or below this depth is left out, and predictions are clamped to it. In metres, above 0.
     pub min_m: f64,
-    /// Which depth the ground truth holds; only recorded.
+    /// The kind of depth in the ground truth; only recorded.
     pub gt: GroundTruth,
-    /// Which scaling heads the report.
+    /// The scaling of the headline metrics.
     pub scaling: Scaling,
-    /// What to do with predicted values that are no depth.
+    /// What to do with predicted values that are not valid depths.
     pub holes: Holes,
-    /// How many pixels to draw for the point statistics (the paper's Fig. 11); 0 = none.
+    /// Number of pixels drawn for the point statistics (the paper's Fig. 11); 0 = none.
     pub points: usize,
-    /// Seed of the drawn points.
+    /// Seed for drawing the points.
     pub points_seed: u64,
     /// Seed of the bootstrap.
     pub seed: u64,
@@ -132,10 +132,10 @@ impl Default for Protocol {
 }
 
 impl Protocol {
-    /// Checks that something can be measured with it.
+    /// Checks that the protocol can measure something.
     ///
     /// # Errors
-    /// [`Error::Protocol`] naming the field.
+    /// [`Error::Protocol`], naming the field.
     pub fn validate(&self) -> Result<()> {
         let fail = |field, value: f64, expected| {
             Err(Error::Protocol {

@@ -1,9 +1,9 @@
-/// Bilinear sampling with half-pixel centres, as OpenCV's `INTER_LINEAR`: destination pixel x lies at
-/// (x + ½)·source/destination − ½, beyond the border the border's value, no antialiasing.
+/// Bilinear sampling with half-pixel centres, as OpenCV's `INTER_LINEAR`: destination pixel x lies at (x + ½)·source/destination − ½.
+/// Border values are repeated beyond the border. No antialiasing.
 #[derive(Debug, Clone)]
 pub(crate) struct Axis(Vec<Tap>);
 
-/// The two source pixels of a destination pixel, and the second one's weight.
+/// The two source pixels that contribute to a destination pixel, and the second one's weight.
 #[derive(Debug, Clone, Copy)]
 struct Tap {
     first: usize,
@@ -12,7 +12,7 @@ struct Tap {
 }
 
 impl Axis {
-    /// From `source` to `destination` pixels, both at least 1.
+    /// Maps `destination` pixels to `source` pixels; both sizes are at least 1.
     pub(crate) fn new(source: usize, destination: usize) -> Self {
         let scale = source as f64 / destination as f64;
         let last = source - 1;
@@ -32,7 +32,7 @@ impl Axis {
     }
 }
 
-/// The resized value at (`x`, `y`); `values` is `width` wide. `None` where a pixel that contributes is a hole.
+/// The resized value at (`x`, `y`); `values` is `width` wide. `None` if a contributing pixel is a hole.
 pub(crate) fn sample(
     values: &[Option<f64>],
     width: usize,
@@ -55,7 +55,7 @@ pub(crate) fn sample(
     blend(on_row(row.first), on_row(row.second), row.weight)
 }
 
-/// a + (b − a)·weight; what has no weight may be a hole.
+/// a + (b − a)·weight; a value with weight 0 may be a hole.
 fn blend(a: Option<f64>, b: Option<f64>, weight: f64) -> Option<f64> {
     if weight == 0.0 {
         return a;

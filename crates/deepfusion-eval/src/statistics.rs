@@ -1,5 +1,4 @@
-/// The median, the mean of the two middle values where their number is even (as NumPy); `None` of none.
-/// NaN sorts last.
+/// The median; for an even number of values the mean of the two middle ones, as in NumPy. `None` without values. NaN sorts last.
 #[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     if values.is_empty() {
@@ -16,12 +15,12 @@ pub fn median(values: &[f64]) -> Option<f64> {
     Some((lower + upper) / 2.0)
 }
 
-/// The arithmetic mean; `None` of none.
+/// The arithmetic mean; `None` without values.
 pub(crate) fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The standard deviation, with `freedom` degrees of freedom taken off the count; `None` where none are left.
+/// The standard deviation: the squared deviations are divided by the count minus `freedom`. `None` if that is not positive.
 pub(crate) fn standard_deviation(values: &[f64], freedom: usize) -> Option<f64> {
     let centre = mean(values)?;
     let n = values.len().checked_sub(freedom).filter(|n| *n > 0)?;
@@ -29,8 +28,8 @@ pub(crate) fn standard_deviation(values: &[f64], freedom: usize) -> Option<f64> 
     Some((squares / n as f64).sqrt())
 }
 
-/// The 95 % interval of the mean by percentile bootstrap: resampled with replacement 10,000 times. `None` below two
-/// values, which say nothing about their spread.
+/// The 95 % interval of the mean by percentile bootstrap: 10,000 resamples with replacement. `None` for fewer than two values, which have
+/// no spread.
 pub(crate) fn bootstrap_mean_ci95(values: &[f64], seed: u64) -> Option<[f64; 2]> {
     const RESAMPLES: usize = 10_000;
     if values.len() < 2 {
@@ -50,8 +49,8 @@ pub(crate) fn bootstrap_mean_ci95(values: &[f64], seed: u64) -> Option<[f64; 2]>
     Some([percentile(0.025), percentile(0.975)])
 }
 
-/// Vigna's SplitMix64: eight lines whose sequence never changes with a dependency's version, so that a report can be
-/// reproduced years later.
+/// Vigna's SplitMix64. With our own eight lines, the sequence does not change with a dependency's version, so a report can be reproduced
+/// years later.
 #[derive(Debug, Clone)]
 pub(crate) struct SplitMix64(pub(crate) u64);
 
@@ -63,7 +62,7 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// A number in [0, `n`), n ≥ 1 (its bias, below n / 2⁶⁴, does not matter here).
+    /// A random number in [0, `n`), n ≥ 1 (its bias, below n / 2⁶⁴, does not matter here).
     pub(crate) fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.next()) * n as u128) >> 64) as usize
     }
@@ -88,7 +87,7 @@ impl<T> Reservoir<T> {
         }
     }
 
-    /// One more item of the stream; it is only made where it is kept.
+    /// Takes one more item of the stream; `make` is called only if the item is kept.
     pub(crate) fn push(&mut self, item: impl FnOnce() -> T) {
         self.seen += 1;
         if self.items.len() < self.capacity {
@@ -109,7 +108,7 @@ mod tests {
 
     #[test]
     fn splitmix_gives_its_published_sequence() {
-        // The first outputs for seed 1234567 in Vigna's reference implementation's test (also Rosetta Code).
+        // The first outputs for seed 1234567 according to the test of Vigna's reference implementation (also on Rosetta Code).
         let mut random = SplitMix64(1_234_567);
         assert_eq!(random.next(), 6_457_827_717_110_365_317);
         assert_eq!(random.next(), 3_203_168_211_198_807_973);
@@ -117,7 +116,7 @@ mod tests {
 
     #[test]
     fn the_bootstrap_interval_has_the_width_theory_says() {
-        // 400 values of known spread: ±1.96 σ/√n, the resampling noise of the percentiles is about 3 %.
+        // 400 values of known spread: the interval is ±1.96 σ/√n; the resampling noise of the percentiles is about 3 %.
         let mut random = SplitMix64(3);
         let values: Vec<f64> = (0..400)
             .map(|_| random.below(1_000_000) as f64 / 1e6)
@@ -142,7 +141,7 @@ mod tests {
             assert_eq!(reservoir.items.len(), 5);
             reservoir.items.iter().for_each(|i| hits[*i as usize] += 1);
         }
-        // 500 expected each; σ ≈ 19, so ±100 is beyond five sigma.
+        // 500 of each are expected; σ ≈ 19, so ±100 is more than five sigma.
         assert!(hits.iter().all(|h| (400..600).contains(h)), "{hits:?}");
     }
 

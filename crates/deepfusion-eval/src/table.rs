@@ -6,7 +6,7 @@ use deepfusion_hint::count_of;
 const LABEL: usize = 22;
 
 impl fmt::Display for Report {
-    /// The tables for people: rows side by side, then the scale, then the ranges.
+    /// The tables for people: metrics row by row, then the scale, then the ranges.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let crop = match self.protocol.crop {
             Crop::None => "whole image",
@@ -62,7 +62,7 @@ impl Report {
         if let Some(fixed) = &self.fixed_scaled {
             row(f, &format!("scaled by {}", fixed.factor), &fixed.metrics)?;
         }
-        // Where nothing moves, the static row would only repeat the first.
+        // Without dynamic pixels, the static row would only repeat the first.
         if let Some(metrics) = &self.moving {
             if let Some(still) = &self.still {
                 row(f, "static (labelled)", still)?;
@@ -125,19 +125,19 @@ impl Report {
     }
 }
 
-/// A line a level.
+/// One line per level.
 fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Result {
     let whose = if intervals.in_sample {
         "the pixels they were calibrated on"
     } else if intervals.calibrated {
         "calibrated"
     } else {
-        "as the network says, not calibrated"
+        "as predicted, not calibrated"
     };
     for row in &intervals.levels {
         writeln!(
             f,
-            "sure    the {:.0} % intervals hold {:.1} % of the pixels, {:.0} % of the depth wide ({whose})",
+            "sure    the {:.0} % intervals contain the truth for {:.1} % of the pixels; width {:.0} % of the depth ({whose})",
             100.0 * row.level,
             100.0 * row.coverage,
             100.0 * row.width_rel,
@@ -146,7 +146,7 @@ fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Res
     Ok(())
 }
 
-/// What truth without a boundary leaves open is not printed.
+/// Prints only the values that exist: without boundaries in the truth there is no boundary error.
 fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result {
     if let (Some(accuracy), Some(completeness)) = (
         sharpness.boundary_accuracy_px,
@@ -154,7 +154,7 @@ fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result
     ) {
         writeln!(
             f,
-            "edges   {accuracy:.2} px from the true ones (accuracy), {completeness:.2} px with those missed (completeness); {}",
+            "edges   {accuracy:.2} px from the true ones (accuracy), {completeness:.2} px including missed ones (completeness); {}",
             count_of(sharpness.boundary_images, "image")
         )?;
     }
@@ -169,7 +169,7 @@ fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result
     Ok(())
 }
 
-/// Distances of drawn points: all, then by range.
+/// The distances of drawn points: all, then by range.
 fn point_table(f: &mut fmt::Formatter<'_>, points: &Points) -> fmt::Result {
     let kind = if points.in_space {
         "Euclidean distance, m"

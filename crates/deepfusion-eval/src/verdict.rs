@@ -1,4 +1,4 @@
-//! What can be said of depth without ground truth: [`Verdict`].
+//! Evaluation of depth without ground truth: [`Verdict`].
 
 mod certificate;
 mod gate;
@@ -13,24 +13,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::statistics::median;
 
-/// What a drive with speeds says of a network's depth, without LiDAR.
+/// What a drive with speeds, but without LiDAR, shows about a network's depth.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Verdict {
-    /// The bias of the metre; `None` where `no_certificate` says why.
+    /// The scale bias; `None` if there is no certificate, with the reason in `no_certificate`.
     pub scale_certificate: Option<ScaleCertificate>,
     /// Why there is no certificate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_certificate: Option<NoCertificate>,
-    /// What else was found.
+    /// Further results.
     pub without_truth: Evidence,
 }
 
-/// Why nothing can be said of the scale.
+/// Why nothing is known about the scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum NoCertificate {
-    /// No recording knows speed and turns.
+    /// No recording measures speed and turns.
     MotionUnknown,
     /// The camera does not move enough from frame to frame.
     NoMovement,
@@ -38,38 +38,39 @@ pub enum NoCertificate {
     AllSeen,
     /// Whether training saw the frames is not known.
     SeenNotKnown,
-    /// The scene shows too few points that can be followed.
+    /// The scene has too few points that can be tracked.
     FewPoints,
 }
 
-/// How well depth, images and the vehicle's motion fit together. A number that does not exist is `null`.
+/// How well depth, images and the vehicle's motion agree. A number that does not exist is `null`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Evidence {
-    /// Whether training saw none of the frames looked at: `Some(false)` where it saw all that could have been, `None` where that is not known.
+    /// Whether training saw none of the frames used: `Some(false)` if it saw all candidates, `None` if that is unknown.
     pub held_out: Option<bool>,
-    /// Frames looked at.
+    /// Number of frames used.
     pub frames: usize,
-    /// How well the frames explain each other.
+    /// How well each frame is reconstructed from its neighbour.
     pub reprojection: Option<Reprojection>,
-    /// The median over frames of the median over pixels of |ln(depth carried over from the frame before / depth)|: 0.05 is 5 %.
+    /// Median over frames of the median over pixels of |ln(depth warped from the frame before / depth)|: 0.05 is 5 %.
     pub consistency: Option<f64>,
-    /// The same of |ln(depth / depth of the mirrored image)|.
+    /// The same for |ln(depth / depth of the mirrored image)|.
     pub flip: Option<f64>,
-    /// The camera's way as seen through the depth, against the vehicle's, by speed.
+    /// The camera's displacement according to the depth, relative to the vehicle's, by speed.
     pub speeds: Vec<SpeedRow>,
-    /// The speed by the road's motion in the images, against the vehicle's, by speed; the camera's height is that which all speeds together
-    /// imply, so that only differences between speeds show. No network takes part.
+    /// The speed according to the road's motion in the images, relative to the vehicle's, by speed. The camera's height is chosen so that
+    /// all speeds agree on average, so only differences between speeds are meaningful. No network is involved.
     #[serde(default)]
     pub road_speeds: Vec<SpeedRow>,
-    /// The way between neighbouring frames as PoseNet sees it, against the vehicle's, by speed; of runs that trained one.
+    /// The displacement between neighbouring frames according to PoseNet, relative to the vehicle's, by speed; for runs that trained a
+    /// PoseNet.
     #[serde(default)]
     pub pose_speeds: Vec<SpeedRow>,
-    /// What the depth is to be multiplied by, by the depth as predicted.
+    /// The factor that depth should be multiplied by, by predicted depth.
     pub ranges: Vec<ScaleRow>,
 }
 
 impl Evidence {
-    /// The ranges of speeds that anything is known of: from, and below, m/s.
+    /// The ranges of speeds with any results: lower and upper limit, m/s.
     #[must_use]
     pub fn speed_ranges(&self) -> Vec<(f64, Option<f64>)> {
         let rows = || {
@@ -85,52 +86,52 @@ impl Evidence {
     }
 }
 
-/// Photometric errors, 0.85 · (1 − SSIM)/2 + 0.15 · |difference| of grey levels in \[0, 1\], means over pairs of frames.
+/// Photometric errors, 0.85 · (1 − SSIM)/2 + 0.15 · |difference| of grey levels in \[0, 1\]: means over pairs of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reprojection {
-    /// With the frame before carried over by the predicted depth and the measured motion.
+    /// With the frame before warped by the predicted depth and the measured motion.
     pub warped: f64,
-    /// With the frame before as it is: depth that explains nothing is not below it.
+    /// With the frame before unchanged: if `warped` is not below this, the depth explains nothing.
     pub unwarped: f64,
-    /// Pairs of frames.
+    /// Number of pairs of frames.
     pub pairs: usize,
 }
 
-/// A range of speeds.
+/// Results in a range of speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedRow {
-    /// From this speed on, m/s.
+    /// Lower limit of the speed, m/s.
     pub from_mps: f64,
-    /// Below this one, m/s; `None`: without an end.
+    /// Upper limit of the speed, m/s; `None` for the last range.
     pub to_mps: Option<f64>,
-    /// Pairs of frames.
+    /// Number of pairs of frames.
     pub n: usize,
-    /// The median of (way through the depth) / (way measured): 1.1 where the depth makes the vehicle 10 % faster than it says. Of the road's
-    /// motion and of PoseNet likewise.
+    /// Median of (displacement according to the depth) / (displacement measured): 1.1 if according to the depth the vehicle is 10 % faster
+    /// than measured. Likewise for the road's motion and for PoseNet.
     pub ratio: f64,
 }
 
-/// A range of predicted depths.
+/// Results in a range of predicted depths.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleRow {
-    /// From this depth on, metres.
+    /// Lower limit of the depth, in metres.
     pub from_m: f64,
-    /// Below this one, metres.
+    /// Upper limit of the depth, in metres.
     pub to_m: f64,
-    /// Scene points.
+    /// Number of scene points.
     pub n: usize,
-    /// The median of (depth by the scene's movement) / (depth predicted), as `scale.median` is with ground truth.
+    /// Median of (depth from the scene's motion) / (predicted depth), comparable with `scale.median` with ground truth.
     pub scale: f64,
 }
 
-/// Where speeds are divided, m/s.
+/// Limits of the speed ranges, m/s.
 const SPEEDS_MPS: [f64; 5] = [0.0, 3.0, 8.0, 15.0, 25.0];
-/// Where depths are divided, metres; as the metrics' ranges.
+/// Limits of the depth ranges, in metres; as for the metrics.
 const RANGES_M: [f64; 5] = [0.0, 10.0, 20.0, 40.0, 80.0];
 
-/// Rows of (speed in m/s, ln of way through the depth over way measured).
+/// Rows from pairs of (speed in m/s, ln of (displacement according to the depth / displacement measured)).
 ///
-/// Rows without a pair are left out.
+/// Ranges without a pair are left out.
 #[must_use]
 pub fn speed_rows(pairs: &[(f64, f64)]) -> Vec<SpeedRow> {
     let rows = SPEEDS_MPS.iter().enumerate().filter_map(|(i, &from_mps)| {
@@ -147,7 +148,7 @@ pub fn speed_rows(pairs: &[(f64, f64)]) -> Vec<SpeedRow> {
     rows.collect()
 }
 
-/// Of the ranges of [`speed_rows`], the one that a speed lies in, by its number.
+/// Index of the range of [`speed_rows`] that contains a speed.
 #[must_use]
 pub fn speed_range(speed_mps: f64) -> usize {
     SPEEDS_MPS
@@ -156,7 +157,7 @@ pub fn speed_range(speed_mps: f64) -> usize {
         .unwrap_or(0)
 }
 
-/// Rows of (predicted depth in metres, ln of the factor it wants).
+/// Rows from points of (predicted depth in metres, ln of the factor that the depth should be multiplied by).
 #[must_use]
 pub fn scale_rows(points: &[(f64, f64)]) -> Vec<ScaleRow> {
     let rows = RANGES_M.windows(2).filter_map(|edge| {

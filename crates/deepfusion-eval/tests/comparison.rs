@@ -1,4 +1,4 @@
-//! Run folders and files of evaluations, as tables in every form.
+//! Run folders and files of evaluations, as tables in every format.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use deepfusion_eval::{
 };
 use deepfusion_hint::Hint;
 
-/// An evaluation of four pixels of two images; `factor` is how wrong the method is, `shift` makes another ground truth.
+/// An evaluation of two images with four pixels each; `factor` is how wrong the predictions are, `shift` changes the ground truth.
 fn report(factor: f64, shift: f64, protocol: Protocol) -> (Report, Vec<FrameScore>) {
     let mut evaluator = Evaluator::new(protocol).unwrap();
     for (name, more) in [("a", 1.0), ("b", 1.1)] {
@@ -108,7 +108,7 @@ fn published_rows_in_every_form() {
     assert_eq!(impossible.count(), 1);
 }
 
-/// The field crops for truth as recorded, and does not for improved truth.
+/// The field crops raw ground truth, but not improved ground truth.
 #[test]
 fn each_kind_of_truth_has_its_own_published_protocol() {
     let folder = tempfile::tempdir().unwrap();
@@ -159,7 +159,7 @@ fn grounds_are_kept_apart() {
     ];
     let tables = run_tables(&collect(&runs));
     assert!(
-        tables.notes[0].contains("4 different grounds"),
+        tables.notes[0].contains("4 groups that differ"),
         "{:?}",
         tables.notes
     );
@@ -200,16 +200,16 @@ fn plain_files_are_read_and_said_to_be_plain() {
     let names: Vec<_> = evaluations.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(names, ["run", "printed", "old"]);
     let text = run_tables(&evaluations).to_text();
-    // The same ground truth, so one table; the file that does not say is apart.
-    assert!(text.contains("2 different grounds"), "{text}");
-    assert!(text.contains("do not say which ground truth"), "{text}");
-    // Two names for one result.
+    // The same ground truth, so one table; the file that does not record it has its own.
+    assert!(text.contains("2 groups that differ"), "{text}");
+    assert!(text.contains("do not record their ground truth"), "{text}");
+    // Two names for the same result.
     assert!(
         text.contains("every figure equals those of `printed`"),
         "{text}"
     );
 
-    // Two evaluations of one run, or the same name twice, are told apart.
+    // Two evaluations of one run, or the same name twice, get different names.
     let again = collect(&[run.clone(), run]);
     assert_ne!(again[0].name, "");
     assert_eq!(again.len(), 2);
@@ -225,12 +225,12 @@ fn an_evaluation_of_other_weights_is_reported() {
         report(1.1, 0.0, Protocol::default()),
     );
     let text = |run: &PathBuf| run_tables(&collect(std::slice::from_ref(run))).to_text();
-    assert!(!text(&run).contains("another file by now"));
+    assert!(!text(&run).contains("has changed since"));
     std::fs::write(run.join("best.safetensors"), "trained on").unwrap();
-    assert!(text(&run).contains("best.safetensors is another file by now"));
-    // A run whose weights were removed still has its figures.
+    assert!(text(&run).contains("best.safetensors has changed since"));
+    // A run without its weights still has its figures.
     std::fs::remove_file(run.join("best.safetensors")).unwrap();
-    assert!(!text(&run).contains("another file by now"));
+    assert!(!text(&run).contains("has changed since"));
 }
 
 #[test]
@@ -288,12 +288,12 @@ fn what_is_no_evaluation_is_an_error() {
     std::fs::create_dir(at.join("run")).unwrap();
     let error = fails(at.join("run"));
     assert!(
-        error.hint().unwrap().contains("measure it first"),
+        error.hint().unwrap().contains("evaluate it first"),
         "{error}"
     );
 }
 
-/// What decides the result is in the file's name; what was not asked for is neither there nor in the file.
+/// Everything that affects the result is in the file's name. Options that were not given are neither there nor in the file.
 #[test]
 fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
     type Change = fn(&mut MeasuredOn);
@@ -330,7 +330,7 @@ fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
     for key in ["intrinsics", "hfov", "ahead", "topics", "allow_holes"] {
         assert!(!plain.contains(key), "{key}: {plain}");
     }
-    // So are the files of programs that did not keep these.
+    // Files of older versions, which did not record these options, keep their names.
     let read: SavedEvaluation = serde_json::from_str(&plain).unwrap();
     assert_eq!(
         folder.path().join("eval").join(read.file_name()),
@@ -338,7 +338,7 @@ fn evaluations_that_were_asked_for_otherwise_replace_no_other() {
     );
 }
 
-/// Only evaluations of this very checkpoint, on frames known to be unseen, say what its metres are worth.
+/// Only evaluations of exactly this checkpoint, on frames known to be unseen, decide how far its metres are trusted.
 #[test]
 fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
     type Change = fn(&mut SavedEvaluation);
@@ -388,7 +388,7 @@ fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
         assert_eq!(found, MetricScale::default(), "{i}");
     }
     assert_eq!(verdict("none", &[]), MetricScale::default());
-    // Right in one street and wrong in another: the mean of the two is no measure of either.
+    // Right in one street and wrong in another: the mean applies to neither.
     let far: Change = |s| {
         (s.report.n, s.report.scale.bias) = (60, 0.31);
         s.report.scale.bias_ci95 = Some([0.25, 0.4]);
@@ -398,7 +398,7 @@ fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
     assert_eq!(both.verdict, Verdict::Open);
     assert_eq!(both.ci95, Some([-0.03, 0.4]));
     assert!((both.bias.unwrap() - (20.0 * 0.01 + 60.0 * 0.31) / 80.0).abs() < 1e-12);
-    // A damaged file says nothing.
+    // A damaged file is ignored.
     let at = folder.path().join("good/eval");
     for entry in std::fs::read_dir(&at).unwrap() {
         std::fs::write(entry.unwrap().path(), [0_u8; 99]).unwrap();

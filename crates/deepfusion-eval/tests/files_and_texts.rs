@@ -1,4 +1,4 @@
-//! Array files, their errors, and the two forms of a report.
+//! Array files, their errors, and a report as JSON and as text.
 
 use std::path::Path;
 
@@ -102,7 +102,7 @@ fn missing_and_extra_names_are_errors() {
     );
     assert!(
         match_names(&open("gt.npz"), &open("few.npz")).is_err(),
-        "extra predictions are named too"
+        "extra predictions are reported too"
     );
     let pairs = match_names(&open("reversed.npz"), &open("gt.npz")).unwrap();
     assert_eq!(pairs[0], ("0000000000".to_owned(), 2, 0));
@@ -158,7 +158,7 @@ fn broken_files_say_what_is_wrong() {
     }
 }
 
-/// A reader that allocates for what a header says is ended by the system: 8 TiB here.
+/// A reader that allocates what the header claims, 8 TiB here, would be killed by the system.
 #[test]
 fn an_array_that_claims_too_much_is_an_error() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The measures, beside other people's code.
+//! Tests of the metrics, many against other people's code.
 
 #![allow(
     clippy::unwrap_used,

@@ -13,7 +13,7 @@ fn cases() -> Vec<Value> {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Through a file, so that reading is part of what is checked.
+/// Goes through a file, so that reading is checked too.
 fn poses(rows: &Value, folder: &Path) -> Vec<Se3> {
     let line = |row: &Value| -> String {
         let words: Vec<String> = row
@@ -38,11 +38,10 @@ fn track(case: &Value) -> TrackPair {
     TrackPair::new(name, truth, predicted).unwrap()
 }
 
-/// The fixture's rotations have ten digits; NumPy takes them as they are, while a pose is projected onto the
-/// nearest rotation. Over 200 m that moves the end by 200 · 1e-9, and relative to drifts of some metres by
-/// 1e-7. The function arccos near 1 turns the digits left out, 1e-9, into angles of √(2 · 1e-9) = 4e-5 rad at worst,
-/// where the angles of whole stretches are 0.04 rad and more: 1e-6 of them. The angles of single pairs,
-/// 0.0035 rad, may be off by 1e-9 / 0.0035², 1e-4 of them.
+/// The fixture's rotations have ten digits. NumPy uses them unchanged, while a pose projects them onto the nearest rotation. Over 200 m
+/// that moves the end by 200 · 1e-9; relative to drifts of some metres that is 1e-7. Near 1, arccos turns the missing digits, 1e-9, into
+/// angles of up to √(2 · 1e-9) = 4e-5 rad. The angles of whole stretches are 0.04 rad and more, so they change by 1e-6 of their size. The
+/// angles of single pairs, 0.0035 rad, change by 1e-9 / 0.0035², which is 1e-4 of their size.
 #[test]
 fn numbers_are_evo_s_and_kitti_s() {
     for case in cases() {
@@ -76,7 +75,7 @@ fn drives_pool_their_stretches() {
     let [long, short] = [0, 1].map(|i| track(&cases()[i]));
     let alone = OdometryReport::of(std::slice::from_ref(&long), "a file");
     let both = OdometryReport::of(&[long, short], "a file");
-    // The short drive has no stretch of 100 m: it adds nothing to the drift, but to all else.
+    // The short drive has no stretch of 100 m: it adds to everything but the drift.
     assert_eq!(both.t_rel_percent, alone.t_rel_percent);
     assert_ne!(both.ate_m, alone.ate_m);
     assert_eq!(both.lengths_m, [100, 200]);
@@ -110,7 +109,7 @@ fn the_table_for_people() {
     insta::assert_snapshot!("odometry_of_a_short_drive", report.to_string());
 }
 
-/// The path of another world's axes scores the same: only motions within a path are compared.
+/// The same trajectory in another world frame scores the same: only motions within a trajectory are compared.
 #[test]
 fn the_world_does_not_matter() {
     let track = track(&cases()[0]);

@@ -1,7 +1,7 @@
 //! Point distances against NumPy (`tests/reference/points.py`).
 //!
-//! Tolerance: 1e-9 relative. Both sides compute in `f64`; NumPy multiplies by an inverted K where this crate divides by
-//! the focal length, and adds pairwise: together below 1e-12 for these sizes.
+//! Tolerance: 1e-9 relative. Both sides compute in `f64`. NumPy multiplies by an inverted K where this crate divides by the focal length,
+//! and sums pairwise: together below 1e-12 for these sizes.
 
 use std::path::Path;
 
@@ -87,7 +87,7 @@ fn equal(ours: &PointErrors, theirs: &Value) {
 #[test]
 fn distances_equal_numpys() {
     let reference = reference();
-    // More than there are: all are drawn.
+    // More than exist: all are drawn.
     let evaluator = evaluated(&reference, 10_000, 5);
     let ours = points(&evaluator);
     assert!(ours.in_space);
@@ -117,7 +117,7 @@ fn the_seed_decides_which_are_drawn() {
     assert_eq!(drawn(1), drawn(1));
     assert_ne!(drawn(1), drawn(2));
     assert_eq!(drawn(1).len(), 40);
-    // The metrics do not depend on it.
+    // The metrics do not depend on the drawing.
     let metrics = |seed| evaluated(&reference, 40, seed).report().unwrap().unscaled;
     assert_eq!(metrics(1), metrics(2));
 }
@@ -129,7 +129,11 @@ fn the_ground_truth_has_a_name_of_its_own() {
     let first = name(&reference);
     assert_eq!(first.as_ref().map(String::len), Some(64));
     reference["images"][1]["depth"][3] = 7.0.into();
-    assert_eq!(name(&reference), first, "predictions do not count");
+    assert_eq!(
+        name(&reference),
+        first,
+        "predictions do not affect the hash"
+    );
     let truth = &mut reference["images"][1]["ground_truth"];
     let place = truth
         .as_array()

@@ -1,4 +1,4 @@
-//! What must hold whatever the numbers are.
+//! Properties that hold for any numbers.
 
 use deepfusion_eval::{
     Crop, Error, Evaluator, Grid, Holes, Metrics, Prediction, Protocol, Report, Sample,
@@ -34,7 +34,7 @@ proptest! {
         prop_assert_eq!(report.scale.bias_ci95, None);
     }
 
-    /// Predictions s times as far away: the ratio is 1/s, the bias ln s, and median scaling undoes s.
+    /// Predictions s times as far away: the ratio is 1/s, the bias is ln s, and median scaling undoes s.
     #[test]
     fn scale_is_seen_and_undone(truth in depths(), pred in depths(), s in 0.2..5.0f64) {
         let truth = grid(&truth);
@@ -54,7 +54,7 @@ proptest! {
         prop_assert_eq!(report(&depth, &grid(&truth)), report(&disparity, &grid(&truth)));
     }
 
-    /// However wild the prediction, none of the numbers is NaN or infinite: serde_json would write `null` for it.
+    /// However odd the prediction, no metric is NaN or infinite: serde_json would write `null` for it.
     #[test]
     fn reports_have_no_nan(truth in depths(), exponents in prop::collection::vec(-300.0..300.0f64, WIDTH * HEIGHT)) {
         let pred: Vec<f64> = exponents.iter().map(|e| 10f64.powf(*e)).collect();
@@ -179,7 +179,7 @@ fn drawn_points_measure_distances_in_space() {
     assert_eq!(along_z.n, 30);
     assert!((along_z.mean_m.unwrap() - 1.0).abs() < 1e-12 && along_z.std_m.unwrap() < 1e-12);
 
-    // A camera so wide that a ray at the border is √2 long or more.
+    // A camera so wide that a ray to the border with z = 1 is at least √2 long.
     let k = deepfusion_geometry::Intrinsics {
         fx: 8.0,
         fy: 8.0,

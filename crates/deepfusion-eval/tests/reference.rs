@@ -1,8 +1,8 @@
-//! Against the protocol written in NumPy (`tests/reference/make_reference.py`).
+//! Compares with the protocol written in NumPy (`tests/reference/make_reference.py`).
 //!
-//! Tolerance: 1e-9 relative. Both sides compute in `f64` from the same file values; what differs is the order of sums
-//! (NumPy adds pairwise), which stays below 1e-12 for these sizes. Thresholded shares (a1…a3) must be equal to the last
-//! pixel, which the same tolerance asks for: one pixel of 4,000 is 2.5e-4.
+//! Tolerance: 1e-9 relative. Both sides compute in `f64` from the same file values. They differ in the order of sums (NumPy sums pairwise),
+//! which stays below 1e-12 for these sizes. Thresholded shares (a1…a3) must agree in every pixel, which this tolerance implies: one pixel
+//! of 4,000 is 2.5e-4.
 
 use std::path::{Path, PathBuf};
 

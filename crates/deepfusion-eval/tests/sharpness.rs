@@ -1,8 +1,8 @@
 //! Sharpness by hand, and against scikit-image's Canny and SciPy's distance transform
 //! (`tests/reference/sharpness.py`).
 //!
-//! Tolerance: 1e-9 relative. Both sides compute in `f64` from the same file values. The mean distances are sums over the
-//! same edge pixels only where every pixel of both edge maps agrees: one that differs moves them by 1e-3 and more.
+//! Tolerance: 1e-9 relative. Both sides compute in `f64` from the same file values. The mean distances agree only if every pixel of both
+//! edge maps agrees: one that differs changes them by 1e-3 or more.
 
 use std::fs::File;
 use std::path::Path;
@@ -16,7 +16,7 @@ use serde_json::Value;
 
 const SIZE: (usize, usize) = (80, 24);
 
-/// The same in every row.
+/// A map with the same values in every row.
 fn columns((width, height): (usize, usize), depth: impl Fn(usize) -> f64) -> Grid {
     Grid::new(
         width,
@@ -26,7 +26,7 @@ fn columns((width, height): (usize, usize), depth: impl Fn(usize) -> f64) -> Gri
     .unwrap()
 }
 
-/// 5 m, and 20 m from a column on.
+/// 5 m, then 20 m from the column `at` on.
 fn step(at: usize) -> impl Fn(usize) -> f64 {
     move |x| if x < at { 5.0 } else { 20.0 }
 }
@@ -52,7 +52,7 @@ fn a_boundary_in_the_wrong_place_has_that_distance() {
         assert_eq!(errors(step(20 + shift)), [distance; 2], "{shift} px right");
         assert_eq!(errors(step(20 - shift)), [distance; 2], "{shift} px left");
     }
-    // From 10 px on it is another boundary: one is missed, and none of the predicted ones has a counterpart.
+    // From 10 px on it is another boundary: the true one is missed, and the predicted one has no counterpart.
     for shift in [10, 14] {
         assert_eq!(errors(step(20 + shift)), [10.0; 2], "{shift}");
     }
@@ -70,34 +70,34 @@ fn what_is_missed_counts_for_completeness_and_what_is_invented_for_neither() {
     assert_eq!(
         [boundary.accuracy_px, boundary.completeness_px],
         [0.0, 5.0],
-        "half is missed"
+        "half of the boundaries are missed"
     );
 }
 
 #[test]
 fn a_blur_keeps_its_boundary_and_flies() {
-    // Between 5 m and 20 m over six pixels; the middle is the true boundary's. Of the four pixels in a row that see the
-    // jump, 18 to 21, all are more than 10 % from both.
+    // Between 5 m and 20 m over six pixels; the middle is at the true boundary. The four pixels of a row near the jump, 18 to 21, are all
+    // more than 10 % from both depths.
     let blurred = |x: usize| 5.0 + 15.0 * ((x as f64 - 16.5) / 6.0).clamp(0.0, 1.0);
     let truth = columns(SIZE, step(20));
     let seen = sharpness(&truth, columns(SIZE, blurred)).unwrap();
     assert!(seen.boundary.unwrap().accuracy_px <= 1.0, "{seen:?}");
     assert_eq!(seen.flying_share, Some(1.0));
-    // Sharp in the wrong place is not flying.
+    // A sharp boundary in the wrong place has no flying pixels.
     let moved = sharpness(&truth, columns(SIZE, step(23))).unwrap();
     assert_eq!(moved.flying_share, Some(0.0));
 }
 
 #[test]
 fn the_truth_enlarged_bilinearly_flies_as_often_as_theory_says() {
-    // Disparities 0.2 and 0.05; enlarged k times, they go over into each other in the k pixels about the boundary, at
-    // (i + ½)/k of the way, and four of each row see the jump.
+    // Disparities 0.2 and 0.05. Enlarged k times, they blend in the k pixels around the boundary, at (i + ½)/k of the way. Four pixels of
+    // each row are near the jump.
     let truth = columns(SIZE, step(24));
     for (k, flying) in [(2, 2.0), (4, 4.0), (8, 4.0)] {
         let small = columns((SIZE.0 / k, SIZE.1 / k), step(24 / k));
         let seen = sharpness(&truth, small).unwrap();
         assert_eq!(seen.flying_share, Some(flying / 4.0), "{k} times");
-        // Disparity's even slope is steepest in depth at its far end: that is where the boundary is seen.
+        // A constant slope in disparity is steepest in depth at its far end, so the boundary is found there.
         assert!(seen.boundary.unwrap().accuracy_px <= k as f64 / 2.0);
     }
 }
@@ -112,7 +112,7 @@ fn neither_scale_nor_what_is_beyond_the_cap_is_a_matter_of_sharpness() {
     };
     let truth = columns(SIZE, step(20));
     assert_eq!(all(&truth, columns(SIZE, |x| 1.7 * step(20)(x))), exact);
-    // The sky's border is a boundary, however deep the prediction sees it.
+    // The sky's border is a boundary, whatever depth is predicted for the sky.
     let sky = columns(SIZE, |x| if x < 60 { 9.0 } else { f64::INFINITY });
     for far in [80.0, 300.0] {
         let seen = |x: usize| if x < 60 { 9.0 } else { far };
@@ -121,9 +121,9 @@ fn neither_scale_nor_what_is_beyond_the_cap_is_a_matter_of_sharpness() {
     assert_eq!(
         all(&sky, columns(SIZE, |_| 9.0)).map(|e| e[1]),
         Some(10.0),
-        "sky that is not seen is missed"
+        "sky predicted at the object's depth is missed"
     );
-    // Unknown is not sky: nothing is known of its border.
+    // Unknown pixels are not sky: their border is not a boundary.
     let unknown = columns(SIZE, |x| if x < 60 { 9.0 } else { 0.0 });
     let seen = sharpness(&unknown, columns(SIZE, step(70))).unwrap();
     assert_eq!((seen.boundary, seen.flying_share), (None, None));
@@ -168,7 +168,7 @@ fn images_are_averaged_where_they_have_what_is_measured() {
             .is_none()
     );
 
-    // A scan beside dense depth, and dense depth that is the ground truth itself.
+    // A sparse scan beside dense depth, then dense depth as the ground truth itself.
     add(Some(&dense), &scan, columns(SIZE, step(23)));
     add(None, &dense, columns(SIZE, step(21)));
     let report = add(None, &flat, columns(SIZE, |_| 5.0));
@@ -184,7 +184,7 @@ fn images_are_averaged_where_they_have_what_is_measured() {
     let text = report.to_string();
     assert!(
         text.contains(
-            "edges   2.00 px from the true ones (accuracy), 2.00 px with those missed (completeness); 2 images\n\
+            "edges   2.00 px from the true ones (accuracy), 2.00 px including missed ones (completeness); 2 images\n\
              flying  0.0 % of the pixels at depth jumps lie between the two sides; 2 images\n"
         ),
         "{text}"

@@ -1,10 +1,10 @@
-//! Metric disparity of 640×192 to a coloured cloud: `cargo bench -p deepfusion-geometry`. Its peer is
-//! `benches/peers/cloud_numpy.py`, on the same numbers.
+//! Metric disparity of 640×192 to a coloured cloud: `cargo bench -p deepfusion-geometry`. `benches/peers/cloud_numpy.py` does the same with
+//! NumPy, on the same numbers.
 
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a benchmark ends where it cannot run"
+    reason = "a benchmark panics if it cannot run"
 )]
 
 use criterion::{Criterion, criterion_main};
@@ -54,7 +54,7 @@ fn cloud(criterion: &mut Criterion) {
     });
 }
 
-// The macro makes a public function that cannot be documented.
+// The macro generates a public function that cannot be documented.
 #[allow(missing_docs)]
 mod group {
     use super::{Criterion, cloud};

@@ -30,10 +30,10 @@ impl DepthMap {
         (depth > 0.0).then_some(depth)
     }
 
-    /// Sets the depth at (`x`, `y`) if it is nearer than what is there, or nothing is.
+    /// Sets the depth at (`x`, `y`) if it is nearer than the existing depth, or there is none.
     ///
     /// # Panics
-    /// Outside the map.
+    /// If the pixel is outside the map.
     pub fn set_nearest(&mut self, x: usize, y: usize, depth_m: f32) {
         assert!(x < self.width, "column {x} of {}", self.width);
         let cell = &mut self.data[y * self.width + x];
@@ -42,7 +42,7 @@ impl DepthMap {
         }
     }
 
-    /// The map resized by nearest neighbour. Nothing is averaged: that would put depths between near and far surfaces.
+    /// The map resized by nearest neighbour. Depths are not averaged, which would create depths between near and far surfaces.
     #[must_use]
     pub fn nearest(&self, width: usize, height: usize) -> Self {
         let mut map = Self::empty(width, height);

@@ -35,7 +35,7 @@ impl DepthRange {
         1.0 / self.disparity(sigmoid)
     }
 
-    /// The sigmoid output that stands for `depth_m`.
+    /// The sigmoid output that corresponds to `depth_m`.
     #[must_use]
     pub fn sigmoid_of(&self, depth_m: f64) -> f64 {
         let (low, high) = (1.0 / self.max_m, 1.0 / self.min_m);

@@ -4,13 +4,13 @@ use deepfusion_hint::Hint;
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Limit of Newton steps; inside the image of a usual lens 4 to 6 are needed.
+/// Largest number of Newton steps; inside the image of a usual lens, 4 to 6 are needed.
 const MAX_STEPS: usize = 30;
 /// Accuracy of the distorted point, in units of the focal length: about a millionth of a pixel.
 const TOLERANCE: f64 = 1e-10;
 
-/// Lens distortion, radial and tangential, after Brown and Conrady, in the form of OpenCV's first
-/// eight coefficients and ROS's `plumb_bob` and `rational_polynomial`.
+/// Lens distortion, radial and tangential, by Brown and Conrady, in the form of OpenCV's first eight coefficients and ROS's `plumb_bob` and
+/// `rational_polynomial`.
 ///
 /// A point of the camera frame with x = X/Z, y = Y/Z, r² = x² + y² appears at
 ///
@@ -18,36 +18,36 @@ const TOLERANCE: f64 = 1e-10;
 /// - x' = g·x + 2p₁xy + p₂(r² + 2x²)
 /// - y' = g·y + p₁(r² + 2y²) + 2p₂xy
 ///
-/// and its pixel is (fx·x' + cx, fy·y' + cy). Of a fisheye lens, [`Self::fisheye`] holds instead.
+/// and its pixel is (fx·x' + cx, fy·y' + cy). For a fisheye lens, [`Self::fisheye`] applies instead.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Distortion {
-    /// Radial, of r², r⁴ and r⁶ above the fraction bar: k₁, k₂, k₃.
+    /// Radial coefficients of r², r⁴ and r⁶ in the numerator: k₁, k₂, k₃.
     pub radial: [f64; 3],
-    /// Tangential: p₁, p₂.
+    /// Tangential coefficients: p₁, p₂.
     pub tangential: [f64; 2],
-    /// Radial, below the fraction bar: k₄, k₅, k₆.
+    /// Radial coefficients in the denominator: k₄, k₅, k₆.
     pub rational: [f64; 3],
-    /// k₁, k₂, k₃, k₄ of a fisheye lens after Kannala and Brandt ("equidistant"; `cv::fisheye`, Kalibr's `equidistant`): a ray at the angle
-    /// θ = atan(r) from the axis appears at θ_d = θ(1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸), so x' = θ_d/r·x and y' = θ_d/r·y. The other
-    /// coefficients then are not used.
+    /// k₁, k₂, k₃, k₄ of a fisheye lens by Kannala and Brandt (`cv::fisheye`, Kalibr's `equidistant`): a ray at the angle θ = atan(r) from
+    /// the axis appears at θ_d = θ(1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸), so x' = θ_d/r·x and y' = θ_d/r·y. The other coefficients are then
+    /// ignored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fisheye: Option<[f64; 4]>,
 }
 
-/// Why coefficients are no lens's.
+/// Why coefficients do not describe a lens.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoDistortion {
-    /// One is NaN or infinite.
+    /// A coefficient is NaN or infinite.
     #[error("a coefficient is {0}")]
     NotFinite(f64),
-    /// So many are none of OpenCV's models.
+    /// None of OpenCV's models has this number of coefficients.
     #[error("{0} coefficients, expected k1, k2, p1, p2[, k3[, k4, k5, k6]]")]
     Count(usize),
-    /// So many are not a fisheye lens's.
-    #[error("{0} coefficients, a fisheye lens has k1, k2, k3, k4")]
+    /// A fisheye lens has another number of coefficients.
+    #[error("{0} coefficients, expected k1, k2, k3, k4 of a fisheye lens")]
     FisheyeCount(usize),
-    /// OpenCV's further coefficients, which are not zero.
+    /// OpenCV's further coefficients are not zero.
     #[error("thin prism or tilt coefficients are not supported")]
     ThinPrism,
 }
@@ -59,11 +59,11 @@ impl Hint for NoDistortion {
 }
 
 impl Distortion {
-    /// From coefficients in OpenCV's order k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆; 0, 4, 5 or 8 of them. More
-    /// (thin prism, tilt) only where all further ones are zero.
+    /// Makes a lens from coefficients in OpenCV's order k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆; 0, 4, 5 or 8 of them. More (thin prism, tilt) are
+    /// accepted only if they are all zero.
     ///
     /// # Errors
-    /// [`NoDistortion`].
+    /// [`NoDistortion`], with the reason.
     pub fn from_opencv(coefficients: &[f64]) -> Result<Self, NoDistortion> {
         if let Some(bad) = coefficients.iter().find(|c| !c.is_finite()) {
             return Err(NoDistortion::NotFinite(*bad));
@@ -83,11 +83,11 @@ impl Distortion {
         })
     }
 
-    /// A fisheye lens by its coefficients k₁, k₂, k₃, k₄, as `cv::fisheye` and Kalibr's `equidistant` name them. All zero is a lens, too:
-    /// r' = θ.
+    /// Makes a fisheye lens from the coefficients k₁, k₂, k₃, k₄ of `cv::fisheye` and Kalibr's `equidistant`. All zero is a valid lens,
+    /// too: r' = θ.
     ///
     /// # Errors
-    /// [`NoDistortion`].
+    /// [`NoDistortion`], with the reason.
     pub fn from_fisheye(coefficients: &[f64]) -> Result<Self, NoDistortion> {
         let Ok(k) = <[f64; 4]>::try_from(coefficients) else {
             return Err(NoDistortion::FisheyeCount(coefficients.len()));
@@ -101,7 +101,7 @@ impl Distortion {
         }
     }
 
-    /// Whether all coefficients leave points unchanged.
+    /// Whether the lens leaves all points unchanged.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
@@ -116,8 +116,8 @@ impl Distortion {
         }
     }
 
-    /// The undistorted point whose distorted position is `seen`; `None` if there is none near it:
-    /// outside the image it was fitted to, the polynomial is not invertible.
+    /// The undistorted point whose distorted position is `seen`; `None` if there is none near it. Outside the image that the polynomial was
+    /// fitted to, it may not be invertible.
     #[must_use]
     pub fn undistort(&self, seen: &Vector2<f64>) -> Option<Vector2<f64>> {
         if let Some(k) = &self.fisheye {
@@ -126,7 +126,7 @@ impl Distortion {
         let mut ideal = *seen;
         for _ in 0..MAX_STEPS {
             let (shown, slope) = self.with_slope(&ideal);
-            // Beyond the fold, neighbouring points change places.
+            // Beyond the fold, the order of neighbouring points is reversed.
             if slope.determinant() <= 0.0 {
                 return None;
             }
@@ -205,7 +205,7 @@ mod tests {
     fn a_fisheye_lens_has_four_coefficients() {
         let lens = Distortion::from_fisheye(&[0.1, 0.0, 0.0, 0.0]).unwrap();
         assert!(!lens.is_none());
-        // Without coefficients it still bends: an angle of 45 degrees is pi/4, not tan(pi/4) = 1.
+        // Without coefficients it still distorts: an angle of 45 degrees appears at pi/4, not at tan(pi/4) = 1.
         let plain = Distortion::from_fisheye(&[0.0; 4]).unwrap();
         assert!(!plain.is_none());
         let seen = plain.distort(&Vector2::new(0.6, 0.8));
@@ -225,8 +225,8 @@ mod tests {
             prop_assert!((back - ideal).norm() < 1e-9, "{back}");
         }
 
-        /// The slope is that of the function, by central differences. Their error is h² times the third
-        /// derivative (some tens at most here), 1e-9, and that of rounding, 1e-16 / h.
+        /// The slope agrees with central differences. Their error is h² times the third derivative (some tens at most here), 1e-9, plus
+        /// that of rounding, 1e-16 / h.
         #[test]
         fn the_slope_is_the_derivative(
             x in -0.5..0.5f64, y in -0.5..0.5f64, k in proptest::collection::vec(-0.2..0.2f64, 8),

@@ -2,8 +2,8 @@ use deepfusion_hint::Hint;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Horizontal fields of view that a camera can be given by, in degrees, both ends left out: beyond them no pinhole camera is
-/// usable, and a wider lens needs its distortion known.
+/// Horizontal fields of view from which a camera can be made, in degrees, limits excluded: beyond them no pinhole camera is usable, and a
+/// wider lens needs its distortion.
 pub const HFOV_DEG: (f64, f64) = (1.0, 170.0);
 
 /// Why numbers are not a valid camera.
@@ -11,7 +11,7 @@ pub const HFOV_DEG: (f64, f64) = (1.0, 170.0);
 #[non_exhaustive]
 pub enum ImplausibleCamera {
     /// A focal length is not positive, or not finite.
-    #[error("{name} is {value}, a focal length is positive")]
+    #[error("{name} is {value}, expected a focal length above 0")]
     Focal {
         /// `fx` or `fy`.
         name: &'static str,
@@ -19,24 +19,24 @@ pub enum ImplausibleCamera {
         value: f64,
     },
     /// The principal point lies outside of the image.
-    #[error("{name} is {value:.1} in an image of {size} pixels")]
+    #[error("{name} is {value:.1}, outside an image of {size} pixels")]
     Centre {
         /// `cx` or `cy`.
         name: &'static str,
-        /// Its value, in pixels.
+        /// The principal point's value, in pixels.
         value: f64,
-        /// The image's side along it, in pixels.
+        /// The image's size along this axis, in pixels.
         size: u32,
     },
 }
 
 impl Hint for ImplausibleCamera {
     fn hint(&self) -> Option<String> {
-        Some("fx, fy, cx, cy are in pixels of the image".into())
+        Some("give fx, fy, cx, cy in pixels of this image".into())
     }
 }
 
-/// A pinhole camera without distortion, in pixels of the image it belongs to.
+/// A pinhole camera without distortion, in pixels of its image.
 ///
 /// The size of that image is part of the type, so that a matrix of one image size cannot silently
 /// be used with an image of another.
@@ -57,8 +57,7 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// From fx, fy, cx, cy in pixels of an image of this width and height. They are not checked;
-    /// see [`Self::implausible`].
+    /// Makes a camera from fx, fy, cx, cy in pixels of an image of this width and height. They are not checked; see [`Self::implausible`].
     #[must_use]
     pub fn from_numbers([fx, fy, cx, cy]: [f64; 4], (width, height): (u32, u32)) -> Self {
         Self {
@@ -71,7 +70,7 @@ impl Intrinsics {
         }
     }
 
-    /// Square pixels, and the principal point in the middle of the image.
+    /// Makes a camera with square pixels and the principal point in the middle of the image.
     #[must_use]
     pub fn centred(focal_px: f64, (width, height): (u32, u32)) -> Self {
         let middle = |side: u32| (f64::from(side) - 1.0) / 2.0;
@@ -79,7 +78,7 @@ impl Intrinsics {
         Self::from_numbers(numbers, (width, height))
     }
 
-    /// Square pixels, the principal point in the middle, and the field of view from the image's left edge to its right:
+    /// Makes a camera with square pixels, the principal point in the middle, and the field of view between the image's left and right edge:
     /// f = W/2 / tan(hfov/2), with `hfov_deg` in degrees. It is not checked; see [`HFOV_DEG`].
     #[must_use]
     pub fn from_hfov(hfov_deg: f64, size: (u32, u32)) -> Self {
@@ -87,8 +86,8 @@ impl Intrinsics {
         Self::centred(f64::from(size.0) / 2.0 / half.tan(), size)
     }
 
-    /// A camera of images of another size that sees as much along their longer side, with pixels of the same shape and the principal
-    /// point in the middle.
+    /// The camera for images of another size with the same field of view along their longer side, with pixels of the same shape and the
+    /// principal point in the middle.
     #[must_use]
     pub fn centred_at(&self, (width, height): (u32, u32)) -> Self {
         let scale = f64::from(width.max(height)) / f64::from(self.width.max(self.height));
@@ -245,17 +244,20 @@ mod tests {
         let (name, value) = ("fx", 0.0);
         let focal = ImplausibleCamera::Focal { name, value };
         assert_eq!(wrong.implausible(), Some(focal));
-        assert_eq!(focal.to_string(), "fx is 0, a focal length is positive");
+        assert_eq!(
+            focal.to_string(),
+            "fx is 0, expected a focal length above 0"
+        );
         let wrong = Intrinsics {
             cy: 400.0,
             ..kitti()
         };
         let text = wrong.implausible().unwrap().to_string();
-        assert_eq!(text, "cy is 400.0 in an image of 375 pixels");
+        assert_eq!(text, "cy is 400.0, outside an image of 375 pixels");
     }
 
     proptest! {
-        /// A resized image sees a point at the pixel that resizing moves its old pixel to.
+        /// In a resized image, a point appears at the pixel to which resizing moves its old pixel.
         #[test]
         fn resize_moves_the_projection_with_the_pixels(
             x in -20.0..20.0f64, y in -3.0..3.0f64, z in 1.0..80.0f64, w in 32u32..2000, h in 32u32..2000,

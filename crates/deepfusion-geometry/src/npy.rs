@@ -1,38 +1,38 @@
-//! The first bytes of a NumPy array file: what it says of its numbers, before anything is allocated for them.
+//! Reads the header of a NumPy array file, so that it can be checked before memory is allocated for the numbers.
 
-/// What the header of an `.npy` file says ([NEP 1](https://numpy.org/neps/nep-0001-npy-format.html), formats 1 to 3).
+/// The header of an `.npy` file ([NEP 1](https://numpy.org/neps/nep-0001-npy-format.html), formats 1 to 3).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NpyHeader {
-    /// NumPy's name for the type of the numbers, such as `<f4`; `None` where there is none, or a structure.
+    /// NumPy's name for the type of the numbers, such as `<f4`; `None` if missing, or for a structure.
     pub descr: Option<String>,
-    /// Whether the array is stored column by column; `None` where that is not said.
+    /// Whether the array is stored column by column; `None` if missing.
     pub fortran_order: Option<bool>,
     /// The length of each axis.
     pub shape: Vec<u64>,
-    /// Where the numbers begin, in bytes from the file's beginning.
+    /// Offset of the numbers, in bytes from the start of the file.
     pub begin: usize,
 }
 
-/// Why the beginning of a file is not an array's.
+/// Why a file does not begin like an array file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NpyHeaderProblem {
-    /// It begins as another kind of file.
+    /// The file is of another kind.
     #[error("not a NumPy array")]
     NotNpy,
-    /// It ends before its header does.
+    /// The file ends before its header does.
     #[error("ends within its header")]
     Cut,
 }
 
 impl NpyHeader {
-    /// The mark at the beginning of each file.
+    /// The first bytes of every `.npy` file.
     pub const MAGIC: &[u8] = b"\x93NUMPY";
 
-    /// Reads the header from a file's first bytes, all of them or more than the header takes.
+    /// Reads the header from the first bytes of a file; `bytes` may be longer than the header.
     ///
     /// # Errors
-    /// [`NpyHeaderProblem`].
+    /// [`NpyHeaderProblem`], with the reason.
     pub fn parse(bytes: &[u8]) -> Result<Self, NpyHeaderProblem> {
         let cut = || NpyHeaderProblem::Cut;
         if !bytes.starts_with(Self::MAGIC) {
@@ -69,7 +69,7 @@ impl NpyHeader {
         })
     }
 
-    /// Bytes of a number; `None` for text, objects and structures.
+    /// Size of a number in bytes; `None` for text, objects and structures.
     #[must_use]
     pub fn item_bytes(&self) -> Option<u64> {
         let kind = self
@@ -80,7 +80,7 @@ impl NpyHeader {
         number.then(|| kind.get(1..)?.parse().ok())?
     }
 
-    /// How long the whole file must be at least; `None` where the numbers' size is not known, or no file is as long.
+    /// Smallest length of the whole file, in bytes; `None` if the numbers' size is not known, or no file is that long.
     #[must_use]
     pub fn file_bytes(&self) -> Option<u64> {
         let mut sides = self.shape.iter();
@@ -90,15 +90,15 @@ impl NpyHeader {
             .checked_add(self.begin as u64)
     }
 
-    /// Whether a file of `length` bytes holds all numbers that it says it has. A reader that allocates for them before it reads
-    /// them, as most do, must ask this first.
+    /// Whether a file of `length` bytes can contain all its numbers. Readers that allocate memory before they read, as most do, must check
+    /// this first.
     #[must_use]
     pub fn fits(&self, length: u64) -> bool {
         self.file_bytes().is_some_and(|bytes| bytes <= length)
     }
 }
 
-/// The value of a key that is neither a tuple nor a structure.
+/// The value of a key, if it is neither a tuple nor a structure.
 fn field<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let after = header.split_once(&format!("'{key}':"))?.1;
     after.split([',', '}']).next().map(str::trim)
@@ -108,7 +108,7 @@ fn field<'a>(header: &'a str, key: &str) -> Option<&'a str> {
 mod tests {
     use super::*;
 
-    /// A file of format 1 with this header and `numbers` bytes behind it.
+    /// A file of format 1 with this header, followed by `numbers` bytes.
     fn file(header: &str, numbers: usize) -> Vec<u8> {
         let mut file = b"\x93NUMPY\x01\x00".to_vec();
         file.extend((header.len() as u16).to_le_bytes());
@@ -140,7 +140,7 @@ mod tests {
         );
     }
 
-    /// Lengths whose product is more than memory, or than a number holds; text, whose width is not a number's.
+    /// Shapes whose product exceeds memory or an integer; and text, whose width is not a number's.
     #[test]
     fn what_no_file_holds_does_not_fit() {
         for (descr, shape) in [

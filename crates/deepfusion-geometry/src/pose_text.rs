@@ -1,8 +1,8 @@
-//! Poses and numbers as KITTI's files have them.
+//! Poses and numbers in the text format of KITTI's files.
 
 use crate::Se3;
 
-/// C's `%.12e`, which KITTI's tools print (with fewer digits): `7.215377000000e+02`.
+/// A number in the format of C's `%.12e`, as printed by KITTI's tools (with fewer digits): `7.215377000000e+02`.
 #[must_use]
 pub fn scientific(value: f64) -> String {
     let text = format!("{value:.12e}");
@@ -18,7 +18,7 @@ pub fn scientific(value: f64) -> String {
     }
 }
 
-/// A pose's line in KITTI's format, without its end: the upper three rows of the matrix, 12 numbers with a space between them.
+/// A pose as a line of KITTI's format, without line end: the upper three rows of the matrix, 12 numbers separated by spaces.
 #[must_use]
 pub fn kitti_line(pose: &Se3) -> String {
     let matrix = pose.matrix();

@@ -5,14 +5,14 @@ use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuatern
 pub struct Se3(Isometry3<f64>);
 
 impl Se3 {
-    /// The identity.
+    /// The identity motion.
     #[must_use]
     pub fn identity() -> Self {
         Self(Isometry3::identity())
     }
 
-    /// From a rotation matrix and a translation in metres. The matrix is projected onto the nearest
-    /// rotation: calibration files carry six decimals, which are not quite orthonormal.
+    /// Makes a motion from a rotation matrix and a translation in metres. The matrix is projected onto the nearest rotation, because
+    /// calibration files have six decimals and are not exactly orthonormal.
     #[must_use]
     pub fn from_parts(rotation: &Matrix3<f64>, translation: Vector3<f64>) -> Self {
         let rotation = Rotation3::from_matrix_eps(rotation, 1e-15, 100, Rotation3::identity());
@@ -22,20 +22,20 @@ impl Se3 {
         ))
     }
 
-    /// A camera's axes (x right, y down, z forward) from those of a body or a scanner (x forward, y left, z up) at the same place.
+    /// Converts the axes of a body or a scanner (x forward, y left, z up) to a camera's (x right, y down, z forward) at the same position.
     #[must_use]
     pub fn cam_from_body_axes() -> Self {
         let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
         Self::from_parts(&axes, Vector3::zeros())
     }
 
-    /// From an axis-angle vector (radians) and a translation (metres).
+    /// Makes a motion from an axis-angle vector (radians) and a translation (metres).
     #[must_use]
     pub fn from_axis_angle(axis_angle: Vector3<f64>, translation: Vector3<f64>) -> Self {
         Self(Isometry3::new(translation, axis_angle))
     }
 
-    /// From a unit quaternion (any norm, normalised here) `[w, x, y, z]` and a translation (metres).
+    /// Makes a motion from a quaternion `[w, x, y, z]` (any norm, normalised here) and a translation (metres).
     #[must_use]
     pub fn from_quaternion(wxyz: [f64; 4], translation: Vector3<f64>) -> Self {
         let q = nalgebra::Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
@@ -52,13 +52,13 @@ impl Se3 {
         [q.w, q.i, q.j, q.k]
     }
 
-    /// The exponential map: twist (rotational part ω, translational part v) to motion, t = V(ω)·v.
+    /// The exponential map from a twist (rotational part ω, translational part v) to a motion, t = V(ω)·v.
     #[must_use]
     pub fn exp(omega: Vector3<f64>, v: Vector3<f64>) -> Self {
         let theta2 = omega.norm_squared();
         let theta = theta2.sqrt();
         let w = omega.cross_matrix();
-        // Series near zero, where the quotients lose all digits.
+        // Series near zero, where the quotients lose all precision.
         let (a, b) = if theta < 1e-5 {
             (0.5 - theta2 / 24.0, 1.0 / 6.0 - theta2 / 120.0)
         } else {
@@ -93,13 +93,13 @@ impl Se3 {
         Self(self.0.inverse())
     }
 
-    /// Transforms a point of frame b to frame a.
+    /// Transforms a point from frame b to frame a.
     #[must_use]
     pub fn transform(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.0.rotation * point + self.0.translation.vector
     }
 
-    /// Transforms a direction of frame b to frame a: rotated, not translated.
+    /// Transforms a direction from frame b to frame a: rotated, not translated.
     #[must_use]
     pub fn rotate(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         self.0.rotation * direction

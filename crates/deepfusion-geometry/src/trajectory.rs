@@ -1,22 +1,22 @@
 use crate::Se3;
 
-/// A body's pose at a time.
+/// The pose of a body at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StampedPose {
     /// Time, in seconds.
     pub time_s: f64,
-    /// Body frame to world frame.
+    /// Pose of the body: body frame to world frame.
     pub world_from_body: Se3,
 }
 
-/// A body's path: poses in order of time.
+/// The trajectory of a body: poses in order of time.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trajectory {
     poses: Vec<StampedPose>,
 }
 
 impl Trajectory {
-    /// A path through `poses`, which are sorted by time. Poses whose time is not finite are dropped.
+    /// A trajectory through `poses`, which are sorted here. Poses whose time is not finite are dropped.
     #[must_use]
     pub fn new(mut poses: Vec<StampedPose>) -> Self {
         poses.retain(|p| p.time_s.is_finite());
@@ -30,8 +30,8 @@ impl Trajectory {
         &self.poses
     }
 
-    /// The pose at `time_s`, interpolated between its neighbours; `None` outside the path, and between neighbours more than `max_gap_s` apart:
-    /// nobody knows how the body moved there.
+    /// The pose at `time_s`, interpolated between its neighbours; `None` outside the trajectory, and between neighbours more than
+    /// `max_gap_s` apart, because the motion between them is unknown.
     #[must_use]
     pub fn at(&self, time_s: f64, max_gap_s: f64) -> Option<Se3> {
         let after = self.poses.partition_point(|p| p.time_s < time_s);
@@ -52,7 +52,7 @@ impl Trajectory {
         )
     }
 
-    /// Length of the path, in metres.
+    /// Length of the trajectory, in metres.
     #[must_use]
     pub fn length_m(&self) -> f64 {
         self.poses

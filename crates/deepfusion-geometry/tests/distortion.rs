@@ -1,10 +1,10 @@
-//! The lens model against OpenCV's, by `reference/distortion_opencv.py`.
+//! Compares the lens model with OpenCV's, by `reference/distortion_opencv.py`.
 
 use deepfusion_geometry::Distortion;
 use nalgebra::Vector2;
 
-/// OpenCV computes in double precision as we do: points differ by the order of operations, 1e-15, and
-/// undistorted ones by where either iteration stops, 1e-10.
+/// OpenCV computes in double precision, too: points differ by the order of operations, 1e-15, and undistorted ones by where either
+/// iteration stops, 1e-10.
 #[test]
 fn distorted_points_equal_opencvs() {
     let text = include_str!("reference/distortion_opencv.txt");
@@ -46,8 +46,8 @@ fn fisheye_points_equal_opencvs() {
         let v = numbers(0);
         let (ideal, seen) = (Vector2::new(v[0], v[1]), Vector2::new(v[2], v[3]));
         assert!((lens.distort(&ideal) - seen).norm() < 1e-13, "{line}");
-        // Back again, where tan magnifies the rounding of a point far from the axis.
-        let back = lens.undistort(&seen).expect("a ray before the camera");
+        // And back, where tan magnifies the rounding error of a point far from the axis.
+        let back = lens.undistort(&seen).expect("a ray in front of the camera");
         assert!(
             (back - ideal).norm() < 1e-12 * (1.0 + ideal.norm_squared()),
             "{line}"

@@ -1,9 +1,9 @@
-//! The scale monitor's work for each frame of a street: the frame's texture, and the pair's costs.
+//! The scale monitor's work for each frame of a street: the frame's texture, and the costs of a pair of frames.
 
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a benchmark ends where it cannot run"
+    reason = "a benchmark panics if it cannot run"
 )]
 #![allow(missing_docs)]
 

@@ -1,11 +1,11 @@
-//! How well a vehicle's own sensors say how it moved, on real recordings:
+//! How accurately a vehicle's own sensors measure its motion, on real recordings:
 //!
 //! ```text
 //! cargo run --release -p deepfusion-motion --example ego_motion -- comma SEGMENT VEHICLE.toml
 //! cargo run --release -p deepfusion-motion --example ego_motion -- kitti DRIVE [FRAMES]
 //! ```
 //!
-//! `VEHICLE.toml` is a [`MotionConfig`]; some are beside this file.
+//! `VEHICLE.toml` is a [`MotionConfig`]; some are in this folder.
 
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -49,7 +49,7 @@ fn comma(folder: &Path, vehicle: &Path) -> Result<(), Box<dyn std::error::Error>
             ),
         }
     }
-    // The tyres, from the first half's positions; what it is worth, on the second half.
+    // The tyres' scale comes from the first half's positions and is tested on the second half.
     let (first, second) = halves(&segment.reference);
     config.speed_scale = speed_scale(&segment.sensors.speed_mps, &first);
     println!(
@@ -102,7 +102,7 @@ fn kitti_drive(drive: &Path, frames: usize) -> Result<(), Box<dyn std::error::Er
     let fused = FusedTrack::new(&kitti::sensors(packets), &MotionConfig::default())?;
     if let Some(parts) = fused.parts(from, to) {
         println!(
-            "over all of it from the first speed alone: IMU {:.2?} m",
+            "over the whole drive, from the initial speed alone: IMU {:.2?} m",
             parts.imu_distance_m
         );
     }

@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 
 /// The kinematic bicycle model: one wheel per axle, without slip.
 ///
-/// θ̇ = v / L · tan δ (Eq. 27), where v is the forward speed of the **rear axle's** middle, which is
-/// the vehicle's origin; L the wheelbase; δ the road wheels' angle. A steering wheel's angle s gives
-/// δ = (s − offset) / ratio; a signal that already is the road wheels' angle has ratio 1.
+/// θ̇ = v / L · tan δ (Eq. 27), where v is the forward speed of the middle of the **rear axle**, which is the vehicle's origin; L is the
+/// wheelbase; δ is the road wheels' angle. A steering wheel's angle s gives δ = (s − offset) / ratio; a signal that already is the road
+/// wheels' angle has ratio 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bicycle {
     /// Distance between the axles, in metres.
     pub wheelbase_m: f64,
-    /// Steering wheel's angle over road wheels' angle; 1 where the signal is the road wheels' angle.
+    /// Ratio of the steering wheel's angle to the road wheels' angle; 1 if the signal is the road wheels' angle.
     #[serde(default = "one")]
     pub steering_ratio: f64,
     /// Reading of the steering signal when the car drives straight, in radians.
@@ -30,7 +30,7 @@ fn one() -> f64 {
 }
 
 impl Bicycle {
-    /// A vehicle whose steering signal is the road wheels' angle, without understeer.
+    /// A vehicle whose signal is the road wheels' angle, without understeer.
     #[must_use]
     pub fn new(wheelbase_m: f64) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Bicycle {
         }
     }
 
-    /// The same with a steering wheel's angle as signal: `steering_ratio` times that of the road wheels.
+    /// The same vehicle with a steering wheel's angle as signal: `steering_ratio` times the road wheels' angle.
     #[must_use]
     pub fn with_steering_wheel(self, steering_ratio: f64) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl Bicycle {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first implausible field.
+    /// [`Error::Config`], naming the first implausible field.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: f64, expected| {
             ok.then_some(()).ok_or(Error::Config {
@@ -69,7 +69,7 @@ impl Bicycle {
             self.wheelbase_m,
             Expected::Metres { from, to },
         )?;
-        // Some makers count to the right: a negative ratio says so.
+        // In some cars the signal grows to the right, which a negative ratio expresses.
         let (from, to) = (0.5, 60.0);
         check(
             (from..=to).contains(&self.steering_ratio.abs()),
@@ -92,9 +92,8 @@ impl Bicycle {
         )
     }
 
-    /// Yaw rate in rad/s, positive to the left, at a speed in m/s and a reading of the steering signal
-    /// in radians. The road wheels' angle is limited to 1.2 rad: larger readings are wrong, and near
-    /// the tangent's pole the car would turn on the spot.
+    /// Yaw rate in rad/s, positive to the left, for a speed in m/s and a reading of the steering signal in radians. The road wheels' angle
+    /// is limited to 1.2 rad: larger readings are wrong, and near the pole of the tangent the yaw rate would grow without limit.
     #[must_use]
     pub fn yaw_rate(&self, speed_mps: f64, steering_rad: f64) -> f64 {
         let delta = (steering_rad - self.steering_offset_rad) / self.steering_ratio;
@@ -102,8 +101,8 @@ impl Bicycle {
         speed_mps * delta.clamp(-1.2, 1.2).tan() / (self.wheelbase_m * slip)
     }
 
-    /// θ̇_V over time: at every sample of the steering signal for which there is a speed, and at every
-    /// sample of the speed for which there is a steering angle. Its integral is θ_V (Eq. 27).
+    /// θ̇_V over time: at every sample of the steering signal with a known speed, and at every sample of the speed with a known steering
+    /// angle. Its integral is θ_V (Eq. 27).
     #[must_use]
     pub fn yaw_rate_signal(&self, speed: &Signal, steering: &Signal) -> Signal {
         let mut times: Vec<f64> = [speed.times_s(), steering.times_s()].concat();
@@ -113,8 +112,8 @@ impl Bicycle {
             let (v, s) = (speed.at(*t)?, steering.at(*t)?);
             Some((*t, self.yaw_rate(v, s)))
         });
-        // A gap of either is a gap of the product: its samples are missing there. Elsewhere its samples
-        // are at least as close as those of the closer one.
+        // A gap in either signal is a gap in the product, because samples are missing there. Elsewhere the product's samples are at least
+        // as dense as those of the denser signal.
         Signal::with_max_gap(samples, speed.max_gap_s().min(steering.max_gap_s()))
     }
 }
@@ -200,7 +199,7 @@ mod tests {
             assert!(error.hint().is_some());
         }
         assert!(Bicycle::new(2.7).validate().is_ok());
-        // A reading far off stays finite.
+        // An absurd reading still gives a finite rate.
         assert!(Bicycle::new(2.7).yaw_rate(10.0, 1e9).is_finite());
     }
 }

@@ -1,4 +1,4 @@
-//! What can go wrong while a vehicle's sensors are read and fused.
+//! What can go wrong when a vehicle's sensors are read and fused.
 
 mod array;
 mod expected;
@@ -9,21 +9,21 @@ pub use self::expected::{ExpectedLayout, ExpectedSetting};
 use deepfusion_hint::{Hint, system_hint};
 use std::path::{Path, PathBuf};
 
-/// Number of names that an error lists.
+/// Number of names that an error message lists.
 const NAMES_SHOWN: usize = 12;
 
-/// What can go wrong while a vehicle's sensors are read and fused.
+/// What can go wrong when a vehicle's sensors are read and fused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A setting that no vehicle or sensor has.
+    /// A setting with an implausible value.
     #[error("{field} is {value}: expected {expected}")]
     Config {
-        /// The field.
+        /// Name of the setting.
         field: &'static str,
-        /// Its value.
+        /// The setting's value.
         value: f64,
-        /// What it must be.
+        /// What the value must be.
         expected: ExpectedSetting,
     },
     /// A stream has too few usable samples.
@@ -34,25 +34,25 @@ pub enum Error {
     TooFewSamples {
         /// The stream: "speed", "imu", …
         stream: &'static str,
-        /// How many can be used.
+        /// Number of usable samples.
         usable: usize,
-        /// How many there are.
+        /// Number of samples.
         total: usize,
-        /// How many are needed.
+        /// Number of samples needed.
         needed: usize,
     },
-    /// What the accelerometer measures on average is not gravity.
+    /// The accelerometer's mean is not gravity.
     #[error(
         "imu: the mean specific force is {norm:.2} m/s² ({:.2}, {:.2}, {:.2} forward, left, up), expected about 9.81",
         found[0], found[1], found[2]
     )]
     NotGravity {
-        /// Its mean, in vehicle axes, m/s².
+        /// Mean specific force, in vehicle axes, m/s².
         found: [f64; 3],
-        /// Its length, m/s².
+        /// Norm of the mean, m/s².
         norm: f64,
     },
-    /// Gravity points elsewhere than down.
+    /// Gravity does not point down in vehicle axes.
     #[error(
         "imu: up is measured {angle_deg:.0}° away from the vehicle's z axis \
          ({:.2}, {:.2}, {:.2} m/s² forward, left, up): vehicle_from_imu does not fit the sensor",
@@ -71,51 +71,51 @@ pub enum Error {
     YawSigns {
         /// Correlation of the two yaw rates.
         correlation: f64,
-        /// How long the vehicle turned, in seconds.
+        /// Duration of turning, in seconds.
         turning_s: f64,
     },
     /// A file could not be opened or read.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// An array file is not what the recording's layout says.
+    /// An array file does not match the recording's layout.
     #[error("{}: {problem}", path.display())]
     Array {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is wrong with it.
         problem: ArrayProblem,
     },
-    /// A DBC file cannot be understood.
+    /// A DBC file cannot be parsed.
     #[error("DBC: {}{source}", of_file(path.as_deref()))]
     Dbc {
-        /// The file; `None` for a text without one.
+        /// Path of the file; `None` for a text without a file.
         path: Option<PathBuf>,
-        /// What the parser said, with the line where it is known.
+        /// The parser's error, with the line if known.
         source: Box<can_dbc::DbcError>,
     },
-    /// There is no such signal.
+    /// A DBC file does not contain the signal.
     #[error("signal `{name}`: {problem}")]
     NoSignal {
         /// The name asked for, "Message.Signal".
         name: String,
-        /// What there is instead.
+        /// What is missing, and what exists instead.
         problem: SignalProblem,
     },
     /// A signal's layout does not fit into a frame.
     #[error("signal `{name}`: {field} is {value}, expected {expected}")]
     Layout {
-        /// The signal.
+        /// Name of the signal.
         name: String,
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// The field's value.
         value: f64,
-        /// What it must be.
+        /// What the value must be.
         expected: ExpectedLayout,
     },
 }
@@ -144,36 +144,36 @@ impl Hint for Error {
             }
             Self::TooFewSamples { stream, .. } => {
                 return Some(format!(
-                    "check that the recording has the {stream} and that its time stamps run forward"
+                    "check that the recording contains {stream} samples and that their time stamps increase"
                 ));
             }
             Self::NotGravity { norm, .. } if (0.8..1.25).contains(norm) => {
-                "the accelerations look like multiples of g: multiply them by 9.80665"
+                "multiply the accelerations by 9.80665: they look like multiples of g"
             }
             Self::NotGravity { norm, .. } if *norm < 0.8 => {
-                "gravity seems to have been removed already: give the raw accelerations, or leave the unit out"
+                "give the raw accelerations, or leave the unit out: gravity seems to have been removed already"
             }
             Self::NotGravity { .. } => "give accelerations in m/s², gravity included",
             Self::NotUp { angle_deg, .. } if *angle_deg > 135.0 => {
-                "the unit is mounted upside down, or counts z downward: turn vehicle_from_imu by 180° about x"
+                "rotate vehicle_from_imu by 180° about x: the unit is mounted upside down, or its z axis points down"
             }
             Self::NotUp { .. } => {
-                "vehicle_from_imu takes the sensor's axes to x forward, y left, z up: correct its rotation"
+                "correct the rotation of vehicle_from_imu, which takes the sensor's axes to x forward, y left, z up"
             }
             Self::YawSigns { .. } => {
-                "make the steering ratio negative where the angle grows to the right, or correct vehicle_from_imu"
+                "make the steering ratio negative if the angle grows to the right, or correct vehicle_from_imu"
             }
             Self::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
-                "a comma2k19 segment has processed_log/CAN, processed_log/IMU and global_pose"
+                "give a comma2k19 segment, a folder with processed_log/CAN, processed_log/IMU and global_pose"
             }
             Self::File { source, .. } => return Some(system_hint(source.kind()).into()),
             Self::Array { .. } => {
-                "fetch the recording again: the file is cut off, or of another data set"
+                "download the recording again: the file is cut off, or from another data set"
             }
             Self::Dbc { .. } => {
-                "repair the line, or describe the signals you need by id, start bit and length instead"
+                "correct the line, or describe the signals you need by id, start bit and length instead"
             }
-            Self::NoSignal { .. } => "names are \"Message.Signal\", as the DBC file spells them",
+            Self::NoSignal { .. } => "give \"Message.Signal\", spelt as in the DBC file",
             Self::Layout { .. } => {
                 "compare the signal's start bit, length and byte order with its documentation"
             }
@@ -182,27 +182,27 @@ impl Hint for Error {
     }
 }
 
-/// Why a DBC file has no signal of a name.
+/// Why a signal is not in a DBC file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalProblem {
-    /// It is no name of a signal.
+    /// The name does not have the form "Message.Signal".
     #[error("expected \"Message.Signal\"")]
     Name,
-    /// There is no such message.
-    #[error("no message `{message}`; there are {}", some_names(known))]
+    /// There is no message of this name.
+    #[error("no message `{message}`; the file has {}", some_names(known))]
     NoMessage {
-        /// The message's name.
+        /// Name of the message.
         message: String,
-        /// Those there are.
+        /// Names of the messages that exist.
         known: Vec<String>,
     },
-    /// The message has no such signal.
-    #[error("`{message}` has {}", some_names(known))]
+    /// The message has no signal of this name.
+    #[error("not in message `{message}`, which has {}", some_names(known))]
     NoSignal {
-        /// The message's name.
+        /// Name of the message.
         message: String,
-        /// The signals it has.
+        /// Names of its signals.
         known: Vec<String>,
     },
 }

@@ -14,14 +14,14 @@ const TURNING_RADPS: f64 = 0.03;
 /// Least duration of turning, in seconds, that proves two sensors disagree about left and right.
 const ENOUGH_TURNING_S: f64 = 3.0;
 
-/// Longest interval, in seconds, with the configured share of the accelerometer. Its remaining bias grows with the square of
-/// time, the wheels' error only with time; so its share falls with the square beyond.
+/// Longest interval, in seconds, in which the accelerometer has its full configured share. The error of its remaining bias grows with the
+/// square of time, the wheels' error only linearly, so its share falls with the square of time beyond that.
 const DRIFTS_S: f64 = 1.0;
 
 /// Ratios of true to measured speed that tyres can explain.
 pub const SPEED_SCALES: RangeInclusive<f64> = 0.5..=2.0;
 
-/// The recordings of a vehicle's sensors, on one clock.
+/// The recorded signals of a vehicle's sensors, on one clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleSensors {
     /// Forward speed, in m/s (negative when reversing, if the vehicle reports it).
@@ -32,8 +32,7 @@ pub struct VehicleSensors {
     pub imu: Option<Vec<ImuSample>>,
 }
 
-/// The weights of the fusion: 1 is the inertial unit alone (of a distance up to a second), 0 the vehicle's speed and
-/// steering alone.
+/// The weights of the fusion: 1 uses the inertial unit alone (for distances over up to a second), 0 the vehicle's speed and steering alone.
 ///
 /// Speed from wheels has a small constant error of scale; speed from an integrated accelerometer
 /// drifts. Heading is the reverse: a gyro has a slow bias, while the steering angle does not
@@ -41,7 +40,7 @@ pub struct VehicleSensors {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FusionConfig {
-    /// α_d, the inertial unit's share of the distance (Eq. 30) over up to a second; over T seconds 1/T² of it.
+    /// α_d, the inertial unit's share of the distance (Eq. 30) over up to a second; over T seconds it is divided by T².
     pub alpha_distance: f64,
     /// α_θ, the inertial unit's share of the yaw (Eq. 31).
     pub alpha_yaw: f64,
@@ -56,14 +55,14 @@ impl Default for FusionConfig {
     }
 }
 
-/// Settings that turn a vehicle's sensors into its motion.
+/// Settings for computing a vehicle's motion from its sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionConfig {
-    /// Ratio of true to measured speed. Wheel speed counts turns: worn or larger tyres scale it by a
-    /// constant factor, and every depth with it. A drive with satellite positions reveals the factor.
+    /// Ratio of true to measured speed. Wheel speed counts turns: worn or larger tyres scale it by a constant factor, and with it every
+    /// depth. A drive with satellite positions reveals the factor.
     pub speed_scale: f64,
-    /// The vehicle's geometry. Without it a steering angle cannot be used.
+    /// The vehicle's geometry. Without it, a steering angle cannot be used.
     pub bicycle: Option<Bicycle>,
     /// The inertial unit's mount and processing.
     pub imu: ImuConfig,
@@ -100,7 +99,7 @@ pub struct MotionParts {
 pub struct FusedTrack {
     speed_mps: Signal,
     steering_yaw_rate: Option<Signal>,
-    /// The yaw rates of gyro and steering, corrected for the errors found by comparing them.
+    /// The yaw rates of gyro and steering, without the errors found by comparing them.
     freed_yaw_rates: Option<[Signal; 2]>,
     imu: Option<ImuTrack>,
     weights: FusionConfig,
@@ -110,9 +109,8 @@ impl FusedTrack {
     /// Prepares the sensors' streams. A steering angle without a [`MotionConfig::bicycle`] is left out.
     ///
     /// # Errors
-    /// [`Error::TooFewSamples`] without a speed; [`Error::Config`] for settings out of range;
-    /// [`Error::NotGravity`], [`Error::NotUp`] for an inertial unit that does not fit its
-    /// configuration; [`Error::YawSigns`] if gyro and steering turn opposite ways.
+    /// [`Error::TooFewSamples`] without a speed; [`Error::Config`] for settings out of range; [`Error::NotGravity`], [`Error::NotUp`] for
+    /// an inertial unit that contradicts its configuration; [`Error::YawSigns`] if gyro and steering turn in opposite directions.
     pub fn new(sensors: &VehicleSensors, config: &MotionConfig) -> Result<Self> {
         config.fusion.validate()?;
         if !SPEED_SCALES.contains(&config.speed_scale) {
@@ -170,7 +168,7 @@ impl FusedTrack {
         self.speed_mps.times_s()
     }
 
-    /// Forward speed at a time, in m/s; `None` where the speed does not cover it.
+    /// Forward speed at a time, in m/s; `None` if the speed signal does not cover it.
     #[must_use]
     pub fn speed_at(&self, time_s: f64) -> Option<f64> {
         self.speed_mps.at(time_s)
@@ -182,7 +180,7 @@ impl FusedTrack {
         &self.speed_mps
     }
 
-    /// Yaw rate from the steering, in rad/s, where the vehicle has one and its geometry is known.
+    /// Yaw rate from the steering, in rad/s, if the vehicle has a steering signal and its geometry is known.
     #[must_use]
     pub fn steering_yaw_rate(&self) -> Option<&Signal> {
         self.steering_yaw_rate.as_ref()
@@ -194,27 +192,25 @@ impl FusedTrack {
         self.imu.as_ref()
     }
 
-    /// Roll and pitch by the inertial unit at a time, in radians ([`ImuTrack::tilt`]); `None` without one.
+    /// Roll and pitch from the inertial unit at a time, in radians ([`ImuTrack::tilt`]); `None` without one.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
         self.imu.as_ref()?.tilt(time_s)
     }
 
-    /// Whether a sensor measures yaw. If not, every motion is straight: its distance is right, the
-    /// effect of the lever arm is missing.
+    /// Whether a sensor measures yaw. If not, every motion is straight: its distance is right, but the effect of the lever arm is missing.
     #[must_use]
     pub fn knows_yaw(&self) -> bool {
         self.imu.is_some() || self.steering_yaw_rate.is_some()
     }
 
-    /// Ratio of the gyro's to the steering's yaw at speeds up to `most_mps` (tyres slip in fast bends), which is 1 if
-    /// wheelbase and steering ratio are right; and the duration of such turning in seconds. `None` without either sensor,
-    /// or without such turning.
+    /// Ratio of the gyro's to the steering's yaw at speeds up to `most_mps` (tyres slip in fast bends), and the duration of this turning in
+    /// seconds. The ratio is 1 if wheelbase and steering ratio are right. `None` without either sensor, or without turning at these speeds.
     #[must_use]
     pub fn gyro_over_steering(&self, most_mps: f64) -> Option<(f64, f64)> {
         let steering = self.steering_yaw_rate.as_ref()?;
         let gyro = self.imu.as_ref()?.yaw_rate();
-        // Least squares with the gyro's bias: gyro = bias + factor · steering, over all that is slow.
+        // Least squares with the gyro's bias: gyro = bias + factor · steering, over all slow samples.
         let (mut n, mut turning_s) = (0.0, 0.0);
         let (mut s, mut g, mut ss, mut sg) = (0.0, 0.0, 0.0, 0.0);
         for (times, rate) in gyro.times_s().windows(2).zip(gyro.values()) {
@@ -255,9 +251,9 @@ impl FusedTrack {
         })
     }
 
-    /// The vehicle's motion from `from_s` to `to_s` (Eq. 30–31): d_F = α_d d_I + (1 − α_d) d_V and θ_F likewise, α_d falling with
-    /// the square of time beyond a second. If one sensor is absent or has a gap, the other has all the weight. `None` if the
-    /// speed has a gap, or every yaw sensor has one, or `to_s` is before `from_s`.
+    /// The vehicle's motion from `from_s` to `to_s` (Eq. 30–31): d_F = α_d d_I + (1 − α_d) d_V and θ_F likewise, where α_d falls with the
+    /// square of time beyond a second. If one sensor is absent or has a gap, the other has the whole weight. `None` if the speed has a gap,
+    /// or every yaw sensor has one, or `to_s` is before `from_s`.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         let parts = self.parts(from_s, to_s)?;
@@ -268,7 +264,7 @@ impl FusedTrack {
         let freed = self.freed_yaw_rates.as_ref();
         let freed = freed.map(|both| both.each_ref().map(|rate| rate.integral(from_s, to_s)));
         let [imu_yaw_rad, steering_yaw_rad] = match freed {
-            // Each without what it was found to be off by, where the other has a gap, too.
+            // Each without the error found for it, even if the other has a gap.
             Some([imu, steering]) => [
                 imu.or(parts.imu_yaw_rad),
                 steering.or(parts.steering_yaw_rad),
@@ -294,7 +290,7 @@ impl FusedTrack {
     }
 }
 
-/// The yaw rates of gyro and steering without the errors found.
+/// The yaw rates of gyro and steering without the errors found in them.
 fn freed_of(
     found: &[DrivingBias],
     gyro: &Signal,

@@ -4,19 +4,18 @@
 //!
 //! ω = v · tan((s − s₀) / ρ) / L + b
 //!
-//! # What a drive shows, and what it does not
+//! # What a drive can determine
 //! With x = (s − s₀) / ρ, the logarithm of the turning changes with those of the parameters as
 //!
 //! ∂ ln ω / ∂ ln L = −1, ∂ ln ω / ∂ ln ρ = −2x / sin 2x = −(1 + 2x²/3 + …)
 //!
-//! At small angles both are −1: only the **product** L·ρ shows, and a longer car with a quicker
-//! steering turns the same. They part by 2x²/3: 0.7 % at a road wheel's 0.1 rad (any drive on roads),
-//! 17 % at 0.5 rad (parking). So both together need manoeuvres near the lock, or one must be known. The
-//! zero s₀ adds a turning that grows with the speed, the bias b one that does not: they part only where
-//! the speed changes. A straight drive shows neither L nor ρ.
+//! At small angles both are −1: only the **product** L·ρ can be determined, since a longer car with a more direct steering turns in the
+//! same way. The two differ by 2x²/3: 0.7 % at 0.1 rad of the road wheels (any drive on roads), 17 % at 0.5 rad (parking). So identifying
+//! both needs manoeuvres near the lock, or one must be known. The zero s₀ adds a turning that grows with the speed, the bias b one that
+//! does not: they can be separated only if the speed changes. A straight drive determines neither L nor ρ.
 //!
-//! Standard errors are those of the fit, widened for residuals that come in runs. They do not know of
-//! tyres that slip: identify at low speed, or give [`IdentifyConfig::understeer_s2_per_m2`].
+//! Standard errors are those of the fit, widened for correlated residuals. They do not include tyre slip: identify at low speed, or give
+//! [`IdentifyConfig::understeer_s2_per_m2`].
 
 mod fit;
 mod problem;
@@ -34,9 +33,9 @@ pub struct IdentifyConfig {
     pub steering_ratio: Option<f64>,
     /// Understeer of the vehicle, in s²/m² ([`Bicycle::understeer_s2_per_m2`]); not identified.
     pub understeer_s2_per_m2: f64,
-    /// Largest standard error of wheelbase and ratio, over their value, that counts as identified.
+    /// Largest relative standard error of wheelbase and ratio that counts as identified.
     pub largest_relative_error: f64,
-    /// Least turning in seconds at 0.03 rad/s or more.
+    /// Shortest turning, in seconds at 0.03 rad/s or more.
     pub least_turning_s: f64,
 }
 
@@ -52,7 +51,7 @@ impl Default for IdentifyConfig {
     }
 }
 
-/// A value with its standard error (0 if it was given).
+/// A value with its standard error, which is 0 if the value was given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// The value.
@@ -62,7 +61,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The standard error over the value.
+    /// The relative standard error.
     #[must_use]
     pub fn relative_error(&self) -> f64 {
         self.std_error / self.value.abs()
@@ -74,9 +73,9 @@ impl Estimate {
 pub struct Identified {
     /// L, in metres.
     pub wheelbase_m: Estimate,
-    /// ρ; negative where the signal grows to the right.
+    /// ρ; negative if the signal grows to the right.
     pub steering_ratio: Estimate,
-    /// L·ρ in metres, which is known better than either.
+    /// L·ρ in metres, which is known more accurately than either factor.
     pub product_m: Estimate,
     /// s₀, in radians of the steering signal.
     pub steering_offset_rad: Estimate,
@@ -112,7 +111,7 @@ pub struct Unidentifiable {
     pub figure: f64,
     /// The required figure.
     pub needed: f64,
-    /// L·ρ in metres, if at least that is known well enough.
+    /// L·ρ in metres, if at least that is known accurately enough.
     pub product_m: Option<Estimate>,
 }
 
@@ -132,9 +131,9 @@ pub enum UnidentifiableReason {
 impl std::fmt::Display for UnidentifiableReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Straight => "the drive is too straight, seconds of turning",
+            Self::Straight => "the drive is too straight; seconds of turning",
             Self::OnlyTheProduct => {
-                "wheelbase and steering ratio only as their product, without large steering angles; relative standard error"
+                "without large steering angles only the product of wheelbase and steering ratio is known; relative standard error"
             }
             Self::TooUncertain => "the turning does not follow the steering well enough; relative standard error",
         })
@@ -222,7 +221,7 @@ fn judge(fit: &Fit, config: &IdentifyConfig, turning_s: f64) -> Result<Identifie
         .wheelbase_m
         .relative_error()
         .max(found.steering_ratio.relative_error());
-    // A ratio at the edge of what steerings have was not found but stopped.
+    // A ratio at the limit of the range was not found; the search was stopped there.
     let both_are_known = worst <= limit && !fit.at_the_edge;
     if !both_are_known {
         let figure = if fit.at_the_edge {

@@ -1,42 +1,39 @@
-//! Image motion from one frame to the next: shift, drop and roll as the camera turns, growth as it
-//! drives.
+//! Image motion between two frames: shift, drop and roll from the camera's rotation, growth from its forward motion.
 //!
-//! In the upper part of a road picture, turning moves everything by the same amount, and driving
-//! moves everything away from the centre, by more the nearer it is. All at once are fitted to a pair
-//! of small grey pictures, coarse to fine, by gradients (Lucas and Kanade 1981; Bergen et al. 1992):
+//! In the upper part of a road image, turning moves everything by the same amount. Driving moves everything away from the centre, near
+//! things more than far ones. All motions are fitted together to a pair of small grey images, coarse to fine, by gradients (Lucas and
+//! Kanade 1981; Bergen et al. 1992):
 //!
 //! I₁(x + s + e·x' − φ·y', y + p + e·y' + φ·x') = I₀(x, y) + β, (x', y') = (x, y) − centre
 //!
-//! with the shift s to the right and p downward (pixels), the roll φ (clockwise), a growth e, in the
-//! end one for each block of the picture, and a change of brightness β.
+//! with the shift s to the right and p downward (pixels), the roll φ (clockwise), a growth e (in the last refinement one for each block of
+//! the image), and a change of brightness β.
 
 mod align;
 
 use crate::{Error, ExpectedSetting, Result};
 use align::Plane;
 
-/// Smallest picture that can be aligned, in pixels.
+/// Smallest image that can be aligned, in pixels.
 const LEAST: (usize, usize) = (32, 16);
 
-/// A small grey picture (some 160×48 pixels are enough), prepared for [`ImageMotion::between`].
+/// A small grey image (some 160×48 pixels are enough), prepared for [`ImageMotion::between`].
 #[derive(Debug, Clone)]
 pub struct GreyFrame {
     time_s: f64,
-    /// Full size first, then halves.
+    /// Full size first, then successive halves.
     pyramid: Vec<Plane>,
 }
 
 impl GreyFrame {
-    /// A picture of `width * height` values, row by row, in any unit, taken at `time_s` of the camera's
-    /// clock.
+    /// Prepares an image of `width * height` values, row by row, in any unit, taken at `time_s` of the camera's clock.
     ///
     /// # Errors
-    /// [`Error::Config`] where the number of values is not `width * height`, or the picture is smaller
-    /// than 32×16.
+    /// [`Error::Config`] if the number of values is not `width * height`, or the image is smaller than 32×16.
     pub fn new(time_s: f64, width: usize, height: usize, values: &[f32]) -> Result<Self> {
         if width < LEAST.0 || height < LEAST.1 {
             return Err(Error::Config {
-                field: "picture size",
+                field: "image size",
                 value: width.min(height) as f64,
                 expected: ExpectedSetting::PictureSize {
                     width: LEAST.0,
@@ -58,7 +55,7 @@ impl GreyFrame {
         Ok(Self { time_s, pyramid })
     }
 
-    /// The same of bytes.
+    /// Prepares an image of bytes.
     ///
     /// # Errors
     /// As [`GreyFrame::new`].
@@ -67,7 +64,7 @@ impl GreyFrame {
         Self::new(time_s, width, height, &values)
     }
 
-    /// When it was taken, in seconds of the camera's clock.
+    /// Time when it was taken, in seconds of the camera's clock.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         self.time_s
@@ -77,24 +74,23 @@ impl GreyFrame {
 /// Image motion between two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageMotion {
-    /// Time of the frame before, in seconds of the camera's clock.
+    /// Time of the earlier frame, in seconds of the camera's clock.
     pub from_s: f64,
-    /// Time of the frame after.
+    /// Time of the later frame.
     pub to_s: f64,
-    /// How far the far scene moved to the right, in pixels (or any unit): f·Δθ for a camera of focal
-    /// length f that turned left by Δθ.
+    /// How far the distant scene moved to the right, in pixels (or any unit): f·Δθ for a camera with focal length f that turned left by Δθ.
     pub shift: f64,
-    /// How far the far scene moved down, in pixels: −f·Δ for a camera whose nose went down by Δ.
+    /// How far the distant scene moved down, in pixels: −f·Δ for a camera whose nose went down by Δ.
     pub drop: f64,
-    /// How far the picture turned clockwise about its centre, in radians: minus the camera's roll.
+    /// How far the image turned clockwise about its centre, in radians: minus the camera's roll.
     pub clockwise_rad: f64,
-    /// Relative growth of the picture: about the distance driven over the depth of the scene.
+    /// Relative growth of the image: about the distance driven divided by the depth of the scene.
     pub growth: f64,
 }
 
 impl ImageMotion {
-    /// The motion from one frame to the next; `None` if the pictures differ in size, have no texture (a
-    /// wall, a tunnel, night), or moved by more than a quarter of their width.
+    /// The motion from one frame to the next; `None` if the images differ in size, have no texture (a wall, a tunnel, night), or moved by
+    /// more than a quarter of their width.
     #[must_use]
     pub fn between(before: &GreyFrame, after: &GreyFrame) -> Option<Self> {
         let warp = align::align(&before.pyramid, &after.pyramid)?;
@@ -109,13 +105,12 @@ impl ImageMotion {
     }
 }
 
-/// The motions of a sequence of frames: from each frame to the first one at least `apart_s` later, if
-/// they can be aligned. About 0.1 s is a good value: errors of the alignment matter less over a
-/// longer time, but too long a time moves the picture out of range.
+/// The motions of a sequence of frames: from each frame to the first one at least `apart_s` later, if they can be aligned. About 0.1 s is a
+/// good value: over a longer time, errors of the alignment matter less, but the motion may become too large to align.
 #[must_use]
 pub fn image_motions(frames: &[GreyFrame], apart_s: f64) -> Vec<ImageMotion> {
     let pair = |(i, before): (usize, &GreyFrame)| {
-        // A frame's time wobbles by a share of an interval.
+        // Frame times jitter by a share of the interval.
         let far = |after: &&GreyFrame| after.time_s - before.time_s >= apart_s - 1e-3;
         let after = frames[i + 1..].iter().find(far)?;
         ImageMotion::between(before, after)
@@ -130,7 +125,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (160, 48);
 
-    /// A scene of waves, moved to the right and grown about the middle of the aligned rows.
+    /// A scene of waves, moved to the right and enlarged about the middle of the aligned rows.
     fn picture(right: f64, roll: f64, growth: f64, brightness: f64) -> GreyFrame {
         let centre = align::centre(SIZE.0, SIZE.1);
         let mut values = Vec::new();

@@ -11,13 +11,12 @@
 //! | 28–31: fusion | [`FusedTrack`], [`FusionConfig`] |
 //! | 32–36: what the loss compares with | [`VehicleMotion`] |
 //!
-//! Beside it: [`identify`] (wheelbase, steering ratio), [`time_offset`] (the camera's clock against the
-//! vehicle's, from [`ImageMotion`]), [`can`] (signals out of CAN frames), [`comma`] (comma2k19).
+//! Further modules: [`identify`] (wheelbase, steering ratio), [`time_offset`] (the camera's clock relative to the vehicle's, from
+//! [`ImageMotion`]), [`can`] (signals from CAN frames), [`comma`] (comma2k19).
 //!
 //! # Conventions
-//! Vehicle frame: x forward, y left, z up, origin in the middle of the rear axle. Seconds, metres,
-//! radians; yaw is positive to the left. Gaps of a sensor are not filled: the result is `None`.
-//! Samples that are not finite or not later than the one before are dropped.
+//! Vehicle frame: x forward, y left, z up, origin in the middle of the rear axle. Seconds, metres, radians; yaw is positive to the left.
+//! Gaps of a sensor are not filled: the result is `None`. Samples that are not finite, or not later than the one before, are dropped.
 //!
 //! ```
 //! use deepfusion_motion::{Bicycle, FusedTrack, MotionConfig, Signal, VehicleSensors};

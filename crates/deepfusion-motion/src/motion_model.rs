@@ -5,7 +5,7 @@ use crate::{FusedTrack, VehicleMotion, VehicleTrack};
 pub enum MotionModel {
     /// One unit that measures speed and yaw rate (KITTI's oxts).
     Track(Box<VehicleTrack>),
-    /// Speed, steering and inertial unit, each with its own clock rate.
+    /// Speed, steering and inertial unit, each with its own sample rate.
     Fused(Box<FusedTrack>),
 }
 
@@ -28,7 +28,7 @@ impl MotionModel {
         }
     }
 
-    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` if nothing measures them.
+    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` if not measured.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
         match self {
@@ -37,7 +37,8 @@ impl MotionModel {
         }
     }
 
-    /// Whether roll and pitch are not measured, and could be taken from elsewhere: of several sensors, whether none of them turns.
+    /// Whether roll and pitch are unknown and may be taken from another source. For several sensors: whether none of them measures
+    /// rotation.
     #[must_use]
     pub fn lacks_tilt(&self) -> bool {
         match self {
@@ -46,7 +47,7 @@ impl MotionModel {
         }
     }
 
-    /// Its speed, with its yaw rate if one unit measures both, as a track of that unit.
+    /// Its speed as the track of one unit, with the yaw rate if one unit measures both.
     #[must_use]
     pub fn into_track(self) -> VehicleTrack {
         match self {
@@ -60,8 +61,7 @@ impl MotionModel {
         }
     }
 
-    /// The vehicle's motion between two times; `None` across gaps, outside the recording, and
-    /// backwards in time.
+    /// The vehicle's motion between two times; `None` across gaps, outside the recording, and backwards in time.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         match self {

@@ -1,9 +1,8 @@
-//! Speed along a track of positions, such as a satellite receiver's.
+//! Speed from a track of positions, such as a satellite receiver's.
 //!
-//! Differences of neighbouring positions are noisy: a metre of jitter at 1 Hz is 1 m/s. So the whole track is smoothed at once:
-//! on each axis position and velocity follow a random acceleration, with measurements weighted by Student's t (iterative
-//! reweighting), so that outliers count less. The result at every fix is the velocity given all fixes, before and after (Rauch,
-//! Tung, Striebel).
+//! Differences between neighbouring positions are noisy: at 1 Hz, a metre of jitter is 1 m/s. So the whole track is smoothed at once: on
+//! each axis, position and velocity follow a random acceleration, and measurements are weighted by Student's t (iterative reweighting), so
+//! that outliers have less weight. The result at every fix is the velocity given all fixes, before and after (Rauch, Tung, Striebel).
 
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::PI;
@@ -15,66 +14,65 @@ const POSITION_SIGMA_M: f64 = 1.0;
 const SPEED_SIGMA_MPS: f64 = 0.15;
 /// Spectral density of the random acceleration, m²/s³: the variance that a car's speed gains per second.
 const ACCELERATION_DENSITY: f64 = 1.5;
-/// Degrees of freedom of Student's t: small is robust.
+/// Degrees of freedom of Student's t: a small number is robust.
 const FREEDOM: f64 = 4.0;
-/// Below this speed by the smoothed positions, in m/s, a fix without a speed stands: some apps write only speeds above 0.
+/// Below this speed of the smoothed positions, in m/s, a fix without a speed counts as standing: some apps write only speeds above 0.
 const STANDING_MPS: f64 = 1.0;
 /// Number of rounds of reweighting.
 const ROUNDS: usize = 5;
-/// Longest time between two fixes from which a turn is taken, in seconds.
+/// Longest time between two fixes for which a yaw rate is computed, in seconds.
 const COURSE_GAP_S: f64 = 3.0;
 /// Longest gap within a track, in seconds.
 const MAX_GAP_S: f64 = 10.0;
-/// The ellipsoid of WGS 84: its equator's radius in metres, and its eccentricity squared.
+/// The WGS 84 ellipsoid: equatorial radius in metres, and eccentricity squared.
 const EQUATOR_M: f64 = 6_378_137.0;
 const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
 
-/// A satellite receiver's position.
+/// A position fix of a satellite receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fix {
-    /// In seconds.
+    /// Time, in seconds.
     pub time_s: f64,
     /// North of the equator, in degrees.
     pub latitude_deg: f64,
     /// East of Greenwich, in degrees.
     pub longitude_deg: f64,
-    /// The speed over ground, in m/s, if the receiver reports it (from Doppler shifts, better than differences of
-    /// positions).
+    /// Speed over ground, in m/s, if the receiver reports it (from Doppler shifts, which is more accurate than differences of positions).
     pub speed_mps: Option<f64>,
 }
 
 /// The speed at a fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixSpeed {
-    /// In seconds.
+    /// Time, in seconds.
     pub time_s: f64,
-    /// Over ground, in m/s.
+    /// Speed over ground, in m/s.
     pub speed_mps: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the speed, in m/s.
     pub sigma_mps: f64,
-    /// Where it was going, in radians from east to the left, by the smoothed positions; `None` below [`COURSE_MPS`], where
-    /// positions do not say it.
+    /// Direction of travel according to the smoothed positions, in radians from east to the left; `None` below [`COURSE_MPS`], where
+    /// positions do not show it.
     pub course_rad: Option<f64>,
-    /// Who says the speed.
+    /// Source of the speed.
     pub source: FixSpeedSource,
 }
 
-/// Who says the speed at a fix.
+/// The source of a fix's speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FixSpeedSource {
     /// The receiver.
     Receiver,
-    /// Nobody, among others whose speeds the receiver says: by its positions it stands.
+    /// The fix has no speed, but most others have one, and its positions show standing: the speed is 0.
     Standing,
     /// The smoothed positions.
     Positions,
 }
 
-/// Least speed at which positions show a course, m/s: their smoothed velocity is sure to some tenths.
+/// Smallest speed at which positions show a course, m/s: their smoothed velocity is accurate to some tenths.
 pub const COURSE_MPS: f64 = 2.0;
 
-/// How fast the course turned between neighbouring fixes that both have one and are at most three seconds apart: time in the
-/// middle in seconds, rate in rad/s, positive to the left. Smoothing spreads a turn to both sides alike.
+/// Rate of turn between neighbouring fixes that both have a course and are at most three seconds apart: time in the middle in seconds, rate
+/// in rad/s, positive to the left. Smoothing spreads a turn equally to both sides.
 #[must_use]
 pub fn course_rates(speeds: &[FixSpeed]) -> Vec<(f64, f64)> {
     let rate = |pair: &[FixSpeed]| {
@@ -87,11 +85,11 @@ pub fn course_rates(speeds: &[FixSpeed]) -> Vec<(f64, f64)> {
     speeds.windows(2).filter_map(rate).collect()
 }
 
-/// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out, but one that leapt ahead is left out
-/// itself where the next is back in time; a fix more than ten seconds from both neighbours has none.
+/// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out. If one fix's time jumped ahead, that
+/// fix is left out instead of the following ones. A fix more than ten seconds from both neighbours gets no speed.
 ///
-/// The receiver's own speeds count where at least half of the fixes of a part without gaps have one, not counting those that stand and have
-/// none: there a fix without one has the speed 0 where its positions stand, and is left out where they move.
+/// In a part without gaps, the receiver's own speeds are used if at least half of its fixes have one; standing fixes without a speed do not
+/// count. There, a fix without a speed gets the speed 0 if its positions stand, and is left out if they move.
 #[must_use]
 pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
     let mut kept: Vec<Fix> = Vec::with_capacity(fixes.len());
@@ -114,7 +112,8 @@ pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
         .collect()
 }
 
-/// Whether the last of the fixes has a time far ahead of its neighbours': of the one before it, and of the next, which goes on where that was.
+/// Whether the time of the last of `fixes` jumped far ahead: both the fix before it and `next`, which continues from there, are much
+/// earlier.
 fn leapt(fixes: &[Fix], next: &Fix) -> bool {
     let Some((last, before)) = fixes.split_last() else {
         return false;
@@ -147,7 +146,7 @@ fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
         let (x, y) = (east.state[1], north.state[1]);
         let (var_x, var_y) = (east.covariance[(1, 1)], north.covariance[(1, 1)]);
         let speed = x.hypot(y);
-        // Along the way it goes; of one that stands, either.
+        // The variance along the direction of travel; for a standing fix, the larger one.
         let variance = if speed > 1e-6 {
             (x * x * var_x + y * y * var_y) / (speed * speed)
         } else {
@@ -164,7 +163,7 @@ fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
     of_receiver(fixes, of_positions.collect())
 }
 
-/// The receiver's own speeds in place of those of the positions, where it says enough of them.
+/// Replaces the speeds from positions by the receiver's own, if it reports enough of them.
 fn of_receiver(fixes: &[Fix], of_positions: Vec<FixSpeed>) -> Vec<FixSpeed> {
     let stands = |by_positions: &FixSpeed| by_positions.speed_mps < STANDING_MPS;
     let measured = fixes.iter().filter(|fix| fix.speed_mps.is_some()).count();
@@ -190,8 +189,8 @@ fn of_receiver(fixes: &[Fix], of_positions: Vec<FixSpeed>) -> Vec<FixSpeed> {
     .collect()
 }
 
-/// East and north of the first fix, in metres, on the plane that touches the ellipsoid in the middle of the track: the scale is
-/// right to a millionth within some kilometres.
+/// East and north of the first fix, in metres, on the plane that touches the ellipsoid in the middle of the track: within some kilometres
+/// the scale is accurate to a millionth.
 fn metres(fixes: &[Fix]) -> Vec<[f64; 2]> {
     let mean = fixes.iter().map(|f| f.latitude_deg).sum::<f64>() / fixes.len() as f64;
     let (sin, cos) = mean.to_radians().sin_cos();
@@ -200,7 +199,7 @@ fn metres(fixes: &[Fix]) -> Vec<[f64; 2]> {
     let per_latitude = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w.powf(1.5);
     let first = fixes[0];
     let place = |fix: &Fix| {
-        // Over the date line it is not far.
+        // Differences across the date line are small, too.
         let east = (fix.longitude_deg - first.longitude_deg + 540.0).rem_euclid(360.0) - 180.0;
         let north = fix.latitude_deg - first.latitude_deg;
         [
@@ -218,9 +217,9 @@ struct Estimate {
     covariance: Matrix2<f64>,
 }
 
-/// The smoother on one axis; a weight of a half doubles a measurement's variance.
+/// The smoother on one axis; a weight of one half doubles a measurement's variance.
 fn smoothed(fixes: &[Fix], measured: &[f64], weights: &[f64]) -> Vec<Estimate> {
-    // Nothing is known of the velocity at first.
+    // Initially the velocity is unknown.
     let mut next = Estimate {
         state: Vector2::new(measured[0], 0.0),
         covariance: Matrix2::new(1e4, 0.0, 0.0, 1e4),
@@ -261,7 +260,7 @@ fn transition(dt: f64) -> Matrix2<f64> {
     Matrix2::new(1.0, dt, 0.0, 1.0)
 }
 
-/// The prediction `dt` seconds later.
+/// Predicts the state `dt` seconds later.
 fn advanced(from: &Estimate, dt: f64) -> Estimate {
     let step = transition(dt);
     let noise = Matrix2::new(dt.powi(3) / 3.0, dt.powi(2) / 2.0, dt.powi(2) / 2.0, dt);

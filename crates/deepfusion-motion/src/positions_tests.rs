@@ -6,7 +6,7 @@ fn noise(i: usize) -> f64 {
     2.0 * (x - x.floor()) - 1.0
 }
 
-/// A drive at 49° north that speeds up from 5 to 15 m/s, brakes and turns; `jitter` metres to either side.
+/// A drive at 49° north that accelerates from 5 to 15 m/s, brakes and turns; `jitter` is the position noise in metres.
 fn drive(jitter: f64) -> (Vec<Fix>, Vec<f64>) {
     let (mut x, mut y, mut heading) = (0.0_f64, 0.0_f64, 0.6_f64);
     let (mut fixes, mut speeds) = (Vec::new(), Vec::new());
@@ -38,7 +38,7 @@ fn drive(jitter: f64) -> (Vec<Fix>, Vec<f64>) {
     (fixes, speeds)
 }
 
-/// Root mean square of the errors, and the ratio of the distances.
+/// Root mean square error of the speeds, and the ratio of the distances.
 fn errors(found: &[FixSpeed], truth: &[f64]) -> (f64, f64) {
     let squares = found
         .iter()
@@ -58,7 +58,7 @@ fn a_track_gives_its_turns() {
             .iter()
             .map(|(t, rate)| (rate - 0.15 * (t / 9.0).sin()).powi(2));
         let rms = (squares.sum::<f64>() / rates.len() as f64).sqrt();
-        // The turns themselves have 0.1 rad/s.
+        // The true turns have 0.1 rad/s.
         assert!(rms < most, "{jitter}: {rms}");
     }
 }
@@ -72,7 +72,7 @@ fn a_track_gives_its_speeds() {
         let (error, ratio) = errors(&found, &truth);
         assert!(error < rms, "{jitter}: {error}");
         assert!((ratio - 1.0).abs() < bias, "{jitter}: {ratio}");
-        // At least two thirds lie within its own standard deviation.
+        // At least two thirds of the errors are within the stated standard deviation.
         let within = found
             .iter()
             .zip(&truth)
@@ -100,7 +100,7 @@ fn leaps_do_not_become_speed() {
     }
     let (error, ratio) = errors(&speeds_of_fixes(&fixes), &truth);
     assert!(error < 0.7 && (ratio - 1.0).abs() < 0.01, "{error} {ratio}");
-    // What neighbours say is tens of m/s.
+    // Differences of neighbouring positions give tens of m/s.
     let naive = 4e-4_f64.to_radians() * EQUATOR_M;
     assert!(naive > 40.0);
 }
@@ -125,7 +125,7 @@ fn a_receivers_own_speed_counts_and_gaps_part_the_track() {
     assert_eq!(
         speeds,
         [3.0, 4.0],
-        "twice a time, a lone fix, and one without a time"
+        "a repeated time, a lone fix, and one without a time"
     );
     assert!(speeds_of_fixes(&[]).is_empty());
     let over = |longitude_deg: f64, time_s: f64| Fix {
@@ -144,7 +144,7 @@ fn a_receivers_own_speed_counts_and_gaps_part_the_track() {
     );
 }
 
-/// A drive of ten seconds at 10 m/s after ten that it stands, a fix a second; `speed_mps` is what the receiver says of each.
+/// Ten seconds of standing, then ten seconds at 10 m/s, one fix a second; `speed_mps` is the speed that the receiver reports for each.
 fn stop_and_go(speed_mps: impl Fn(usize) -> Option<f64>) -> Vec<Fix> {
     let fix = |i: usize| Fix {
         time_s: i as f64,
@@ -157,7 +157,7 @@ fn stop_and_go(speed_mps: impl Fn(usize) -> Option<f64>) -> Vec<Fix> {
 
 #[test]
 fn a_fix_that_says_no_speed_does_not_take_the_others_away() {
-    // An app that writes speeds above 0, and one fix without one in between.
+    // An app that writes only speeds above 0, and one fix without a speed in between.
     let fixes = stop_and_go(|i| (i > 10 && i != 15).then_some(10.25));
     let found = speeds_of_fixes(&fixes);
     let times: Vec<f64> = found.iter().map(|f| f.time_s).collect();
@@ -170,7 +170,7 @@ fn a_fix_that_says_no_speed_does_not_take_the_others_away() {
         };
         assert_eq!((f.source, f.speed_mps), expected, "{f:?}");
     }
-    // Those next to the start move by the smoothed positions.
+    // According to the smoothed positions, the fixes next to the start are moving.
     assert!(found.len() >= 17, "{times:?}");
 }
 

@@ -1,15 +1,15 @@
 //! The camera's height above the road, from the road's motion in its images.
 //!
-//! The road is a plane. Two frames show its motion in units of the camera's height over it: the homography of the plane
-//! n·X = h between them is K (R + t nᵀ / h) K⁻¹, so a known t gives h. A sweep over h finds the plane that best carries
-//! the earlier image onto the later one. No depth and no network take part.
+//! The road is a plane. Two frames show its motion in units of the camera's height above it: the homography of the plane n·X = h between
+//! them is K (R + t nᵀ / h) K⁻¹, so a known t gives h. A sweep over h finds the plane that best maps the earlier image onto the later one.
+//! Neither depth nor a network is involved.
 
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Range of heights tried, in metres, and the ratio of one to the next. Beyond 15 m the road hardly moves.
+/// Range of heights tried, in metres, and the ratio of one height to the next. Beyond 15 m the road hardly moves.
 pub const SWEEP_M: (f64, f64) = (0.3, 15.0);
 /// See [`SWEEP_M`].
 pub const SWEEP_RATIO: f64 = 1.06;
@@ -23,8 +23,8 @@ const MIN_PAIRS: usize = 4;
 /// steeply down as the bottom row's.
 const COLUMNS: (f64, f64) = (0.2, 0.8);
 const STEEPNESS: f64 = 0.35;
-/// The far scene, which translation hardly moves: columns in the middle, and rows about the horizon, as the share of
-/// depth that rays there go down or up.
+/// The distant scene, which translation hardly moves: columns in the middle, and rows around the horizon, given as the slope (down or up)
+/// of their rays.
 const FAR_COLUMNS: (f64, f64) = (0.3, 0.7);
 const FAR_SLOPE: f64 = 0.06;
 /// Search range (to both sides) and step of the pitch between two frames, radians: speed and yaw rate do not contain it,
@@ -33,9 +33,9 @@ const PITCH: f64 = 0.0105;
 const PITCH_STEP: f64 = 0.0007;
 /// One in this many of the road's pixels is used.
 const THIN: usize = 2;
-/// Half the window whose mean is subtracted, so that shade and exposure have no effect, in pixels.
+/// Half width of the window whose mean is subtracted to remove shade and exposure, in pixels.
 const HIGH_PASS: usize = 4;
-/// Largest difference of one pixel that counts, in grey levels of 255: cars and kerbs are not the plane.
+/// Differences of one pixel are clipped at this, in grey levels of 255: cars and kerbs are not on the plane.
 const CLIP: f64 = 20.0;
 
 /// A small grey image, values 0 to 255, row by row.
@@ -49,8 +49,8 @@ pub struct GreyImage {
     pub data: Vec<f32>,
 }
 
-/// A frame's texture, without shade and exposure, from which the road's motion is measured. Made once, it serves
-/// the pair before and the pair after.
+/// A frame's texture, without shade and exposure, from which the road's motion is measured. Computed once, it serves the pair before and
+/// the pair after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoadTexture(GreyImage);
 
@@ -63,22 +63,22 @@ impl From<&GreyImage> for RoadTexture {
 /// Two frames of a drive, and the measured motion of the camera between them.
 #[derive(Debug, Clone)]
 pub struct GroundPair {
-    /// The frame before.
+    /// The earlier frame.
     pub earlier: Arc<RoadTexture>,
-    /// The frame after, of the same size.
+    /// The later frame, of the same size.
     pub later: Arc<RoadTexture>,
     /// Intrinsics of these small images.
     pub intrinsics: Intrinsics,
-    /// Time between them, seconds; NaN if unknown.
+    /// Time between the frames, in seconds; NaN if unknown.
     pub seconds: f64,
-    /// A point of the later camera in the earlier one; its translation is what is tested.
+    /// Maps points from the later camera to the earlier one; its translation is tested.
     pub earlier_from_later: Se3,
-    /// The direction to the ground in the camera's frame, of length 1.
+    /// The direction to the ground in the camera's frame, as a unit vector.
     pub down_in_cam: Vector3<f64>,
 }
 
-/// The height above the road, in metres, at which the pairs' motion explains their images best; `None`
-/// if no height is clearly better than the others, or fewer than four pairs show road.
+/// The height above the road, in metres, at which the pairs' motion explains their images best; `None` if no height is clearly better than
+/// the others, or fewer than four pairs show the road.
 #[must_use]
 pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
     let costs: Vec<RoadCosts> = pairs.par_iter().filter_map(RoadCosts::of).collect();
@@ -86,7 +86,7 @@ pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
     (pooled[best] <= CONCLUSIVE * median(&pooled)).then(|| height_at(best as f64))
 }
 
-/// How well each of the heights that are tried explains a pair; pairs are pooled by them.
+/// For each height tried, how well it explains a pair; pairs are pooled by these costs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoadCosts(Vec<f64>);
 
@@ -99,8 +99,8 @@ impl RoadCosts {
         pair.costs(&heights).map(Self)
     }
 
-    /// As [`implied_camera_height`], but between the heights that are tried: where a parabola through the best one and its neighbours,
-    /// by the logarithm of the height, is least.
+    /// As [`implied_camera_height`], but interpolated between the heights tried: the minimum of a parabola in the logarithm of the height,
+    /// through the best height and its neighbours.
     #[must_use]
     pub fn height(of_pairs: &[&Self]) -> Option<f64> {
         let (pooled, best) = Self::pooled(of_pairs)?;
@@ -113,7 +113,7 @@ impl RoadCosts {
         Some(height_at(best as f64 + step.clamp(-0.5, 0.5)))
     }
 
-    /// The mean cost at each height, and which is the least; `None` of fewer than four pairs.
+    /// The mean cost at each height, and the index of the smallest; `None` for fewer than four pairs.
     fn pooled(of_pairs: &[&Self]) -> Option<(Vec<f64>, usize)> {
         if of_pairs.len() < MIN_PAIRS {
             return None;
@@ -125,21 +125,21 @@ impl RoadCosts {
     }
 }
 
-/// The heights that are tried, by their number, metres.
+/// The height with this index among the heights tried, in metres.
 fn height_at(number: f64) -> f64 {
     SWEEP_M.0 * SWEEP_RATIO.powf(number)
 }
 
 impl GroundPair {
-    /// Mean difference of the two images over the road for each height, over the median of them; `None`
-    /// if the road is not in view or has no texture.
+    /// Mean difference of the two images over the road for each height, divided by the median of these; `None` if the road is not in view
+    /// or has no texture.
     #[must_use]
     pub fn costs(&self, heights: &[f64]) -> Option<Vec<f64>> {
         self.costs_and_pitch(heights, 0.0).0
     }
 
-    /// As [`Self::costs`], for a camera pitched by `tilt` (radians, nose up) from its mount in the earlier frame; with the
-    /// estimated pitch from the earlier to the later one.
+    /// As [`Self::costs`], for a camera whose pitch in the earlier frame differs by `tilt` from its mount (radians, nose up). The pitch
+    /// from the earlier to the later frame is estimated.
     pub(crate) fn costs_and_pitch(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
         let (earlier, later) = (&self.earlier.0, &self.later.0);
         let pitch = self.pitch(earlier, later);
@@ -147,13 +147,13 @@ impl GroundPair {
         (pitched.road_costs(earlier, later, heights), pitch)
     }
 
-    /// Rotation of the camera's nose upwards.
+    /// Rotation that turns the camera's nose up.
     fn nose_up(&self, angle: f64) -> Se3 {
         let side = self.down_in_cam.cross(&Vector3::z());
         Se3::from_axis_angle(side * angle, Vector3::zeros())
     }
 
-    /// The motion and the direction to the ground of a pitched camera: the vehicle's sensors do not include the pitch.
+    /// The motion and the direction to the ground of a pitched camera, because the vehicle's sensors do not measure the pitch.
     fn pitched(&self, tilt: f64, pitch: f64) -> Pitched<'_> {
         let motion = &self.earlier_from_later;
         let rotation = self.nose_up(pitch).rotation() * motion.rotation();
@@ -165,7 +165,7 @@ impl GroundPair {
         }
     }
 
-    /// The pitch between the frames that best maps the far scene from one image to the other, radians, nose up.
+    /// The pitch between the frames that best maps the distant scene from one image to the other, in radians, nose up.
     fn pitch(&self, earlier: &GreyImage, later: &GreyImage) -> f64 {
         let k_inverse = self.intrinsics.inverse_matrix();
         let (width, height) = (later.width, later.height);
@@ -195,7 +195,7 @@ impl GroundPair {
     }
 }
 
-/// A camera's motion, and the direction to the ground in it.
+/// A camera's motion, and the direction to the ground in its frame.
 struct Pitched<'a> {
     intrinsics: &'a Intrinsics,
     motion: Se3,
@@ -239,21 +239,21 @@ impl Pitched<'_> {
         Some(costs)
     }
 
-    /// Pixels of the later image to pixels of the earlier, for points on the plane at height `h`.
+    /// Maps pixels of the later image to pixels of the earlier one, for points on the plane at height `h`.
     fn homography(&self, h: f64, k_inverse: &Matrix3<f64>) -> Matrix3<f64> {
         let plane = self.motion.rotation() + self.motion.translation() * self.down.transpose() / h;
         self.intrinsics.matrix() * plane * k_inverse
     }
 }
 
-/// Mean difference of the later image's pixels and the earlier image at the positions to which a homography maps them.
+/// Mean difference between the later image's pixels and the earlier image at the positions given by a homography.
 fn difference(
     earlier: &GreyImage,
     later: &GreyImage,
     earlier_from_later: &Matrix3<f64>,
     pixels: &[(usize, usize)],
 ) -> f64 {
-    // A hundredth of a pixel is far less than what the images tell: single precision is enough.
+    // Images are not accurate to a hundredth of a pixel, so single precision is enough.
     let h = earlier_from_later.map(|v| v as f32);
     let clip = CLIP as f32;
     let width = earlier.width;
@@ -262,7 +262,7 @@ fn difference(
     }
     let most = [width, earlier.height].map(|size| size as f32 - 1.0);
     let last = [width - 2, earlier.height - 2];
-    // As `sample`, with one check of bounds for its four pixels: this is where the time goes.
+    // As `sample`, but with one bounds check for the four pixels: most of the time is spent here.
     let one = |&(x, y): &(usize, usize)| {
         let (u, v) = (x as f32, y as f32);
         let row = |i: usize| h[(i, 0)] * u + h[(i, 1)] * v + h[(i, 2)];
@@ -279,7 +279,7 @@ fn difference(
     pixels.iter().map(one).sum::<f32>() as f64 / pixels.len() as f64
 }
 
-/// Index of the least cost, interpolated by a parabola; `None` if it is the first or the last.
+/// Index of the smallest cost, interpolated by a parabola; `None` if it is the first or the last.
 pub(crate) fn least(costs: &[f64]) -> Option<f64> {
     let least = (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
     if least == 0 || least + 1 == costs.len() {
@@ -296,10 +296,10 @@ pub(crate) fn least(costs: &[f64]) -> Option<f64> {
 }
 
 impl GreyImage {
-    /// The image less its mean over a square window about each pixel.
+    /// The image minus its mean over a square window around each pixel.
     fn high_pass(&self) -> Self {
         let stride = self.width + 1;
-        // Sums over all pixels above and to the left: those of a window are four of them.
+        // Sums over all pixels above and to the left: a window's sum follows from four of them.
         let mut sums = vec![0.0f64; stride * (self.height + 1)];
         for (y, row) in self.data.chunks_exact(self.width.max(1)).enumerate() {
             let mut so_far = 0.0;

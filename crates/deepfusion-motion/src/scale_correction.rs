@@ -2,16 +2,15 @@
 
 use crate::scale_monitor::{ScaleReading, ScaleState};
 
-/// Largest change from one pair of frames to the next, as ln: 10 % take about thirty frames. A short error of the
-/// reading hardly moves it, and depth never jumps.
+/// Largest change from one pair of frames to the next, as ln: a change of 10 % takes about thirty frames. So a short error of the reading
+/// has little effect, and depth never jumps.
 const STEP: f64 = 0.003;
 
 /// Follows the ratio of the [`ScaleMonitor`](crate::ScaleMonitor) while it reports a drift.
 ///
-/// The ratio is the camera's height in the vehicle's metres over its reference. In images zoomed by 10 % everything
-/// looks 10 % nearer to a network, which judges distance by size; a camera that is now higher has a similar effect on
-/// the road. Depth times the ratio is right again. If the speed is wrong, depth follows the wrong speed: the vehicle's
-/// metres are the reference.
+/// The ratio is the camera's height in the vehicle's metres divided by its reference. In images zoomed by 10 % everything looks 10 % nearer
+/// to a network, which judges distance by size; raising the camera has a similar effect on the road. Depth times the ratio is right again.
+/// If the speed is wrong, depth follows the wrong speed: the vehicle's metres are the reference.
 #[derive(Debug, Clone, Default)]
 pub struct ScaleCorrection {
     ln_factor: f64,
@@ -54,7 +53,11 @@ mod tests {
         let mut correction = ScaleCorrection::default();
         correction.follow(&reading(ScaleState::Learning, 1.3));
         correction.follow(&reading(ScaleState::Steady, 1.04));
-        assert_eq!(correction.factor(), 1.0, "what is no alarm is not followed");
+        assert_eq!(
+            correction.factor(),
+            1.0,
+            "without an alarm, the ratio is not followed"
+        );
         correction.follow(&reading(ScaleState::Drift, f64::NAN));
         assert_eq!(correction.factor(), 1.0);
         let mut last = 1.0;

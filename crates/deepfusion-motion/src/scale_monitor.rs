@@ -1,10 +1,9 @@
-//! Monitors the metric scale: the camera's height over the road, measured from the road's motion and the vehicle's
-//! speed, must not change while driving.
+//! Monitors the metric scale: the camera's height above the road, measured from the road's motion and the vehicle's speed, must not change
+//! while driving.
 //!
-//! It changes if images are zoomed (a lens touched, a resolution switched), if the camera comes loose, and if the speed
-//! becomes wrong (other tyres, another unit). The network's depth is not involved, so that its errors on a street raise no
-//! alarm. The height of the camera over the network's own road is reported beside it: the ratio of the two is the scale of
-//! depth.
+//! It changes if images are zoomed (a lens touched, a resolution switched), if the camera comes loose, or if the speed becomes wrong (other
+//! tyres, another unit). The network's depth is not involved, so its errors on a street raise no alarm. The camera's height above the road
+//! in the network's depth is reported as well: the ratio of the two is the scale of depth.
 
 use crate::road_height::{CONCLUSIVE, GroundPair, SWEEP_M, least};
 use serde::{Deserialize, Serialize};
@@ -16,15 +15,15 @@ use std::collections::VecDeque;
 pub struct ScaleMonitorConfig {
     /// Number of pairs of frames from which the reference is learned.
     pub learn_pairs: usize,
-    /// Number of latest pairs from which a reading is made.
+    /// Number of most recent pairs from which a reading is made.
     pub window_pairs: usize,
     /// Shortest translation of the camera between two frames of a pair that is used, metres.
     pub min_distance_m: f64,
-    /// Smallest change that is an alarm, as a share.
+    /// Smallest relative change that raises an alarm.
     pub min_change: f64,
     /// Rise of the vehicle's nose under acceleration, radians per m/s²: 2 degrees per g, a guess for a car.
     pub pitch_per_acceleration: f64,
-    /// The camera's height over the road in metres, if it was measured: then nothing has to be learned.
+    /// The camera's height above the road in metres, if it was measured: then no reference has to be learned.
     pub height_m: Option<f64>,
 }
 
@@ -47,23 +46,23 @@ impl Default for ScaleMonitorConfig {
 pub enum ScaleState {
     /// The reference is being learned.
     Learning,
-    /// Unchanged.
+    /// The scale has not changed.
     Steady,
-    /// It has changed.
+    /// The scale has changed.
     Drift,
 }
 
-/// A reading.
+/// A reading of the monitor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReading {
-    /// Height now over the reference: 1.1 if images are zoomed by 10 %, or the reported speed is 10 % too high. `None`
-    /// while learning, and while a height far from the last one is measured.
+    /// Current height divided by the reference: 1.1 if images are zoomed by 10 %, or the reported speed is 10 % too high. `None` while
+    /// learning, and while a height far from the last one is measured.
     pub ratio: Option<f64>,
-    /// Its 95 % interval.
+    /// The ratio's 95 % interval.
     pub ci95: Option<[f64; 2]>,
-    /// The camera's height by the road's motion, metres.
+    /// The camera's height according to the road's motion, in metres.
     pub height_m: Option<f64>,
-    /// The network's metres over the vehicle's, by the height of its road: the divisor that would correct depth.
+    /// The network's metres divided by the vehicle's, from the height of its road: dividing depth by this would correct it.
     pub depth_ratio: Option<f64>,
     /// The verdict.
     pub state: ScaleState,
@@ -73,41 +72,41 @@ pub struct ScaleReading {
 const REACH: f64 = 0.35;
 /// See [`REACH`].
 const STEP: f64 = 0.02;
-/// Share of the camera's fast pitch that carries over from one pair to the next.
+/// Share of the camera's fast pitch that is carried over from one pair to the next.
 const TILT_KEPT: f64 = 0.9;
 /// Number of pairs per estimate: single pairs are too noisy.
 const BLOCK: usize = 10;
-/// Heights tried first, metres, in steps of 6 %: those of anything that drives, and those that a speed in another unit makes of them.
+/// Heights tried first, in metres, in steps of 6 %: those of any vehicle, and those that result from a speed in another unit.
 const FIRST_M: (f64, f64) = SWEEP_M;
-/// Blocks one after the other that none of the heights tried explains, before all heights are tried again.
+/// Number of consecutive blocks that none of the heights tried explains before all heights are tried again.
 const BLOCKS_LOST: usize = 3;
-/// Number of standard errors of a significant change.
+/// Number of standard errors that make a change significant.
 const SIGMAS: f64 = 3.0;
-/// Least standard error assumed: blocks on one street agree better than different streets do.
+/// Smallest standard error assumed: blocks on one street agree better than different streets do.
 const LEAST_ERROR: f64 = 0.012;
 
 /// Monitors the metric scale of a drive.
 #[derive(Debug, Clone)]
 pub struct ScaleMonitor {
     config: ScaleMonitorConfig,
-    /// Centre of the heights tried, metres, once one is known.
+    /// Centre of the heights tried, in metres, once known.
     guess_m: Option<f64>,
     first: Vec<Vec<f64>>,
-    /// Costs of the pairs of the block that is being filled.
+    /// Costs of the pairs in the block being filled.
     block: Vec<Vec<f64>>,
-    /// ln of the height of each whole block, the latest last.
+    /// ln of the height of each complete block, the most recent last.
     heights: VecDeque<f64>,
     learned: Vec<f64>,
-    /// ln of the height of the network's road, the latest last.
+    /// ln of the height above the network's road, the most recent last.
     depth_heights: VecDeque<f64>,
     drifting: bool,
-    /// How many of the latest blocks no height tried explains.
+    /// Number of most recent blocks that no height tried explains.
     lost: usize,
-    /// The centre before all heights were tried again.
+    /// The previous centre, while all heights are tried again.
     lost_m: Option<f64>,
     /// The camera's pitch relative to its mount, radians, nose up.
     tilt: f64,
-    /// Speed over each of the latest pairs, m/s, and their seconds.
+    /// Speed over each of the most recent pairs, m/s, and their duration in seconds.
     speeds: VecDeque<(f64, f64)>,
 }
 
@@ -131,14 +130,14 @@ impl ScaleMonitor {
         }
     }
 
-    /// Its settings.
+    /// The monitor's settings.
     #[must_use]
     pub fn config(&self) -> &ScaleMonitorConfig {
         &self.config
     }
 
-    /// Adds a pair of frames. `depth_height_m` is the camera's height over the network's road in the later frame,
-    /// metres, if there is a network and it sees a road.
+    /// Adds a pair of frames. `depth_height_m` is the camera's height above the network's road in the later frame, in metres, if there is a
+    /// network and it finds a road.
     pub fn add(&mut self, pair: &GroundPair, depth_height_m: Option<f64>) -> ScaleReading {
         if let Some(height) = depth_height_m.filter(|h| h.is_finite() && *h > 0.0) {
             self.depth_heights.push_back(height.ln());
@@ -156,16 +155,15 @@ impl ScaleMonitor {
         self.reading()
     }
 
-    /// Marks a break: the next pair does not continue the last one, so that pitch and speeds are dropped. What was
-    /// learned stays.
+    /// Marks a break: the next pair does not continue the last one, so pitch and speeds are reset. The learned reference stays.
     pub fn pause(&mut self) {
         self.tilt = 0.0;
         self.speeds.clear();
     }
 
-    /// A pair's costs. A camera pitches as the vehicle brakes and the road undulates, which neither speed nor yaw rate
-    /// contain, and a tenth of a degree matters. Fast pitch is measured in the far scene from frame to frame and summed
-    /// with a decay, so that it does not drift; slow pitch follows from the acceleration.
+    /// A pair's costs. The camera pitches when the vehicle brakes or the road undulates. Speed and yaw rate do not contain this, and a
+    /// tenth of a degree matters. Fast pitch is measured in the distant scene from frame to frame and summed with a decay, so that it does
+    /// not drift; slow pitch follows from the acceleration.
     fn costs(&mut self, pair: &GroundPair, heights: &[f64]) -> Option<Vec<f64>> {
         let tilt = self.tilt + self.config.pitch_per_acceleration * self.acceleration(pair);
         let (costs, pitch) = pair.costs_and_pitch(heights, tilt);
@@ -173,7 +171,7 @@ impl ScaleMonitor {
         costs
     }
 
-    /// The vehicle's acceleration over the latest pairs, m/s².
+    /// The vehicle's acceleration over the most recent pairs, m/s².
     fn acceleration(&mut self, pair: &GroundPair) -> f64 {
         let speed = pair.earlier_from_later.translation().norm() / pair.seconds;
         if !speed.is_finite() {
@@ -190,7 +188,7 @@ impl ScaleMonitor {
         }
     }
 
-    /// A coarse sweep over all possible heights, before a guess is known.
+    /// A coarse sweep over all possible heights while no guess is known.
     fn coarse_search(&mut self, pair: &GroundPair) {
         let count = ((FIRST_M.1 / FIRST_M.0).ln() / 0.06).ceil() as usize;
         let heights: Vec<f64> = (0..=count)
@@ -199,14 +197,14 @@ impl ScaleMonitor {
         let costs = self.costs(pair, &heights);
         self.first.extend(costs);
         if self.first.len() >= BLOCK {
-            // Where the images say nothing it is tried again.
+            // If the images are inconclusive, it is tried again.
             self.guess_m = best(&self.first).map(|place| FIRST_M.0 * (0.06 * place).exp());
             self.first.clear();
             let moved = |before: f64, now: f64| (now / before).ln().abs() > REACH;
             if let (Some(now), Some(before)) = (self.guess_m, self.lost_m)
                 && moved(before, now)
             {
-                // What was measured before is of another time.
+                // Earlier measurements no longer apply.
                 self.heights.clear();
                 self.lost_m = None;
             }
@@ -226,7 +224,7 @@ impl ScaleMonitor {
         let place = best(&self.block);
         self.block.clear();
         let Some(place) = place else {
-            // The height may have left those that are tried, by a speed in another unit or another size of the images.
+            // The height may be outside those tried, after a change of the speed's unit or of the images' size.
             self.lost += 1;
             if self.lost == BLOCKS_LOST {
                 (self.lost, self.lost_m) = (0, self.guess_m.take());
@@ -245,7 +243,7 @@ impl ScaleMonitor {
         }
     }
 
-    /// ln of the height that is compared with, and its standard error.
+    /// ln of the reference height, and its standard error.
     fn reference(&self) -> Option<(f64, f64)> {
         match self.config.height_m {
             Some(height) => Some((height.ln(), 0.0)),
@@ -270,7 +268,7 @@ impl ScaleMonitor {
                 depths.sort_by(f64::total_cmp);
                 depths.get(depths.len() / 2).map(|d| (d - height).exp())
             }),
-            // A change goes on being one while it is measured anew.
+            // The alarm stays on while the height is measured again.
             state: if self.drifting {
                 ScaleState::Drift
             } else {
@@ -282,7 +280,7 @@ impl ScaleMonitor {
             let error = reference_error.hypot(error).max(LEAST_ERROR);
             reading.ratio = Some(change.exp());
             reading.ci95 = Some([-1.96, 1.96].map(|z| (change + z * error).exp()));
-            // An alarm ends where half of what began it is left: it does not flicker.
+            // An alarm ends only at half the change that raises it, so it does not flicker.
             let limit = (1.0 + self.config.min_change).ln().max(SIGMAS * error);
             let limit = if self.drifting { 0.5 * limit } else { limit };
             self.drifting = change.abs() > limit;
@@ -296,8 +294,8 @@ impl ScaleMonitor {
     }
 }
 
-/// Index of the least pooled cost, interpolated by a parabola; `None` if no height is clearly better, or the best is
-/// the first or last.
+/// Index of the smallest pooled cost, interpolated by a parabola; `None` if no height is clearly better, or the best is the first or the
+/// last.
 fn best(costs: &[Vec<f64>]) -> Option<f64> {
     let count = costs.first()?.len();
     let pooled: Vec<f64> = (0..count)
@@ -320,7 +318,7 @@ fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
     let kept = &sorted[cut..sorted.len() - cut];
     let n = kept.len() as f64;
     let mean = kept.iter().sum::<f64>() / n;
-    // Of all, by their median distance: 1.48 of it is a standard deviation.
+    // From the median deviation of all values: 1.48 times that is the standard deviation.
     let mut off: Vec<f64> = values.iter().map(|v| (v - mean).abs()).collect();
     off.sort_by(f64::total_cmp);
     Some((

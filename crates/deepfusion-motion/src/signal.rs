@@ -1,14 +1,14 @@
 //! A sensor's value over time.
 
-/// Longest gap between two samples that is interpolated, in seconds: five packets of KITTI's oxts.
-/// Across a longer one the value is unknown.
+/// Longest gap between two samples that is interpolated, in seconds: five packets of KITTI's oxts. Across a longer gap the value is
+/// unknown.
 const LONGEST_GAP_S: f64 = 0.5;
-/// The same for fast sensors, in median intervals, if that is at least [`SHORTEST_GAP_S`].
+/// The same limit for fast sensors, in median intervals, if that is at least [`SHORTEST_GAP_S`].
 const GAP_INTERVALS: f64 = 5.0;
 /// Scheduling on a recorder's computer delays packets by tens of milliseconds; that does not count as a gap.
 const SHORTEST_GAP_S: f64 = 0.1;
-/// How far a signal is extended as constant beyond its first or last sample, in seconds: the clocks
-/// of sensors that belong to one frame differ by some milliseconds either way.
+/// How far a signal is extended as constant beyond its first or last sample, in seconds: the times of sensors that belong to one frame
+/// differ by some milliseconds.
 const OVERHANG_S: f64 = 0.15;
 
 /// A value over time: samples in order, linear interpolation between them, and gaps that are not bridged.
@@ -21,9 +21,9 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// A signal of samples (time in s, value). Samples that are not finite, and samples that are not
-    /// later than the one before them (recorders repeat packets, clocks step back), are dropped and
-    /// counted. A gap is longer than five median intervals, a limit kept between 0.1 s and 0.5 s.
+    /// A signal from samples (time in s, value). Samples that are not finite, or not later than the one before (recorders repeat packets,
+    /// clocks step back), are dropped and counted. A gap is longer than five median intervals; this limit is at least 0.1 s and at most 0.5
+    /// s.
     #[must_use]
     pub fn new(samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut signal = Self::with_max_gap(samples, LONGEST_GAP_S);
@@ -33,7 +33,7 @@ impl Signal {
         signal
     }
 
-    /// The same with the longest interval, in seconds, that is not a gap.
+    /// A signal from samples, with the longest interval, in seconds, that is not a gap.
     #[must_use]
     pub fn with_max_gap(samples: impl IntoIterator<Item = (f64, f64)>, max_gap_s: f64) -> Self {
         let mut signal = Self {
@@ -105,12 +105,12 @@ impl Signal {
         let (Some(first), Some(last)) = (self.time_s.first(), self.time_s.last()) else {
             return false;
         };
-        // Also false for times that are not numbers.
+        // Also false for NaN times.
         let inside = from_s >= first - OVERHANG_S && to_s <= last + OVERHANG_S && from_s <= to_s;
         if !inside {
             return false;
         }
-        // The samples from the last one not after the start to the first one not before the end.
+        // From the last sample not after the start to the first one not before the end.
         let begin = self.time_s.partition_point(|t| *t <= from_s).max(1) - 1;
         let end = self.time_s.partition_point(|t| *t < to_s) + 1;
         let around = &self.time_s[begin..end.min(self.time_s.len())];
@@ -123,8 +123,8 @@ impl Signal {
         self.covers(time_s, time_s).then(|| self.between(time_s))
     }
 
-    /// ∫ value dt from `from_s` to `to_s`: the trapezoidal rule over the samples between, interpolated
-    /// at both ends. `None` if the signal does not cover the interval, or it runs backwards.
+    /// ∫ value dt from `from_s` to `to_s`: the trapezoidal rule over the samples between, interpolated at both ends. `None` if the signal
+    /// does not cover the interval, or the interval runs backwards.
     #[must_use]
     pub fn integral(&self, from_s: f64, to_s: f64) -> Option<f64> {
         self.covers(from_s, to_s).then(|| {
@@ -135,8 +135,8 @@ impl Signal {
         })
     }
 
-    /// ∬ value dt dt from `from_s` to `to_s`, starting at the inner integral 0: both integrals by the
-    /// trapezoidal rule, as Eq. 23–24 take acceleration to speed to distance.
+    /// ∬ value dt dt from `from_s` to `to_s`, with the inner integral starting at 0: both integrals by the trapezoidal rule. Eq. 23–24
+    /// integrate acceleration to speed and distance in this way.
     #[must_use]
     pub fn double_integral(&self, from_s: f64, to_s: f64) -> Option<f64> {
         self.covers(from_s, to_s).then(|| {
@@ -164,7 +164,7 @@ impl Signal {
         self.value[after - 1] + (self.value[after] - self.value[after - 1]) * fraction
     }
 
-    /// The straight pieces between two covered times: duration, value before, value after.
+    /// The linear pieces between two covered times: duration, value before, value after.
     fn steps(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = (f64, f64, f64)> {
         let inner = self.time_s.partition_point(|t| *t <= from_s)
             ..self.time_s.partition_point(|t| *t < to_s);

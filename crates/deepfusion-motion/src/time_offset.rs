@@ -1,18 +1,15 @@
 //! The offset between the camera's clock and the vehicle's.
 //!
-//! When a car turns, the picture moves sideways; when its nose dips, up; when it rolls, it turns; when
-//! it drives faster, it grows faster. The offset at which the picture's motion follows the vehicle's
-//! best is that of the clocks. Shift, drop, roll and growth per second are compared with the mean yaw,
-//! pitch and roll rate and the speed over the same pair of frames, moved by the offset, both without
-//! their slow trend (trees on one side move the picture, too, but slowly). With r(o) their correlation
-//! and n the number of independent pairs, the offset is where Σ −n/2 · ln(1 − r²), the logarithm of
-//! the likelihood, is largest; r below 0 counts as 0.
+//! When a car turns, the image moves sideways; when its nose dips, up; when it rolls, the image rotates; when it drives faster, the image
+//! grows faster. The offset at which the image motion follows the vehicle's motion best is that of the clocks. Shift, drop, roll and growth
+//! per second are compared with the mean yaw, pitch and roll rate and the speed over the same pair of frames, moved by the offset. Slow
+//! trends are removed from both (trees on one side move the image, too, but slowly). With r(o) their correlation and n the number of
+//! independent pairs, the offset is where Σ −n/2 · ln(1 − r²), the log-likelihood, is largest; r below 0 counts as 0.
 //!
-//! Its standard error comes from resampling blocks of the drive (Künsch 1989): a straight drive at one
-//! speed gives a different offset for every resample, and says so. Bends are slow, and houses that pass
-//! disturb the shift: yaw rate and speed alone give some tens of milliseconds on half a minute. Roll
-//! and pitch change within a second on any road, and driving ahead moves nothing about the centre: with
-//! an inertial unit it is some milliseconds.
+//! The standard error comes from resampling blocks of the drive (Künsch 1989): on a straight drive at constant speed every resample gives a
+//! different offset, so the error is large. Bends are slow, and passing houses disturb the shift: with yaw rate and speed alone, half a
+//! minute gives some tens of milliseconds. Roll and pitch change within a second on any road, and driving forward moves nothing about the
+//! centre: with an inertial unit the error is some milliseconds.
 
 mod correlation;
 
@@ -20,16 +17,16 @@ use crate::{FusedTrack, ImageMotion, MotionModel, Signal, VehicleTrack};
 use correlation::Channel;
 use deepfusion_hint::{Hint, count_of};
 
-/// The vehicle's rates, on its own clock, as far as they are measured.
+/// The vehicle's measured rates, on its own clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleRates {
     /// Forward speed, in m/s.
     pub speed_mps: Option<Signal>,
     /// Yaw rate in rad/s, positive to the left.
     pub yaw_rate_radps: Option<Signal>,
-    /// Pitch rate in rad/s, positive where the nose goes down.
+    /// Pitch rate in rad/s, positive if the nose goes down.
     pub pitch_rate_radps: Option<Signal>,
-    /// Roll rate in rad/s, positive where the left side rises.
+    /// Roll rate in rad/s, positive if the left side rises.
     pub roll_rate_radps: Option<Signal>,
 }
 
@@ -44,7 +41,7 @@ impl From<&VehicleTrack> for VehicleRates {
 }
 
 impl From<&FusedTrack> for VehicleRates {
-    /// The inertial unit's rates; without one, the yaw rate of the steering.
+    /// The inertial unit's rates; without one, the yaw rate from the steering.
     fn from(track: &FusedTrack) -> Self {
         let imu = track.imu();
         let yaw_rate = imu.map(|i| i.yaw_rate()).or(track.steering_yaw_rate());
@@ -69,9 +66,9 @@ impl From<&MotionModel> for VehicleRates {
 /// Settings of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetConfig {
-    /// Largest offset either way, in seconds.
+    /// Largest offset in either direction, in seconds.
     pub search_s: f64,
-    /// Slower trends than this are removed, in seconds.
+    /// Trends slower than this are removed, in seconds.
     pub trend_s: f64,
 }
 
@@ -84,50 +81,48 @@ impl Default for OffsetConfig {
     }
 }
 
-/// The offset of two clocks.
+/// The offset between two clocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeOffset {
-    /// Added to a time of the camera's clock it gives the vehicle's, in seconds.
+    /// Added to a time of the camera's clock, it gives the vehicle's time, in seconds.
     pub vehicle_minus_camera_s: f64,
-    /// Its standard error, in seconds.
+    /// Standard error of the offset, in seconds.
     pub std_error_s: f64,
-    /// Correlation of the picture's shift with the yaw rate at that offset; `None` if it is not
-    /// measured or does not change.
+    /// Correlation of the image's shift with the yaw rate at that offset; `None` if the rate is not measured or does not change.
     pub yaw_correlation: Option<f64>,
-    /// The same of drop and pitch rate.
+    /// The same for drop and pitch rate.
     pub pitch_correlation: Option<f64>,
-    /// The same of the picture's and the vehicle's roll rate.
+    /// The same for the image's and the vehicle's roll rate.
     pub roll_correlation: Option<f64>,
-    /// The same of growth and speed.
+    /// The same for growth and speed.
     pub speed_correlation: Option<f64>,
     /// Number of pairs of frames compared.
     pub pairs: usize,
 }
 
-/// Why there is no offset.
+/// Why no offset was found.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoTimeOffset {
-    /// Too few pairs of frames whose times the vehicle's track covers at every offset searched.
+    /// Too few pairs of frames whose times are covered by the vehicle's track at every offset searched.
     #[error(
         "time offset: {} of frames inside the vehicle's track, expected at least {needed}",
         count_of(*pairs, "pair")
     )]
     TooFewPairs {
-        /// How many there are.
+        /// Number of pairs.
         pairs: usize,
-        /// How many are needed.
+        /// Number of pairs needed.
         needed: usize,
     },
-    /// Nothing changes: any offset fits.
+    /// The vehicle's motion does not change: any offset fits.
     #[error(
-        "time offset: nothing measured changes: no turn (0.004 rad/s), no change of speed (0.1 m/s)"
+        "time offset: the motion does not change: no turn above 0.004 rad/s, no change of speed above 0.1 m/s"
     )]
     NothingChanges,
-    /// The picture's motion does not follow the vehicle's at any offset, or best at the end of the
-    /// search.
+    /// The image motion does not follow the vehicle's at any offset, or best at the limit of the search.
     #[error(
-        "time offset: within ±{search_s} s the picture's motion follows the vehicle's nowhere (best correlation {correlation:.2})"
+        "time offset: the image motion does not follow the vehicle's within ±{search_s} s (best correlation {correlation:.2})"
     )]
     NoPeak {
         /// The search range, in seconds.
@@ -144,13 +139,13 @@ impl Hint for NoTimeOffset {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::TooFewPairs { .. } => {
-                "use a longer drive, and check that both clocks count from the same event"
+                "use a longer drive, and check that both clocks count from the same moment"
             }
             Self::NothingChanges => "use a part of the drive with bends",
             Self::NoPeak { .. } => {
-                "the clocks may be further apart: search wider, or check the yaw rate's sign"
+                "search wider in case the clocks are further apart, or check the sign of the yaw rate"
             }
-            Self::Config => "the defaults are 1 s and 4 s",
+            Self::Config => "set them to values in this range, such as the defaults 1 s and 4 s",
         };
         Some(text.to_owned())
     }
@@ -158,16 +153,16 @@ impl Hint for NoTimeOffset {
 
 /// Fewest pairs for a result.
 const LEAST_PAIRS: usize = 40;
-/// Changes below these are noise: rad/s and m/s.
+/// Smaller changes are noise: rad/s and m/s.
 const LEAST_TURN_STD: f64 = 0.004;
 const LEAST_SPEED_STD: f64 = 0.1;
-/// Least correlation of a picture that follows the vehicle.
+/// Smallest correlation at which the image motion counts as following the vehicle.
 const LEAST_CORRELATION: f64 = 0.15;
 
-/// Estimates the offset from the picture's motion (in the order of time) and the vehicle's.
+/// Estimates the offset from the image motions (in order of time) and the vehicle's motion.
 ///
 /// # Errors
-/// [`NoTimeOffset`] says why there is none.
+/// [`NoTimeOffset`], with the reason.
 pub fn time_offset(
     pictures: &[ImageMotion],
     vehicle: &VehicleRates,
@@ -177,7 +172,7 @@ pub fn time_offset(
     if !range.contains(&config.search_s) || !range.contains(&config.trend_s) {
         return Err(NoTimeOffset::Config);
     }
-    // What is compared with what; the signs are those of a camera that looks ahead.
+    // The pairs that are compared; the signs are those of a camera that looks forward.
     let channel = |picture: fn(&ImageMotion) -> f64, vehicle: &Option<Signal>, least_std| {
         let vehicle = vehicle.as_ref()?;
         Channel::new(pictures, picture, vehicle, least_std, config)

@@ -1,4 +1,4 @@
-//! One stretch of a drive as an arc, and the camera motion that follows from it (docs/concepts/ego-motion.md).
+//! The vehicle's motion over a short time as an arc, and the camera's motion that follows from it (docs/concepts/ego-motion.md).
 
 use deepfusion_geometry::Se3;
 use nalgebra::{Rotation3, Vector3};
@@ -10,8 +10,8 @@ pub struct VehicleMotion {
     pub distance_m: f64,
     /// Change of heading, in radians; positive to the left.
     pub yaw_rad: f64,
-    /// Roll and pitch of the body at the end relative to its start, after the yaw, in radians: roll (about x, the left
-    /// side up) and pitch (about y, the nose down), as Rz(yaw)·Ry(pitch)·Rx(roll). Zero if not measured.
+    /// Roll and pitch of the body at the end relative to its start, after the yaw, in radians: roll (about x, the left side up) and pitch
+    /// (about y, the nose down), as Rz(yaw)·Ry(pitch)·Rx(roll). Zero if not measured.
     pub tilt_rad: [f64; 2],
 }
 
@@ -21,7 +21,7 @@ impl VehicleMotion {
     #[must_use]
     pub fn vehicle0_from_vehicle1(&self) -> Se3 {
         let half = 0.5 * self.yaw_rad;
-        // Two terms of the series are exact to the last bit here.
+        // Here two terms of the series are accurate to the last bit.
         let sinc = if half.abs() < 1e-4 {
             1.0 - half * half / 6.0
         } else {
@@ -34,7 +34,7 @@ impl VehicleMotion {
         )
     }
 
-    /// The same without roll and pitch.
+    /// The same motion without roll and pitch.
     #[must_use]
     pub fn level(self) -> Self {
         Self {
@@ -43,9 +43,9 @@ impl VehicleMotion {
         }
     }
 
-    /// `camera0_from_camera1` of a camera fixed to the car: the rigid body's motion along the arc at the
-    /// camera's position, lever arm included, and the body's roll and pitch. Their axes are unknown (the
-    /// body hangs on springs, between the axles); so they rotate the camera without moving it.
+    /// `camera0_from_camera1` of a camera fixed to the car: the rigid body's motion along the arc at the camera's position, including the
+    /// lever arm, and the body's roll and pitch. The axes of roll and pitch are unknown (the body hangs on springs, between the axles), so
+    /// they rotate the camera without moving it.
     #[must_use]
     pub fn camera0_from_camera1(&self, cam_from_vehicle: &Se3) -> Se3 {
         let level = *cam_from_vehicle * self.vehicle0_from_vehicle1() * cam_from_vehicle.inverse();
@@ -55,8 +55,8 @@ impl VehicleMotion {
     }
 }
 
-/// [`VehicleMotion::tilt_rad`] from roll and pitch against the vertical at the start and at the end, in radians: the
-/// turn T₀ᵀ·Rz(θ)·T₁ without its yaw.
+/// [`VehicleMotion::tilt_rad`] from roll and pitch relative to the vertical at the start and at the end, in radians: the rotation
+/// T₀ᵀ·Rz(θ)·T₁ without its yaw.
 pub(crate) fn tilt_between(from: [f64; 2], to: [f64; 2], yaw_rad: f64) -> [f64; 2] {
     let [from, to] = [from, to].map(|[roll, pitch]| Rotation3::from_euler_angles(roll, pitch, 0.0));
     let turn = Rotation3::from_euler_angles(0.0, 0.0, yaw_rad);
@@ -123,8 +123,7 @@ mod tests {
             .map(|m| m.camera0_from_camera1(&mount))
             .into();
         assert!((tilted.translation() - level.translation()).norm() < 1e-12);
-        // The camera's y points down: looking down moves its axis to +y; Rz(yaw)·Ry(pitch) takes x to
-        // z = −sin(pitch).
+        // The camera's y points down: when it looks down, its axis moves to +y; Rz(yaw)·Ry(pitch) maps x to z = −sin(pitch).
         let axis = tilted.rotate(&Vector3::z());
         assert!((axis.y - 0.03_f64.sin()).abs() < 1e-12, "{axis}");
         // The left side up: the camera's x (right) dips, by cos(pitch)·sin(roll).
@@ -136,7 +135,7 @@ mod tests {
     }
 
     proptest! {
-        /// Two pieces of an arc of constant curvature make the whole.
+        /// Two pieces of an arc of constant curvature compose to the whole arc.
         #[test]
         fn arcs_join(d in 0.1..5.0f64, yaw in -1.0..1.0f64, part in 0.05..0.95f64) {
             let piece = |f: f64| VehicleMotion { distance_m: d * f, yaw_rad: yaw * f, tilt_rad: [0.0; 2] }.vehicle0_from_vehicle1();

@@ -8,9 +8,9 @@ use crate::{Signal, VehicleMotion};
 pub struct VehicleTrack {
     speed_mps: Signal,
     yaw_rate_radps: Signal,
-    /// Roll and pitch.
+    /// Roll and pitch, if measured.
     tilt_rad: Option<[Signal; 2]>,
-    /// Their rates, where these alone are known.
+    /// Rates of roll and pitch, if only these are known.
     tilt_rates_radps: Option<[Signal; 2]>,
 }
 
@@ -18,11 +18,11 @@ impl VehicleTrack {
     /// Longest gap that is interpolated, in seconds: five packets of KITTI's oxts.
     pub const MAX_GAP_S: f64 = 0.5;
 
-    /// A track of samples (time in s, forward speed in m/s, yaw rate in rad/s). A sample that is not
-    /// finite, or not later than the one before it, is dropped: recorders repeat packets.
+    /// A track from samples (time in s, forward speed in m/s, yaw rate in rad/s). A sample that is not finite, or not later than the one
+    /// before it, is dropped: recorders repeat packets.
     #[must_use]
     pub fn new(samples: &[(f64, f64, f64)]) -> Self {
-        // One bad value drops the sample from both, which keeps their times the same.
+        // One bad value drops the sample from both signals, which keeps their times the same.
         let good = || {
             samples
                 .iter()
@@ -36,7 +36,7 @@ impl VehicleTrack {
         }
     }
 
-    /// The same with samples of the body's tilt (time in s, roll and pitch in radians, as [`VehicleTrack::tilt`]).
+    /// The same track with samples of the body's tilt (time in s, roll and pitch in radians, as [`VehicleTrack::tilt`]).
     #[must_use]
     pub fn with_tilt(self, samples: &[(f64, f64, f64)]) -> Self {
         let good = || {
@@ -52,7 +52,7 @@ impl VehicleTrack {
         }
     }
 
-    /// The same without roll and pitch, where nothing measured those it was given.
+    /// The same track without roll and pitch, for samples in which they were not really measured.
     #[must_use]
     pub fn without_tilt(self) -> Self {
         Self {
@@ -62,8 +62,8 @@ impl VehicleTrack {
         }
     }
 
-    /// The same with samples of the rates of roll and pitch (time in s, then rad/s, as [`VehicleTrack::tilt`]), which are bridged over up to
-    /// so many seconds. Where they are not known a motion is level.
+    /// The same track with samples of the rates of roll and pitch (time in s, then rad/s, axes as [`VehicleTrack::tilt`]). Gaps of up to
+    /// `max_gap_s` seconds are interpolated. Where the rates are unknown, the motion is level.
     #[must_use]
     pub fn with_tilt_rates(self, samples: &[(f64, [f64; 2])], max_gap_s: f64) -> Self {
         let rates = |axis: usize| {
@@ -76,7 +76,8 @@ impl VehicleTrack {
         }
     }
 
-    /// The same with samples of another yaw rate (time in s, rad/s, positive to the left), which are bridged over up to so many seconds.
+    /// The same track with samples of another yaw rate (time in s, rad/s, positive to the left). Gaps of up to `max_gap_s` seconds are
+    /// interpolated.
     #[must_use]
     pub fn with_yaw_rate(self, samples: &[(f64, f64)], max_gap_s: f64) -> Self {
         Self {
@@ -91,7 +92,7 @@ impl VehicleTrack {
         self.tilt_rad.is_some() || self.tilt_rates_radps.is_some()
     }
 
-    /// The same with every speed multiplied by `scale`, the ratio of true to measured speed.
+    /// The same track with every speed multiplied by `scale`, the ratio of true to measured speed.
     #[must_use]
     pub fn with_speed_scale(self, scale: f64) -> Self {
         Self {
@@ -131,9 +132,8 @@ impl VehicleTrack {
         self.speed_mps.at(time_s)
     }
 
-    /// The vehicle's motion from `from_s` to `to_s`: the integrals of speed and yaw rate by the
-    /// trapezoidal rule over the samples between, interpolated at both ends. `None` if the track does
-    /// not cover the interval, or it does not run forward.
+    /// The vehicle's motion from `from_s` to `to_s`: the integrals of speed and yaw rate by the trapezoidal rule over the samples between,
+    /// interpolated at both ends. `None` if the track does not cover the interval, or the interval does not run forward.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         if from_s >= to_s {
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn an_accelerating_car_goes_half_a_t_squared() {
-        // v = 3 t sampled unevenly: the trapezoidal rule is exact for it.
+        // v = 3 t sampled unevenly: for which the trapezoidal rule is exact.
         let samples: Vec<_> = [0.0, 0.1, 0.25, 0.3, 0.5]
             .iter()
             .map(|t| (*t, 3.0 * t, -0.2))

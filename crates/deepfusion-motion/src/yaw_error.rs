@@ -4,23 +4,23 @@ use crate::imu::{DrivingBias, by_windows};
 use crate::{Bicycle, Signal};
 use nalgebra::{SMatrix, SVector, Vector3};
 
-/// Typical error of the road wheels' zero, in radians: a degree of the steering wheel.
+/// Prior standard deviation of the road wheels' zero, in radians: a degree of the steering wheel.
 const USUAL_OFFSET: f64 = 0.001;
-/// Typical error of the steering's factor: wheelbase, ratio, and tyres that slip.
+/// Prior standard deviation of the steering's relative error: wheelbase, ratio, and slipping tyres.
 const USUAL_FACTOR: f64 = 0.1;
-/// Typical error of the steering's yaw rate, in rad/s, and its duration, in seconds.
+/// Typical error of the steering's yaw rate, in rad/s, and how long it lasts, in seconds.
 const RATE_ERROR: f64 = 0.01;
 const RATE_ERROR_S: f64 = 0.5;
 
-/// Prior standard deviation of the gyro's bias, in rad/s: unknown, or known from a standstill.
+/// Prior standard deviation of the gyro's bias, in rad/s: if unknown, and if known from a standstill.
 pub(crate) const UNKNOWN_BIAS: f64 = 0.01;
 pub(crate) const KNOWN_BIAS: f64 = 1e-4;
 
-/// By windows: the gyro's bias in rad/s; the steering's error per speed, in rad/m (an error of its zero); and the
-/// relative error of its yaw rate (the vehicle's geometry).
+/// Estimates by window: the gyro's bias in rad/s; the steering's error per speed, in rad/m (an error of its zero); and the relative error
+/// of its yaw rate (from the vehicle's geometry).
 ///
-/// gyro − steering is the sum of the three: least squares with a prior on each. On a straight drive at one speed the
-/// first two cannot be separated, and the difference goes to the likelier one.
+/// gyro − steering is the sum of the three: least squares with a prior on each. On a straight drive at constant speed the first two cannot
+/// be separated, and the difference is attributed to the likelier one.
 pub(crate) fn yaw_errors(
     gyro: &Signal,
     steering: &Signal,

@@ -1,4 +1,4 @@
-//! Signals decoded from CAN frames, against cantools (`tests/reference/dbc.py`).
+//! Signals decoded from CAN frames, compared with cantools (`tests/reference/dbc.py`).
 
 use deepfusion_hint::Hint;
 use deepfusion_motion::Error;
@@ -69,10 +69,10 @@ fn names_units_and_what_is_not_there() {
     assert_eq!(dbc.unit("POWERTRAIN_DATA.XMISSION_SPEED"), Some("km/h"));
     for (name, said) in [
         ("XMISSION_SPEED", "Message.Signal"),
-        ("POWERTRAIN.XMISSION_SPEED", "there are POWERTRAIN_DATA"),
+        ("POWERTRAIN.XMISSION_SPEED", "the file has POWERTRAIN_DATA"),
         (
             "POWERTRAIN_DATA.SPEED",
-            "`POWERTRAIN_DATA` has XMISSION_SPEED",
+            "`POWERTRAIN_DATA`, which has XMISSION_SPEED",
         ),
     ] {
         let error = dbc.signal(name).unwrap_err();
@@ -115,7 +115,7 @@ fn a_signal_beyond_the_longest_frame_is_refused() {
         matches!(&error, Error::Layout { field: "start_bit", expected: e, .. } if *e == expected),
         "{error}"
     );
-    let said = "start_bit is 501, expected one that ends within 64 bytes";
+    let said = "start_bit is 501, expected a position that ends within 64 bytes";
     assert!(error.to_string().ends_with(said), "{error}");
 }
 
@@ -123,7 +123,7 @@ proptest! {
     #[test]
     fn garbage_never_panics(text in "(BO_|SG_| |:|[0-9]|\\||@|[a-zM]|\n|\"|;|,|-){0,200}", cut in 0usize..2500) {
         let _ = Dbc::parse(&text);
-        // And pieces of a real file.
+        // Truncated real files must not panic either.
         let piece = DBC.get(..cut.min(DBC.len())).unwrap_or_default();
         if let Ok(dbc) = Dbc::parse(&format!("{piece}{text}")) {
             for name in dbc.names().collect::<Vec<_>>() {

@@ -1,4 +1,4 @@
-//! Wheelbase and steering ratio from drives whose parameters are known.
+//! Wheelbase and steering ratio identified from drives with known parameters.
 
 use deepfusion_hint::Hint;
 use deepfusion_motion::{
@@ -27,7 +27,7 @@ fn noise(i: usize, salt: u64) -> f64 {
 }
 
 impl Drive {
-    /// `steer` is the road wheels' angle over time, `speed` the car's.
+    /// A drive in which `steer` is the road wheels' angle over time and `speed` the car's speed.
     fn new(
         car: &Bicycle,
         seconds: f64,
@@ -35,7 +35,7 @@ impl Drive {
         steer: impl Fn(f64) -> f64,
     ) -> Self {
         let wheel = |t: f64| car.steering_ratio * steer(t) + car.steering_offset_rad;
-        // Quantised as cars send them: 0.01 km/h and 0.1°.
+        // Quantised as in cars: 0.01 km/h and 0.1°.
         let step = |value: f64, step: f64| (value / step).round() * step;
         let slow = (0..(seconds * 50.0) as usize).map(|i| i as f64 * 0.02);
         let fast = (0..(seconds * 100.0) as usize).map(|i| (i, i as f64 * 0.01));

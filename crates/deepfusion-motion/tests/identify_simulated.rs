@@ -1,5 +1,6 @@
-//! Wheelbase and steering ratio from the simulator's streams: CAN speed at 50 Hz, wheel angle at 80 Hz, a 6-axis unit at 100 Hz, each quantised or noisy
-//! in its own way, the gyro with a bias that nothing tells. The truth is the road's geometry, not the model that is fitted.
+//! Wheelbase and steering ratio identified from the simulator's streams: CAN speed at 50 Hz, wheel angle at 80 Hz, a 6-axis unit at 100 Hz,
+//! each quantised or noisy in its own way, and the gyro with an unknown bias. The ground truth is the road's geometry, not the fitted
+//! model.
 
 use deepfusion_motion::{
     Estimate, Identified, IdentifyConfig, ImuConfig, ImuSample, ImuTrack, Signal, Unidentifiable,
@@ -9,15 +10,15 @@ use deepfusion_sim::{Scene, Sensors, SimConfig, Simulation, WHEELBASE_M};
 
 const SECONDS: f64 = 120.0;
 const FPS: f64 = 10.0;
-/// Of a car whose CAN bus tells the steering wheel's angle; the simulator's tells the road wheels'.
+/// Ratio of a car whose CAN bus sends the steering wheel's angle; the simulator sends the road wheels' angle.
 const RATIO: f64 = 15.3;
-/// How near to the truth an estimate has to be.
+/// Largest relative error of an estimate.
 const SHARE: f64 = 0.03;
 
 struct Drive {
     name: String,
     speed: Signal,
-    /// Of the road wheels.
+    /// Angle of the road wheels.
     steering: Signal,
     yaw_rate: Signal,
 }
@@ -57,7 +58,7 @@ impl Drive {
         }
     }
 
-    /// With the steering signal `factor` times the road wheels' angle.
+    /// The same drive with a steering signal that is `factor` times the road wheels' angle.
     fn identify(
         &self,
         factor: f64,
@@ -73,8 +74,8 @@ impl Drive {
         identify(&self.speed, &steering, &self.yaw_rate, &config)
     }
 
-    /// The parts where the wheels, smoothed over half a second, stay within `largest_rad` for `shortest_s` or more, and their seconds: all else is cut out of
-    /// all streams.
+    /// Keeps the parts in which the wheels' angle, smoothed over half a second, stays within `largest_rad` for at least `shortest_s`;
+    /// everything else is cut out of all streams. Returns the seconds kept as well.
     fn straight_parts(&self, largest_rad: f64, shortest_s: f64) -> (Self, f64) {
         let mut parts: Vec<(f64, f64)> = Vec::new();
         let mut from_s = None;
@@ -120,7 +121,7 @@ fn is_near(estimate: Estimate, truth: f64, drive: &Drive) {
     let (name, relative) = (&drive.name, estimate.relative_error());
     eprintln!("{name}: {estimate:.4?}, off by {:+.2} %", 100.0 * share);
     assert!(share.abs() < SHARE, "{name}: {estimate:?}, {truth}");
-    // The error it states is neither far too small nor idle.
+    // The stated standard error is neither far too small nor too large to be useful.
     assert!(
         share.abs() < 4.0 * relative,
         "{name}: {estimate:?}, {truth}"
@@ -137,14 +138,15 @@ fn bends_show_the_wheelbase_or_the_ratio_within_three_percent() {
         is_near(found.wheelbase_m, WHEELBASE_M, &drive);
         let found = drive.identify(RATIO, Some(WHEELBASE_M), None).unwrap();
         is_near(found.steering_ratio, RATIO, &drive);
-        // A steering that counts to the right.
+        // A steering signal that grows to the right.
         let found = drive.identify(-RATIO, Some(WHEELBASE_M), None).unwrap();
         is_near(found.steering_ratio, -RATIO, &drive);
         eprintln!("turning {:.1} s", found.turning_s);
     }
 }
 
-/// The simulator's streets bend with 32 m at the least, a road wheel's 0.09 rad: there the two part by half a percent.
+/// The simulator's streets bend with a radius of at least 32 m, 0.09 rad of the road wheels: there the two parameters differ by half a
+/// percent.
 #[test]
 fn without_either_the_streets_show_only_the_product() {
     for seed in [1, 4] {
@@ -170,7 +172,7 @@ fn the_straight_parts_of_the_same_drives_show_nothing() {
             assert!(error.product_m.is_none(), "{error}");
             error.figure
         };
-        // Long enough that a count of seconds without a look at the turning would let it through.
+        // So long that counting seconds instead of turning would accept it.
         let least_s = IdentifyConfig::default().least_turning_s;
         assert!(seconds > 4.0 * least_s, "{}: {seconds} s", drive.name);
         refused(1.0, None, Some(1.0));

@@ -1,4 +1,4 @@
-//! Motion from sensors.
+//! Tests of motion from sensors.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! Distance and heading on real drives, against positions from satellites.
+//! Distance and heading on real drives, compared with satellite positions.
 
 use crate::support::{self, errors, halves, kitti, real_data, rows, speed_scale, windows};
 use deepfusion_motion::comma::CommaSegment;
@@ -18,7 +18,7 @@ fn a_comma_segments_axes_and_clocks_are_those_of_its_pose() {
     let Some(segment) = segment() else { return };
     let track = FusedTrack::new(&segment.sensors, &rav4()).unwrap();
     let imu = track.imu().unwrap();
-    // Rotation between poses two frames apart, in vehicle axes, against the gyro's integral.
+    // Rotation between poses two frames apart, in vehicle axes, compared with the gyro's integral.
     let poses = segment.reference.poses();
     let mut sums = [[0.0; 3]; 3];
     for pair in poses[20..poses.len() - 20].windows(3) {
@@ -52,18 +52,18 @@ fn on_a_comma_segment_the_fusion_is_better_than_its_parts_where_they_err_apart()
     let truths = windows(&segment.reference, 10.0, 0.5);
     assert!(truths.len() > 90);
     let [(_, vehicle), (_, imu), (_, fused)] = rows(&track, &truths);
-    // Yaw: gyro and steering err to different sides.
+    // Yaw: the errors of gyro and steering have opposite signs.
     assert!(
         fused.yaw_rad <= vehicle.yaw_rad.min(imu.yaw_rad),
         "{fused:?}"
     );
-    // Distance: the wheels read 0.9 % low, and the accelerometer starts from them.
+    // Distance: the wheels read 0.9 % low, and the accelerometer starts from their speed.
     assert!(vehicle.distance_bias.abs() < 0.012 && imu.distance_bias.abs() < 0.012);
     assert!(
         fused.distance_m <= vehicle.distance_m.min(imu.distance_m) + 1e-3,
         "{fused:?}"
     );
-    // Over the time between two frames, where it is used, nothing has time to drift.
+    // Between two frames, where it is used, nothing drifts noticeably.
     let short = windows(&segment.reference, 0.1, 0.5);
     let motion = |t: &support::Truth| {
         let motion = track.motion(t.from_s, t.to_s)?;
@@ -91,14 +91,14 @@ fn with_the_tyres_known_the_fusion_is_no_worse_than_the_better_of_its_parts() {
         config.speed_scale
     );
     let track = FusedTrack::new(&segment.sensors, &config).unwrap();
-    // The windows of docs/concepts/ego-motion.md.
+    // The same windows as in docs/concepts/ego-motion.md.
     let truths = windows(&second, 10.0, 0.1);
     assert!(truths.len() > 140, "{}", truths.len());
     let [(_, vehicle), (_, imu), (_, fused)] = rows(&track, &truths);
     eprintln!("{vehicle:?}\n{imu:?}\n{fused:?}");
     assert!(vehicle.distance_bias.abs() < 0.003, "{vehicle:?}");
     assert!(fused.distance_bias.abs() < 0.003, "{fused:?}");
-    // No worse than the better part, in both: a millimetre and a hundredth of a degree are what the document's digits show.
+    // Distance and yaw are no worse than the better part, to the document's digits: a millimetre and a hundredth of a degree.
     assert!(
         fused.distance_m <= vehicle.distance_m.min(imu.distance_m) + 1e-3,
         "{fused:?} {vehicle:?} {imu:?}"
@@ -107,7 +107,7 @@ fn with_the_tyres_known_the_fusion_is_no_worse_than_the_better_of_its_parts() {
         fused.yaw_rad <= vehicle.yaw_rad.min(imu.yaw_rad) + 0.01_f64.to_radians(),
         "{fused:?} {vehicle:?} {imu:?}"
     );
-    // Neither part is so poor that any mean would do.
+    // Neither part is so poor that any mean would be better.
     assert!(imu.distance_m > vehicle.distance_m + 0.1 && vehicle.yaw_rad > 2.0 * imu.yaw_rad);
 }
 
@@ -136,8 +136,8 @@ fn kittis_speed_integrates_to_the_gps_path() {
         let track = kitti::track(packets);
         let (from, to) = (packets[0].time_s, packets[frames - 1].time_s);
         let motion = track.motion(from, to).unwrap();
-        // Noise of the positions lengthens a path through all of them, corners cut shorten one through
-        // few: through every fifth (half a second) the two differ by less than 0.1 % here.
+        // Position noise lengthens a path through all positions, and cutting corners shortens one through few. For every fifth position
+        // (half a second) the two differ by less than 0.1 % here.
         let length = kitti::path_length_m(packets, 5);
         assert!((kitti::path_length_m(packets, 1) / length - 1.0).abs() < 1e-3);
         let off = motion.distance_m / length - 1.0;

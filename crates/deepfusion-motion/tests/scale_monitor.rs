@@ -1,4 +1,4 @@
-//! The monitor on simulated drives whose images are zoomed on the way.
+//! The monitor on simulated drives whose images are zoomed during the drive.
 
 use deepfusion_geometry::Se3;
 use deepfusion_motion::{
@@ -10,9 +10,9 @@ use std::sync::Arc;
 
 /// Width of the images, pixels.
 const WIDTH: u32 = 320;
-/// Frames before and after the zoom begins.
+/// Number of frames before and after the zoom begins.
 const FRAMES: [usize; 2] = [102, 100];
-/// The simulator's camera stands so high, metres; a moving car pitches.
+/// Height of the simulator's camera, in metres; a moving car pitches.
 const HEIGHT_M: f64 = 1.65;
 
 struct Drive {
@@ -47,7 +47,7 @@ fn drive(seed: u64) -> Drive {
     }
 }
 
-/// The image enlarged about its middle.
+/// The image enlarged about its centre.
 fn zoomed(image: &GreyImage, zoom: f64) -> GreyImage {
     let middle = [image.width, image.height].map(|s| (s as f64 - 1.0) / 2.0);
     let data = (0..image.height)
@@ -60,8 +60,7 @@ fn zoomed(image: &GreyImage, zoom: f64) -> GreyImage {
     GreyImage { data, ..*image }
 }
 
-/// The readings after each frame; from the second stretch on the images are zoomed and the reported speed is too high by these
-/// factors.
+/// The readings after each frame. From the second stretch on, the images are zoomed and the reported speed is too high by these factors.
 fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) -> Vec<ScaleReading> {
     let mut monitor = ScaleMonitor::new(config);
     let images: Vec<Arc<RoadTexture>> = drive
@@ -99,7 +98,7 @@ fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) ->
         .collect()
 }
 
-/// The part of a motion that a vehicle's speed and yaw rate measure: neither its pitch nor its heave.
+/// The part of a motion that a vehicle's speed and yaw rate measure: without pitch and heave.
 fn planar(motion: &Se3) -> Se3 {
     let turn = Vector3::new(0.0, motion.axis_angle().y, 0.0);
     let way = motion.translation();
@@ -126,7 +125,7 @@ fn clean_drives_are_silent_and_a_zoom_is_noticed() {
             (last.height_m.unwrap() / HEIGHT_M - 1.0).abs() < 0.06,
             "{seed}: {last:?}"
         );
-        // Enough was learned before the zoom.
+        // The reference was learned before the zoom.
         assert_eq!(clean[FRAMES[0] - 3].state, ScaleState::Learning);
 
         let zoomed = readings(&drive, 1.1, 1.0, ScaleMonitorConfig::default());
@@ -142,7 +141,7 @@ fn clean_drives_are_silent_and_a_zoom_is_noticed() {
     }
 }
 
-/// Speeds in another unit, and another resolution, are beyond the heights that are tried about the usual one.
+/// Speeds in another unit, and another resolution, lead to heights outside those tried around the usual one.
 #[test]
 fn a_change_by_more_than_is_tried_is_one_all_the_same() {
     let drive = drive(81);
@@ -154,7 +153,7 @@ fn a_change_by_more_than_is_tried_is_one_all_the_same() {
         let ratio = last.ratio.unwrap();
         assert!((ratio / expected).ln().abs() < 0.2, "{expected}: {last:?}");
     }
-    // From the first frame on, where the height was measured.
+    // With a measured height, the alarm comes from the first reading on.
     let known = ScaleMonitorConfig {
         height_m: Some(HEIGHT_M),
         ..ScaleMonitorConfig::default()
@@ -205,7 +204,7 @@ fn the_network_s_metres_stand_beside_the_vehicle_s() {
             earlier_from_later: at(i - 1).inverse() * at(i),
             down_in_cam: Vector3::y(),
         };
-        // A network whose road is a fifth too far below; now and then it sees none.
+        // A network whose road is a fifth too far below the camera; now and then it finds no road.
         let height = if i % 5 == 0 { f64::NAN } else { 1.2 * HEIGHT_M };
         last = monitor.add(&pair, Some(height)).depth_ratio;
     }

@@ -1,4 +1,4 @@
-//! The scale of a depth image from the scene's movement, on simulated streets whose depth is known.
+//! The scale of a depth image from the scene's motion, on simulated streets with known depth.
 
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_motion::{DepthImage, GreyImage, GreyPyramid, View, align, scene_points};
@@ -39,7 +39,7 @@ impl Street {
         (GreyPyramid::new(grey), frame.depth)
     }
 
-    /// A point of frame `target` in the camera of frame `source`.
+    /// Maps a point of frame `target` to the camera of frame `source`.
     fn motion(&self, source: usize, target: usize) -> Se3 {
         let at = |frame| self.simulation.world_from_cam(frame);
         at(source).inverse() * at(target)
@@ -71,7 +71,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// What a vehicle's sensors would have said of it: without pitch and roll, and half a degree off in heading.
+/// The motion as a vehicle's sensors would measure it: without pitch and roll, and half a degree off in heading.
 fn as_measured(motion: &Se3) -> Se3 {
     let turn = motion.axis_angle();
     let planar = Se3::from_axis_angle(Vector3::new(0.0, turn.y, 0.0), motion.translation());
@@ -94,7 +94,7 @@ fn a_turn_and_a_way_are_found_in_units_of_the_depth() {
             )
             .unwrap();
             let motion = found.source_from_target;
-            // A fortieth of a degree: at this size a sixth of a pixel.
+            // A fortieth of a degree, which is a sixth of a pixel at this size.
             let turn = (motion * truth.inverse()).angle();
             assert!(turn < 5e-4, "{source} {target} {factor}: {turn}");
             let way = motion.translation().norm() / truth.translation().norm();
@@ -126,7 +126,7 @@ fn patches_give_the_factor_that_the_depth_was_given() {
         let found = median(points.iter().map(|p| p.log_factor).collect());
         let off = found + f64::from(factor).ln();
         assert!(off.abs() < 0.01, "{factor}: {off}");
-        // Most patches agree: the spread is that of a fraction of a pixel.
+        // Most patches agree: the spread corresponds to a fraction of a pixel.
         let spread = median(
             points
                 .iter()
@@ -139,8 +139,8 @@ fn patches_give_the_factor_that_the_depth_was_given() {
 
 #[test]
 fn a_wrong_focal_length_does_not_hide_a_wrong_depth() {
-    // The camera goes where it looks: how fast points leave the middle tells depth over way, whatever the focal length is thought
-    // to be.
+    // The camera looks in the direction of motion: how fast points leave the centre gives depth relative to the translation, whatever focal
+    // length is assumed.
     let street = Street::new(5);
     let (target, depth) = street.frame(30);
     let (before, _) = street.frame(27);
@@ -151,7 +151,7 @@ fn a_wrong_focal_length_does_not_hide_a_wrong_depth() {
         fy: 1.1 * camera.fy,
         ..camera
     };
-    // A network that takes the camera for one of longer focal length sees everything farther away.
+    // A network that assumes a longer focal length predicts everything farther away.
     let depth = scaled(&depth, 1.1);
     let depth = image(&depth, wrong);
     let found = align(&target, &depth, &before, &truth).unwrap();

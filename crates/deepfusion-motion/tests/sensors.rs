@@ -1,4 +1,4 @@
-//! The inertial unit and the fusion on a drive whose motion is known: slopes, a crooked mount, biases.
+//! The inertial unit and the fusion on a drive with known motion: slopes, a tilted mount, biases.
 
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
@@ -27,7 +27,7 @@ fn yaw_rate(t: f64) -> f64 {
     speed(t) * 0.03 * (0.2 * t).sin()
 }
 
-/// The road's slope, as pitch (positive: nose down); bumps included.
+/// The road's slope, as pitch (positive: nose down), including bumps.
 fn pitch(t: f64) -> f64 {
     let slope = 0.04 * (0.11 * t.clamp(8.0, 68.0)).sin();
     slope + 0.0005 * speed(t) * (5.0 * t).sin()
@@ -37,13 +37,13 @@ fn derivative(f: impl Fn(f64) -> f64, t: f64) -> f64 {
     (f(t + 1e-4) - f(t - 1e-4)) / 2e-4
 }
 
-/// What a unit mounted as `vehicle_from_imu` reads at 100 Hz over 74 s.
+/// The readings of a unit mounted as `vehicle_from_imu`, at 100 Hz over 74 s.
 fn imu(vehicle_from_imu: &Se3) -> Vec<ImuSample> {
     let imu_from_vehicle = vehicle_from_imu.inverse();
     let reading = |i: usize| {
         let t = i as f64 * 0.01;
         let (sin, cos) = pitch(t).sin_cos();
-        // Level axes: forward v̇, left v·ψ̇, up g. Nose down turns x towards −z.
+        // Level axes: forward v̇, left v·ψ̇, up g. Nose down tilts x towards −z.
         let level = Vector3::new(derivative(speed, t), speed(t) * yaw_rate(t), G);
         let force = Vector3::new(
             level.x * cos - level.z * sin,
@@ -90,7 +90,7 @@ fn distance_and_heading_survive_slopes_biases_and_any_mount() {
         for step in 0..60 {
             let (from, to) = (10.0 + f64::from(step), 11.0 + f64::from(step));
             let distance = track.distance(from, to, speed(from)).unwrap();
-            // A tenth of a m/s² over a second: slopes change faster than the filter follows.
+            // A tenth of a m/s² over a second is allowed: slopes change faster than the filter follows.
             let error = distance - exact(speed, from, to);
             assert!(error.abs() < 0.05, "{from}: {error}");
             let error = track.yaw(from, to).unwrap() - exact(yaw_rate, from, to);
@@ -166,7 +166,7 @@ fn bicycle() -> Bicycle {
     Bicycle::new(2.7).with_steering_wheel(15.0)
 }
 
-/// The steering wheel that makes the drive, 2 % too large.
+/// The steering wheel's angle for this drive, 2 % too large.
 fn steering() -> Signal {
     let angle = |t: f64| {
         if speed(t) > 0.1 {
@@ -218,11 +218,11 @@ fn the_fusion_is_the_weighted_mean() {
     };
     let (gyro, steering) = (yaw_by(1.0), yaw_by(0.0));
     assert!((motion.yaw_rad - 0.9 * gyro - 0.1 * steering).abs() < 1e-12);
-    // The steering's 3 % were seen in the bends: what it gives to the mean is without most of them.
+    // The steering's error of 3 % shows in the bends, so most of it is removed from the fused yaw.
     assert!((steering / exact(yaw_rate, 20.0, 20.5) - 1.0).abs() < 0.01);
 }
 
-/// The middle of the drive: nothing stands from 15 to 55 s.
+/// The middle of the drive: the vehicle does not stand from 15 to 55 s.
 fn without_standstill() -> VehicleSensors {
     let mut sensors = all();
     let imu = sensors.imu.as_mut().unwrap();
@@ -236,7 +236,7 @@ fn a_drive_without_a_stop_shows_the_gyros_bias_too() {
     let track = FusedTrack::new(&without_standstill(), &config).unwrap();
     let imu = track.imu().unwrap();
     assert!(imu.standstills().is_empty());
-    // The body's rates over the whole drive, from which a bias would stand out.
+    // The mean of the body's rates over the whole drive, where a bias would show.
     let roll_rate = |t: f64| -yaw_rate(t) * pitch(t).sin();
     let pitch_rate = |t: f64| derivative(pitch, t);
     let left = [
@@ -257,7 +257,7 @@ fn a_drive_without_a_stop_shows_the_gyros_bias_too() {
         };
         (0..37).map(error).sum::<f64>() / 37.0
     };
-    // As the configuration without a bias had it: 0.9 of the gyro's 0.008 rad/s.
+    // Without correction, 0.9 of the gyro's 0.008 rad/s would remain.
     let mut silent = config;
     silent.imu.gyro_bias_radps = Some([0.0; 3]);
     let (found, as_it_reads) = (
@@ -268,7 +268,7 @@ fn a_drive_without_a_stop_shows_the_gyros_bias_too() {
         as_it_reads > 6e-3 && found < 1.5e-3,
         "{as_it_reads} {found}"
     );
-    // Where the steering is missing the bias that it showed elsewhere is still no turn.
+    // Where the steering is missing, the bias found elsewhere is still removed.
     let mut sensors = without_standstill();
     sensors.steering_rad = sensors.steering_rad.map(|steering| {
         let samples = steering
@@ -333,7 +333,7 @@ fn an_absent_sensor_leaves_its_weight_to_the_other() {
     assert!(knows && Some(motion.yaw_rad) == parts.imu_yaw_rad);
     let (knows, motion, _) = only(|s| (s.imu, s.steering_rad) = (None, None));
     assert!(!knows && motion.yaw_rad == 0.0);
-    // A steering angle without the vehicle's geometry is as good as none.
+    // A steering angle without the vehicle's geometry is not used.
     let track = FusedTrack::new(&all(), &MotionConfig::default()).unwrap();
     assert!(track.steering_yaw_rate().is_none());
     let mut nothing = all();
@@ -364,7 +364,7 @@ fn gaps_are_refused_or_left_to_the_other_sensor() {
     assert!(track.motion(19.5, 20.5).is_none() && track.speed_at(20.5).is_none());
     let parts = track.parts(30.1, 30.4).unwrap();
     assert!(parts.steering_yaw_rad.is_none() && parts.imu_yaw_rad.is_some());
-    // The one that is there alone, freed of what it was found to be off by elsewhere.
+    // The only sensor present is used, without the error found for it elsewhere.
     let off = |from, to| {
         let yaw = track.motion(from, to).unwrap().yaw_rad;
         (yaw - exact(yaw_rate, from, to)).abs()
@@ -444,7 +444,7 @@ fn the_configuration_reads_from_a_file_and_names_what_is_wrong() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    /// Whatever a recorder writes, the answer is a finite motion, none, or an error.
+    /// Whatever a recorder writes, the result is a finite motion, `None`, or an error.
     #[test]
     fn never_nan_never_a_panic(
         times in proptest::collection::vec(prop_oneof![8 => 0.0..5.0f64, 1 => any::<f64>()], 0..80),

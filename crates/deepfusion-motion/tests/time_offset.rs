@@ -1,4 +1,4 @@
-//! The clocks' offset on simulated drives, where it is known, and on KITTI, where it should be none.
+//! The clocks' offset on simulated drives, where it is known, and on KITTI, where it should be zero.
 
 use crate::support::{kitti, real_data};
 use deepfusion_hint::Hint;
@@ -9,14 +9,14 @@ use deepfusion_motion::{
 use deepfusion_sim::{SimConfig, Simulation};
 use image::imageops;
 
-/// The simulator's sensors run at 100 Hz; every fourth instant is a picture.
+/// The simulator's sensors run at 100 Hz; every fourth sample has an image.
 const SENSOR_HZ: f64 = 100.0;
 const EVERY: usize = 4;
 
-/// OXTS: forward speed, then roll, pitch and yaw rate.
+/// OXTS values: forward speed, then roll, pitch and yaw rate.
 const READINGS: [usize; 4] = [8, 17, 18, 19];
 
-/// A drive with bends: its vehicle's readings with their times, and its pictures' motion at 25 Hz.
+/// A drive with bends: the vehicle's readings with their times, and the image motion at 25 Hz.
 struct Drive {
     readings: Vec<(f64, [f64; 4])>,
     pictures: Vec<ImageMotion>,
@@ -50,7 +50,7 @@ impl Drive {
         }
     }
 
-    /// The vehicle's side on a clock that is `offset_s` ahead of the camera's.
+    /// The vehicle's rates on a clock that is `offset_s` ahead of the camera's.
     fn rates(&self, offset_s: f64) -> VehicleRates {
         let signal = |i: usize| {
             let samples = self.readings.iter();
@@ -82,7 +82,7 @@ fn the_offset_of_simulated_drives_is_found_within_ten_milliseconds() {
             assert!(found.std_error_s < 0.015, "{found:?}");
             assert!(error.abs() < 3.0 * found.std_error_s, "{found:?}");
 
-            // Bends alone are slow: the error is larger, and so is its estimate.
+            // Bends alone are slow: the error is larger, and so is the estimated error.
             let bends_only = VehicleRates {
                 roll_rate_radps: None,
                 pitch_rate_radps: None,
@@ -97,7 +97,7 @@ fn the_offset_of_simulated_drives_is_found_within_ten_milliseconds() {
     }
 }
 
-/// A vehicle whose yaw rate and speed are given functions of time, and what its camera would see.
+/// A vehicle whose yaw rate and speed are given functions of time, and the image motion of its camera.
 fn ideal(
     yaw_rate: fn(f64) -> f64,
     speed: fn(f64) -> f64,
@@ -113,7 +113,7 @@ fn ideal(
     let pictures = (0..380).map(|i| {
         let (from, to) = (1.0 + f64::from(i) * 0.1, 1.0 + f64::from(i + 1) * 0.1);
         let middle = 0.5 * (from + to);
-        // A rough noise that repeats from run to run.
+        // A simple noise that is the same in every run.
         let rough = noise * (f64::from(i * i % 97) / 48.5 - 1.0);
         ImageMotion {
             from_s: from,
@@ -165,7 +165,7 @@ fn pictures_that_do_not_follow_give_none_or_a_large_error() {
         Ok(found) => assert!(found.std_error_s > 0.1, "{found:?}"),
         Err(error) => assert!(matches!(error, NoTimeOffset::NoPeak { .. }), "{error}"),
     }
-    // The wrong sign is no correlation.
+    // A correlation with the wrong sign does not count.
     let (mut pictures, rates) = ideal(|t| 0.2 * (0.9 * t).sin(), |_| 10.0, 0.0, 0.0);
     pictures.iter_mut().for_each(|p| p.shift = -p.shift);
     let found = time_offset(
@@ -213,8 +213,8 @@ fn bad_input_is_an_answer_too() {
     assert!(found.vehicle_minus_camera_s.abs() < 0.005, "{found:?}");
 }
 
-/// OpenCV's features, essential matrix and rotation on the full pictures, correlated the same way, put
-/// all three axes of both drives at 0.055 to 0.065 s: the drives' oxts readings are late by as much.
+/// OpenCV's features, essential matrix and rotation on the full images, correlated in the same way, give 0.055 to 0.065 s for all three
+/// axes of both drives: the drives' oxts readings are late by that much.
 #[test]
 fn kittis_oxts_is_late_by_sixty_milliseconds() {
     for (drive, most) in [("0005", 0.006), ("0009", 0.02)] {

@@ -3,7 +3,7 @@
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a benchmark ends where it cannot run"
+    reason = "a benchmark panics if it cannot run"
 )]
 #![allow(missing_docs)]
 
@@ -53,7 +53,7 @@ fn targets(criterion: &mut Criterion) {
                 i = (i + 1) % frames.len();
                 time_s += 0.1;
                 if i == 0 {
-                    // The drive begins anew: what was remembered is not there.
+                    // The drive starts again: nothing remembered is in view.
                     perception.reset();
                 }
                 let stamp = Stamp {

@@ -6,23 +6,23 @@ use crate::outermost::ends;
 use crate::rows::{Turn, Vote};
 use crate::silhouette::{FOOT_M, Silhouette};
 
-/// Length and width of a typical car, metres.
+/// Length and width of a typical car, in metres.
 pub(crate) const CAR: [f32; 2] = [4.4, 1.8];
 /// Length and width of the smallest car, metres.
 const SHORTEST: [f32; 2] = [3.2, 1.45];
-/// Up to this extent, in metres, something counts as a person or a thing of that size, even if partly hidden.
+/// Up to this extent, in metres, an object counts as a person or something of that size, even if partly hidden.
 pub(crate) const SMALL: f32 = 1.0;
-/// Least visible extent of a side that counts as a measurement of its length, metres.
+/// Smallest visible extent of a side that counts as a measurement of its length, in metres.
 const MEASURED: f32 = 0.6;
-/// A visible part smaller than this, in metres, says nothing about the rest.
+/// A visible part smaller than this, in metres, does not determine the rest.
 const SLIVER: f32 = 0.8;
-/// Least visible width of a bumper that is completed to a car, metres.
+/// Smallest visible width of a bumper that is completed to a car, in metres.
 const BUMPER: f32 = 1.2;
-/// Smallest extent of a box, metres.
+/// Smallest extent of a box, in metres.
 const THIN: f32 = 0.3;
 
-/// Fits a box to a silhouette. `expected` is the expected orientation, which decides only between fits of about equal
-/// quality. The box comes with its vote on the orientation of its neighbours.
+/// Fits a box to a silhouette. `expected` is the expected orientation, which only decides between fits of about equal quality. Returned
+/// with the box is its vote on the orientation of its neighbours.
 #[must_use]
 pub(crate) fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
     let angle = best_angle(&silhouette.contour, expected.angle());
@@ -37,14 +37,14 @@ pub(crate) fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
         let missing = (whole[i] - size[i]).max(0.0);
         let [low, high] = room[i];
         let away = if from + to >= 0.0 { 0.5 } else { -0.5 };
-        // What is missing lies where it may; where it may lie at both ends, behind what is seen.
+        // The missing part is added where there is room; with room at both ends, behind the visible part.
         let shift = match (low > 0.0, high > 0.0) {
             (true, false) => -0.5,
             (false, true) => 0.5,
             _ => 0.5 * away,
         };
         middle[i] = 0.5 * (from + to) + shift * missing;
-        // The end that was not moved; the middle of a side that was seen whole.
+        // The end that was not moved; for a completely visible side, its middle.
         fixed[i] = middle[i] - if missing > 0.0 { shift * whole[i] } else { 0.0 };
     }
     let on_ground = |p: [f32; 2]| [0, 1].map(|k| p[0] * axes[0][k] + p[1] * axes[1][k]);
@@ -80,9 +80,8 @@ fn extent(points: &[[f32; 3]], axis: [f32; 2]) -> [f32; 2] {
     ends(&mut along, 100).unwrap_or_default()
 }
 
-/// How far the box may extend beyond its low and its high end along an axis, in metres: 0 where a free end of the
-/// contour or a visible face shows its limit. Behind an occluder it may extend without limit, towards the camera only
-/// up to the occluder.
+/// How far the box may extend beyond its low and its high end along an axis, in metres: 0 where a free end of the contour or a visible face
+/// shows its limit. Behind an occluder it may extend without limit, but towards the camera only up to the occluder.
 fn room(
     silhouette: &Silhouette,
     axis: [f32; 2],
@@ -126,8 +125,8 @@ fn room(
     })
 }
 
-/// How much of the face at `place` along `axis` is visible down to the ground, metres: above an occluder, the visible
-/// part may lie farther in.
+/// How much of the face at `place` along `axis` is visible down to the ground, in metres. Above an occluder, the visible part may lie
+/// farther in.
 fn face_width(silhouette: &Silhouette, axis: [f32; 2], across: [f32; 2], place: f32) -> f32 {
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
     for (p, foot) in silhouette.contour.iter().zip(&silhouette.feet) {
@@ -141,7 +140,7 @@ fn face_width(silhouette: &Silhouette, axis: [f32; 2], across: [f32; 2], place: 
     high - low
 }
 
-/// Full extents along the two axes, from the visible ones.
+/// Full extents along the two axes, estimated from the visible ones.
 fn completed(
     size: [f32; 2],
     room: [[f32; 2]; 2],
@@ -149,36 +148,36 @@ fn completed(
     expected: Turn,
     silhouette: &Silhouette,
 ) -> Option<([f32; 2], f32)> {
-    // Where its lower half is hidden, what is seen is a roof, which is shorter than the whole.
+    // If the lower half is hidden, only a roof is visible, which is shorter than the whole.
     let roof_only = silhouette.bottom > 0.55 * silhouette.top && silhouette.top > 1.0;
     let hidden = silhouette.hidden.iter().any(|step| *step > 0.0) || roof_only;
     let largest = size[0].max(size[1]);
     if largest < SLIVER && hidden {
         return None;
     }
-    // A car from behind is as wide as a container; it is higher. Of what is hidden there is more.
+    // A car from behind is as wide as a container, but higher. A partly hidden object is larger than its visible part.
     let small = match (hidden, silhouette.top > 1.35) {
         (true, _) => SLIVER,
         (false, true) => SMALL,
         (false, false) => SHORTEST[1],
     };
-    // Of a car whose rest is hidden, the bumper may be all that is seen.
+    // If the rest of a car is hidden, only its bumper may be visible.
     let lowest = if hidden && largest > BUMPER { 0.6 } else { 0.9 };
     if largest < small || silhouette.top < lowest {
         return Some((size.map(|s| s.max(THIN)), 0.0));
     }
     let room = room.map(|[low, high]| low + high);
     let usual = |i: usize, length_on: usize| CAR[usize::from(i != length_on)];
-    // As a car with its length along the first or the second axis: the way that explains more of what was seen.
+    // As a car with its length along the first or the second axis: the cost of what the car does not explain.
     let as_car = |length_on: usize| {
         let mut cost = 0.0;
         for i in 0..2 {
             let more = size[i] - usual(i, length_on);
             cost += if more > 0.0 {
-                // A car may be longer than usual, hardly wider.
+                // A car may be longer than usual, but hardly wider.
                 if i == length_on { more } else { 3.0 * more }
             } else {
-                // Too short, and no room to go on.
+                // Too short, without room to extend.
                 0.5 * (-more - room[i]).max(0.0)
             };
         }
@@ -193,7 +192,7 @@ fn completed(
         let usual = usual(i, length_on);
         let least = SHORTEST[usize::from(i != length_on)];
         if size[i] + room[i] < least {
-            // Both ends are seen, but of less than any car: its far end was not, after all.
+            // Shorter than any car: the far end that seemed visible was not the car's end.
             size[i].max(usual)
         } else {
             size[i].max(usual.min(size[i] + room[i]))
@@ -206,7 +205,7 @@ fn completed(
 mod tests {
     use super::*;
 
-    /// The front of a car, 1.7 m of it along x = 4, and 1 m of its side, behind which the image ends.
+    /// The front of a car, 1.7 m of it along x = 4, and 1 m of its side; the image ends behind that.
     fn corner() -> Silhouette {
         let front = (0..18).map(|i| [4.0, 9.7 - 0.1 * i as f32]);
         let side = (1..11).map(|i| [4.0 + 0.1 * i as f32, 8.0]);
@@ -225,7 +224,7 @@ mod tests {
     #[test]
     fn a_box_does_not_go_on_before_a_face_that_is_seen() {
         let seen = fit(&corner(), Turn::ahead()).unwrap();
-        // Its length points away from the lane: both ends of the front are seen, and a car is not so short.
+        // Its length points away from the lane: both ends of the front are visible, and no car is that short.
         let [right, forward] = seen.place.middle;
         assert!(
             (right - 6.2).abs() < 0.2 && (forward - 8.85).abs() < 0.2,
@@ -235,7 +234,7 @@ mod tests {
             seen.place.angle.sin().abs() < 0.1 && seen.margin > 0.5,
             "{seen:?}"
         );
-        // Where the side's foot is hidden it may lie farther in than the car's end.
+        // If the foot of the side is hidden, its visible end may lie farther in than the car's end.
         let mut hidden = corner();
         hidden.feet.fill(0.9);
         let seen = fit(&hidden, Turn::ahead()).unwrap();
@@ -244,7 +243,7 @@ mod tests {
 
     #[test]
     fn neighbours_decide_where_what_is_seen_does_not() {
-        // A corner of which both ends are hidden.
+        // A corner with both ends hidden.
         let unclear = Silhouette {
             hidden: [f32::INFINITY; 2],
             feet: vec![0.9; corner().contour.len()],

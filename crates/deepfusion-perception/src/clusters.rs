@@ -10,12 +10,12 @@ pub struct Run {
     pub v: u32,
     /// First column.
     pub from: u32,
-    /// Column after the last.
+    /// The column after the last one.
     pub to: u32,
 }
 
 impl Run {
-    /// Its pixels in an image of this width, row by row.
+    /// Indices of its pixels in an image of this width, row by row.
     pub(crate) fn pixels(&self, width: usize) -> std::ops::Range<usize> {
         let row = self.v as usize * width;
         row + self.from as usize..row + self.to as usize
@@ -25,7 +25,7 @@ impl Run {
 /// Obstacle pixels that belong together.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Cluster {
-    /// Its runs, from the top row down.
+    /// The cluster's runs, from the top row down.
     pub runs: Vec<Run>,
     /// Number of pixels.
     pub pixels: usize,
@@ -48,8 +48,8 @@ impl Cluster {
         )
     }
 
-    /// Splits it in two: the pixels for whose point in the camera's frame `beyond` is false, and those for which it is
-    /// true; `None` if one part would be empty.
+    /// Splits the cluster in two: the pixels for whose point in the camera's frame `beyond` is false, and those for which it is true;
+    /// `None` if one part would be empty.
     pub(crate) fn divided(
         &self,
         depth: &[f32],
@@ -83,11 +83,11 @@ impl Cluster {
     }
 }
 
-/// How far two neighbouring pixels of one surface may lie apart in depth.
+/// How far two neighbouring pixels of one surface may differ in depth.
 ///
-/// On an upright surface seen at a grazing angle, as the side of a car ahead is, depth grows by z²·δ/|x| from
-/// one column to the next (δ: the angle between them, x: the surface's distance to the side). On a level one it
-/// grows by z²·δ/|y| from row to row. The depth's own error grows with z² in metres, thus with z relative to it.
+/// On an upright surface seen at a grazing angle, such as the side of a car ahead, depth grows by z²·δ/|x| from one column to the next (δ:
+/// the angle between them, x: the surface's distance to the side). On a level surface it grows by z²·δ/|y| from row to row. The depth's own
+/// error grows with z² in metres, and so with z as a share of the depth.
 pub(crate) struct Gaps {
     error: f32,
     step: [f32; 2],
@@ -102,12 +102,12 @@ impl Gaps {
         }
     }
 
-    /// From one column to the next, for a surface at `x` to the side and `z` ahead, metres.
+    /// From one column to the next, for a surface at `x` to the side and `z` ahead, in metres.
     pub(crate) fn across(&self, x: f32, z: f32) -> f32 {
         0.12 + self.limit(x.abs(), z, self.step[0])
     }
 
-    /// Of level surfaces, only those below the camera show more than their edge.
+    /// Only level surfaces below the camera show more than their edge.
     fn down(&self, y: f32, z: f32) -> f32 {
         0.35 + self.limit(y, z, self.step[1])
     }
@@ -122,7 +122,7 @@ impl Gaps {
     }
 }
 
-/// A surface that goes past the camera at less than this, in metres, is seen edge-on.
+/// A surface that passes the camera at less than this distance, in metres, is seen edge-on.
 const EDGE_ON: f32 = 0.4;
 
 /// Joins the obstacle pixels of a depth image into clusters of at least `min_pixels`.
@@ -202,10 +202,10 @@ fn find_runs(
     }
 }
 
-/// Widest object in front of a surface that does not cut it in two, metres: a lamp post, a sign.
+/// Widest object in front of a surface that does not split it, in metres: a lamp post, a sign.
 const POST_M: f32 = 0.7;
 
-/// Joins the runs of a row that go on, at the same depth, behind a narrow thing that stands nearer.
+/// Joins the runs of a row that continue, at the same depth, behind a narrow object that is nearer.
 fn join_behind(
     depth: &[f32],
     rays: &Rays,
@@ -269,7 +269,7 @@ fn join_rows(
             });
             if touching {
                 let (a, b) = (root(parent, here as u32), root(parent, other as u32));
-                // The smaller index stays the root, so that clusters come in the order of their top rows.
+                // The smaller index stays the root, so that clusters are in the order of their top rows.
                 parent[a.max(b) as usize] = a.min(b);
             }
         }

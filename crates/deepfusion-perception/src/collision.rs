@@ -3,7 +3,7 @@
 use crate::Target;
 use serde::{Deserialize, Serialize};
 
-/// The vehicle around its camera, metres.
+/// Dimensions of the vehicle around its camera, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct VehicleShape {
@@ -13,9 +13,9 @@ pub struct VehicleShape {
     pub front_m: f64,
     /// From the camera back to the rear axle, about which the vehicle turns.
     pub axle_m: f64,
-    /// Kept free on each side.
+    /// Margin on each side.
     pub margin_m: f64,
-    /// By how much the camera is turned to the left of the way straight ahead, rad.
+    /// Yaw of the camera relative to straight ahead, in radians, positive to the left.
     pub camera_yaw_rad: f64,
 }
 
@@ -45,8 +45,9 @@ const HORIZON_S: f64 = 10.0;
 /// See [`HORIZON_S`].
 const STEP_S: f64 = 0.05;
 
-/// The first target that the vehicle's front would touch, at its present speed (m/s) and yaw rate (rad/s, positive to the
-/// left), if every target keeps its velocity: the likeliest one, where it is not sure yet. What nothing follows counts as static.
+/// The first target that the vehicle's front would touch at its present speed (m/s) and yaw rate (rad/s, positive to the left), if every
+/// target keeps its velocity. For a target whose velocity is not certain yet, the likeliest velocity is used. Targets without a track count
+/// as static.
 #[must_use]
 pub fn time_to_collision(
     targets: &[Target],
@@ -68,7 +69,7 @@ pub fn time_to_collision(
     })
 }
 
-/// The camera's future pose: x right, z forward, and its turn to the left.
+/// The camera's future pose: x right, z forward, and its yaw to the left.
 struct Pose {
     x: f64,
     z: f64,
@@ -76,7 +77,7 @@ struct Pose {
 }
 
 impl Pose {
-    /// Along the arc that the rear axle drives.
+    /// The pose after driving along the rear axle's arc.
     fn after(time_s: f64, speed: f64, yaw_rate: f64, vehicle: &VehicleShape) -> Self {
         let (way, turn) = (speed * time_s, yaw_rate * time_s);
         let chord = if turn.abs() < 1e-6 {
@@ -84,7 +85,7 @@ impl Pose {
         } else {
             way * (0.5 * turn).sin() / (0.5 * turn)
         };
-        // The axle moves along the chord; the camera sits ahead of it.
+        // The axle moves along the chord; the camera is ahead of it.
         let axle = (-chord * (0.5 * turn).sin(), chord * (0.5 * turn).cos());
         Self {
             x: axle.0 - vehicle.axle_m * turn.sin(),
@@ -96,14 +97,14 @@ impl Pose {
     fn touches(&self, target: &Target, time_s: f64, vehicle: &VehicleShape) -> bool {
         let velocity = target.velocity_mps.or(target.likely_velocity_mps);
         let velocity = velocity.unwrap_or_default();
-        // From the camera's axes into those of the vehicle.
+        // From the camera's axes to the vehicle's.
         let (turned, ahead) = vehicle.camera_yaw_rad.sin_cos();
         let level = |[x, _, z]: [f64; 3]| [ahead * x - turned * z, turned * x + ahead * z];
         let velocity = level(velocity);
         let half = 0.5 * vehicle.width_m + vehicle.margin_m;
         let (sin, cos) = self.turn.sin_cos();
         let corners = target.corners();
-        // The footprint's outline, in the vehicle's axes then.
+        // The footprint's outline, in the vehicle's axes at that time.
         let points: Vec<(f64, f64)> = corners[..4]
             .iter()
             .map(|c| {
@@ -113,11 +114,11 @@ impl Pose {
                 (cos * x + sin * z, -sin * x + cos * z)
             })
             .collect();
-        // Behind the bumper, and not behind the camera: what is beside the car is not run into by its front.
+        // Between the bumper and the camera: the front does not hit what is beside the car.
         let inside = |(x, z): (f64, f64)| x.abs() <= half && (0.0..=vehicle.front_m).contains(&z);
         (0..4).any(|i| {
             let (a, b) = (points[i], points[(i + 1) % 4]);
-            // Sides are shorter than 13 m: a point every quarter of a metre does not miss the car's front.
+            // A point every quarter of a metre along each side cannot miss the car's front.
             let steps = (((b.0 - a.0).hypot(b.1 - a.1) / 0.25).ceil() as usize).max(1);
             (0..=steps).any(|k| {
                 let share = k as f64 / steps as f64;
@@ -179,7 +180,7 @@ mod tests {
 
     #[test]
     fn the_way_is_the_vehicles_and_not_the_cameras() {
-        // The camera looks five degrees to the left: what is straight ahead of the vehicle is seen to the right.
+        // The camera looks five degrees to the left, so a target straight ahead of the vehicle appears to the right.
         let yaw = 5.0_f64.to_radians();
         let vehicle = VehicleShape {
             camera_yaw_rad: yaw,
@@ -189,7 +190,7 @@ mod tests {
         let of =
             |x: f64, z: f64| time_to_collision(&[target(1, x, z, [0.0; 3])], 10.0, 0.0, &vehicle);
         assert!(of(right, ahead).is_some());
-        assert_eq!(of(0.0, 30.0), None, "that is 2.6 m to the left of the way");
+        assert_eq!(of(0.0, 30.0), None, "it is 2.6 m to the left of the path");
     }
 
     #[test]
@@ -197,7 +198,7 @@ mod tests {
         let vehicle = VehicleShape::default();
         let left = [target(4, -3.5, 25.0, [0.0; 3])];
         assert_eq!(time_to_collision(&left, 10.0, 0.0, &vehicle), None);
-        // Left with a radius of about 89 m: 25² / 178 = 3.5 m to the side at 25 m.
+        // A left bend with a radius of about 89 m: 25² / 178 = 3.5 m to the side at 25 m.
         let collision = time_to_collision(&left, 10.0, 0.112, &vehicle).unwrap();
         assert_eq!(collision.id, 4);
         assert_eq!(time_to_collision(&left, 10.0, -0.112, &vehicle), None);

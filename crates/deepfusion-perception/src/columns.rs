@@ -1,12 +1,12 @@
-//! A cluster's pixels column by column.
+//! Groups a cluster's pixels by column.
 
 use crate::clusters::Cluster;
 
-/// The pixels of a cluster, column by column from left to right and in each from the top down: (depth, row).
+/// The pixels of a cluster, column by column from left to right, and from the top down in each: (depth, row).
 pub(crate) struct Columns {
     /// Leftmost column in the image.
     left: u32,
-    /// The index after each column's last pixel.
+    /// For each column, the index after its last pixel.
     ends: Vec<usize>,
     pixels: Vec<(f32, u32)>,
 }
@@ -21,7 +21,7 @@ impl Columns {
                 *end += 1;
             }
         }
-        // First where each column begins; filling it moves that on to where it ends.
+        // At first the start of each column; filling a column moves it to the column's end.
         let mut pixels_before = 0;
         for end in &mut ends {
             pixels_before += std::mem::replace(end, pixels_before);
@@ -38,7 +38,7 @@ impl Columns {
         Self { left, ends, pixels }
     }
 
-    /// Calls `each` with every column that has pixels, and with those pixels.
+    /// Calls `each` with every column that has pixels, and its pixels.
     pub(crate) fn for_each(&mut self, mut each: impl FnMut(usize, &mut [(f32, u32)])) {
         let mut start = 0;
         for (column, end) in self.ends.iter().enumerate() {

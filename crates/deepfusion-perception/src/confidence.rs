@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 /// Indicators of an error at one pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Evidence {
-    /// Largest difference of the disparity to the pixels beside it, over the disparity.
+    /// Largest difference between the disparity and that of an adjacent pixel, divided by the disparity.
     pub gradient: f32,
-    /// Difference between the disparity and that of the mirrored image, over their mean; 0 if that was not computed.
+    /// Difference between the disparity and that of the mirrored image, divided by their mean; 0 if that was not computed.
     pub flip: f32,
 }
 
 impl Evidence {
-    /// Computes it for every pixel of a disparity image, row by row; `mirrored` is the mirrored image's disparity, mirrored back.
+    /// Computes the evidence for every pixel of a disparity image, row by row; `mirrored` is the mirrored image's disparity, mirrored back.
     #[must_use]
     pub fn of(disparity: &[f32], mirrored: Option<&[f32]>, width: usize) -> Vec<Self> {
         let width = width.max(1);
@@ -51,11 +51,11 @@ impl Evidence {
     }
 }
 
-/// Expected relative error of a depth: constant + gradient·(its gradient) + flip·(its disagreement).
+/// Expected relative error of a depth: constant + gradient·(gradient of the disparity) + flip·(disagreement with the mirrored image).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConfidenceModel {
-    /// The error of every pixel.
+    /// The constant part of the error.
     pub constant: f64,
     /// Weight of [`Evidence::gradient`].
     pub gradient: f64,
@@ -63,11 +63,11 @@ pub struct ConfidenceModel {
     pub flip: f64,
 }
 
-/// Cap of a relative error, so that a single pixel beside a pole does not dominate.
+/// Largest relative error that is used, so that a single pixel beside a pole does not dominate.
 pub const MOST_ERROR: f64 = 1.0;
 
 impl ConfidenceModel {
-    /// The expected relative error.
+    /// The expected relative error for this evidence.
     #[must_use]
     pub fn expected_error(&self, evidence: &Evidence) -> f64 {
         self.constant
@@ -75,14 +75,14 @@ impl ConfidenceModel {
             + self.flip * f64::from(evidence.flip)
     }
 
-    /// exp(−expected relative error): 1 for a depth that is right, 0.9 for one that is expected to be 10 % off.
+    /// exp(−expected relative error): 1 for a depth without error, 0.9 for one that is expected to be 10 % off.
     #[must_use]
     pub fn confidence(&self, evidence: &Evidence) -> f64 {
         (-self.expected_error(evidence)).exp()
     }
 
-    /// Least squares of the errors (capped at [`MOST_ERROR`]) on the evidence with no negative weight: more evidence never
-    /// means less error. `None` without any sample.
+    /// Fits the errors (capped at [`MOST_ERROR`]) to the evidence by least squares without negative weights, so that more evidence never
+    /// means a smaller error. `None` without any sample.
     #[must_use]
     pub fn fit(samples: &[(Evidence, f64)]) -> Option<Self> {
         let mut normal = Matrix3::<f64>::zeros();
@@ -98,7 +98,7 @@ impl ConfidenceModel {
         if normal[(0, 0)] < 1.0 {
             return None;
         }
-        // Three weights: every choice of those that are not 0 is tried.
+        // Non-negative least squares: tries every subset of the three weights as the non-zero ones.
         let mut best: Option<(f64, Vector3<f64>)> = None;
         for choice in 1..8u32 {
             let used = |i: usize| choice & (1 << i) != 0;
@@ -125,8 +125,8 @@ impl ConfidenceModel {
         })
     }
 
-    /// Samples in `bins` parts of equal number, from the least to the most trusted: mean confidence, expected and observed
-    /// error, and number of each.
+    /// Divides the samples into `bins` parts of equal size, from the least to the most trusted: mean confidence, expected and observed
+    /// error, and number of samples in each.
     #[must_use]
     pub fn reliability(&self, samples: &[(Evidence, f64)], bins: usize) -> Vec<Reliability> {
         let mut pairs: Vec<(f64, f64)> = samples
@@ -161,9 +161,9 @@ pub struct Reliability {
     pub confidence: f64,
     /// Mean expected relative error.
     pub expected: f64,
-    /// Mean relative error found.
+    /// Mean observed relative error.
     pub observed: f64,
-    /// Pixels.
+    /// Number of pixels.
     pub n: usize,
 }
 
@@ -185,7 +185,7 @@ mod tests {
             gradient: 1.5,
             flip: 0.4,
         };
-        // A pattern of errors about the expectation, with mean 0.
+        // A pattern of deviations from the expectation, with mean 0.
         let samples: Vec<_> = (0..14_300)
             .map(|i| {
                 let e = evidence(i);

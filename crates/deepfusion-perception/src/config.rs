@@ -7,39 +7,39 @@ use serde::{Deserialize, Serialize};
 pub struct PerceptionConfig {
     /// Largest camera z that is used, in metres.
     pub max_depth_m: f32,
-    /// Least height of an obstacle above the ground, in metres: kerbs are lower.
+    /// Smallest height of an obstacle above the ground, in metres; kerbs are lower.
     pub min_height_m: f32,
-    /// Height up to which pixels are joined into clusters, in metres: what hangs above, a tree's crown or a sign, would
-    /// join the cars below it. If a cluster reaches it, its box extends up to [`Self::max_target_height_m`].
+    /// Height up to which pixels are joined into clusters, in metres. Things that hang higher, such as a tree's crown or a sign, would join
+    /// the cars below them. If a cluster reaches this height, its box extends up to [`Self::max_target_height_m`].
     pub join_height_m: f32,
-    /// Lowest and highest target, in metres.
+    /// Limits of a target's height, in metres.
     pub min_target_height_m: f32,
     /// See [`Self::min_target_height_m`].
     pub max_target_height_m: f32,
-    /// Largest footprint of a target, length and width in metres.
+    /// Largest footprint of a target: length and width in metres.
     pub max_footprint_m: [f32; 2],
-    /// Fewest pixels of a target in an image of 640×192; other sizes in proportion to their area.
+    /// Smallest number of pixels of a target in an image of 640×192; for other sizes in proportion to their area.
     pub min_pixels: f32,
-    /// Least confidence of a reported target; tracks below it continue unreported.
+    /// Smallest confidence of a reported target; tracks below it continue unreported.
     pub min_confidence: f64,
     /// Number of frames in which a target must have been seen before it is reported.
     pub confirm_frames: u32,
-    /// Standard deviation of a disparity over itself: with 0.01 a depth of 30 m is accurate to 30 cm at each
-    /// pixel. Exact depth: 0. It widens the gaps that a cluster may bridge.
+    /// Standard deviation of a disparity divided by the disparity: with 0.01 a depth of 30 m is accurate to 30 cm at each pixel. Exact
+    /// depth: 0. It widens the gaps that a cluster may bridge.
     pub relative_error: f32,
-    /// Jump of depth, as a share of it, beyond which a pixel between a near and a far surface is dropped
-    /// ([`crate::flying_pixels`]); 0 keeps all.
+    /// Jump of depth, as a share of the depth, beyond which a pixel between a near and a far surface is dropped ([`crate::flying_pixels`]);
+    /// 0 keeps all pixels.
     pub edge_jump: f32,
     /// Largest distance of such a pixel from both surfaces, in pixels of an image 640 wide.
     pub edge_radius: f32,
-    /// Steepest ground, rise over run, in the direction of sight.
+    /// Steepest ground, rise over run, in the viewing direction.
     pub max_slope: f32,
-    /// Lowest and highest camera position above the ground, in metres.
+    /// Limits of the camera's height above the ground, in metres.
     pub camera_height_m: [f32; 2],
     /// Largest angle between the camera's up and the ground's normal, in degrees.
     pub max_tilt_deg: f32,
-    /// Whether rows of parked cars are completed, as in a car park: those that are seen well tell where the others stand, of which
-    /// only a corner or a strip is seen. It needs the camera's poses, and remembers the cars that were passed.
+    /// Whether rows of parked cars are completed, as in a car park: clearly visible cars show where the others stand, of which only a
+    /// corner or a strip is visible. This needs the camera's poses, and remembers the cars already passed.
     pub parking_rows: bool,
 }
 
@@ -57,7 +57,7 @@ impl PerceptionConfig {
         }
     }
 
-    /// These with [`Self::parking_rows`], as the commands and the Python package have them unless their settings say otherwise.
+    /// These settings with [`Self::parking_rows`]: the default of the commands and the Python package.
     #[must_use]
     pub fn with_parking_rows(self) -> Self {
         Self {
@@ -71,8 +71,8 @@ impl PerceptionConfig {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first invalid one: a length, count or share that is negative or not finite, or a
-    /// lower limit above its upper limit.
+    /// [`Error::Config`], naming the first invalid setting: a length, count or share that is negative or not finite, or a lower limit above
+    /// its upper limit.
     pub fn validate(&self) -> Result<()> {
         let [camera_low, camera_high] = self.camera_height_m;
         let [length, width] = self.max_footprint_m;
@@ -94,7 +94,7 @@ impl PerceptionConfig {
             ("max_slope", self.max_slope),
             ("max_tilt_deg", self.max_tilt_deg),
         ];
-        // In order: the first limit may not be above the second.
+        // Pairs of limits: the first may not be above the second.
         let ordered = [
             (
                 "min_height_m",
@@ -231,7 +231,7 @@ mod tests {
     fn what_a_setting_may_be_is_said() {
         for (expected, said) in [
             (Expected::AboveZero, "a number above 0"),
-            (Expected::NotNegative, "a number from 0"),
+            (Expected::NotNegative, "a number of at least 0"),
             (Expected::Below(80.0), "less than 80"),
             (
                 Expected::BelowSetting("join_height_m"),

@@ -7,12 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Number of hypotheses drawn.
 const HYPOTHESES: usize = 160;
-/// Fewest level samples needed for a ground plane.
+/// Smallest number of level samples for a ground plane.
 const FEWEST: usize = 30;
-/// Points more than this many tolerances below the plane are impossible.
+/// Points more than this many tolerances below the plane count against it.
 const BELOW: f32 = -2.5;
 
-/// The best of the last frame's plane and some through three level samples each, `None` where it has no support.
+/// The best among the last frame's plane and planes through three level samples each; `None` if none has support.
 pub(crate) fn consensus(
     samples: &[Sample],
     level: &[Sample],
@@ -51,7 +51,7 @@ pub(crate) fn consensus(
     (score > 0.1 * level.len() as f32).then_some(plane)
 }
 
-/// Level points on the plane count for it, all points below it against it: nothing is below the ground.
+/// Level points on the plane count for it, all points below it against it, because nothing is below the ground.
 fn score([level, all]: &[SampleBlocks; 2], plane: &DisparityPlane) -> f32 {
     let on = level.sum(plane, |above| {
         let off = 1.0 - above * above;
@@ -62,7 +62,7 @@ fn score([level, all]: &[SampleBlocks; 2], plane: &DisparityPlane) -> f32 {
 
 /// Samples in SIMD lanes; the last block is padded with samples above every plane, which have no effect.
 struct SampleBlocks {
-    /// Disparity, the ray's x and y, and 1, each scaled to tolerances, 1 m below the camera.
+    /// Disparity, the ray's x and y, and 1, each divided by the tolerance 1 m below the camera.
     blocks: Vec<[[f32; LANES]; 4]>,
 }
 
@@ -85,7 +85,7 @@ impl SampleBlocks {
         }
     }
 
-    /// Sum of something over how many tolerances each lies above a plane.
+    /// Sum of a function of each sample's height above the plane, in tolerances.
     fn sum(&self, plane: &DisparityPlane, of: impl Fn(f32) -> f32) -> f32 {
         let height = 1.0 / plane.norm();
         let [a, b, c] = [plane.x, plane.y, plane.z];
@@ -100,7 +100,7 @@ impl SampleBlocks {
     }
 }
 
-/// xorshift64*: the same numbers every time, so that a frame always gives the same ground.
+/// xorshift64* with a fixed seed, so that a frame always gives the same ground.
 struct Random(u64);
 
 impl Random {

@@ -11,10 +11,10 @@ use crate::split::split;
 use crate::{Ground, GroundBox, PerceptionConfig, Rays, Target};
 use rayon::prelude::*;
 
-/// Least visible height of a target, metres.
+/// Smallest visible height of a target, in metres.
 const MIN_VISIBLE_HEIGHT: f32 = 0.25;
 
-/// Number of times that boxes are refitted with the votes of their row.
+/// Number of times that boxes are refitted with the votes of their rows.
 const ROUNDS: usize = 2;
 
 /// The usual orientation of objects at a point on the ground.
@@ -27,20 +27,20 @@ pub struct Detection {
     pub place: GroundBox,
     /// Number of its pixels.
     pub pixels: usize,
-    /// Left, top, right, bottom of those pixels.
+    /// Left, top, right and bottom limits of these pixels.
     pub bounds: [u32; 4],
-    /// Those pixels.
+    /// These pixels.
     pub runs: Vec<Run>,
     /// Confidence, 0 to 1.
     pub confidence: f32,
-    /// Standard deviation of its depth over itself, where the depth came with one.
+    /// Standard deviation of its depth divided by the depth, if the depth came with one.
     pub relative_error: Option<f32>,
     /// Its class, if a segmentation model gave one.
     pub kind: Option<Kind>,
 }
 
 impl Detection {
-    /// As a target of one image, without velocity; `index` is its own among the image's detections.
+    /// Converts it to a target of one image, without velocity; `index` is its index among the image's detections.
     #[must_use]
     pub fn target(&self, ground: &Ground, id: u64, index: usize) -> Target {
         let [right, forward] = self.place.middle;
@@ -73,8 +73,8 @@ impl Detection {
 }
 
 impl Detection {
-    /// Sets the relative error from its pixels: the median of `sigma` over `depth`, both row by row in images of this
-    /// width. The pixels' errors are correlated, so that averaging does not reduce them.
+    /// Sets the relative error from its pixels: the median of `sigma` over `depth`, both row by row in images of this width. The pixels'
+    /// errors are correlated, so averaging does not reduce them.
     pub(crate) fn weigh(&mut self, depth: &[f32], sigma: &[f32], width: usize) {
         let pixels = self.runs.iter().flat_map(|run| run.pixels(width));
         let shares = pixels.map(|i| sigma[i] / depth[i]);
@@ -88,8 +88,8 @@ impl Detection {
     }
 }
 
-/// Boxes of the obstacles of one depth image, row by row at `rays`' size, that have a target's size: first of the `instances`,
-/// whose pixels are given, then of the rest.
+/// Boxes for the obstacles of one depth image, row by row at `rays`' size, that have the size of a target: first those of the `instances`,
+/// whose pixels are given, then those of the remaining obstacles.
 #[must_use]
 pub fn detect(
     depth: &[f32],
@@ -126,7 +126,7 @@ pub(crate) fn detect_turned(
     let unnamed = (!taken.is_empty()).then(|| obstacles.without(&taken, rays.x.len()));
     let unnamed = unnamed.as_ref().unwrap_or(obstacles);
     let mut left = clusters(depth, unnamed, rays, min_pixels, config);
-    // What is cut in two is classified again.
+    // The two parts are classified again.
     while !left.is_empty() {
         let outcomes: Vec<Outcome> = std::mem::take(&mut left)
             .into_par_iter()
@@ -193,7 +193,7 @@ fn confidence(place: &GroundBox, kind: Option<&Kind>) -> f32 {
     1.0 - (1.0 - seen) * (1.0 - kind.map_or(0.0, |kind| kind.score))
 }
 
-/// Drops what lies inside a larger detection (a roof's edge, a mirror, a number plate's frame), or in one with a class.
+/// Drops detections inside a larger detection (a roof's edge, a mirror, a number plate's frame), or inside one with a class.
 fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
     detections.sort_by_key(|d| std::cmp::Reverse((d.kind.is_some(), d.pixels)));
     let mut kept: Vec<Detection> = Vec::with_capacity(detections.len());

@@ -3,14 +3,13 @@
 use deepfusion_geometry::DepthMap;
 use rayon::prelude::*;
 
-/// Fewest rows for which another core pays off.
+/// Smallest number of rows for which another core pays off.
 const ROWS: usize = 16;
 
-/// Marks the pixels of a depth image (row by row) that hang between two surfaces.
+/// Marks the flying pixels of a depth image (row by row), which hang between two surfaces.
 ///
-/// Such a pixel is farther than what is `radius` pixels to one side and nearer than what is as far to the other,
-/// by more than `jump` of its own depth (and 0.3 m) each. A surface that is seen at a grazing angle rises no
-/// faster.
+/// A flying pixel is farther than the pixel `radius` to one side and nearer than the pixel as far to the other side, by more than `jump` of
+/// its own depth (and 0.3 m) each. The depth of a surface seen at a grazing angle changes less than that.
 #[must_use]
 pub fn flying_pixels(depth: &[f32], width: usize, radius: usize, jump: f32) -> Vec<bool> {
     let mut flying = vec![false; depth.len()];
@@ -27,7 +26,7 @@ pub fn without_flying_pixels(depth: &DepthMap, radius: f32, jump: f32) -> DepthM
     clean
 }
 
-/// Sets `marks`, one of each pixel, to `flying` where a pixel flies.
+/// Sets each pixel's entry in `marks` to `flying` if the pixel is a flying one.
 fn mark<T: Copy + Send + Sync>(
     depth: &[f32],
     width: usize,
@@ -36,7 +35,7 @@ fn mark<T: Copy + Send + Sync>(
     marks: &mut [T],
     flying: T,
 ) {
-    // Farther than the image is wide and high nothing lies.
+    // A larger radius than the image's sides has no effect.
     let radius = radius.clamp(1, depth.len().max(1));
     let rows = marks.par_chunks_exact_mut(width.max(1));
     rows.with_min_len(ROWS).enumerate().for_each(|(v, marks)| {

@@ -5,43 +5,43 @@ use deepfusion_hint::Hint;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The depth image is not of the camera's size.
+    /// The depth image does not have the camera's size.
     #[error(
-        "depth of {}x{} pixels with a camera of {}x{}",
+        "depth has {}x{} pixels, expected {}x{} as the camera intrinsics",
         found.0, found.1, expected.0, expected.1
     )]
     Size {
-        /// Width and height of the depth.
+        /// Width and height of the depth image.
         found: (usize, usize),
-        /// Width and height that the camera has.
+        /// Width and height of the camera's images.
         expected: (usize, usize),
     },
-    /// A setting that cannot be.
+    /// An invalid setting.
     #[error("{field} is {value}, expected {expected}")]
     Config {
-        /// The setting.
+        /// Name of the setting.
         field: &'static str,
-        /// What it is.
+        /// The setting's value.
         value: f64,
-        /// What it may be.
+        /// What the value must be.
         expected: ExpectedSetting,
     },
-    /// Pixels of an instance that the depth image does not have.
-    #[error("instance `{class}`: row {}, columns {} to {} of a depth image of {}x{}", run[0], run[1], run[2], size.0, size.1)]
+    /// An instance has pixels outside the depth image.
+    #[error("instance `{class}`: row {}, columns {} to {} are outside the depth image of {}x{} pixels", run[0], run[1], run[2], size.0, size.1)]
     Instance {
-        /// What it is.
+        /// Class of the instance.
         class: String,
         /// Row, first column, and the column after the last.
         run: [u32; 3],
         /// Width and height of the depth image.
         size: (usize, usize),
     },
-    /// The intrinsics are no camera's.
+    /// The camera intrinsics are invalid.
     #[error("camera: {0}")]
     Camera(#[from] ImplausibleCamera),
 }
 
-/// What a setting may be.
+/// What a setting must be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedSetting {
@@ -49,9 +49,9 @@ pub enum ExpectedSetting {
     #[error("a number above 0")]
     AboveZero,
     /// A number that is not negative.
-    #[error("a number from 0")]
+    #[error("a number of at least 0")]
     NotNegative,
-    /// A number below this.
+    /// A number below a fixed limit.
     #[error("less than {0}")]
     Below(f64),
     /// A number below another setting.
@@ -69,10 +69,10 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Size { .. } => Some(
-                "intrinsics belong to one image size: resize them with the image (Intrinsics::resized)".into(),
+                "resize the intrinsics with the image (Intrinsics::resized): they belong to one image size".into(),
             ),
-            Self::Instance { .. } => Some("masks are taken in the depth image's size".into()),
-            Self::Config { .. } => Some("leave it out for its default".into()),
+            Self::Instance { .. } => Some("give masks at the depth image's size".into()),
+            Self::Config { .. } => Some("leave it out to use its default".into()),
             Self::Camera(problem) => problem.hint(),
         }
     }

@@ -7,32 +7,32 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cell {
-    /// Not seen.
+    /// Not visible.
     Unknown,
     /// Ground was seen there, with nothing in front of it.
     Free,
-    /// Something stands there.
+    /// An obstacle is there.
     Occupied,
 }
 
 /// A grid on the ground, ahead of the camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeSpace {
-    /// Side of a cell, metres.
+    /// Side of a cell, in metres.
     pub cell_m: f32,
-    /// Cells to the side; the camera looks along the middle.
+    /// Number of cells across; the camera looks along the middle.
     pub width: usize,
-    /// Cells forward.
+    /// Number of cells forward.
     pub length: usize,
     /// `length * width` cells: the row nearest to the camera first, each from left to right.
     pub cells: Vec<Cell>,
 }
 
-/// Fewest obstacle pixels of an occupied cell.
+/// Smallest number of obstacle pixels in an occupied cell.
 const WITNESSES: u16 = 3;
 
 impl FreeSpace {
-    /// An empty grid of `cell_m` reaching `length_m` forward and half as far to each side.
+    /// An empty grid with cells of `cell_m`, reaching `length_m` forward and half as far to each side.
     #[must_use]
     pub fn new(cell_m: f32, length_m: f32) -> Self {
         let length = ((length_m / cell_m) as usize).max(1);
@@ -44,7 +44,7 @@ impl FreeSpace {
         }
     }
 
-    /// The cell at a point (right, forward, metres); `None` outside the grid.
+    /// Index of the cell at a point (right, forward, metres); `None` outside the grid.
     #[must_use]
     pub fn at(&self, right_m: f32, forward_m: f32) -> Option<Cell> {
         self.index(right_m, forward_m).map(|i| self.cells[i])
@@ -60,8 +60,8 @@ impl FreeSpace {
 
     /// Fills the grid from a depth image, row by row, and its obstacles.
     ///
-    /// A cell is free where the ray to it meets no obstacle first and the image shows its distance; occupied where
-    /// obstacle pixels fall into it.
+    /// A cell is free if the ray to it meets no obstacle first and the image shows ground at its distance. It is occupied if obstacle
+    /// pixels fall into it.
     pub fn fill(
         &mut self,
         depth: &[f32],
@@ -73,7 +73,7 @@ impl FreeSpace {
         let width = rays.x.len();
         self.cells.fill(Cell::Unknown);
         let mut witnesses = vec![0u16; self.cells.len()];
-        // Of each column: where the first obstacle stands, and from where to where the ground is seen, forward, metres.
+        // For each column: the distance of the first obstacle, and the range in which ground is visible, forward in metres.
         let mut first = vec![f32::INFINITY; width];
         let mut seen = vec![0.0f32; width];
         let mut from = vec![f32::INFINITY; width];

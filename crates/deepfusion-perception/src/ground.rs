@@ -1,22 +1,22 @@
-//! The ground: a plane by consensus, then the height profile of the road ahead.
+//! The ground: a plane found by consensus, then the height profile of the road ahead.
 
 use crate::consensus::consensus;
 use crate::{PerceptionConfig, Rays};
 use nalgebra::{Matrix3, Vector3};
 
-/// Approximate limit on the number of samples for the plane.
+/// Approximate largest number of samples for the plane.
 const SAMPLES: usize = 1_600;
-/// Largest distance of a point from the plane, as a share of its distance plus a constant: slopes and
-/// the disparity's error both grow with distance.
+/// Largest distance of a point from the plane, as a share of its distance plus a constant: slopes and the disparity's error both grow with
+/// distance.
 const TOLERANCE: (f32, f32) = (0.08, 0.006);
-/// Length of a piece of the height profile, metres, and how many there are.
+/// Length of a piece of the height profile, in metres, and the number of pieces.
 const PIECE_M: f32 = 4.0;
 const PIECES: usize = 20;
 
 /// The ground below and ahead of the camera.
 ///
-/// Its axes, in the camera's frame (x right, y down, z forward): `up` is the plane's normal, `forward` the
-/// camera's z on the plane, `right` completes them. A height is measured along `up` from the profile.
+/// Its axes, in the camera's frame (x right, y down, z forward): `up` is the plane's normal, `forward` is the camera's z projected onto the
+/// plane, `right` completes them. Heights are measured along `up` from the profile.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ground {
     /// Unit normal, away from the ground.
@@ -29,12 +29,12 @@ pub struct Ground {
     pub camera_height_m: f32,
     /// Share of the samples near the road that lie on it, 0 to 1.
     pub support: f32,
-    /// Height of the road over the plane at `PIECE_M` steps forward, metres.
+    /// Height of the road above the plane at every `PIECE_M` forward, in metres.
     profile: [f32; PIECES],
 }
 
 impl Ground {
-    /// A plane from its normal (any length, up) and the camera's height, without rise or fall.
+    /// A flat ground from a plane's normal (any length, up) and the camera's height.
     #[must_use]
     pub fn plane(up: [f32; 3], camera_height_m: f32) -> Self {
         let up = normalised(up);
@@ -56,7 +56,7 @@ impl Ground {
         }
     }
 
-    /// The ground of a depth image, row by row at `rays`' size; `before` is the last frame's, tried first.
+    /// Finds the ground of a depth image, row by row at `rays`' size; `before` is the last frame's ground, which is tried first.
     /// `None` if no plausible plane has enough support.
     #[must_use]
     pub fn find(
@@ -90,17 +90,17 @@ impl Ground {
             && (low..=high).contains(&self.camera_height_m)
     }
 
-    /// Height of the plane's profile at a distance forward, metres.
+    /// Height of the profile above the plane at a distance forward, in metres.
     #[must_use]
     pub fn profile_at(&self, forward_m: f32) -> f32 {
         let place = (forward_m / PIECE_M - 0.5).clamp(0.0, PIECES as f32 - 1.0);
-        // By way of 32 bits, of which a machine converts many at a time.
+        // Through 32 bits, of which processors convert many at a time.
         let index = (place as u32 as usize).min(PIECES - 2);
         let share = place - index as f32;
         self.profile[index] + share * (self.profile[index + 1] - self.profile[index])
     }
 
-    /// A point of the camera's frame as (right, forward, height above the ground), metres.
+    /// A point of the camera's frame as (right, forward, height above the ground), in metres.
     #[must_use]
     pub fn locate(&self, p: [f32; 3]) -> [f32; 3] {
         let forward = dot(self.forward, p);
@@ -108,7 +108,7 @@ impl Ground {
         [dot(self.right, p), forward, height]
     }
 
-    /// The point of the camera's frame at (right, forward, height above the ground), metres.
+    /// The point of the camera's frame at (right, forward, height above the ground), in metres.
     #[must_use]
     pub fn place(&self, at: [f32; 3]) -> [f32; 3] {
         let height = at[2] - self.camera_height_m + self.profile_at(at[1]);
@@ -123,7 +123,7 @@ impl Ground {
         for sample in samples {
             let p = sample.point();
             let forward = dot(self.forward, p);
-            // What lies to the side of the way says little about the way.
+            // Points beside the path say little about the path itself.
             if dot(self.right, p).abs() > 4.0 + 0.1 * forward {
                 continue;
             }
@@ -139,7 +139,7 @@ impl Ground {
             piece.retain(|h| (h - expected).abs() < reach);
             if piece.len() >= 8 {
                 piece.sort_by(f32::total_cmp);
-                // Below the median: what stands on the road adds heights on one side only.
+                // Below the median, because objects on the road add heights on one side only.
                 let height = piece[piece.len() * 2 / 5];
                 rise = if i == 0 {
                     0.0
@@ -148,7 +148,7 @@ impl Ground {
                 };
                 last = height;
             } else {
-                // Nothing seen: it goes on as it was, ever less so.
+                // Without samples, the slope continues, decaying.
                 last = expected;
                 rise *= 0.7;
             }
@@ -163,27 +163,27 @@ pub(crate) struct Sample {
     pub ray: [f32; 2],
     pub disparity: f32,
     pub depth: f32,
-    /// Gain of the disparity from row to row, per unit of the ray's y: on a level surface 1 over the camera's
-    /// height above it, on an upright one 0.
+    /// Increase of the disparity from row to row, per unit of the ray's y: 1 / (the camera's height above it) on a level surface, 0 on an
+    /// upright one.
     gain: f32,
 }
 
 impl Sample {
     fn take(depth: &[f32], rays: &Rays, config: &PerceptionConfig) -> Vec<Self> {
         let (width, height) = (rays.x.len(), rays.y.len());
-        // Rows that can see ground at all: below the horizon of the most tilted camera.
+        // Only rows that can show ground: below the horizon of the most tilted camera.
         let lowest = -(config.max_tilt_deg.to_radians().tan());
         let first = rays.y.iter().position(|y| *y > lowest).unwrap_or(height);
         let pixels = (height - first) * width;
         let step = ((pixels as f32 / SAMPLES as f32).sqrt() as usize).max(1);
         let mut samples = Vec::with_capacity(2 * SAMPLES);
-        // Some rows apart, so that the depth's rounding does not drown the gain.
+        // The rows are some distance apart, so that rounding of the depth does not dominate the gain.
         let apart = (height / 60).max(1);
         for (row, v) in (first..height.saturating_sub(apart))
             .step_by(step)
             .enumerate()
         {
-            // Every row starts elsewhere, so that a pattern in the image does not meet the grid.
+            // Every row starts at another column, so that a pattern in the image does not coincide with the grid.
             for u in ((row * 7) % step..width).step_by(step) {
                 let at = |v: usize| depth[v * width + u];
                 let z = at(v);
@@ -193,7 +193,7 @@ impl Sample {
                         let known = a > 0.0 && b > 0.0;
                         known.then(|| (1.0 / b - 1.0 / a) / (rays.y[lower] - rays.y[upper]))
                     };
-                    // Level above and below: the foot of a wall is not ground.
+                    // Level above and below, since the foot of a wall is not ground.
                     let below = gain(v, v + apart).unwrap_or(0.0);
                     let above = v.checked_sub(apart).and_then(|upper| gain(upper, v));
                     samples.push(Self {
@@ -219,7 +219,7 @@ impl Sample {
         [self.ray[0] * z, self.ray[1] * z, z]
     }
 
-    /// The point's height above the plane and its tolerance, in metres; `height` is 1 / |plane|, the camera's.
+    /// The point's height above the plane and its tolerance, in metres; `height` is 1 / |plane|, the camera's height.
     fn residual(&self, plane: &Vector3<f32>, height: f32) -> (f32, f32) {
         let on_plane = plane.x * self.ray[0] + plane.y * self.ray[1] + plane.z;
         let above = (self.disparity - on_plane) * self.depth * height;
@@ -248,8 +248,8 @@ pub(crate) fn plane_of(plane: &DisparityPlane) -> Option<([f32; 3], f32)> {
     })
 }
 
-/// Weighted least squares on the points near the plane, a few times (Tukey's weights), ever nearer: what lies in
-/// front of the camera counts most, so that the road wins over a pavement a kerb higher.
+/// Weighted least squares on the points near the plane, repeated with Tukey's weights and ever smaller tolerances. What lies in front of
+/// the camera counts most, so that the road wins over a pavement a kerb higher.
 fn refine(level: &[Sample], mut plane: DisparityPlane) -> DisparityPlane {
     for narrow in [1.0, 0.8, 0.6, 0.6, 0.6] {
         let height = 1.0 / plane.norm();
@@ -278,7 +278,7 @@ fn refine(level: &[Sample], mut plane: DisparityPlane) -> DisparityPlane {
     plane
 }
 
-/// Share on the plane among the samples that are not above it.
+/// Share of samples on the plane among those not above it.
 fn support(samples: &[Sample], plane: &DisparityPlane) -> f32 {
     let mut on = 0.0;
     let mut all = 0.0f32;

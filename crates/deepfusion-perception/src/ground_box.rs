@@ -5,21 +5,21 @@
 pub struct GroundBox {
     /// Middle of the footprint: right, forward, in metres.
     pub middle: [f32; 2],
-    /// Angle from `right` to the length, towards `forward`, in radians; a box has none beyond half a turn.
+    /// Angle from `right` to the length, towards `forward`, in radians; defined up to half a turn.
     pub angle: f32,
-    /// Length and width, in metres; length is not the smaller.
+    /// Length and width, in metres; the length is not smaller than the width.
     pub footprint: [f32; 2],
-    /// Height of the lower and the upper face over the ground, in metres.
+    /// Heights of the lower and the upper face above the ground, in metres.
     pub heights: [f32; 2],
-    /// Share of the length and of the width that was seen.
+    /// Visible share of the length and of the width.
     pub seen: [f32; 2],
-    /// The point of the footprint that stays fixed if the extents are corrected: the corner or the middle of the
-    /// visible side, (right, forward) in metres.
+    /// The point of the footprint that stays fixed when the extents are corrected: the corner, or the middle of the visible side (right,
+    /// forward), in metres.
     pub anchor: [f32; 2],
 }
 
 impl GroundBox {
-    /// The four corners of the footprint in order: right, forward, in metres.
+    /// The four corners of the footprint, in order: right, forward, in metres.
     #[must_use]
     pub fn corners(&self) -> [[f32; 2]; 4] {
         let [along, across] = axes(self.angle);
@@ -42,7 +42,7 @@ impl GroundBox {
         middle
     }
 
-    /// Shared area of two footprints over that of the smaller, 0 to 1.
+    /// Intersection of two footprints divided by the area of the smaller, 0 to 1.
     #[must_use]
     pub fn overlap(&self, other: &Self) -> f32 {
         let apart = [0, 1].map(|k| self.middle[k] - other.middle[k]);
@@ -56,7 +56,7 @@ impl GroundBox {
     }
 }
 
-/// A convex polygon's part inside a box (Sutherland and Hodgman).
+/// Clips a convex polygon to a box (Sutherland and Hodgman).
 fn clipped(mut polygon: Vec<[f32; 2]>, within: &GroundBox) -> Vec<[f32; 2]> {
     for (axis, half) in axes(within.angle).into_iter().zip(within.footprint) {
         for sign in [1.0, -1.0] {

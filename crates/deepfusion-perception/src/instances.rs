@@ -1,4 +1,4 @@
-//! Instances: objects whose pixels a segmentation model gives, fused with their depth.
+//! Instances: objects whose pixels come from a segmentation model, fused with their depth.
 
 use crate::clusters::{Cluster, Run};
 use crate::obstacles::{NONE, Obstacles};
@@ -9,7 +9,7 @@ use crate::{Error, PerceptionConfig, Result};
 pub struct Kind {
     /// The class, such as `car`.
     pub class: String,
-    /// 0 to 1.
+    /// Score of the class, 0 to 1.
     pub score: f32,
 }
 
@@ -20,15 +20,15 @@ pub struct Instance {
     pub class: String,
     /// Score of the class, 0 to 1.
     pub score: f32,
-    /// Its pixels, at the depth image's size; the whole box if only that is known.
+    /// Its pixels, at the depth image's size; the whole box if only the box is known.
     pub runs: Vec<Run>,
-    /// Whether the pixels are a mask, rather than a box.
+    /// Whether the pixels are a mask and not a box.
     pub drawn: bool,
 }
 
-/// Quantiles of depth between which an object's pixels are taken to lie: a mask's edge and windows show what is behind.
+/// Quantiles of depth between which an object's pixels are assumed to lie: a mask's edge and windows show the background.
 const OF_A_MASK: [f32; 2] = [0.05, 0.9];
-/// As [`OF_A_MASK`], for a box, whose corners show the background, and whose lower edge the foreground.
+/// As [`OF_A_MASK`], for a box: its corners show the background, and its lower edge the foreground.
 const OF_A_BOX: [f32; 2] = [0.1, 0.6];
 /// Margin beyond them, metres.
 const MARGIN_M: f32 = 1.0;
@@ -42,7 +42,7 @@ impl Instance {
         }
     }
 
-    /// Checks that it lies in a depth image of this width and height.
+    /// Checks that it lies inside a depth image of this width and height.
     ///
     /// # Errors
     /// [`Error::Instance`].
@@ -59,7 +59,7 @@ impl Instance {
         }
     }
 
-    /// The obstacle pixels of it at about the distance of most of them.
+    /// Its obstacle pixels at about the distance of most of them.
     pub(crate) fn cluster(
         &self,
         depth: &[f32],
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn what_shows_through_a_mask_is_left_out() {
         let (width, height) = (20, 10);
-        // A thing 8 m away in the middle, a wall at 30 m about it, the road below.
+        // An object 8 m away in the middle, a wall at 30 m around it, the road below.
         let is_thing = |u: usize, v: usize| (5..15).contains(&u) && (2..8).contains(&v);
         let depth: Vec<f32> = (0..width * height)
             .map(|i| {
@@ -150,7 +150,7 @@ mod tests {
         let expected: Vec<Run> = (2..8).map(|v| run(v, 5, 15)).collect();
         assert_eq!((cluster.runs, cluster.pixels), (expected, 60));
 
-        // A mask is taken at its word.
+        // A mask is trusted.
         let drawn = Instance {
             drawn: true,
             ..mask.clone()

@@ -5,7 +5,7 @@ pub(crate) const LANES: usize = 8;
 
 /// Points in blocks of lanes; the last block is padded with the last point.
 pub(crate) struct Points {
-    /// Right and forward of each, metres.
+    /// Right and forward positions of the points, in metres.
     pub blocks: Vec<[[f32; LANES]; 2]>,
     /// Number of points.
     pub count: usize,
@@ -31,7 +31,7 @@ impl Points {
         Self { blocks, count }
     }
 
-    /// Squared distance of a point from the nearest of them, infinite without any.
+    /// Squared distance of a point from the nearest of these points, infinite without any.
     pub(crate) fn nearest(&self, [x, y]: [f32; 2]) -> f32 {
         let mut nearest = [f32::INFINITY; LANES];
         for [right, forward] in &self.blocks {
@@ -43,7 +43,7 @@ impl Points {
         nearest.into_iter().fold(f32::INFINITY, less)
     }
 
-    /// Their extent along an axis.
+    /// The points' extent along an axis.
     pub(crate) fn extent(&self, axis: [f32; 2]) -> [f32; 2] {
         let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
         for [right, forward] in &self.blocks {
@@ -58,12 +58,12 @@ impl Points {
     }
 }
 
-/// The lesser of two numbers, in one instruction: unlike [`f32::min`] it does not handle NaN.
+/// The smaller of two numbers, in one instruction: unlike [`f32::min`] it does not handle NaN.
 fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater of two numbers, as [`less`].
+/// The larger of two numbers, as [`less`].
 fn more(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }

@@ -1,4 +1,4 @@
-//! Finds what stands on the ground: from a depth image to boxes in metres, tracked over time.
+//! Finds objects that stand on the ground: from a depth image to boxes in metres, tracked over time.
 //!
 //! # Conventions
 //! Camera axes: x right, y down, z forward; depth is camera z in metres, 0 = none. Ground axes: right, forward, height. Units are metres,

@@ -4,15 +4,15 @@ use crate::clusters::Cluster;
 use crate::{Ground, PerceptionConfig, Rays};
 use rayon::prelude::*;
 
-/// Heights above the ground, pixel by pixel, where there is an obstacle.
+/// Heights above the ground, pixel by pixel, of the obstacles.
 #[derive(Debug, Clone, Default)]
 pub struct Obstacles {
-    /// H·W heights above the ground in metres, row by row; negative where the pixel has no depth, lies too far
-    /// away, is ground, or hangs too high.
+    /// H·W heights above the ground in metres, row by row; negative where the pixel has no depth, is too far away, is ground, or hangs too
+    /// high.
     pub height: Vec<f32>,
 }
 
-/// Fewest rows for which another core pays off.
+/// Smallest number of rows for which another core pays off.
 const ROWS: usize = 16;
 
 /// Not an obstacle.
@@ -40,15 +40,15 @@ impl Obstacles {
         let rows = rows.zip(self.height.par_chunks_exact_mut(width));
         let rows = rows.with_min_len(ROWS).enumerate();
         rows.for_each(|(v, (row, heights))| {
-            // Its own, so that the compiler sees that writing heights changes none of it and takes many at a time.
+            // Copies, so that the compiler knows that writing heights does not change them, and vectorises the loop.
             let (ground, config) = (ground.clone(), config.clone());
             let up_y = ground.up[1] * rays.y[v] + ground.up[2];
             let forward_y = ground.forward[1] * rays.y[v] + ground.forward[2];
             for ((z, height), up_x) in row.iter().zip(heights).zip(&up_x) {
                 let above = z * (up_x + up_y) + ground.camera_height_m;
-                // `forward` has next to no part along x (the camera's roll): left out here.
+                // `forward` has almost no component along x (from the camera's roll), which is left out here.
                 let above = above - ground.profile_at(forward_y * z);
-                // Far away the ground's own tilt is worth more than a kerb.
+                // Far away, an error of the ground's tilt exceeds a kerb's height.
                 let lowest = config.min_height_m + 0.004 * z;
                 let is = (*z > 0.0)
                     & (*z <= config.max_depth_m)

@@ -1,7 +1,6 @@
 //! The range of some values, without outliers.
 
-/// The least and the largest of some values after dropping one in `stray` at both ends; `None` without values. Changes their
-/// order.
+/// The smallest and the largest value after dropping one in `stray` at both ends; `None` without values. Changes the order of the values.
 pub(crate) fn ends(values: &mut [f32], stray: usize) -> Option<[f32; 2]> {
     let stray = values.len() / stray;
     let last = values.len().checked_sub(1 + stray)?;

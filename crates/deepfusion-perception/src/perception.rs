@@ -12,14 +12,14 @@ use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 pub struct Stamp {
     /// Seconds, on any monotonic clock.
     pub time_s: f64,
-    /// Camera to a fixed frame, metres: that of the first camera, for instance.
+    /// Pose of the camera in a fixed frame, in metres; the fixed frame may be that of the first camera.
     pub world_from_cam: Se3,
 }
 
 /// The result for one frame.
 #[derive(Debug, Clone, Default)]
 pub struct Surroundings {
-    /// The road; `None` if none was found, and then there are no targets.
+    /// The ground; `None` if none was found, and then there are no targets.
     pub ground: Option<Ground>,
     /// The boxes of this image alone.
     pub detections: Vec<Detection>,
@@ -29,7 +29,7 @@ pub struct Surroundings {
 
 /// Turns a sequence of depth images into tracked targets.
 ///
-/// Its buffers grow to an image's size once; its only state is the last ground, the tracks and the rows of parked cars.
+/// Its buffers grow to an image's size once. Its only state is the last ground, the tracks and the rows of parked cars.
 #[derive(Debug, Default)]
 pub struct Perception {
     config: PerceptionConfig,
@@ -37,12 +37,12 @@ pub struct Perception {
     ground: Option<Ground>,
     rays: Option<(Intrinsics, Rays)>,
     obstacles: Obstacles,
-    /// The rows of parked cars, where [`PerceptionConfig::parking_rows`] asks for them.
+    /// The rows of parked cars, if [`PerceptionConfig::parking_rows`] is set.
     parking: Parking,
 }
 
 impl Perception {
-    /// A new one with these settings.
+    /// A perception with these settings.
     #[must_use]
     pub fn new(config: PerceptionConfig) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Perception {
         &self.config
     }
 
-    /// The obstacles' heights of the last image.
+    /// Heights of the obstacles in the last image.
     #[must_use]
     pub fn obstacles(&self) -> &Obstacles {
         &self.obstacles
@@ -70,10 +70,10 @@ impl Perception {
         self.ground = None;
     }
 
-    /// Finds the targets in a depth image of a camera `k` (of the same size). Without a `stamp` the image is
-    /// independent of others: every target has a new id and no velocity.
+    /// Finds the targets in a depth image from a camera `k` (of the same size). Without a `stamp` the image is independent of others: every
+    /// target has a new id and no velocity.
     ///
-    /// Pixels without depth, with NaN or infinity are ignored.
+    /// Pixels without depth, or with NaN or infinity, are ignored.
     ///
     /// # Errors
     /// [`Error::Size`] if the depth does not have the camera's size, [`Error::Camera`] if `k` is implausible.
@@ -86,8 +86,8 @@ impl Perception {
         self.detect_with_instances(depth, k, stamp, &[])
     }
 
-    /// As [`Self::detect`], with instances from a segmentation model: each becomes a target with its class, if its depth
-    /// allows it; all others are found by depth alone.
+    /// As [`Self::detect`], with instances from a segmentation model. Each becomes a target with its class, if its depth allows it; all
+    /// other targets are found by depth alone.
     ///
     /// # Errors
     /// As [`Self::detect`], and [`Error::Instance`] for pixels outside the depth image.
@@ -101,9 +101,9 @@ impl Perception {
         self.detect_with_sigma(depth, None, k, stamp, instances)
     }
 
-    /// As [`Self::detect_with_instances`], with each pixel's standard deviation of depth (metres, same size). The uncertainty of
-    /// a target's position, and with it the tracker's gate, follow from its own pixels; [`PerceptionConfig::relative_error`] is
-    /// used for pixels without one.
+    /// As [`Self::detect_with_instances`], with each pixel's standard deviation of depth (metres, same size). The uncertainty of a target's
+    /// position, and with it the tracker's gate, follows from its own pixels; [`PerceptionConfig::relative_error`] is used for pixels
+    /// without a standard deviation.
     ///
     /// # Errors
     /// As [`Self::detect_with_instances`].
@@ -130,7 +130,7 @@ impl Perception {
         } else {
             depth
         };
-        // The last ground is a guess for this one only while the camera goes on.
+        // The last ground is an initial guess only if the camera's motion is continuous.
         let before = self.ground.take().filter(|_| stamp.is_some());
         let Some(ground) = Ground::find(&depth.data, rays, before.as_ref(), &self.config) else {
             self.obstacles.height.clear();
@@ -188,7 +188,7 @@ impl Perception {
     }
 }
 
-/// Refuses a camera that is implausible, and what does not have its size.
+/// Checks that the camera is plausible and the depth images have its size.
 fn check(
     depth: &DepthMap,
     sigma: Option<&DepthMap>,

@@ -1,25 +1,25 @@
-//! Cars stand in rows: the orientation of a clearly visible one helps with its less visible neighbours.
+//! Cars stand in rows: the orientation of a clearly visible car helps with its less visible neighbours.
 
 use crate::GroundBox;
 
-/// An orientation, up to half a turn, and its weight.
+/// An orientation (defined up to half a turn) and its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Turn {
-    /// Cosine and sine of twice the angle (as [`crate::GroundBox::angle`]), times the weight.
+    /// Cosine and sine of twice the angle (as [`crate::GroundBox::angle`]), multiplied by the weight.
     doubled: [f32; 2],
 }
 
-/// Cost of an orientation against all expectation, per unit of weight.
+/// Cost of an orientation that contradicts the expectation completely, per unit of weight.
 const COST: f32 = 0.25;
-/// Largest weight of a vote for the road's direction, of one against it, and of all together.
+/// Largest weight of a vote for the road's direction, of one against it, and of all votes together.
 const MOST: [f32; 3] = [0.5, 4.0, 6.0];
-/// How far a row reaches to both sides of a car in it, metres; nearer cars count more.
+/// How far a row reaches to both sides of a car in it, in metres; nearer cars have more weight.
 const ROW_M: f32 = 15.0;
-/// Margin of a row beside a box's own length or width, metres.
+/// Margin of a row beyond a box's own length or width, in metres.
 const BESIDE_M: f32 = 0.3;
 
 impl Turn {
-    /// From an angle in radians and a weight; the road has weight 1.
+    /// An orientation with an angle in radians and a weight; the road has weight 1.
     pub(crate) fn new(angle: f32, weight: f32) -> Self {
         let (sin, cos) = (2.0 * angle).sin_cos();
         Self {
@@ -27,7 +27,7 @@ impl Turn {
         }
     }
 
-    /// Along the road.
+    /// The orientation along the road.
     pub(crate) fn ahead() -> Self {
         Self::new(std::f32::consts::FRAC_PI_2, 1.0)
     }
@@ -41,7 +41,7 @@ impl Turn {
         self.doubled[0].hypot(self.doubled[1])
     }
 
-    /// The cost of an angle.
+    /// The cost of an angle relative to this orientation.
     pub(crate) fn against(self, angle: f32) -> f32 {
         let (sin, cos) = (2.0 * angle).sin_cos();
         COST * (self.weight() - self.doubled[0] * cos - self.doubled[1] * sin)
@@ -64,16 +64,16 @@ impl Turn {
 /// A box's vote on the orientation of its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Vote {
-    /// Middle of its visible part: right, forward, in metres.
+    /// Position of the middle of its visible part: right, forward, in metres.
     pub at: [f32; 2],
-    /// Its box.
+    /// The fitted box.
     pub place: GroundBox,
     /// How much worse the other orientation would fit.
     pub margin: f32,
 }
 
 impl Vote {
-    /// Its vote for something at `at`, if that lies in its row: before, behind or beside it.
+    /// Its vote for something at `at`, if that is in its row: before, behind or beside it.
     fn on(&self, at: [f32; 2]) -> Option<Turn> {
         let (sin, cos) = self.place.angle.sin_cos();
         let middle = self.place.middle;
@@ -81,14 +81,14 @@ impl Vote {
         let apart = [cos * off[0] + sin * off[1], cos * off[1] - sin * off[0]].map(f32::abs);
         let inside = |i: usize| apart[i] < 0.5 * self.place.footprint[i] + BESIDE_M;
         let farthest = apart[0].max(apart[1]);
-        // That something stands as all do says less than that it does not.
+        // Standing along the road, as most do, is weaker evidence than standing across it.
         let as_all = Turn::ahead().against(self.place.angle) < COST;
         let weight = self.margin.min(MOST[usize::from(!as_all)]) * (1.0 - farthest / ROW_M);
         ((inside(0) || inside(1)) && weight > 0.0).then(|| Turn::new(self.place.angle, weight))
     }
 }
 
-/// The expected orientation of the `index`-th box, from what is `usual` there and the votes of the others in its row.
+/// The expected orientation of the `index`-th box, from the `usual` orientation there and the votes of the others in its row.
 pub(crate) fn expected(votes: &[Vote], index: usize, usual: Turn) -> Turn {
     let others = votes.iter().enumerate().filter(|(i, _)| *i != index);
     others
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use std::f32::consts::FRAC_PI_2;
 
-    /// A car that is seen whole, turned to `angle`.
+    /// A completely visible car, turned to `angle`.
     fn vote(middle: [f32; 2], angle: f32, margin: f32) -> Vote {
         Vote {
             at: middle,
@@ -125,7 +125,7 @@ mod tests {
         let in_the_lane = vote([0.5, 12.0], FRAC_PI_2, 0.0);
         let votes = [clear, beside, in_the_lane];
         assert!(expected(&votes, 1, Turn::ahead()).angle().abs() < 0.1);
-        // Neither beside nor before it: as the road.
+        // Neither beside nor before it: the road's orientation.
         assert_eq!(expected(&votes, 2, Turn::ahead()), Turn::ahead());
     }
 

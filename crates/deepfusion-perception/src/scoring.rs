@@ -1,4 +1,4 @@
-//! Targets against labelled boxes: recall, precision, errors, identities.
+//! Compares targets with labelled boxes: recall, precision, errors, identities.
 
 use crate::Target;
 use serde::Serialize;
@@ -14,12 +14,12 @@ pub struct Label {
     pub center_m: [f64; 3],
     /// Length, width and height, metres.
     pub size_m: [f64; 3],
-    /// As [`Target::yaw_rad`].
+    /// Orientation, as in [`Target::yaw_rad`].
     pub yaw_rad: f64,
-    /// Over ground, in the camera's axes, m/s, where it is known.
+    /// Velocity over ground, in the camera's axes, m/s, if known.
     pub velocity_mps: Option<[f64; 3]>,
-    /// Whether it should be found. Others (a tree, a house, an invisible car) count neither way: a target on one is not
-    /// false, and a missing one is not missed.
+    /// Whether it should be found. Other labels (a tree, a house, a hidden car) are neutral: a target on one is not false, and a missing
+    /// one is not missed.
     pub counts: bool,
 }
 
@@ -28,7 +28,7 @@ impl Label {
         norm(self.center_m)
     }
 
-    /// Whether a point lies on the box's footprint, enlarged by a metre.
+    /// Whether a point is on the box's footprint, enlarged by a metre.
     fn covers(&self, point: [f64; 3]) -> bool {
         let (sin, cos) = self.yaw_rad.sin_cos();
         let (x, z) = (point[0] - self.center_m[0], point[2] - self.center_m[2]);
@@ -37,12 +37,12 @@ impl Label {
     }
 }
 
-/// The rules for what counts as found.
+/// The rules for counting a label as found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoringRules {
-    /// Farthest distance between centres of a target and its label, metres.
+    /// Largest distance between the centres of a target and its label, in metres.
     pub match_m: f64,
-    /// Labels beyond this distance from the camera count neither way, metres.
+    /// Labels beyond this distance from the camera are neutral, in metres.
     pub max_distance_m: f64,
     /// Velocities are compared once one track has followed a label for this long, seconds.
     pub velocity_after_s: f64,
@@ -65,9 +65,9 @@ pub struct RangeScore {
     pub from_m: f64,
     /// End of the range, metres from the camera.
     pub to_m: f64,
-    /// Labels that count.
+    /// Number of labels that count.
     pub labels: usize,
-    /// Of them, found.
+    /// How many of them were found.
     pub found: usize,
     /// `found / labels`.
     pub recall: Option<f64>,
@@ -78,38 +78,38 @@ pub struct RangeScore {
 pub struct TargetScore {
     /// Number of frames.
     pub frames: usize,
-    /// Labels that count.
+    /// Number of labels that count.
     pub labels: usize,
-    /// Of them, found.
+    /// How many of them were found.
     pub found: usize,
-    /// Targets on no label.
+    /// Number of targets without a label.
     pub false_targets: usize,
     /// `found / labels`.
     pub recall: Option<f64>,
     /// `found / (found + false_targets)`.
     pub precision: Option<f64>,
-    /// Mean distance between centres of what was found, metres.
+    /// Mean distance between the centres of found labels and their targets, in metres.
     pub center_error_m: Option<f64>,
-    /// Mean angle between the lengths, up to half a turn, degrees.
+    /// Mean angle between their lengths, up to half a turn, in degrees.
     pub yaw_error_deg: Option<f64>,
-    /// Mean length of the difference of velocities, once tracked for long enough, m/s.
+    /// Mean norm of the difference of velocities, once tracked for long enough, m/s.
     pub velocity_error_mps: Option<f64>,
     /// Number of velocities compared.
     pub velocities: usize,
-    /// Share of those correctly classified as dynamic or static.
+    /// Share of these velocities correctly classified as dynamic or static.
     pub motion_accuracy: Option<f64>,
     /// Number of times that an object's track changed.
     pub identity_switches: usize,
-    /// By distance.
+    /// Results by distance.
     pub ranges: Vec<RangeScore>,
 }
 
 /// The assignment of targets to labels in one frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Matched {
-    /// For each label its target, by index.
+    /// For each label the index of its target.
     pub found: Vec<Option<usize>>,
-    /// The targets on no label, by index.
+    /// Indices of the targets without a label.
     pub false_targets: Vec<usize>,
 }
 
@@ -119,7 +119,7 @@ pub struct Scorer {
     rules: ScoringRules,
     score: TargetScore,
     errors: Errors,
-    /// For each object the track that found it last, and since when.
+    /// For each object, the track that found it last, and the time since when.
     tracks: HashMap<u64, (u64, f64)>,
 }
 
@@ -131,9 +131,9 @@ struct Errors {
     motion: usize,
 }
 
-/// Borders of [`TargetScore::ranges`], metres.
+/// Borders of [`TargetScore::ranges`], in metres.
 const RANGES: [f64; 5] = [0.0, 10.0, 20.0, 30.0, 40.0];
-/// Least speed of a dynamic label, m/s.
+/// Smallest speed of a dynamic label, m/s.
 const MOVES_MPS: f64 = 0.75;
 
 impl Scorer {
@@ -159,7 +159,7 @@ impl Scorer {
         }
     }
 
-    /// Begins a new drive: drops the assignment of tracks to objects.
+    /// Starts a new drive: drops the assignment of tracks to objects.
     pub fn begin_drive(&mut self) {
         self.tracks.clear();
     }
@@ -169,7 +169,7 @@ impl Scorer {
         self.add_but(time_s, targets, labels, &|_| false)
     }
 
-    /// As [`Self::add`], of a frame in which not everything is labelled: a target that meets no label and is `unlabelled` is neither found nor
+    /// As [`Self::add`], for a frame in which not everything is labelled: an `unlabelled` target without a label is neither found nor
     /// false.
     pub fn add_but(
         &mut self,
@@ -184,7 +184,7 @@ impl Scorer {
             for (j, target) in targets.iter().enumerate() {
                 let apart = norm(minus(label.center_m, target.center_m));
                 if apart <= self.rules.match_m {
-                    // What counts is matched first: a tree beside a car does not take its target.
+                    // Labels that count are matched first, so that a tree beside a car does not take the car's target.
                     pairs.push((!counts(label), apart, i, j));
                 }
             }
@@ -348,7 +348,7 @@ mod tests {
         assert_eq!((score.labels, score.found, score.false_targets), (2, 1, 1));
         assert_eq!((score.recall, score.precision), (Some(0.5), Some(0.5)));
         assert_eq!(score.center_error_m, Some(0.5));
-        // Half a turn is no error of a box.
+        // Half a turn is not an error for a box.
         assert!(score.yaw_error_deg.unwrap() < 1e-9);
         assert_eq!(score.velocities, 0);
         assert_eq!(score.ranges[1].labels, 1);

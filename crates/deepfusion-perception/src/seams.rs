@@ -1,16 +1,16 @@
-//! Seams in a cluster's contour between two objects: a step back between one and another behind it, and a border
-//! between what reaches the ceiling and what does not.
+//! Seams between two objects in a cluster's contour: a step back from one object to another behind it, or a border between parts that reach
+//! the ceiling and parts that do not.
 
 use crate::clusters::{Cluster, Gaps};
 use crate::lanes::Points;
 use crate::silhouette::{FOOT_M, Silhouette};
 use crate::{Ground, PerceptionConfig, Rays};
 
-/// How far the contour must step back, beyond a surface's own step, metres.
+/// How far the contour must step back, in addition to a surface's own step, in metres.
 const STEP_M: f32 = 0.15;
-/// Limit on the points of a part's contour to which a pixel's distance is measured.
+/// Largest number of points of a part's contour to which a pixel's distance is measured.
 const POINTS: usize = 24;
-/// Fewest columns on each side of a border between tall and low parts.
+/// Smallest number of columns on each side of a border between tall and low parts.
 const COLUMNS: usize = 2;
 
 /// The two sides of a cluster's clearest seam; `None` if it has none.
@@ -32,13 +32,13 @@ pub(crate) fn part_at_seam(
     })
 }
 
-/// A subsample of a part of a contour; the last point is included.
+/// A subsample of a part of a contour, including the last point.
 fn some_of(part: &[[f32; 2]]) -> Points {
     let stride = part.len().div_ceil(POINTS);
     Points::new(part.iter().step_by(stride).chain(part.last()).copied())
 }
 
-/// The index in the contour after which the widest seam lies.
+/// Index of the contour point after which the widest seam lies.
 fn clearest(silhouette: &Silhouette, rays: &Rays, config: &PerceptionConfig) -> Option<usize> {
     let gaps = Gaps::of(rays, config);
     let contour = &silhouette.contour;
@@ -50,7 +50,7 @@ fn clearest(silhouette: &Silhouette, rays: &Rays, config: &PerceptionConfig) -> 
         let side = 0.5 * (a[0] + b[0]);
         let usual = gaps.across(side, near) * columns;
         let shown = silhouette.feet[i].max(silhouette.feet[i + 1]) < FOOT_M;
-        // A face seen at a grazing angle steps back from column to column, not only here.
+        // A face seen at a grazing angle steps back at every column, not only at one.
         let beside = [i.checked_sub(1), (i + 2 < contour.len()).then_some(i + 1)];
         let grazing = beside.map(|i| i.map_or(f32::INFINITY, back));
         let more = back(i) - usual.max(1.3 * grazing[0]).max(1.3 * grazing[1]) - STEP_M;
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use deepfusion_geometry::Intrinsics;
 
-    /// A contour, one point per column, that stands on the ground and rises where `rises` is true.
+    /// A contour with one point per column that stands on the ground, tall where `rises` is true.
     fn silhouette(contour: Vec<[f32; 2]>, rises: Vec<bool>) -> Silhouette {
         Silhouette {
             feet: vec![0.3; contour.len()],
@@ -100,7 +100,7 @@ mod tests {
         clearest(silhouette, &rays, &PerceptionConfig::default())
     }
 
-    /// Two fronts along x = -4, each of ten columns, with a gap of 0.8 m between them.
+    /// Two fronts along x = -4 with ten columns each, and a gap of 0.8 m between them.
     fn fronts() -> Vec<[f32; 2]> {
         let front = |from: f32| (0..10).map(move |i| [-4.0, from + 0.18 * i as f32]);
         front(10.0).chain(front(12.5)).collect()
@@ -110,7 +110,7 @@ mod tests {
     fn two_fronts_are_parted_where_one_ends() {
         let mut row = silhouette(fronts(), vec![false; 20]);
         assert_eq!(seam(&row), Some(9));
-        // Where the lower part is hidden, a windscreen lies behind a hood.
+        // If the lower part is hidden, the step may be a windscreen behind a hood.
         row.feet = vec![0.9; 20];
         assert_eq!(seam(&row), None);
     }

@@ -1,4 +1,4 @@
-//! A cluster seen from above, and which of its ends are its own.
+//! A cluster seen from above, and which of its ends are real ends of the object.
 
 use crate::clusters::Cluster;
 use crate::columns::Columns;
@@ -17,7 +17,7 @@ pub(crate) struct Silhouette {
     pub feet: Vec<f32>,
     /// Whether each column continues upwards beyond the highest target, to a ceiling or out of the image.
     pub rises: Vec<bool>,
-    /// Those columns in the image.
+    /// These columns' indices in the image.
     pub columns: Vec<u32>,
     /// A sample of all points, (right, forward, height) in metres.
     pub points: Vec<[f32; 3]>,
@@ -27,16 +27,16 @@ pub(crate) struct Silhouette {
     pub tall: bool,
     /// Height of its lowest point, metres.
     pub bottom: f32,
-    /// How far in front of its left and its right end an occluder stands, in metres of depth; infinite if the image
-    /// ends there, 0 if nothing hides it.
+    /// For its left and its right end, how far in front of it an occluder is, in metres of depth; infinite if the image ends there, 0 if
+    /// nothing hides it.
     pub hidden: [f32; 2],
 }
 
-/// A column whose lowest point is higher than this does not show its near end: something hides it, metres.
+/// A column whose lowest point is higher than this, in metres, does not show its near end: something hides it.
 pub(crate) const FOOT_M: f32 = 0.6;
-/// Approximate number of points kept of a cluster.
+/// Approximate number of points kept from a cluster.
 const POINTS: usize = 400;
-/// One in this many of a column's sorted depths lies in front of the contour, so that single pixels do not decide.
+/// One in this many of a column's sorted depths is in front of the contour, so that single pixels do not decide.
 const NEAR_SHARE: usize = 8;
 
 impl Silhouette {
@@ -61,7 +61,7 @@ impl Silhouette {
             let top = obstacles.height[pixels[0].1 as usize * width + u];
             let rises = above.follow(u, pixels[0], depth, rays, ground, config);
             let lowest = pixels[pixels.len() - 1].1 as usize;
-            // Below the image's last row it goes on.
+            // It continues below the image's last row.
             let foot = if lowest + 1 == rays.y.len() {
                 0.0
             } else {
@@ -93,7 +93,7 @@ fn sampled(cluster: &Cluster, depth: &[f32], rays: &Rays, ground: &Ground) -> Ve
     });
     let mut points = Vec::with_capacity(2 * POINTS);
     for (place, (u, v)) in pixels.enumerate() {
-        // Scattered: an even stride would meet the same columns in every row.
+        // Scattered, because a constant stride would hit the same columns in every row.
         if stride.divides(scatter(place)) {
             points.push(ground.locate(rays.point(u, v, depth[v * width + u])));
         }
@@ -131,7 +131,7 @@ fn reach(cluster: &Cluster, obstacles: &Obstacles, width: usize) -> [f32; 2] {
     ends(&mut heights, 100).unwrap_or_default()
 }
 
-/// The continuation of a cluster above the height up to which pixels are joined.
+/// Whether a cluster continues above the height up to which pixels are joined.
 #[derive(Default)]
 struct Continuation {
     columns: usize,
@@ -140,8 +140,8 @@ struct Continuation {
 }
 
 impl Continuation {
-    /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance. Returns
-    /// whether it rises above the highest target.
+    /// Follows a column upwards from its topmost pixel (depth and row) as long as the depth stays the same. Returns whether it rises above
+    /// the highest target.
     fn follow(
         &mut self,
         u: usize,
@@ -155,7 +155,7 @@ impl Continuation {
         let width = rays.x.len();
         let mut row = v as usize;
         let mut height = ground.locate(rays.point(u, row, start))[2];
-        // Three rows at most are skipped between the last joined pixel and the height of joining.
+        // At most three rows are skipped between the last joined pixel and the joining height.
         if height + 3.0 * start * rays.step[1] < config.join_height_m {
             return false;
         }
@@ -168,7 +168,7 @@ impl Continuation {
             };
             let z = depth[next * width + u];
             if z <= 0.0 || (z - start).abs() > near {
-                // A ceiling, or a pipe below it, is nearer; above a roof is what lies behind it.
+                // A ceiling, or a pipe below it, is nearer; above a roof, the background is farther.
                 rises = z > 0.0 && z < start;
                 break;
             }
@@ -184,7 +184,7 @@ impl Continuation {
         3 * self.tall > self.columns
     }
 
-    /// Height that a quarter of the columns reach, 0 where most end below the height of joining.
+    /// Height reached by a quarter of the columns; 0 if most end below the joining height.
     fn top(&self) -> f32 {
         let mut tops = self.tops.clone();
         tops.sort_unstable_by(f32::total_cmp);
@@ -197,8 +197,8 @@ impl Continuation {
     }
 }
 
-/// An end is hidden if most of the outermost runs end at something nearer, or at the border. Pixels that were removed as flying count as open:
-/// looking across them completes boxes by what predicted depth has blurred, and a sixth fewer were found.
+/// An end is hidden if most of the outermost runs end at something nearer, or at the border. Pixels removed as flying count as open:
+/// looking past them would complete boxes by what predicted depth has blurred, and found a sixth fewer targets.
 fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize) -> [f32; 2] {
     let [left, _, right, _] = cluster.bounds();
     let reach = ((right - left) / 6).max(1);

@@ -4,23 +4,23 @@ use crate::clusters::Cluster;
 use crate::silhouette::Silhouette;
 use crate::{Ground, GroundBox, Rays};
 
-/// A cluster longer than this, and as wide and high as a car, counts as several cars, metres.
+/// A cluster longer than this, in metres, but as wide and high as a car, counts as several cars.
 const LONGEST: f32 = 5.7;
-/// Width and height up to which that is so, metres: a lorry is more.
+/// Width and height up to which that applies, in metres: a lorry is larger.
 const WIDEST: f32 = 2.7;
 /// See [`WIDEST`].
 const HIGHEST: f32 = 2.4;
-/// A cluster wider than this and no higher than a car counts as two side by side, metres.
+/// A cluster wider than this, in metres, and no higher than a car counts as two cars side by side.
 const TWO_ABREAST: f32 = 2.3;
-/// Length of a piece across, metres.
+/// Length of a piece across, in metres.
 const ABREAST_PIECE_M: f32 = 0.2;
-/// Shortest car, metres, and a car with the gap to the next.
+/// Length of the shortest car, and of a car with the gap to the next, in metres.
 const SHORTEST: f32 = 3.0;
 /// See [`SHORTEST`].
 const PITCH: f32 = 5.4;
-/// Share of the height from which on there is no gap.
+/// Share of the height above which a dip is not a gap.
 const LEVEL: f32 = 0.85;
-/// Length of a piece of the height profile, metres.
+/// Length of a piece of the height profile, in metres.
 const PIECE_M: f32 = 0.25;
 
 /// The two parts of a box's cluster; `None` if it is not a row of cars.
@@ -110,7 +110,7 @@ fn best_cut(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
             (low + 0.15 * uneven, low, from + x)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
-        // A wall or a hedge is as high there as anywhere.
+        // A wall or a hedge is as high there as elsewhere.
         .filter(|(_, low, _)| *low < LEVEL)
         .map(|(_, _, cut)| cut)
 }

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-/// Something that stands on the ground: a box in the camera's frame (x right, y down, z forward).
+/// An object that stands on the ground: a box in the camera's frame (x right, y down, z forward).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Its track's id, constant over frames.
@@ -9,17 +9,16 @@ pub struct Target {
     pub center_m: [f64; 3],
     /// Length, width and height, metres.
     pub size_m: [f64; 3],
-    /// KITTI's rotation_y: the length points along (cos, 0, −sin) of it. Without a velocity it is ambiguous by half
-    /// a turn.
+    /// KITTI's rotation_y: the length points along (cos, 0, −sin) of this angle. Without a velocity it is ambiguous by half a turn.
     pub yaw_rad: f64,
-    /// From the camera to the centre, metres.
+    /// Distance from the camera to the centre, in metres.
     pub distance_m: f64,
-    /// Standard deviation of the distance, metres, if the depth came with one.
+    /// Standard deviation of the distance, in metres, if the depth came with one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_m: Option<f64>,
-    /// Over ground, in the camera's axes, m/s; `None` before it could be measured.
+    /// Velocity over ground, in the camera's axes, m/s; `None` before it could be measured.
     pub velocity_mps: Option<[f64; 3]>,
-    /// The best guess of that velocity, sure or not; `None` where nothing followed it.
+    /// The best estimate of that velocity, whether certain or not; `None` if the target is not tracked.
     #[serde(skip)]
     pub likely_velocity_mps: Option<[f64; 3]>,
     /// Whether it is dynamic (moves over ground); `None` until that is known.
@@ -29,10 +28,10 @@ pub struct Target {
     /// Number of pixels in this frame; 0 if the track continues unseen.
     #[serde(default)]
     pub pixels: usize,
-    /// Its class by a segmentation model, if there is one: the class with the most votes.
+    /// Its class from a segmentation model, if there is one: the class with the most votes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
-    /// Left, top, right, bottom of those pixels, in pixels of the depth image; [`crate::scale_bounds`] brings them to an image's.
+    /// Left, top, right and bottom of its pixels, in pixels of the depth image; [`crate::scale_bounds`] converts them to another size.
     pub bounds: Option<[u32; 4]>,
     /// Its index among the image's detections.
     #[serde(skip)]

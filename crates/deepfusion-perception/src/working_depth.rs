@@ -1,14 +1,13 @@
-//! The size at which a depth image is looked at.
+//! The size at which a depth image is processed.
 
 use deepfusion_geometry::{DepthMap, Intrinsics};
 
 use crate::Target;
 
-/// Widest depth image that is looked at: more pixels cost time and say no more than the network knew.
+/// Widest depth image that is processed: more pixels take time and add nothing to what the network predicted.
 const WIDTH: usize = 640;
 
-/// The depth at its working size, the nearest pixel of each (a mean would put points between near and far), with its
-/// camera.
+/// The depth at its working size, taken from the nearest pixel (a mean would create points between near and far surfaces), with its camera.
 #[must_use]
 pub fn working_depth(depth: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics) {
     if depth.width <= WIDTH {
@@ -19,8 +18,8 @@ pub fn working_depth(depth: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics)
     (depth.nearest(WIDTH, height), k)
 }
 
-/// Brings [`Target::bounds`] from pixels of a depth image at its working size to those of an image, both as width and height: the whole pixels that
-/// hold all of them.
+/// Converts [`Target::bounds`] from pixels of a depth image at its working size to those of another image, both sizes given as width and
+/// height. The result is the whole pixels that contain them.
 pub fn scale_bounds(targets: &mut [Target], working: [usize; 2], image: [u32; 2]) {
     for bounds in targets
         .iter_mut()
@@ -87,7 +86,7 @@ mod tests {
             width: 1242,
             height: 375,
         };
-        // Depth that tells its own column and row.
+        // Depth values that encode their column and row.
         let data = (0..width * height).map(|i| 1.0 + i as f32).collect();
         let depth = DepthMap {
             width,

@@ -16,7 +16,7 @@ fn camera(width: u32, height: u32) -> Intrinsics {
     }
 }
 
-/// A road 1.6 m below the camera, and a wall of `wall` metres' height at 12 m.
+/// A road 1.6 m below the camera, and a wall 12 m away that is `wall` metres high.
 fn road(k: &Intrinsics, wall: f64) -> DepthMap {
     let mut map = DepthMap::empty(k.width as usize, k.height as usize);
     for v in 0..map.height {
@@ -147,7 +147,7 @@ fn a_clock_that_jumps_begins_anew_and_ids_are_not_used_twice() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
-    /// Whatever the pixels say, nothing panics and every target is a box.
+    /// Whatever the pixels contain, nothing panics and every target has a valid box.
     #[test]
     fn rubbish_gives_boxes_or_nothing(
         width in 2u32..70, height in 2u32..40,

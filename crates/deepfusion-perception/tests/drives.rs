@@ -1,4 +1,4 @@
-//! Simulated drives, whose boxes are known exactly: the bounds that the project holds itself to.
+//! Simulated drives with exactly known boxes, and the lower bounds for the scores on them.
 
 use crate::common;
 use deepfusion_perception::{Perception, PerceptionConfig, Rays, Stamp, detect};
@@ -14,8 +14,8 @@ fn drive(scene: Scene, seed: u64) -> SimConfig {
     }
 }
 
-/// On many streets (`deepfusion eval-targets --depth truth`, docs/benchmarks/targets.md) both are above 0.9; these few were chosen
-/// among those that were measured: they keep what was reached, they do not show it.
+/// On many streets (`deepfusion eval-targets --depth truth`, docs/benchmarks/targets.md) both are above 0.9. These few streets were chosen
+/// among those measured: they guard against regressions and do not show the general level.
 #[test]
 fn targets_of_true_depth_are_where_the_simulator_put_them() {
     let drives = [
@@ -36,7 +36,7 @@ fn targets_of_true_depth_are_where_the_simulator_put_them() {
     assert!(score.identity_switches <= 6, "{score:?}");
 }
 
-/// Cars doors to doors along an aisle, behind pillars: a row tells where those stand of which little is seen.
+/// Cars door to door along an aisle, behind pillars: a row shows where the cars stand that are hardly visible.
 #[test]
 fn rows_of_cars_in_a_garage_are_separated() {
     let score = common::score(&[201, 202, 203, 204].map(|seed| drive(Scene::Garage, seed)));
@@ -47,7 +47,7 @@ fn rows_of_cars_in_a_garage_are_separated() {
     assert!(score.yaw_error_deg.unwrap() <= 5.0, "{score:?}");
 }
 
-/// In a drive's first second few cars were seen twice; the longer it lasts, the more rows are known.
+/// In a drive's first second few cars have been seen twice; the longer it lasts, the more rows are known.
 #[test]
 fn a_longer_drive_knows_its_rows() {
     let score = common::score(&[71, 75].map(|seed| SimConfig {
@@ -61,7 +61,7 @@ fn a_longer_drive_knows_its_rows() {
     assert!(score.yaw_error_deg.unwrap() <= 5.0, "{score:?}");
 }
 
-/// Rows are completed where somebody asks for it; else the boxes are those of each image alone.
+/// Rows are completed only if asked for; otherwise the boxes are those of each image alone.
 #[test]
 fn rows_are_completed_where_they_are_asked_for() {
     let simulation = Simulation::new(&drive(Scene::Garage, 201)).unwrap();

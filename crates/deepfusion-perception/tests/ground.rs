@@ -12,8 +12,8 @@ const CAMERA: Intrinsics = Intrinsics {
     height: 192,
 };
 
-/// Depth of a road whose height over the camera's foot is `height(forward)`, seen from `camera_m` above its begin by a
-/// camera pitched up by `pitch`, with a wall on the left that no ground is to be fitted to.
+/// Depth of a road with height `height(forward)` relative to the camera's foot, seen from `camera_m` above its start by a camera pitched up
+/// by `pitch`, with a wall on the left that must not be taken for ground.
 fn road(height: impl Fn(f64) -> f64, camera_m: f64, pitch: f64) -> DepthMap {
     let mut map = DepthMap::empty(640, 192);
     let (sin, cos) = f64::sin_cos(pitch);
@@ -23,7 +23,7 @@ fn road(height: impl Fn(f64) -> f64, camera_m: f64, pitch: f64) -> DepthMap {
                 (u as f64 - CAMERA.cx) / CAMERA.fx,
                 (v as f64 - CAMERA.cy) / CAMERA.fy,
             );
-            // The ray, level: forward and down for each metre of depth.
+            // The ray in level axes: forward and down per metre of depth.
             let (forward, down) = (cos + sin * y, cos * y - sin);
             let hit = (5..6000).map(|i| f64::from(i) * 0.01).find(|z| {
                 let wall = x * z < -6.0;
@@ -40,7 +40,7 @@ fn find(depth: &DepthMap) -> Ground {
     Ground::find(&depth.data, &Rays::of(&CAMERA), None, &config).unwrap()
 }
 
-/// The estimated height of points of the road, at distances ahead of the camera.
+/// The estimated height of road points at distances ahead of the camera.
 fn heights(ground: &Ground, height: impl Fn(f64) -> f64, camera_m: f64, pitch: f64) -> Vec<f32> {
     let (sin, cos) = f64::sin_cos(pitch);
     [6.0, 12.0, 20.0, 30.0]

@@ -1,11 +1,11 @@
-//! Masks of a segmentation model with depth: touching objects are separated and keep their classes.
+//! Masks of a segmentation model, fused with depth: touching objects are separated and keep their classes.
 
 use crate::common::blocks::{CARS, SIZE, camera, scene};
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
 use deepfusion_perception::{Error, Instance, Perception, PerceptionConfig, Run, Stamp, Target};
 
-/// The pixels that see a block, as a model would draw them.
+/// The pixels that show a block, as in a model's mask.
 fn mask(of: &[Option<usize>], block: usize, class: &str) -> Instance {
     let mut runs: Vec<Run> = Vec::new();
     for (i, seen) in of.iter().enumerate() {
@@ -50,7 +50,7 @@ fn what_touches_is_separated_by_its_masks() {
         assert!((target.size_m[1] - 1.8).abs() < 0.15, "{target:?}");
         assert!(target.confidence > 0.8);
     }
-    // Of one alone, the other is still found by its depth, and nobody says what it is.
+    // With one mask only, the other object is still found by its depth, without a class.
     let found = perception
         .detect_with_instances(&depth, &camera(), None, &masks[..1])
         .unwrap()
@@ -58,7 +58,7 @@ fn what_touches_is_separated_by_its_masks() {
     assert_eq!(found.len(), 2);
     assert_eq!(near(&found, 0.1).unwrap().class, None);
     assert_eq!(near(&found, -1.7).unwrap().class.as_deref(), Some("car"));
-    // A mask of the road makes no target of it.
+    // A mask on the road does not make a target.
     let mut road = mask(&seen, 0, "car");
     road.runs = (170..190)
         .map(|v| Run {

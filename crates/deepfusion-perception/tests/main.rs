@@ -1,4 +1,4 @@
-//! 3D targets, ground and bad input.
+//! Tests of 3D targets, ground and bad input.
 
 #![allow(
     clippy::unwrap_used,

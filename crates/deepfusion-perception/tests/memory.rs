@@ -6,12 +6,12 @@ use deepfusion_sim::{SimConfig, Simulation};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicIsize, Ordering};
 
-/// Counts the bytes that are held.
+/// Counts the bytes allocated.
 struct Counting;
 
 static HELD: AtomicIsize = AtomicIsize::new(0);
 
-// SAFETY: every call goes to the system's allocator as it came.
+// SAFETY: every call is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         HELD.fetch_add(layout.size() as isize, Ordering::Relaxed);
@@ -29,7 +29,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Ten thousand frames of a street that is driven again and again, with tracks that are born and die.
+/// Ten thousand frames of a street that is driven again and again, with tracks that start and end.
 #[test]
 fn ten_thousand_frames_hold_no_more_than_a_thousand() {
     let simulation = Simulation::new(&SimConfig {
@@ -65,7 +65,7 @@ fn ten_thousand_frames_hold_no_more_than_a_thousand() {
         last = look(number).or(last);
     }
     let grown = HELD.load(Ordering::Relaxed) - held;
-    // Tracks come and go, each some hundred bytes; a leak of one a frame would be megabytes.
+    // Tracks start and end, each some hundred bytes; leaking one per frame would be megabytes.
     assert!(grown.abs() < 100_000, "{grown} bytes");
-    assert!(last > Some(1_000), "tracks were born: {last:?}");
+    assert!(last > Some(1_000), "tracks were started: {last:?}");
 }

@@ -11,7 +11,7 @@ fn stamp(time_s: f64) -> Option<Stamp> {
     })
 }
 
-/// `share` of each depth.
+/// A standard deviation of `share` of each depth.
 fn sigma(depth: &DepthMap, share: f32) -> DepthMap {
     let mut sigma = depth.clone();
     sigma.data.iter_mut().for_each(|z| *z *= share);
@@ -23,17 +23,17 @@ fn only(seen: &Surroundings) -> &Target {
     &seen.targets[0]
 }
 
-/// A car whose front is at a distance.
+/// A car whose front is at this distance.
 fn car(front_m: f64) -> DepthMap {
     scene(&[([-2.6, front_m], [-0.8, front_m + 4.2], 1.5)]).0
 }
 
-/// A target's standard deviation is that of its pixels, of one image and followed; without any it says none.
+/// A target's standard deviation is that of its pixels, in a single image and when tracked. Without the pixels' values it has none.
 #[test]
 fn a_target_says_what_its_distance_is_worth() {
     let (depth, k) = (car(14.0), camera());
     let mut deviation = sigma(&depth, 0.07);
-    // What is not of the car has no say, nor has a pixel of which nothing is known.
+    // Pixels outside the car, and those without a value, have no effect.
     for (s, z) in deviation.data.iter_mut().zip(&depth.data) {
         if !(13.5..19.0).contains(z) {
             *s = 50.0;
@@ -53,8 +53,8 @@ fn a_target_says_what_its_distance_is_worth() {
     }
 }
 
-/// A car that has stood for a second and jumps by three metres is another one to exact depth, and the same one to depth that is
-/// good to a tenth.
+/// A car that has stood for a second and jumps by three metres is another car with exact depth, but the same car with depth that is
+/// accurate to a tenth.
 #[test]
 fn what_is_unsure_may_be_found_farther_off() {
     let k = camera();

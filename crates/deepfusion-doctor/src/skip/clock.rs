@@ -41,7 +41,7 @@ mod tests {
             ),
             (
                 NoTimeOffset::NothingChanges.into(),
-                "time offset: nothing measured changes: no turn (0.004 rad/s), no change of speed (0.1 m/s)",
+                "time offset: the motion does not change: no turn above 0.004 rad/s, no change of speed above 0.1 m/s",
             ),
             (
                 ClockSkip::Unsure {

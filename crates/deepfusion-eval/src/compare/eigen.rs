@@ -1,16 +1,16 @@
-//! The field's two protocols on KITTI's Eigen images.
+//! The field's two protocols on the KITTI Eigen images.
 
 use crate::{Crop, GroundTruth, Report};
 use deepfusion_hint::count_of;
 
 /// How the rows of published tables were measured, depths from 0.001 to 80 m.
 struct Published {
-    /// What the tables are of.
+    /// What the tables are called.
     tables: &'static str,
     images: usize,
     crop: Crop,
     gt: GroundTruth,
-    /// What is to be said of rows that are measured alike.
+    /// Words added to the sentence about rows that were measured in the same way.
     and: &'static str,
 }
 
@@ -22,16 +22,16 @@ const RECORDED: Published = Published {
     and: " with ground truth as recorded",
 };
 
-/// Monodepth2's script crops the split `eigen` alone, and here masks truth at 0 m only: what is beyond 80 m counts there.
+/// Monodepth2's script crops only the split `eigen`. For this one it masks ground truth at 0 m only, so that depths beyond 80 m count.
 const IMPROVED: Published = Published {
     tables: "the published KITTI Eigen tables with improved ground truth",
     images: 652,
     crop: Crop::None,
     gt: GroundTruth::Annotated,
-    and: ", but for depths beyond 80 m, which count there",
+    and: ", except that depths beyond 80 m count there",
 };
 
-/// Whether a report's figures can stand beside those of published tables, in a sentence.
+/// A sentence that says whether a report's figures are comparable with the published tables.
 pub(super) fn beside_published(report: &Report) -> String {
     let published = match report.protocol.gt {
         GroundTruth::Annotated => &IMPROVED,

@@ -8,38 +8,38 @@ use serde_json::Value;
 use super::saved::{MeasuredOn, ModelFile, SavedEvaluation, sha256_of_file};
 use super::{Error, EvaluationProblem, Result, SAVED_VERSION};
 
-/// An evaluation to be compared.
+/// An evaluation to compare.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// What its rows are called.
+    /// The name of its rows.
     pub name: String,
-    /// What it found.
+    /// The result.
     pub report: Report,
-    /// Where the file is.
+    /// Path of the file it was read from.
     pub path: PathBuf,
-    /// What the file says beyond the result.
+    /// What the file records beyond the result.
     pub origin: Origin,
 }
 
-/// What is known of where an evaluation comes from.
+/// What is known about an evaluation's origin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Origin {
-    /// Nothing: the file is a plain [`Report`](crate::Report).
+    /// Nothing: the file contains a plain [`Report`](crate::Report).
     Plain,
-    /// A file of a run's folder.
+    /// A file from a run's folder.
     Saved {
-        /// What was measured on.
+        /// The data that were measured on.
         measured: Box<MeasuredOn>,
-        /// With which weights.
+        /// The weights that were measured.
         model: ModelFile,
-        /// Whether the run's checkpoint is another one by now.
+        /// Whether the run's checkpoint has changed since.
         outdated: bool,
     },
 }
 
 impl Evaluation {
-    /// Reads what was given: run folders (all their evaluations), saved evaluations, and files that hold a plain [`Report`](crate::Report).
-    /// Rows of the same name are told apart by their paths and checkpoints.
+    /// Reads the paths given: run folders (all their evaluations), saved evaluations, and files with a plain [`Report`](crate::Report).
+    /// Rows with the same name get their path and checkpoint added.
     ///
     /// # Errors
     /// [`Error::NotEvaluated`], [`Error::NotAnEvaluation`], [`Error::Version`], [`Error::File`].
@@ -94,7 +94,7 @@ impl Evaluation {
             None => return Err(not(EvaluationProblem::VersionNumber)),
         }
         let saved: SavedEvaluation = serde_json::from_value(value).map_err(|e| not(e.into()))?;
-        // A saved file lies in RUN/eval.
+        // Saved evaluations are in RUN/eval.
         let run = run.or_else(|| path.parent().and_then(Path::parent));
         let now = run.and_then(|run| {
             let checkpoint = run.join(&saved.model.checkpoint);
@@ -134,7 +134,7 @@ impl Evaluation {
         }
     }
 
-    /// In how many ways the network looked at each image; `None`: in one.
+    /// The test-time augmentation; `None` if each image was predicted once.
     pub(crate) fn post_process(&self) -> Option<PostProcess> {
         match &self.origin {
             Origin::Plain => None,
@@ -142,8 +142,8 @@ impl Evaluation {
         }
     }
 
-    /// What must agree for two rows to stand in one table: the protocol, and the ground truth to the last depth. Files that
-    /// do not say the latter share a table with none that does.
+    /// What two rows must have in common to be in one table: the protocol, and exactly the same ground truth. Files that do not record the
+    /// ground truth never share a table with files that do.
     pub(crate) fn ground(&self) -> String {
         let report = &self.report;
         let p = &report.protocol;
@@ -155,7 +155,8 @@ impl Evaluation {
     }
 }
 
-/// How a row's name says that its predictions were post-processed. The field's tables mean the mirrored image by the word alone.
+/// What a row's name adds if its predictions were post-processed. In the field's tables, "post-processed" alone means averaging with the
+/// mirrored image.
 pub(crate) fn in_words(how: PostProcess) -> String {
     match how {
         PostProcess::Flip => "post-processed".into(),
@@ -163,7 +164,7 @@ pub(crate) fn in_words(how: PostProcess) -> String {
     }
 }
 
-/// Adds what tells rows of one name in one table apart: the checkpoint, then the engine, then the path.
+/// Adds to rows of the same name and table what distinguishes them: the checkpoint, then the engine, then the path.
 fn tell_apart(all: &mut [Evaluation]) {
     type Distinction = fn(&Evaluation) -> Option<String>;
     let distinctions: [Distinction; 4] = [

@@ -1,4 +1,4 @@
-//! What a checkpoint's metres are worth, from what was measured of it.
+//! How far a checkpoint's metres can be trusted, according to its evaluations.
 
 use std::path::Path;
 
@@ -7,15 +7,16 @@ use serde::{Deserialize, Serialize};
 use super::saved::SavedEvaluation;
 use crate::{GroundTruth, PostProcess};
 
-/// How far a prediction may be off as a whole, and its metres still be trusted: exp(|bias|) ≤ 1 ± this.
+/// How far predictions may be off overall for their metres to be trusted: exp(|bias|) ≤ 1 ± this.
 pub const TRUSTED_WITHIN: f64 = 0.1;
 
-/// Images that an evaluation must have for its interval to count. The bootstrap draws from the images that there are: of a few
-/// it knows only those, and its interval is too narrow.
+/// Images an evaluation needs for its interval to count. The bootstrap resamples the images it has; with only a few, its interval is too
+/// narrow.
 pub const LEAST_IMAGES: usize = 10;
 
-/// Steps below which nothing is trusted: over so many the speed loss, which the metres come from, rises to its full weight
-/// (`loss.speed_warmup_steps` of every preset). A network that has hardly learned predicts about the depth that it starts with, which may be right on average.
+/// Steps below which nothing is trusted. Over this many steps the speed loss, which teaches the metres, rises to its full weight
+/// (`loss.speed_warmup_steps` of every preset). A network that has hardly learned predicts about the depth it started with, which may be
+/// right on average by chance.
 pub const LEAST_STEPS: usize = 500;
 
 /// Whether metres can be relied on.
@@ -24,27 +25,26 @@ pub const LEAST_STEPS: usize = 500;
 pub enum Verdict {
     /// The whole interval lies within [`TRUSTED_WITHIN`] of 1.
     Trusted,
-    /// Not measured, or not well enough to say.
+    /// Not measured, or the interval is too wide to decide.
     #[default]
     Open,
     /// The whole interval lies outside.
     Wrong,
 }
 
-/// The scale of a checkpoint's metres on recordings that it has not learned from, as sidecars say it.
+/// The scale of a checkpoint's metres on recordings it was not trained on, as written to sidecars.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MetricScale {
-    /// Mean over images of ln(median(prediction) / median(truth)): above 0 where things are seen too far away. `None` where
-    /// nothing was measured.
+    /// Mean over images of ln(median(prediction) / median(truth)): above 0 if predictions are too far. `None` if nothing was measured.
     pub bias: Option<f64>,
     /// Its 95 % interval.
     pub ci95: Option<[f64; 2]>,
-    /// What follows.
+    /// The conclusion from the interval.
     pub verdict: Verdict,
 }
 
 impl MetricScale {
-    /// What a bias and its interval say of a network that has learned for `steps`.
+    /// The verdict on a network trained for `steps`, from its bias and the interval.
     #[must_use]
     pub fn judged(bias: f64, ci95: [f64; 2], steps: usize) -> Self {
         let [low, high] = ci95.map(f64::exp);
@@ -63,12 +63,13 @@ impl MetricScale {
         }
     }
 
-    /// From the evaluations that a run's folder keeps: those of this very checkpoint (by the SHA-256 of its file), and of the same
-    /// data set where it learned several. They must have the same correction for the focal length and the same post-processing, be of the camera's own depth (not
-    /// `velodyne`), and be known to be of frames that training did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
-    /// place and not in another are not trusted.
+    /// From the evaluations saved in the run's folder. Counted are those of exactly this checkpoint (by the SHA-256 of its file) and, if
+    /// the run learned several data sets, of the same data set. They must have the same correction for the focal length and the same
+    /// post-processing, use the camera's own depth (not `velodyne`), and be on frames that training is known not to have seen. Of several
+    /// evaluations, the bias is the mean over all their images, and the interval spans all of theirs: metres that are right in one place
+    /// and wrong in another are not trusted.
     ///
-    /// A file that cannot be read, or is of an older version that does not say what training saw, says nothing.
+    /// Files that cannot be read are ignored, and so are those of older versions that do not record what training saw.
     #[must_use]
     pub fn measured(
         run: &Path,
@@ -87,7 +88,7 @@ impl MetricScale {
                 && saved.measured.focal_correction == focal_correction
                 && saved.measured.post_process == post_process
                 && saved.measured.held_out == Some(true)
-                // Those depths are the scanner's, a quarter of a metre from the camera's.
+                // Those depths are measured from the scanner, a quarter of a metre from the camera.
                 && saved.report.protocol.gt != GroundTruth::Velodyne
                 && saved.report.n >= LEAST_IMAGES
         };
@@ -125,7 +126,7 @@ mod tests {
         };
         assert_eq!(verdict(0.95, 1.05), Verdict::Trusted);
         assert_eq!(verdict(0.91, 1.09), Verdict::Trusted);
-        // One end outside says that it may be either.
+        // One end outside leaves it open.
         for (low, high) in [(0.85, 1.0), (1.0, 1.2), (0.5, 2.0), (1.05, 1.15)] {
             assert_eq!(verdict(low, high), Verdict::Open, "{low} {high}");
         }
@@ -134,7 +135,7 @@ mod tests {
         assert_eq!(MetricScale::default().verdict, Verdict::Open);
     }
 
-    /// The depth that a network starts with may be right on average: that is no trust. That it is wrong can be said at once.
+    /// The depth that a network starts with may be right on average by chance, so it is not trusted. Wrong metres are reported at once.
     #[test]
     fn a_network_that_has_hardly_learned_is_not_trusted() {
         let right = MetricScale::judged(0.01, [-0.02, 0.04], 8);

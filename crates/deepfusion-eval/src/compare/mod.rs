@@ -1,10 +1,9 @@
 //! Evaluations side by side, the field's published tables, and which rows cannot be right.
 //!
-//! A [`SavedEvaluation`] is what `eval` leaves in a run's folder; [`Evaluation::collect`] reads such files, whole run folders
-//! and plain [`Report`](crate::Report)s. [`run_tables`] sorts them by what they were measured on, so that no table mixes
-//! protocols or images; [`published_tables`] are the field's, quoted with their places. Every row goes through
-//! [`plausibility::check`]. The tables come as [text](Tables::to_text), [CSV](Tables::to_csv), [LaTeX](Tables::to_latex), and as
-//! a section of an HTML page through `deepfusion-render`.
+//! A [`SavedEvaluation`] is what `eval` writes into a run's folder. [`Evaluation::collect`] reads such files, whole run folders and plain
+//! [`Report`](crate::Report)s. [`run_tables`] groups them by what they were measured on, so that no table mixes protocols or images.
+//! [`published_tables`] are the field's, quoted with their sources. Every row is checked by [`plausibility::check`]. Tables are printed as
+//! [text](Tables::to_text), [CSV](Tables::to_csv) and [LaTeX](Tables::to_latex), and by `deepfusion-render` as a section of an HTML page.
 
 mod eigen;
 mod error;

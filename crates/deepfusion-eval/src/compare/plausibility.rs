@@ -1,20 +1,20 @@
 //! Which rows of metrics cannot be right.
 //!
-//! The seven metrics are not independent. Every bound below is derived per image and survives the mean over images; figures
-//! are taken at the end of their rounding that is kindest to the row. With t = ln 1.25, L = |ln(pred/gt)| of a pixel and
-//! bₖ = 1 − δₖ, the share of pixels with L ≥ k·t:
+//! The seven metrics are not independent. Every bound below is derived for one image and also applies to the mean over images. Figures are
+//! taken at the end of their rounding interval that favours the row. With t = ln 1.25, L = |ln(pred/gt)| of a pixel and bₖ = 1 − δₖ, the
+//! share of pixels with L ≥ k·t:
 //!
 //! - δ₁ ≤ δ₂ ≤ δ₃, since the thresholds grow.
 //! - RMSE log ≥ t·(b₁ + b₂ + b₃): min(⌊L/t⌋, 3) is the number of thresholds that a pixel misses, so mean L is at least t times
-//!   their sum, and a root mean square is at least the mean. It is linear in bₖ, so it holds for means over images, and it
-//!   is sharp: images that are wholly right or wholly wrong reach it.
+//!   their sum, and a root mean square is at least the mean. It is linear in bₖ, so it also applies to means over images, and it
+//!   is sharp: images in which all pixels are right or all are wrong reach it.
 //! - Abs Rel ≥ 0.2·b₁ + 0.16·b₂ + 0.128·b₃: a pixel that misses k thresholds is off by at least 1 − 0.8ᵏ of its depth.
-//! - RMSE ≤ √(cap · Sq Rel): gt ≤ cap in every pixel gives it per image, and the root is concave.
+//! - RMSE ≤ √(cap · Sq Rel): gt ≤ cap in every pixel gives this for each image, and the root is concave.
 //! - Sq Rel ≤ cap · Abs Rel: no clamped depth is off by more than the cap.
 //!
-//! One bound is about what is likely. Inside an image, RMSE log ≥ t·√(b₁ + 3·b₂ + 5·b₃) holds (a pixel that misses k thresholds
-//! adds k²t², and 1 + 3 + … = k²). The root is concave, so means over images may fall below it when a few images hold
-//! the wrong pixels; a row that does is flagged as implausible, not impossible.
+//! One bound is about what is likely. Inside an image, RMSE log ≥ t·√(b₁ + 3·b₂ + 5·b₃) applies (a pixel that misses k thresholds adds
+//! k²t², and 1 + 3 + … = k²). The root is concave, so means over images may fall below it if a few images contain most of the wrong pixels.
+//! A row that does is flagged as implausible, not impossible.
 
 mod reason;
 
@@ -22,22 +22,22 @@ pub use self::reason::FlagReason;
 
 use crate::Metrics;
 
-/// The seven metrics as far as they are known, in the order of [`Metrics::NAMES`].
+/// The seven metrics, `None` if unknown, in the order of [`Metrics::NAMES`].
 pub type Seven = [Option<f64>; 7];
 
-/// How sure it is that a row is wrong.
+/// How certain it is that a row is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
-    /// No predictions whatever give these figures.
+    /// No predictions can give these figures.
     Impossible,
-    /// Possible, but only by an odd spread of the errors, or a sign of a slip.
+    /// Possible, but only with unusually distributed errors; or a sign of a mistake.
     Implausible,
-    /// No fault of the row: something that a reader must know.
+    /// Not a fault of the row: something a reader must know.
     Note,
 }
 
 impl Severity {
-    /// The word that is printed.
+    /// The word as printed.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -51,9 +51,9 @@ impl Severity {
 /// What is wrong with a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flag {
-    /// How sure it is.
+    /// How certain it is that the row is wrong.
     pub severity: Severity,
-    /// Why.
+    /// The reason.
     pub why: FlagReason,
 }
 
@@ -68,11 +68,11 @@ impl Flag {
     }
 }
 
-/// Half a unit of the third decimal, which published tables print.
+/// Half a unit of the third decimal, as published tables print three decimals.
 pub const THREE_DECIMALS: f64 = 0.0005;
 
-/// What cannot be right about a row. `rounding` is half a unit of the last printed decimal (0 for figures of full
-/// precision), `cap_m` the farthest depth that counts.
+/// What cannot be right about a row. `rounding` is half a unit of the last printed decimal (0 for figures with full precision), `cap_m` the
+/// largest depth that counts.
 #[must_use]
 pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
     let mut flags = Vec::new();
@@ -97,7 +97,7 @@ pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
     ] {
         if let (Some(low), Some(high)) = (low, high)
             && low > high
-            // Said by the two before.
+            // The two comparisons before cover this one.
             && !(names == ("δ₁", "δ₃") && a2.is_some())
         {
             let (narrow, wide) = names;
@@ -112,11 +112,11 @@ pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
             );
         }
     }
-    // Kindest to the row: rounded up from below, never below none; a share that is not printed may be whole.
+    // In favour of the row: shares are rounded up, the missed share is never below 0, and a share that is not printed may be 1.
     let missed = |share: Option<f64>| share.map_or(0.0, |a| (1.0 - a - rounding).max(0.0));
     let b = [missed(a1), missed(a2), missed(a3)];
     let t = 1.25f64.ln();
-    // f64 sums of a thousand images are off by less.
+    // The rounding error of an f64 sum over a thousand images is smaller.
     let slack = rounding + 1e-9;
     if let Some(rmse_log) = rmse_log {
         let least = t * (b[0] + b[1] + b[2]);
@@ -165,8 +165,8 @@ pub fn check(row: &Seven, rounding: f64, cap_m: f64) -> Vec<Flag> {
     flags
 }
 
-/// Flags rows that equal another one in every figure: two methods never do. `rows` are the names and figures of one table.
-/// Rows with fewer than four figures say too little.
+/// Flags rows in which every figure equals another row's: two methods never agree that exactly. `rows` are the names and figures of one
+/// table. Rows with fewer than four figures are not compared.
 #[must_use]
 pub fn identical(rows: &[(&str, Seven)]) -> Vec<Option<Flag>> {
     let known = |row: &Seven| row.iter().flatten().count();
@@ -244,7 +244,7 @@ mod tests {
                 "{flags:?}"
             );
         }
-        // δ₂ is not printed: the outer two are compared.
+        // Without δ₂, δ₁ and δ₃ are compared.
         let gap = [None, None, None, None, Some(0.9), None, Some(0.8)];
         assert_eq!(check(&gap, 0.0, 80.0).len(), 1);
         assert_eq!(check(&[None; 7], 0.0, 80.0), []);
@@ -269,8 +269,8 @@ mod tests {
     }
 
     proptest! {
-        /// What is called impossible never comes out of real pixels, however odd: images of random sizes, depths up to the
-        /// cap, any predictions, averaged as the tables are.
+        /// Metrics of real pixels are never flagged as impossible, however odd: images of random sizes, depths up to the cap, any
+        /// predictions, averaged as in the tables.
         #[test]
         fn real_predictions_are_never_impossible(
             images in prop::collection::vec(
@@ -286,7 +286,7 @@ mod tests {
             let printed = mean.map(|v| Some((v * 1000.0).round() / 1000.0));
             let rounded = check(&printed, THREE_DECIMALS, 80.0);
             prop_assert!(rounded.iter().all(|f| f.severity != Severity::Impossible), "{rounded:?}");
-            // One image: the stronger bound holds as well.
+            // For a single image, the stronger bound applies too.
             let one = check(&each[0].to_array().map(Some), 0.0, 80.0);
             prop_assert!(one.is_empty(), "{one:?}");
         }

@@ -6,10 +6,10 @@ use super::plausibility::{Flag, FlagReason, Seven, THREE_DECIMALS, check, identi
 use super::table::{Column, Row, Table, Tables, Value};
 use super::{Error, PublishedProblem, Result};
 
-/// Farthest depth of KITTI's protocols, in metres.
+/// Largest depth in KITTI's protocols, in metres.
 const CAP_M: f64 = 80.0;
 
-/// The field's figures, as `data/published.toml` has them.
+/// The published figures as read from `data/published.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
@@ -80,7 +80,7 @@ impl Published {
     /// Reads a table of published figures.
     ///
     /// # Errors
-    /// [`Error::Published`] naming the line, or the row whose source or group there is not.
+    /// [`Error::Published`], naming the line, or the row whose source or group does not exist.
     pub fn parse(text: &str) -> Result<Self> {
         Self::read(text).map_err(Error::Published)
     }
@@ -100,7 +100,7 @@ impl Published {
         Ok(published)
     }
 
-    /// A table for each group, its rows checked.
+    /// One table per group, with its rows checked.
     #[must_use]
     pub fn tables(&self) -> Tables {
         let left_out = self
@@ -137,7 +137,7 @@ impl Published {
         let mut notes = vec![group.note.clone()];
         if let Some((supervision, scaling)) = kind {
             notes.push(format!(
-                "Best and second are marked among rows of one kind: trained with {supervision}, scaling {scaling}."
+                "Best and second best are marked only among rows of one kind: trained with {supervision}, scaling {scaling}."
             ));
         }
         let ranked = |r: &PublishedRow| kind == Some((r.supervision.as_str(), r.scaling.as_str()));
@@ -189,14 +189,14 @@ impl Published {
     }
 }
 
-/// Training and scaling that most rows share, where at least two do: only such rows can be ranked. How a row whose scaling is
-/// not stated was measured is not known.
+/// The training data and scaling that most rows share, if at least two do: only those rows can be ranked. Rows whose scaling is not stated
+/// cannot be compared.
 fn commonest<'a>(rows: &[&'a PublishedRow]) -> Option<(&'a str, &'a str)> {
     let kind = |r: &&'a PublishedRow| (r.supervision.as_str(), r.scaling.as_str());
     let count = |wanted: (&str, &str)| rows.iter().filter(|r| kind(r) == wanted).count();
     let stated = rows.iter().filter(|r| r.scaling != "not stated").map(kind);
     let kinds = stated.map(|kind| (count(kind), kind));
-    // The first of equals, as the table has them.
+    // Among equals, the first in the table's order.
     let most = kinds.fold(None, |most: Option<(usize, _)>, next| match most {
         Some(most) if most.0 >= next.0 => Some(most),
         _ => Some(next),
@@ -204,10 +204,10 @@ fn commonest<'a>(rows: &[&'a PublishedRow]) -> Option<(&'a str, &'a str)> {
     most.filter(|(count, _)| *count > 1).map(|(_, kind)| kind)
 }
 
-/// The field's tables that come with the program.
+/// The published tables that are embedded in the program.
 ///
 /// # Errors
-/// [`Error::Published`], which a test excludes.
+/// [`Error::Published`]; a test checks that it does not occur.
 pub fn published_tables() -> Result<Tables> {
     static PUBLISHED: LazyLock<std::result::Result<Published, PublishedProblem>> =
         LazyLock::new(|| Published::read(include_str!("../../data/published.toml")));
@@ -274,6 +274,6 @@ mod tests {
         let text = include_str!("../../data/published.toml")
             .replace("source = \"monovit\"", "source = \"no\"");
         let error = Published::parse(&text).unwrap_err().to_string();
-        assert!(error.contains("`MonoViT` has no such source"), "{error}");
+        assert!(error.contains("`MonoViT` names a source"), "{error}");
     }
 }

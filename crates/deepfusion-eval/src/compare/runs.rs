@@ -8,7 +8,7 @@ use super::evaluation::{Evaluation, Origin};
 use super::plausibility::{Flag, FlagReason, Severity, check, identical};
 use super::table::{Better, Column, Row, Table, Tables, Value};
 
-/// Tables of evaluations: unscaled, median-scaled, by range and of drawn points, for each ground on which was measured.
+/// Tables of evaluations: unscaled, median-scaled, by range and of drawn points, for each combination of protocol and ground truth.
 #[must_use]
 pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
     let mut grounds: Vec<(String, Vec<&Evaluation>)> = Vec::new();
@@ -22,7 +22,7 @@ pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
     let mut notes = Vec::new();
     if grounds.len() > 1 {
         notes.push(format!(
-            "These evaluations were made on {} different grounds (protocol or ground truth). Each has its own tables; rows of \
+            "These evaluations form {} groups that differ in protocol or ground truth. Each has its own tables; rows of \
              different tables cannot be compared.",
             grounds.len()
         ));
@@ -31,8 +31,8 @@ pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
     for (number, (_, members)) in grounds.iter().enumerate() {
         let ground = match (grounds.len(), recordings(members).join("; ")) {
             (1, _) => String::new(),
-            (_, names) if names.is_empty() => format!("Ground {}: ", number + 1),
-            (_, names) => format!("Ground {} ({names}): ", number + 1),
+            (_, names) if names.is_empty() => format!("Group {}: ", number + 1),
+            (_, names) => format!("Group {} ({names}): ", number + 1),
         };
         tables.extend(ground_tables(&ground, members));
     }
@@ -55,7 +55,7 @@ fn ground_tables(ground: &str, members: &[&Evaluation]) -> Vec<Table> {
     tables
 }
 
-/// What was measured, in sentences.
+/// What was measured and how, in sentences.
 fn about(members: &[&Evaluation]) -> Vec<String> {
     let report = &members[0].report;
     let p = &report.protocol;
@@ -75,10 +75,10 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
     }
     notes.push(match &report.truth_sha256 {
         Some(digest) => format!(
-            "The ground truth of all rows is the same to the last depth (SHA-256 {}…).",
+            "All rows have exactly the same ground truth (SHA-256 {}…).",
             &digest.get(..12).unwrap_or(digest)
         ),
-        None => "These files do not say which ground truth they were measured on: equal protocol and number of images is all \
+        None => "These files do not record their ground truth: only the protocol and the number of images are known to be \
                  that is known."
             .into(),
     });
@@ -86,7 +86,7 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
     notes
 }
 
-/// Names of the recordings, as far as the evaluations say; each once.
+/// Names of the recordings that the evaluations record; each once.
 fn recordings(members: &[&Evaluation]) -> Vec<String> {
     let mut data: Vec<String> = Vec::new();
     for member in members {
@@ -106,7 +106,7 @@ fn file_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Mean-depth baselines and the names of the evaluations that print them.
+/// Mean-depth baselines, each with the names of the evaluations that contain it.
 fn baseline_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
     let mut rows: Vec<(Vec<&str>, Metrics, Metrics)> = Vec::new();
     for member in members {
@@ -213,7 +213,7 @@ fn metric_table(
     }
 }
 
-/// What a reader must know of an evaluation.
+/// What a reader must know about an evaluation.
 fn notes(member: &Evaluation) -> Vec<Flag> {
     let mut flags = Vec::new();
     if let Origin::Saved {
@@ -234,7 +234,7 @@ fn notes(member: &Evaluation) -> Vec<Flag> {
     flags
 }
 
-/// A metric of a range.
+/// Reads one metric from a range.
 type OfRange = fn(&RangeBin) -> Option<f64>;
 
 fn range_tables(ground: &str, members: &[&Evaluation]) -> [Table; 2] {
@@ -328,7 +328,7 @@ fn point_table(ground: &str, members: &[&Evaluation]) -> Option<Table> {
     let rows: Vec<Row> = members.iter().filter_map(row).collect();
     (!rows.is_empty()).then(|| Table {
         title: format!("{ground}Distances of drawn points"),
-        notes: vec!["Points are the same where number and seed are.".into()],
+        notes: vec!["Rows with the same number and seed have the same points.".into()],
         columns,
         rows,
     })

@@ -7,18 +7,18 @@ use sha2::{Digest, Sha256};
 
 use super::{Error, Result};
 
-/// Version of the file's layout.
+/// Version of the file format.
 pub const SAVED_VERSION: u32 = 1;
 
-/// The folder of evaluations inside a run's.
+/// Name of the folder with the evaluations inside a run's folder.
 const FOLDER: &str = "eval";
 
-/// An evaluation as `eval` keeps it in `RUN/eval/<name>.json`: the result, what it was measured on, and with which weights.
+/// An evaluation as `eval` saves it in `RUN/eval/<name>.json`: the result, the data it was measured on, and the weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedEvaluation {
-    /// [`SAVED_VERSION`].
+    /// Version of the file format, [`SAVED_VERSION`].
     pub format_version: u32,
-    /// What was measured on.
+    /// The data that were measured on, and the options.
     pub measured: MeasuredOn,
     /// The weights that were measured.
     pub model: ModelFile,
@@ -28,7 +28,7 @@ pub struct SavedEvaluation {
     pub images: Vec<FrameScore>,
 }
 
-/// What an evaluation was measured on, and how it was asked for.
+/// The data an evaluation was measured on, and the options it was asked for with.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct MeasuredOn {
     /// The recordings, as given.
@@ -36,69 +36,69 @@ pub struct MeasuredOn {
     /// The split file, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<PathBuf>,
-    /// The file of ground truth, if any; else the recordings' scans.
+    /// The file of ground truth, if any; otherwise the recordings' scans are used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gt: Option<PathBuf>,
-    /// Which camera: "2", "3" or "both".
+    /// The camera: "2", "3" or "both".
     pub camera: String,
-    /// fx, fy, cx, cy in pixels, where they were given in place of the recordings' own.
+    /// fx, fy, cx, cy in pixels, if given in place of the recordings' own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<[f64; 4]>,
-    /// The images' field of view from left to right in degrees, where it was given in place of a calibration.
+    /// The images' horizontal field of view in degrees, if given in place of a calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hfov_deg: Option<f64>,
-    /// How far the camera's clock is ahead of the vehicle's in seconds, where that was given or measured.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds, if given or measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_ahead_s: Option<f64>,
-    /// Topics of bags that were named, as `role=topic`.
+    /// Topics chosen for bags, as `role=topic`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
-    /// Whether predictions that are no depth were left out.
+    /// Whether predicted values that are not valid depths were left out.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub allow_holes: bool,
-    /// The file of scans for the mean-depth baseline, where one was given.
+    /// The file of scans for the mean-depth baseline, if given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trivial: Option<PathBuf>,
-    /// What ran the network, and in which numbers.
+    /// The engine that ran the network, and its number format.
     pub engine: String,
-    /// Which of the data sets that the run learned its metres are of, where it learned several.
+    /// The data set whose metres were used, if the run learned several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
-    /// Whether depth was corrected for another focal length than the one trained on.
+    /// Whether depth was corrected for a focal length other than the one trained on.
     pub focal_correction: bool,
     /// The test-time augmentation, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub post_process: Option<PostProcess>,
-    /// Whether training saw none of these frames; absent where that is unknown.
+    /// Whether training saw none of these frames; absent if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<bool>,
     /// The program's version.
     pub program: String,
-    /// The command.
+    /// The command line that was run.
     pub command: String,
-    /// When, UTC: `20260131-235959`.
+    /// Time of the evaluation, in UTC: `20260131-235959`.
     pub time: String,
 }
 
-/// The weights of an evaluation.
+/// The weights that were evaluated.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ModelFile {
-    /// The checkpoint's name in the run's folder.
+    /// The checkpoint's file name in the run's folder.
     pub checkpoint: String,
-    /// SHA-256 of its bytes.
+    /// SHA-256 of the file's bytes.
     pub sha256: String,
 }
 
 /// One image's scores.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameScore {
-    /// Its name.
+    /// The image's name.
     pub name: String,
-    /// How many pixels were compared.
+    /// Number of pixels compared.
     pub pixels: usize,
-    /// Unscaled.
+    /// Metrics without scaling.
     pub abs_rel: f64,
-    /// Median-scaled.
+    /// Metrics after median scaling.
     pub abs_rel_median_scaled: f64,
     /// median(gt) / median(prediction).
     pub ratio: f64,
@@ -117,8 +117,8 @@ impl From<&ImageScore> for FrameScore {
 }
 
 impl SavedEvaluation {
-    /// Its file's name: the data's, the checkpoint's and eight digits that follow from all that decides the result, so that
-    /// the same evaluation replaces its own file and no other's.
+    /// The file's name: the data's, the checkpoint's and eight digits derived from everything that affects the result. So the same
+    /// evaluation replaces its own file and no other.
     #[must_use]
     pub fn file_name(&self) -> String {
         let place = |path: &PathBuf| {
@@ -143,7 +143,7 @@ impl SavedEvaluation {
         format!("{}.json", names.join("-"))
     }
 
-    /// All that decides the result.
+    /// Everything that affects the result, as text.
     fn decides(&self) -> String {
         let measured = &self.measured;
         let mut decides = format!(
@@ -158,7 +158,7 @@ impl SavedEvaluation {
             self.report.protocol,
             self.model.checkpoint,
         );
-        // The rest is named only where it is there: files of earlier evaluations keep their names.
+        // The rest is added only if set, so that files of earlier evaluations keep their names.
         if let Some(how) = measured.post_process {
             decides += &format!(" {how:?}");
         }
@@ -186,10 +186,10 @@ impl SavedEvaluation {
         decides
     }
 
-    /// Writes it into the run's folder, whole or not at all; the file's path.
+    /// Writes the evaluation atomically into the run's folder and returns the file's path.
     ///
     /// # Errors
-    /// [`Error::File`] naming the file.
+    /// [`Error::File`], naming the file.
     pub fn write(&self, run: &Path) -> Result<PathBuf> {
         let folder = run.join(FOLDER);
         std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
@@ -200,7 +200,7 @@ impl SavedEvaluation {
         Ok(path)
     }
 
-    /// The files of evaluations in a run's folder, by name; none where it was never evaluated.
+    /// The files of evaluations in a run's folder, sorted by name; empty if it was never evaluated.
     pub(crate) fn files(run: &Path) -> Vec<PathBuf> {
         let Ok(entries) = std::fs::read_dir(run.join(FOLDER)) else {
             return Vec::new();
@@ -217,7 +217,7 @@ impl SavedEvaluation {
 /// SHA-256 of a file's bytes, in hexadecimal.
 ///
 /// # Errors
-/// [`Error::File`] naming the file.
+/// [`Error::File`], naming the file.
 pub fn sha256_of_file(path: &Path) -> Result<String> {
     let failed = |e| Error::file(path, e);
     let mut file = std::fs::File::open(path).map_err(failed)?;
@@ -231,7 +231,7 @@ pub fn sha256_of_file(path: &Path) -> Result<String> {
     }
 }
 
-/// Letters and digits, everything else as one dash; at most 40.
+/// Keeps letters and digits, replaces everything else by single dashes; at most 40 characters.
 fn slug(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars() {

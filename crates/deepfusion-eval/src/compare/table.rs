@@ -1,31 +1,31 @@
 use super::plausibility::{Flag, Severity};
 
-/// Which end of a column is better.
+/// Which values of a column are better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Better {
-    /// Errors.
+    /// Lower is better: errors.
     Lower,
-    /// Accuracies.
+    /// Higher is better: accuracies.
     Higher,
-    /// Nearer to 1 by ratio: scales.
+    /// Nearer to 1 by ratio is better: scales.
     NearOne,
 }
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
-    /// Its name in CSV: `abs_rel`.
+    /// Its name in CSV, such as `abs_rel`.
     pub key: String,
-    /// Its heading: "Abs Rel".
+    /// Its heading, such as "Abs Rel".
     pub title: String,
-    /// Which end is better; `None` for columns that are not ranked.
+    /// Which values are better; `None` for columns that are not ranked.
     pub better: Option<Better>,
-    /// Digits after the point.
+    /// Digits after the decimal point.
     pub decimals: usize,
 }
 
 impl Column {
-    /// A column of words.
+    /// A column of text.
     #[must_use]
     pub fn words(key: &str, title: &str) -> Self {
         Self {
@@ -36,7 +36,7 @@ impl Column {
         }
     }
 
-    /// A column of numbers with three digits after the point.
+    /// A column of numbers with three digits after the decimal point.
     #[must_use]
     pub fn numbers(key: &str, title: &str, better: Option<Better>) -> Self {
         Self {
@@ -46,7 +46,7 @@ impl Column {
         }
     }
 
-    /// The seven metrics.
+    /// The columns of the seven metrics.
     #[must_use]
     pub fn metrics() -> Vec<Self> {
         const TITLES: [&str; 7] = [
@@ -69,20 +69,20 @@ impl Column {
     }
 }
 
-/// What a cell holds.
+/// The content of a cell.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Value {
-    /// Nothing: not measured, not published.
+    /// Empty: not measured or not published.
     #[default]
     Missing,
-    /// Words.
+    /// Text.
     Text(String),
     /// A number.
     Number(f64),
 }
 
 impl Value {
-    /// The number, if it is one.
+    /// The number, if the cell contains one.
     #[must_use]
     pub fn number(&self) -> Option<f64> {
         match self {
@@ -91,7 +91,7 @@ impl Value {
         }
     }
 
-    /// As it is printed.
+    /// The cell's text with this many digits after the decimal point.
     #[must_use]
     pub fn print(&self, decimals: usize) -> String {
         match self {
@@ -118,24 +118,24 @@ impl From<&str> for Value {
 /// A row of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Row {
-    /// A cell for each column.
+    /// One cell per column.
     pub cells: Vec<Value>,
-    /// What is wrong with it.
+    /// What is wrong with the row, and notes on it.
     pub flags: Vec<Flag>,
-    /// Whether it may be the best: not so the mean-depth baseline.
+    /// Whether the row is ranked; the mean-depth baseline is not.
     pub ranked: bool,
-    /// Where the figures are from.
+    /// The source of the figures.
     pub source: Option<String>,
 }
 
 impl Row {
-    /// Whether a reader must be warned of it.
+    /// Whether a reader must be warned about the row.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
         self.flags.iter().any(|f| f.severity != Severity::Note)
     }
 
-    /// Whether it takes part in the ranking: rows that cannot be right do not.
+    /// Whether the row takes part in the ranking: rows that cannot be right do not.
     fn competes(&self) -> bool {
         self.ranked
             && self
@@ -145,24 +145,24 @@ impl Row {
     }
 }
 
-/// Rank of a cell among the cells of its column that compete.
+/// Rank of a cell among the ranked cells of its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rank {
-    /// Neither.
+    /// Neither best nor second best.
     #[default]
     None,
-    /// The best, or as good as the best to the printed digits.
+    /// The best, or equal to the best by the printed digits.
     Best,
-    /// The best of the others.
+    /// The best of the remaining cells.
     Second,
 }
 
-/// Rows that may be compared with each other.
+/// A table of rows that may be compared with each other.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
-    /// What it shows.
+    /// Its title.
     pub title: String,
-    /// What was measured, and how: sentences below it.
+    /// What was measured and how: sentences printed below the title.
     pub notes: Vec<String>,
     /// Its columns.
     pub columns: Vec<Column>,
@@ -171,8 +171,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// The rank of every cell, by the digits that are printed. Nothing is ranked below two competing rows, nor where all are
-    /// equal.
+    /// The rank of every cell, by the printed digits. Nothing is ranked if fewer than two rows compete, or if all are equal.
     #[must_use]
     pub fn ranks(&self) -> Vec<Vec<Rank>> {
         let mut ranks = vec![vec![Rank::None; self.columns.len()]; self.rows.len()];
@@ -208,8 +207,7 @@ impl Table {
         ranks
     }
 
-    /// The different flags of its rows and where the figures are from, numbered from 1 in the order in which they come; and
-    /// for each row the numbers of its flags.
+    /// The distinct flags and sources of the rows, numbered from 1 in order of appearance; and for each row the numbers of its notes.
     #[must_use]
     pub fn footnotes(&self) -> (Vec<String>, Vec<Vec<usize>>) {
         let mut notes: Vec<String> = Vec::new();
@@ -231,17 +229,17 @@ impl Table {
     }
 }
 
-/// Tables that are told apart on purpose.
+/// Tables that are kept apart on purpose.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tables {
-    /// What holds for all.
+    /// Notes on all tables.
     pub notes: Vec<String>,
     /// The tables.
     pub tables: Vec<Table>,
 }
 
 impl Tables {
-    /// These tables, then those.
+    /// These tables, followed by the others.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.notes.extend(other.notes);
@@ -284,7 +282,7 @@ mod tests {
             (0.3, true),
         ]));
         assert_eq!(ranks, [Best, Best, Second, None]);
-        // The mean-depth baseline does not compete, a single row has nothing to beat.
+        // The mean-depth baseline is not ranked, and a single row has no competitor.
         assert_eq!(column(&table(&[(0.3, true), (0.1, false)])), [None, None]);
         assert_eq!(column(&table(&[(0.1, true), (0.1, true)])), [None, None]);
         assert_eq!(

@@ -1,107 +1,109 @@
-//! Why a file does not hold the arrays that it should.
+//! Why a file does not contain the expected arrays.
 
 use deepfusion_hint::count_of;
 use ndarray_npy::ReadNpyError;
 use zip::result::ZipError;
 
-/// Why a file does not hold the arrays that it should.
+/// Why a file does not contain the expected arrays.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArrayProblem {
-    /// It is another kind of file.
+    /// The file is of another kind.
     #[error("is neither an .npz nor an .npy file")]
     NotArrays,
-    /// There is nothing in it.
+    /// The file is empty.
     #[error("has no arrays")]
     Empty,
-    /// It has fewer arrays than that.
-    #[error("has {}, number {index} was asked for", count_of(*count, "array"))]
+    /// The file has fewer arrays than the index asked for.
+    #[error("has {}, but index {index} was asked for", count_of(*count, "array"))]
     NoSuchArray {
-        /// How many it has.
+        /// Number of arrays in the file.
         count: usize,
-        /// The one asked for, from 0.
+        /// The index asked for, from 0.
         index: usize,
     },
-    /// An array of other dimensions.
+    /// An array has the wrong number of dimensions.
     #[error("{array} has shape {found:?}, expected {expected}")]
     Shape {
-        /// Which one.
+        /// The array.
         array: ArrayName,
         /// Its dimensions.
         found: Vec<usize>,
-        /// What they should be.
+        /// The expected dimensions.
         expected: ExpectedShape,
     },
-    /// An array of other numbers, or of objects.
-    #[error("{array} holds values of type {found}, expected float32 or float64")]
+    /// An array contains numbers of another type, or objects.
+    #[error("{array} has values of type {found}, expected float32 or float64")]
     Numbers {
-        /// Which one.
+        /// The array.
         array: ArrayName,
-        /// NumPy's name for what it holds.
+        /// NumPy's name for the type.
         found: String,
     },
-    /// An array of which something is missing.
+    /// An array is incomplete.
     #[error("{array} has fewer numbers than its header says")]
     Cut {
-        /// Which one.
+        /// The array.
         array: ArrayName,
     },
-    /// An array that cannot be read.
+    /// An array cannot be read.
     #[error("{array} cannot be read: {source}")]
     Unreadable {
-        /// Which one.
+        /// The array.
         array: ArrayName,
-        /// What the reader says.
+        /// The reader's error.
         source: Box<ReadNpyError>,
     },
-    /// An archive that cannot be read.
+    /// The archive cannot be read.
     #[error("cannot be read: {0}")]
     Archive(#[source] Box<ZipError>),
 }
 
 impl ArrayProblem {
-    /// What to do about it, if there is something.
+    /// What to do about it, if known.
     pub(super) fn hint(&self) -> Option<&'static str> {
         match self {
             Self::NotArrays => Some(
                 "write it with numpy.savez (arrays with names) or numpy.save (N×H×W in split order)",
             ),
             Self::Empty | Self::NoSuchArray { .. } => None,
-            Self::Shape { .. } => Some("one H×W array an image; different sizes need an .npz"),
+            Self::Shape { .. } => {
+                Some("write one H×W array per image; for images of different sizes, use an .npz")
+            }
             Self::Numbers { .. } => Some(
-                "convert with .astype(numpy.float32); pickled object arrays: numpy.savez(file, **{name: array, …})",
+                "convert with .astype(numpy.float32); replace a pickled object array by numpy.savez(file, **{name: array, …})",
             ),
             Self::Cut { .. } | Self::Unreadable { .. } | Self::Archive(_) => {
-                Some("the file may be cut off: write it again")
+                Some("write the file again: it may be cut off")
             }
         }
     }
 }
 
-/// Of what shape an array must be.
+/// The expected shape of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedShape {
-    /// That of a stack of images.
+    /// A stack of images.
     #[error("N×H×W")]
     Stack,
-    /// That of one image.
+    /// One image.
     #[error("H×W")]
     Image,
-    /// That of one image with at least one pixel.
+    /// One image with at least one pixel.
     #[error("H×W, not empty")]
     ImageWithPixels,
 }
 
-/// Which array of a file.
+/// An array in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ArrayName {
-    /// The only one, or all of them in one.
+    /// The only array, or the whole stack.
     Only,
-    /// By its place, from 0.
+    /// By index, from 0.
     Number(usize),
-    /// By its name.
+    /// By name.
     Named(String),
 }
 

@@ -1,31 +1,31 @@
-//! What can go wrong with paths that are compared, and with their files.
+//! Errors when trajectories are compared, and in their files.
 
 use deepfusion_hint::{Hint, count_of, system_hint};
 use std::path::PathBuf;
 
-/// Two paths that cannot be compared.
+/// Two trajectories that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {
-    /// They have different numbers of poses.
-    #[error("{name}: {}, {}", count_of(*predicted, "predicted pose"), count_of(*truth, "true one"))]
+    /// The numbers of poses differ.
+    #[error("{name}: {}, {}", count_of(*predicted, "predicted pose"), count_of(*truth, "true pose"))]
     Lengths {
-        /// The drive.
+        /// Name of the drive.
         name: String,
         /// Number of predicted poses.
         predicted: usize,
         /// Number of true poses.
         truth: usize,
     },
-    /// There is no motion to compare.
-    #[error("{name}: {}, and a motion takes two", count_of(*poses, "pose"))]
+    /// Too few poses for a single motion.
+    #[error("{name}: {}, expected at least 2", count_of(*poses, "pose"))]
     TooShort {
-        /// The drive.
+        /// Name of the drive.
         name: String,
-        /// How many poses there are.
+        /// Number of poses.
         poses: usize,
     },
-    /// Files with times of which too few agree.
+    /// Too few of the two files' times agree.
     #[error(
         "{name}: only {matched} of {} {} within {within_s} s of {}",
         count_of(*predicted, "predicted time"),
@@ -33,25 +33,25 @@ pub enum TrackError {
         one_of(*truth)
     )]
     Times {
-        /// The predicted file.
+        /// Name of the predicted file.
         name: String,
-        /// How many poses have a partner.
+        /// Number of predicted poses that have a true pose.
         matched: usize,
         /// Number of predicted poses.
         predicted: usize,
         /// Number of true poses.
         truth: usize,
-        /// How near two times must be, in seconds.
+        /// Largest difference of matching times, in seconds.
         within_s: f64,
     },
 }
 
-/// One of so many true times.
+/// The true times, in words.
 fn one_of(truth: usize) -> String {
     if truth == 1 {
-        "the true one".to_owned()
+        "the true time".to_owned()
     } else {
-        format!("one of the {truth} true ones")
+        format!("one of the {truth} true times")
     }
 }
 
@@ -60,42 +60,42 @@ impl Hint for TrackError {
         Some(
             match self {
                 Self::Lengths { .. } => {
-                    "files without times are matched line by line: write a pose for every frame of both, or TUM files"
+                    "write a pose for every frame in both files, or use TUM files: files without times are matched line by line"
                 }
-                Self::TooShort { .. } => "give at least two consecutive frames",
-                Self::Times { .. } => "both files must count seconds from the same moment",
+                Self::TooShort { .. } => "give a drive with at least two consecutive frames",
+                Self::Times { .. } => "count seconds from the same moment in both files",
             }
             .into(),
         )
     }
 }
 
-/// A pose file that cannot be read.
+/// A pose file that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseFileError {
-    /// It cannot be opened or written.
+    /// The file cannot be opened or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A line is no pose.
+    /// A line is not a pose.
     #[error("{}:{line}: {problem}", path.display())]
     Line {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line, counted from 1.
+        /// The line's number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// What is wrong with the line.
         problem: PoseLineProblem,
     },
-    /// It holds no pose at all.
-    #[error("{}: no pose in it", path.display())]
+    /// The file contains no poses.
+    #[error("{}: contains no poses", path.display())]
     Empty {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
@@ -105,7 +105,7 @@ impl Hint for PoseFileError {
         match self {
             Self::Io { source, .. } => Some(system_hint(source.kind()).into()),
             Self::Line { .. } | Self::Empty { .. } => Some(
-                "a line is a pose of the camera in the world: KITTI's 12 numbers (the rows of [R t]), or TUM's \
+                "write one pose of the camera in the world per line: KITTI's 12 numbers (the rows of [R t]), or TUM's \
                  8 (time tx ty tz qx qy qz qw); # starts a comment"
                     .into(),
             ),
@@ -113,58 +113,58 @@ impl Hint for PoseFileError {
     }
 }
 
-/// Why a line is no pose.
+/// Why a line is not a pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseLineProblem {
-    /// As many columns as neither format has.
+    /// The number of columns matches neither format.
     #[error("{}, expected 12 (KITTI) or 8 (TUM)", count_of(*found, "column"))]
     Columns {
-        /// How many.
+        /// Number of columns found.
         found: usize,
     },
-    /// Other columns than those of the lines before.
-    #[error("{}, the lines before have {before}", count_of(*found, "column"))]
+    /// The number of columns differs from the previous lines.
+    #[error("{}, expected {before} as in the lines before", count_of(*found, "column"))]
     OtherColumns {
-        /// How many.
+        /// Number of columns found.
         found: usize,
-        /// How many the lines before have.
+        /// Number of columns in the lines before.
         before: usize,
     },
-    /// A word that is not a number.
+    /// A word is not a number.
     #[error("'{text}' is not a number")]
     NotANumber {
-        /// Its first 40 letters.
+        /// The word's first 40 characters.
         text: String,
     },
-    /// A number that no pose has.
+    /// A number is infinite or NaN.
     #[error("{value} is not a finite number")]
     NotFinite {
         /// The number.
         value: f64,
     },
-    /// Three rows that are no rotation.
+    /// The first three columns are not a rotation.
     #[error(
-        "its first three columns are no rotation (R·Rᵀ is {off:.2e} from the identity, its determinant {determinant:.3})"
+        "its first three columns are not a rotation (R·Rᵀ is {off:.2e} from the identity, its determinant {determinant:.3})"
     )]
     Rotation {
-        /// How far R·Rᵀ is from the identity.
+        /// Distance of R·Rᵀ from the identity (Frobenius norm).
         off: f64,
-        /// The determinant.
+        /// The determinant of R.
         determinant: f64,
     },
-    /// Four numbers that are no rotation.
-    #[error("its quaternion has length {length:.4}, a rotation's has 1")]
+    /// The quaternion does not have length 1.
+    #[error("its quaternion has length {length:.4}, expected 1")]
     Quaternion {
-        /// The length.
+        /// Length of the quaternion.
         length: f64,
     },
-    /// A time that does not rise.
-    #[error("time {time_s} is not after {before_s}, the one before")]
+    /// Times do not increase.
+    #[error("time {time_s} is not after {before_s}, the time before")]
     Time {
-        /// The time, in seconds.
+        /// The line's time, in seconds.
         time_s: f64,
-        /// That of the line before.
+        /// Time of the line before, in seconds.
         before_s: f64,
     },
 }

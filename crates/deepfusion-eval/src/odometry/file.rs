@@ -3,13 +3,13 @@ use super::{PoseFileError, PoseLineProblem, TrackError, TrackPair};
 use deepfusion_geometry::Se3;
 use std::path::{Path, PathBuf};
 
-/// Two times nearer than this are one moment, in seconds: less than half a frame at 25 Hz.
+/// Two times that differ by less than this are the same moment, in seconds: less than half a frame at 25 Hz.
 const SAME_MOMENT_S: f64 = 0.01;
 
-/// How a file writes poses.
+/// The format of a pose file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PoseFormat {
-    /// KITTI's odometry benchmark: the upper three rows of `world_from_cam`, 12 numbers a line, no time.
+    /// KITTI's odometry benchmark: the upper three rows of `world_from_cam`, 12 numbers per line, no time.
     Kitti,
     /// TUM's RGB-D benchmark: `time tx ty tz qx qy qz qw` of `world_from_cam`, in seconds and metres.
     Tum,
@@ -18,22 +18,22 @@ pub enum PoseFormat {
 /// A file of poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseFile {
-    /// Where it was read.
+    /// Path the file was read from.
     pub path: PathBuf,
-    /// How it is written, recognised by the number of columns.
+    /// The format, recognised by the number of columns.
     pub format: PoseFormat,
     /// `world_from_cam`, in the file's order.
     pub poses: Vec<Se3>,
-    /// Times in seconds, strictly rising; empty for KITTI's format.
+    /// Times in seconds, strictly increasing; empty for KITTI's format.
     pub times_s: Vec<f64>,
 }
 
 impl PoseFile {
-    /// Reads a file of either format; empty lines and lines that start with `#` are passed over.
+    /// Reads a file in either format. Empty lines and lines that start with `#` are skipped.
     ///
     /// # Errors
-    /// [`PoseFileError`] with the line where it has another number of columns than the first, a value is no finite
-    /// number, three rows are no rotation, a quaternion is not of length 1, or a time does not rise.
+    /// [`PoseFileError`], with the line, if the number of columns changes, a value is not a finite number, a matrix or a quaternion is not
+    /// a rotation, or a time does not increase.
     pub fn read(path: &Path) -> Result<Self, PoseFileError> {
         let bytes = std::fs::read(path).map_err(|source| PoseFileError::Io {
             path: path.to_owned(),
@@ -82,11 +82,11 @@ impl PoseFile {
         })
     }
 
-    /// The predicted poses of `self` beside the true ones of `truth`. Two files with times are matched by the nearest
-    /// time within 10 ms, each pose at most once, poses without a partner left out; otherwise line by line.
+    /// Pairs the predicted poses of `self` with the true ones of `truth`. If both files have times, each pose is matched with the nearest
+    /// time within 10 ms, at most once, and poses without a match are left out. Otherwise they are matched line by line.
     ///
     /// # Errors
-    /// [`TrackError`] where the numbers of lines differ, or fewer than two times agree.
+    /// [`TrackError`] if the numbers of lines differ, or fewer than two times agree.
     pub fn beside(&self, truth: &Self) -> Result<TrackPair, TrackError> {
         let name = self
             .path
@@ -103,7 +103,7 @@ impl PoseFile {
         }
         let (mut true_poses, mut predicted, mut times_s) = (Vec::new(), Vec::new(), Vec::new());
         for (i, (pose, time_s)) in self.poses.iter().zip(&self.times_s).enumerate() {
-            // Of several that are nearest to one true pose, as those of a faster path are, the nearest.
+            // If several share a nearest true pose, as in a trajectory with a higher rate, keep the nearest.
             if let Some(partner) = nearest(&truth.times_s, *time_s)
                 && nearest(&self.times_s, truth.times_s[partner]) == Some(i)
             {
@@ -125,7 +125,7 @@ impl PoseFile {
     }
 }
 
-/// The index of the time nearest to `time_s`, if it is the same moment.
+/// The index of the time nearest to `time_s`, if both are the same moment.
 fn nearest(times_s: &[f64], time_s: f64) -> Option<usize> {
     let after = times_s.partition_point(|t| *t < time_s);
     let candidates = after.saturating_sub(1)..(after + 1).min(times_s.len());
@@ -184,7 +184,7 @@ mod tests {
         let cases = [
             (
                 format!("{good}1 2 3\n"),
-                "p.txt:3: 3 columns, the lines before have 12",
+                "p.txt:3: 3 columns, expected 12 as in the lines before",
             ),
             (
                 "1 2 3\n".into(),
@@ -198,14 +198,14 @@ mod tests {
                 good.replacen("0.000000000000e+00", "left", 1),
                 "'left' is not a number",
             ),
-            (scaled.into(), "no rotation"),
-            (mirrored.into(), "no rotation"),
+            (scaled.into(), "not a rotation"),
+            (mirrored.into(), "not a rotation"),
             ("0 1 2 3 0 0 0 2\n".into(), "length 2"),
             (
                 "1 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n".into(),
                 "p.txt:2: time 1 is not after 1",
             ),
-            ("# nothing\n".into(), "no pose"),
+            ("# nothing\n".into(), "no poses"),
         ];
         for (text, expected) in cases {
             let error = parse(&text).unwrap_err();
@@ -233,7 +233,9 @@ mod tests {
         assert!(error.to_string().contains("only 0 of 2"), "{error}");
         let error = file(vec![], &path(5)).beside(&truth).unwrap_err();
         assert!(
-            error.to_string().contains("5 predicted poses, 6 true"),
+            error
+                .to_string()
+                .contains("5 predicted poses, 6 true poses"),
             "{error}"
         );
     }

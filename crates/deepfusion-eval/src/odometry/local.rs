@@ -3,29 +3,29 @@ use crate::statistics::{mean, median};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
-/// Poses of a snippet of the absolute trajectory error.
+/// Number of poses in a snippet for the absolute trajectory error.
 const ATE_POSES: usize = 5;
-/// Pairs in which the camera truly moves less say nothing about the scale, in metres.
+/// Pairs of frames between which the camera moves less than this, in metres, are not used for the scale.
 const MOVING_M: f64 = 0.05;
 
 /// Errors over a few frames.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Local {
-    /// Per snippet of five poses: √(mean ‖p̂ − p‖²), positions seen from the snippet's first pose, in metres.
+    /// Per snippet of five poses: √(mean ‖p̂ − p‖²), with positions relative to the snippet's first pose, in metres.
     pub ate_m: Vec<f64>,
-    /// The same in SfMLearner's form, for its tables: positions scaled by the least squares' factor first, and
-    /// √(Σ ‖p̂ − p‖²) / 5 instead.
+    /// The same in SfMLearner's form, for comparison with its tables: positions are first scaled by the least-squares factor, and the error
+    /// is √(Σ ‖p̂ − p‖²) / 5.
     pub ate_scaled_m: Vec<f64>,
-    /// Per pair of frames: true over predicted displacement, where the camera moves.
+    /// Per pair of frames: true over predicted displacement, for pairs between which the camera moves.
     pub ratios: Vec<f64>,
-    /// Per pair of frames: the length of what is left of the predicted motion after the true one, in metres.
+    /// Per pair of frames: translation of the error motion (the predicted motion relative to the true one), in metres.
     pub pair_m: Vec<f64>,
-    /// Per pair of frames: its angle, in radians.
+    /// Per pair of frames: rotation angle of the error motion, in radians.
     pub pair_rad: Vec<f64>,
 }
 
 impl Local {
-    /// Of all drives.
+    /// The errors of all drives.
     #[must_use]
     pub fn of(tracks: &[TrackPair]) -> Self {
         let mut local = Self::default();
@@ -44,7 +44,7 @@ impl Local {
         median(&self.ratios)
     }
 
-    /// The mean over snippets.
+    /// The mean absolute trajectory error over snippets.
     #[must_use]
     pub fn mean_ate_m(&self) -> Option<f64> {
         mean(&self.ate_m)

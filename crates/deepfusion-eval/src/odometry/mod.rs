@@ -1,8 +1,7 @@
-//! Odometry: a predicted path of the camera beside the true one.
+//! Odometry: compares predicted trajectories of the camera with the true ones.
 //!
-//! Every number is unscaled, as a metric method must stand it: nothing is aligned but the place and the
-//! direction from which a stretch starts. A pose is `world_from_cam`, in metres; the two paths' worlds need
-//! not be the same, since only motions within a path are compared.
+//! Every number is unscaled, as is fair for a metric method: only the position and the direction at the start of a stretch are aligned. A
+//! pose is `world_from_cam`, in metres. The two world frames may differ, since only motions within a trajectory are compared.
 
 mod error;
 mod file;
@@ -21,22 +20,22 @@ pub use segments::{SegmentError, Segments};
 
 use deepfusion_geometry::Se3;
 
-/// One drive's predicted and true poses, frame by frame.
+/// The predicted and true poses of one drive, frame by frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackPair {
-    /// The drive's name.
+    /// Name of the drive.
     pub name: String,
     /// True `world_from_cam`.
     pub truth: Vec<Se3>,
     /// Predicted `world_from_cam`.
     pub predicted: Vec<Se3>,
-    /// Their times, in seconds; empty where they are unknown.
+    /// Times of the poses, in seconds; empty if unknown.
     pub times_s: Vec<f64>,
 }
 
 impl TrackPair {
     /// # Errors
-    /// [`TrackError`] where the two differ in length, or hold no motion.
+    /// [`TrackError`] if the two differ in length or have fewer than two poses.
     pub fn new(
         name: impl Into<String>,
         truth: Vec<Se3>,
@@ -64,22 +63,21 @@ impl TrackPair {
         })
     }
 
-    /// The same with the times of its poses, in seconds.
+    /// The same drive with times for its poses, in seconds.
     #[must_use]
     pub fn with_times(mut self, times_s: Vec<f64>) -> Self {
         self.times_s = times_s;
         self
     }
 
-    /// Length of the true path, in metres.
+    /// Length of the true trajectory, in metres.
     #[must_use]
     pub fn distance_m(&self) -> f64 {
         distances(&self.truth).last().copied().unwrap_or(0.0)
     }
 }
 
-/// Poses from the motions between consecutive frames: `motions[i]` is `frame(i+1)_from_frame(i)`, and the world is
-/// the first frame.
+/// Poses from the motions between consecutive frames: `motions[i]` is `frame(i+1)_from_frame(i)`. The world is the first frame.
 #[must_use]
 pub fn chain(motions: &[Se3]) -> Vec<Se3> {
     let mut poses = vec![Se3::identity()];
@@ -91,14 +89,14 @@ pub fn chain(motions: &[Se3]) -> Vec<Se3> {
     poses
 }
 
-/// The same path in the world of its first pose, as KITTI writes paths.
+/// The same trajectory relative to its first pose, as in KITTI's files.
 #[must_use]
 pub fn from_first(poses: &[Se3]) -> Vec<Se3> {
     let first_from_world = poses.first().map_or_else(Se3::identity, Se3::inverse);
     poses.iter().map(|pose| first_from_world * *pose).collect()
 }
 
-/// Length of the path up to each pose, in metres.
+/// Distance travelled up to each pose, in metres.
 fn distances(poses: &[Se3]) -> Vec<f64> {
     let mut length = 0.0;
     let mut lengths = Vec::with_capacity(poses.len());
@@ -140,7 +138,7 @@ mod tests {
         let one = vec![Se3::identity()];
         let two = vec![Se3::identity(); 2];
         let error = TrackPair::new("drive", one.clone(), two).unwrap_err();
-        assert!(error.to_string().contains("2 predicted poses, 1 true"));
+        assert!(error.to_string().contains("2 predicted poses, 1 true pose"));
         let error = TrackPair::new("drive", one.clone(), one).unwrap_err();
         assert!(error.to_string().contains("1 pose"), "{error}");
     }

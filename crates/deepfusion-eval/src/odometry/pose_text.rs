@@ -1,22 +1,22 @@
-//! Lines of pose files.
+//! Parses and writes the lines of pose files.
 
 use super::{PoseFormat, PoseLineProblem};
 use deepfusion_geometry::{Se3, kitti_line};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write as _;
 
-/// How far R·Rᵀ may be from the identity (Frobenius norm), and a quaternion's length from 1: files carry six digits,
-/// some programs single precision, and what is no rotation is off by its scale.
+/// Largest accepted distance of R·Rᵀ from the identity (Frobenius norm), and of a quaternion's length from 1. Files have six digits or
+/// single precision; the usual mistake, a scaled matrix, is off by much more.
 const ROTATION_TOLERANCE: f64 = 1e-2;
 
-/// What a line says.
+/// The content of a line.
 pub(super) struct Line {
     pub(super) format: PoseFormat,
     pub(super) pose: Se3,
     pub(super) time_s: Option<f64>,
 }
 
-/// Reads a line in the format of those before it, or, for the first, in the one its number of columns means.
+/// Reads a line in the format of the lines before it. The first line's format follows from its number of columns.
 pub(super) fn parse_line(line: &str, before: Option<PoseFormat>) -> Result<Line, PoseLineProblem> {
     let values = line
         .split([' ', '\t', ','])
@@ -80,7 +80,7 @@ fn from_quaternion(v: &[f64]) -> Result<Se3, PoseLineProblem> {
     ))
 }
 
-/// Poses in KITTI's format: the upper three rows of `world_from_cam`, 12 numbers a line.
+/// Poses in KITTI's format: the upper three rows of `world_from_cam`, 12 numbers per line.
 #[must_use]
 pub fn kitti_text(poses: &[Se3]) -> String {
     let mut text = String::new();
@@ -91,7 +91,7 @@ pub fn kitti_text(poses: &[Se3]) -> String {
     text
 }
 
-/// Poses in TUM's format, with a comment that names the columns; the longer slice is cut to the shorter.
+/// Poses in TUM's format, with a comment that names the columns. If the slices differ in length, the longer one is cut.
 #[must_use]
 pub fn tum_text(poses: &[Se3], times_s: &[f64]) -> String {
     let mut text = String::from("# time_s tx ty tz qx qy qz qw\n");
@@ -107,7 +107,7 @@ pub fn tum_text(poses: &[Se3], times_s: &[f64]) -> String {
     text
 }
 
-/// w, x, y, z of the rotation; of the two quaternions that mean it, the one whose w is not negative.
+/// w, x, y, z of the rotation; of the two equivalent quaternions, the one with w ≥ 0.
 fn quaternion(pose: &Se3) -> [f64; 4] {
     let wxyz = pose.quaternion();
     if wxyz[0] < 0.0 {

@@ -2,73 +2,73 @@ use super::{Local, Segments, TrackPair};
 use crate::statistics::mean;
 use serde::{Deserialize, Serialize};
 
-/// What an evaluation of odometry says, over all drives together. Serialises to the JSON that scripts rely on: a number
-/// that does not exist is `null`, never NaN.
+/// The result of an odometry evaluation over all drives. It serialises to JSON that scripts rely on: a number that does not exist is
+/// `null`, never NaN.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OdometryReport {
-    /// How many poses were compared.
+    /// Number of poses compared.
     pub n: usize,
-    /// Length of the true paths, in metres.
+    /// Length of the true trajectories, in metres.
     pub distance_m: f64,
-    /// Drift over stretches of `lengths_m`, in percent of their length; `None` where no stretch fits.
+    /// Translation drift over stretches of `lengths_m`, in percent of their length; `None` if no stretch fits.
     pub t_rel_percent: Option<f64>,
-    /// Turn over the same stretches, in degrees per metre.
+    /// Rotation drift over the same stretches, in degrees per metre.
     pub r_rel_deg_per_m: Option<f64>,
-    /// The absolute trajectory error of snippets of five poses, in metres: mean over snippets of the root mean square,
-    /// each seen from its first pose. Unscaled.
+    /// The absolute trajectory error of snippets of five poses, in metres: the root mean square relative to the snippet's first pose,
+    /// averaged over snippets. Unscaled.
     pub ate_m: Option<f64>,
-    /// Median over pairs of frames of the true over the predicted displacement: 1 for a metric method.
+    /// Median over pairs of frames of true / predicted displacement: 1 for a metric method.
     pub scale: Option<f64>,
-    /// The lengths of which there were stretches: of 100 to 800 m, or, where no drive is long enough, of 10 to 50 m.
+    /// The lengths of the stretches: 100 to 800 m, or 10 to 50 m if no drive is long enough.
     pub lengths_m: Vec<u32>,
-    /// Where the true poses come from.
+    /// Source of the true poses.
     pub truth: String,
-    /// The five-pose error in SfMLearner's form (each snippet scaled, √(Σ e²)/5), for tables that print that.
+    /// The five-pose error in SfMLearner's form (each snippet scaled, √(Σ e²)/5), for comparison with tables that use it.
     pub ate_scaled_m: Option<f64>,
-    /// Root mean square over pairs of frames of the motion that is left, in metres.
+    /// Root mean square over pairs of frames of the translation error, in metres.
     pub rpe_m: Option<f64>,
-    /// The same of its angle, in degrees.
+    /// Root mean square over pairs of frames of the rotation error, in degrees.
     pub rpe_deg: Option<f64>,
-    /// By length.
+    /// Drift by length of the stretch.
     pub lengths: Vec<LengthRow>,
-    /// By drive.
+    /// Results of each drive.
     pub drives: Vec<TrackRow>,
 }
 
-/// The drift over stretches of one length.
+/// Drift over the stretches of one length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LengthRow {
-    /// The length, in metres.
+    /// The nominal length, in metres.
     pub length_m: u32,
-    /// How many stretches.
+    /// Number of stretches.
     pub n: usize,
-    /// Drift, in percent.
+    /// Translation drift, in percent.
     pub t_rel_percent: f64,
-    /// Turn, in degrees per metre.
+    /// Rotation drift, in degrees per metre.
     pub r_rel_deg_per_m: f64,
 }
 
-/// One drive's numbers; its stretches are of the same lengths as the others'.
+/// Results of one drive, for stretches of the same lengths as in the whole report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrackRow {
-    /// The drive's name.
+    /// Name of the drive.
     pub name: String,
-    /// How many poses.
+    /// Number of poses.
     pub n: usize,
-    /// Length of the true path, in metres.
+    /// Length of the true trajectory, in metres.
     pub distance_m: f64,
-    /// Drift, in percent.
+    /// Translation drift, in percent.
     pub t_rel_percent: Option<f64>,
-    /// Turn, in degrees per metre.
+    /// Rotation drift, in degrees per metre.
     pub r_rel_deg_per_m: Option<f64>,
-    /// Five-pose error, in metres.
+    /// Absolute trajectory error of five poses, in metres.
     pub ate_m: Option<f64>,
-    /// True over predicted displacement.
+    /// Median of true / predicted displacement.
     pub scale: Option<f64>,
 }
 
 impl OdometryReport {
-    /// Of all drives together; `truth` says where the true poses come from.
+    /// The report over all drives; `truth` names the source of the true poses.
     #[must_use]
     pub fn of(tracks: &[TrackPair], truth: impl Into<String>) -> Self {
         let segments = Segments::of(tracks);
@@ -99,7 +99,7 @@ impl OdometryReport {
 
 fn track_row(track: &TrackPair, all: &Segments) -> TrackRow {
     let own = Segments::of(std::slice::from_ref(track));
-    // A short drive beside a long one has no stretch of the long one's lengths.
+    // A short drive beside a long one has no stretches of the long one's lengths.
     let same = own.lengths_m == all.lengths_m;
     let (t_rel_percent, r_rel_deg_per_m) = drift(&own, |_| same);
     let local = Local::of(std::slice::from_ref(track));
@@ -128,7 +128,7 @@ fn length_row(segments: &Segments, length_m: u32) -> Option<LengthRow> {
     })
 }
 
-/// Percent and degrees per metre, means over the stretches of the lengths wanted.
+/// Percent and degrees per metre: means over the stretches with the lengths `wanted`.
 fn drift(segments: &Segments, wanted: impl Fn(u32) -> bool) -> (Option<f64>, Option<f64>) {
     let chosen: Vec<_> = segments
         .errors

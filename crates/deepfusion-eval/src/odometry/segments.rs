@@ -1,36 +1,36 @@
 use super::{TrackPair, distances};
 use deepfusion_geometry::Se3;
 
-/// Lengths of KITTI's odometry benchmark, in metres.
+/// Stretch lengths of KITTI's odometry benchmark, in metres.
 const KITTI_LENGTHS_M: [u32; 8] = [100, 200, 300, 400, 500, 600, 700, 800];
-/// Lengths where no drive is 100 m long.
+/// Stretch lengths if no drive is 100 m long.
 pub(super) const SHORT_LENGTHS_M: [u32; 5] = [10, 20, 30, 40, 50];
-/// KITTI's devkit starts a stretch at every tenth frame (each second); on short drives every frame counts.
+/// KITTI's devkit starts a stretch at every tenth frame (once a second); on short drives, every frame starts one.
 const KITTI_STEP: usize = 10;
 
-/// The drift over one stretch of the road.
+/// The drift over one stretch of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SegmentError {
     /// Its nominal length, in metres.
     pub length_m: u32,
-    /// Drift per metre: the translation of E over the length.
+    /// Translation of E divided by the length.
     pub translation: f64,
-    /// Turn per metre: the angle of E over the length, in radians per metre.
+    /// Rotation angle of E divided by the length, in radians per metre.
     pub rotation_radpm: f64,
 }
 
-/// KITTI's drift over stretches of the true path: for a stretch from frame a to frame b, the first one more than
-/// the length farther along the road, E = (P_a⁻¹·P_b)⁻¹·(G_a⁻¹·G_b).
+/// KITTI's drift over stretches of the true trajectory. A stretch goes from frame a to b, the first frame more than the length farther
+/// along the road. Its error is E = (P_a⁻¹·P_b)⁻¹·(G_a⁻¹·G_b).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segments {
-    /// The lengths that were asked for.
+    /// The lengths in use.
     pub lengths_m: &'static [u32],
     /// All stretches of all drives.
     pub errors: Vec<SegmentError>,
 }
 
 impl Segments {
-    /// The stretches of KITTI's lengths; where no drive has one, those of 10 to 50 m.
+    /// The stretches with KITTI's lengths, or those of 10 to 50 m if no drive has any.
     #[must_use]
     pub fn of(tracks: &[TrackPair]) -> Self {
         let kitti = Self::with_lengths(tracks, &KITTI_LENGTHS_M, KITTI_STEP);
@@ -58,7 +58,7 @@ impl Segments {
         Self { lengths_m, errors }
     }
 
-    /// Whether they are the short lengths.
+    /// Whether the short lengths are in use.
     #[must_use]
     pub fn short(&self) -> bool {
         self.lengths_m == SHORT_LENGTHS_M
@@ -86,8 +86,8 @@ mod tests {
         (0..frames).map(at).collect()
     }
 
-    /// A path that is 2 % too long: stretches end at the first frame beyond their length, so that the drift over
-    /// 100 m is 2 % of 101 m where frames are a metre apart.
+    /// A trajectory that is 2 % too long. Stretches end at the first frame beyond their length, so with frames a metre apart the drift over
+    /// 100 m is 2 % of 101 m.
     #[test]
     fn a_scale_error_is_its_own_drift() {
         let track = TrackPair::new("d", straight(152, 1.0), straight(152, 1.02)).unwrap();

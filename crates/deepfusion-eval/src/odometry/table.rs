@@ -6,7 +6,7 @@ use std::fmt;
 const LABEL: usize = 30;
 
 impl fmt::Display for OdometryReport {
-    /// The tables for people: one row a drive and one for all, then the drift by length.
+    /// The tables for people: one row per drive and one for all, then the drift by length.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
@@ -44,7 +44,7 @@ impl fmt::Display for OdometryReport {
         self.lengths_lines(f)?;
         writeln!(
             f,
-            "ATE    over 5 poses, root mean square from the first, mean over snippets{}",
+            "ATE    over 5 poses, root mean square relative to the first, mean over snippets{}",
             match self.ate_scaled_m {
                 Some(scaled) => format!("; SfMLearner's form (scaled, √Σe²/5): {scaled:.4} m"),
                 None => String::new(),
@@ -64,7 +64,7 @@ impl fmt::Display for OdometryReport {
 impl OdometryReport {
     fn lengths_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.lengths.first() {
-            None => writeln!(f, "drift  no stretch of 10 m: the drive is too short"),
+            None => writeln!(f, "drift  no stretches of 10 m: the drives are too short"),
             Some(first) => {
                 let short = SHORT_LENGTHS_M.contains(&first.length_m);
                 writeln!(

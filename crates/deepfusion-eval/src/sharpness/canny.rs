@@ -1,28 +1,26 @@
 //! Edges of a depth map.
 //!
-//! Our own: `canny` of `imageproc` 0.27 takes 8-bit images, so that a depth map would be cut into 256 steps (0.3 m each up to
-//! 80 m, which makes stairs of every slope). Its σ is fixed, and it has no mask for pixels without depth.
+//! Our own code, because `canny` of `imageproc` 0.27 takes 8-bit images. A depth map would be reduced to 256 steps (0.3 m each up to 80 m,
+//! which turns every slope into stairs). It also has a fixed σ and no mask for pixels without depth.
 
 use super::smooth::gaussian;
 
-/// Standard deviation of the smoothing, in pixels, and the thresholds on Sobel's gradient of values in [0, 1]: those of
-/// iBims-1's evaluation script. A step of height h between two pixels, so smoothed, has the gradient 1.98 h at both: edges
-/// start at steps of 15 % of the map's range of depth, and go on down to 8 %.
+/// Standard deviation of the smoothing, in pixels, and the thresholds on Sobel's gradient of values in [0, 1], as in iBims-1's evaluation
+/// script. After this smoothing, a step of height h between two pixels has the gradient 1.98 h at both. So edges start at steps of 15 % of
+/// the map's range of depth and continue down to 8 %.
 const SIGMA: f64 = std::f64::consts::SQRT_2;
 const LOW: f64 = 0.15;
 const HIGH: f64 = 0.3;
 
-/// Gradients that differ by less than this share are equal: of a step between two pixels both see the same, but for
-/// rounding.
+/// Gradients that differ by less than this share are equal: the two pixels at a step have the same gradient except for rounding.
 const EQUAL: f64 = 1e-9;
 
-/// Canny's edges of an H×W map, whatever its unit: it is brought to [0, 1] by its smallest and largest known value
-/// first. Smoothing, Sobel's gradient, pixels whose gradient is the largest across the edge (interpolated between the
-/// neighbours, as in scikit-image), and of these connected lines the ones that reach the high threshold.
+/// Canny's edges of an H×W map of any unit. Values are first normalised to [0, 1] by the smallest and largest known value. Then follow
+/// smoothing, Sobel's gradient, the pixels whose gradient is the largest across the edge (interpolated between the neighbours, as in
+/// scikit-image), and of these the connected lines that reach the high threshold.
 ///
-/// Pixels beside an unknown one, and the image's border, are never edges: what would make them one is not known. Of
-/// two equally good pixels the first (left, upper) is the edge, so that lines are one pixel wide; scikit-image keeps
-/// both.
+/// Pixels beside an unknown one, and those on the image's border, are never edges, because their gradient is not known. Of two equally good
+/// pixels the first (left, upper) is the edge, so that lines are one pixel wide; scikit-image keeps both.
 pub(super) fn edges(map: &[f64], known: &[bool], (width, height): (usize, usize)) -> Vec<bool> {
     let none = vec![false; map.len()];
     let Some(normalised) = normalised(map, known) else {
@@ -44,7 +42,7 @@ pub(super) fn edges(map: &[f64], known: &[bool], (width, height): (usize, usize)
     connected_to_strong(&candidate, &gradient.size, width)
 }
 
-/// To [0, 1] by the known values' range; `None` where they are all the same.
+/// Normalises to [0, 1] by the known values' range; `None` if they are all equal.
 fn normalised(map: &[f64], known: &[bool]) -> Option<Vec<f64>> {
     let of_known = || map.iter().zip(known).filter(|(_, k)| **k).map(|(v, _)| *v);
     let least = of_known().fold(f64::INFINITY, f64::min);
@@ -53,7 +51,7 @@ fn normalised(map: &[f64], known: &[bool]) -> Option<Vec<f64>> {
     (range > 0.0).then(|| map.iter().map(|v| (v - least) / range).collect())
 }
 
-/// Sobel's gradient, not divided by its weights' sum of 8; beyond the border the border's values.
+/// Sobel's gradient, not divided by the sum 8 of its weights. Border values are repeated beyond the border.
 struct Gradient {
     x: Vec<f64>,
     y: Vec<f64>,
@@ -86,13 +84,13 @@ impl Gradient {
         }
     }
 
-    /// Whether the gradient is nowhere larger one step along it, forward or back. The step ends between a neighbour
-    /// along an axis and a diagonal one, where the size is interpolated. For pixels that are not on the border.
+    /// Whether the gradient is not larger one step along its direction, forward or back. The step ends between a neighbour along an axis
+    /// and a diagonal one, where the gradient is interpolated. Only for pixels that are not on the border.
     fn is_largest_across(&self, x: usize, y: usize) -> bool {
         let here = y * self.width + x;
         let (gx, gy, size) = (self.x[here], self.y[here], self.size[here]);
         let steep = gy.abs() > gx.abs();
-        // Right or down is forward, whichever way the depth grows: ties then fall the same way on both sides of a thing.
+        // Right or down counts as forward, whichever way the depth grows, so that ties are resolved alike on both sides of an object.
         let same_sign = (gx > 0.0) == (gy > 0.0);
         let (straight, sideways) = if steep {
             (self.width as isize, 1)
@@ -110,7 +108,7 @@ impl Gradient {
     }
 }
 
-/// The candidates that hang together, over eight neighbours, with one at the high threshold.
+/// The candidates in connected groups (eight neighbours) that contain one at the high threshold.
 fn connected_to_strong(candidate: &[bool], size: &[f64], width: usize) -> Vec<bool> {
     let mut edges = vec![false; candidate.len()];
     let mut reached: Vec<usize> = (0..candidate.len())
@@ -151,14 +149,14 @@ mod tests {
         let step = |x: usize| if x < 12 { 5.0 } else { 20.0 };
         assert_eq!(columns_of(step, |_| false), [11]);
         assert_eq!(columns_of(|x| 25.0 - step(x), |_| false), [11]);
-        // With a pixel half way, that is the edge.
+        // With a pixel at half the height, that pixel is the edge.
         let soft = |x: usize| if x == 12 { 12.5 } else { step(x) };
         assert_eq!(columns_of(soft, |_| false), [12]);
     }
 
     #[test]
     fn small_steps_slopes_and_flat_maps_have_none() {
-        // Of a range of 1: 0.1 is below the 0.15 of the high threshold.
+        // With a range of 1, a step of 0.1 is below the 0.15 of the high threshold.
         let small = |x: usize| match x {
             0 => 0.0,
             1..12 => 0.45,
@@ -166,7 +164,7 @@ mod tests {
             _ => 1.0,
         };
         assert!(!columns_of(small, |_| false).contains(&11));
-        // A slope over the whole map: 8/23 is above the threshold, but nowhere a maximum except at its start.
+        // A slope over the whole map: its gradient, 8/23, is above the threshold, but has no maximum except at its start.
         assert!(columns_of(|x| x as f64, |_| false).len() <= 1);
         assert!(columns_of(|_| 9.0, |_| false).is_empty());
         assert!(columns_of(|x| x as f64, |_| true).is_empty());
@@ -174,7 +172,7 @@ mod tests {
 
     #[test]
     fn the_border_of_a_hole_is_no_edge() {
-        // 1e9 in the hole must not be seen; the step inside it cannot be.
+        // The 1e9 in the hole must be ignored, and the step inside the hole must stay invisible.
         let step = |x: usize| match x {
             10..14 => 1e9,
             _ if x < 12 => 5.0,

@@ -1,7 +1,7 @@
-/// Euclidean distance of each pixel to the nearest of `marked`, in pixels; infinite where nothing is marked.
+/// Euclidean distance of each pixel to the nearest pixel in `marked`, in pixels; infinite if none is marked.
 ///
-/// Exact, in linear time: squared distances along each column, then along each row as the lower envelope of parabolas
-/// (Felzenszwalb and Huttenlocher, "Distance Transforms of Sampled Functions").
+/// Exact and in linear time: squared distances along each column, then along each row as the lower envelope of parabolas (Felzenszwalb and
+/// Huttenlocher, "Distance Transforms of Sampled Functions").
 pub(super) fn to_nearest(marked: &[bool], (width, height): (usize, usize)) -> Vec<f64> {
     let mut squared: Vec<f64> = marked
         .iter()
@@ -28,12 +28,12 @@ pub(super) fn to_nearest(marked: &[bool], (width, height): (usize, usize)) -> Ve
     squared.into_iter().map(f64::sqrt).collect()
 }
 
-/// min over p of (x − p)² + f(p): the parabolas that are lowest somewhere, from left to right.
+/// The lower envelope min over p of (x − p)² + f(p): the parabolas that are lowest somewhere, from left to right.
 #[derive(Default)]
 struct Envelope {
-    /// Each parabola's p and f(p), and from which x on it is the lowest.
+    /// For each parabola p, f(p), and the x from which it is the lowest.
     parts: Vec<(f64, f64, f64)>,
-    /// The one that was lowest at the last x asked for.
+    /// Index of the lowest parabola at the last x asked for.
     current: usize,
 }
 
@@ -45,7 +45,7 @@ impl Envelope {
             let p = p as f64;
             let mut from = f64::NEG_INFINITY;
             while let Some(&(q, other, start)) = self.parts.last() {
-                // Where both are equally high; to the right of it the new one is lower.
+                // Where the two intersect; to the right of that, the new one is lower.
                 from = ((height + p * p) - (other + q * q)) / (2.0 * (p - q));
                 if from > start {
                     break;
@@ -57,7 +57,7 @@ impl Envelope {
         }
     }
 
-    /// At x, which never goes back between two builds.
+    /// The value at x. Between two calls of `build`, x must not decrease.
     fn at(&mut self, x: usize) -> f64 {
         let x = x as f64;
         while self.parts.get(self.current + 1).is_some_and(|p| p.2 < x) {

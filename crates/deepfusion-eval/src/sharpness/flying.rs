@@ -1,16 +1,16 @@
 use super::pair::Pair;
 
-/// Neighbours in the image, one this many times deeper than the other, are a jump from one thing to another. The road
-/// is no jump: a pixel further up it is z / (f h) deeper, 7 % at 80 m for KITTI's camera.
+/// Two neighbouring pixels with a depth ratio above this lie on different objects: a jump. The road has no jumps: the next pixel up is z /
+/// (f h) deeper, 7 % at 80 m for KITTI's camera.
 const JUMP: f64 = 1.25;
 /// A predicted depth within this share of a true one lies on that surface.
 const TOLERANCE: f64 = 0.1;
 /// Pixels to each side: the neighbourhood is 5×5.
 const REACH: usize = 2;
 
-/// The share of flying pixels: of the pixels in whose 5×5 neighbourhood the true depth jumps between two pixels side by
-/// side, those whose predicted depth lies between the neighbourhood's least and greatest true depth and more than 10 % from
-/// every one of them. `None` where no true depth jumps.
+/// The share of flying pixels. Counted are the pixels in whose 5×5 neighbourhood the true depth jumps between two adjacent pixels. A flying
+/// pixel has a predicted depth between the neighbourhood's smallest and largest true depth and more than 10 % from each of them. `None` if
+/// the true depth has no jumps.
 pub(super) fn share(pair: &Pair) -> Option<f64> {
     let (mut near, mut flying) = (0usize, 0usize);
     for y in 0..pair.height {
@@ -58,7 +58,7 @@ impl Neighbourhood {
         (self.rows.clone()).flat_map(move |y| columns.clone().map(move |x| (x, y, y * width + x)))
     }
 
-    /// True ones.
+    /// The known true depths.
     fn depths<'a>(&self, pair: &'a Pair) -> impl Iterator<Item = f64> + use<'a> {
         self.pixels(pair.width)
             .filter(|(_, _, i)| pair.known[*i])

@@ -1,12 +1,12 @@
-//! How sharp a depth map is: whether its boundaries are where the truth's are, and whether things end there.
+//! How sharp a depth map is: whether its boundaries are at the true place, and whether depth changes abruptly there.
 //!
-//! Metrics over all pixels hardly see a blur: boundaries are few pixels, and half-way depth is half as wrong. The depth
-//! boundary error says how far boundaries are from their place, flying pixels (which float between two things in a
-//! cloud) say how many belong to neither.
+//! Metrics over all pixels hardly notice blur: boundaries are few pixels, and a depth half way between two objects is only half as wrong.
+//! The depth boundary error measures how far boundaries are from their true place. The share of flying pixels (which float between two
+//! objects in a point cloud) counts pixels that belong to neither.
 //!
-//! Both compare within the protocol's crop and range, at the truth's size, where truth and prediction are both known.
-//! The prediction is median-scaled first: a wrong scale is no blur, and other numbers tell it. What lies beyond the cap
-//! is at the cap, in both maps; the sky, infinitely deep, too, so that its borders are boundaries.
+//! Both are computed inside the protocol's crop and range, at the truth's size, where truth and prediction are both known. The prediction
+//! is median-scaled first, since a wrong scale is not blur and other metrics show it. In both maps, everything beyond the cap is put at the
+//! cap. So is the sky, which is infinitely deep, so that its borders are boundaries.
 
 mod boundary;
 mod canny;
@@ -23,20 +23,20 @@ use self::pair::Pair;
 use crate::statistics::mean;
 use crate::{Grid, Prediction, Protocol};
 
-/// How sharp one image's depth is.
+/// Sharpness of one image's depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageSharpness {
-    /// How far depth boundaries are from their place; `None` where the truth has none.
+    /// How far depth boundaries are from their true place; `None` if the truth has none.
     pub boundary: Option<BoundaryError>,
-    /// Of the pixels within two of a jump of the true depth (a neighbour more than 1.25 times deeper), the share that
-    /// hangs between two depths; `None` where the truth has no jump. Such a pixel's predicted depth is between the least
-    /// and the greatest true depth of the 5×5 pixels around, and more than 10 % from each of them.
+    /// Share of flying pixels among the pixels within two pixels of a jump of the true depth (a neighbour more than 1.25 times deeper);
+    /// `None` if the truth has no jump. A flying pixel's predicted depth is between the smallest and the largest true depth of the
+    /// surrounding 5×5 pixels and more than 10 % from each of them.
     pub flying_share: Option<f64>,
 }
 
 impl ImageSharpness {
-    /// Of a prediction of any size, compared with H×W depth in metres: 0 or NaN where nothing is known, infinity where
-    /// the sky is. `None` unless the crop is 21×21 or larger, half of it is known, and something of it is within the range.
+    /// Sharpness of a prediction of any size, compared with H×W depth in metres: 0 or NaN for unknown, infinity for sky. `None` unless the
+    /// crop is 21×21 or larger, half of it is known, and some of it is within the range.
     ///
     /// ```
     /// use deepfusion_eval::{Grid, ImageSharpness, Prediction, Protocol};
@@ -61,7 +61,7 @@ impl ImageSharpness {
     }
 }
 
-/// How sharp the depth of several images is: means over the images that have what is measured.
+/// Sharpness of several images: means over the images for which each value exists.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sharpness {
     /// Mean of [`BoundaryError::accuracy_px`], in pixels of the truth; lower is better.
@@ -70,16 +70,16 @@ pub struct Sharpness {
     pub boundary_completeness_px: Option<f64>,
     /// Mean of [`ImageSharpness::flying_share`]; lower is better.
     pub flying_share: Option<f64>,
-    /// How many images have dense truth.
+    /// Number of images with dense ground truth.
     pub images: usize,
-    /// How many of them have depth boundaries, over which the first two are means.
+    /// Number of these images with depth boundaries: the first two values are means over them.
     pub boundary_images: usize,
-    /// How many of them have jumps of depth, over which the third is a mean.
+    /// Number of these images with depth jumps: the third value is a mean over them.
     pub flying_images: usize,
 }
 
 impl Sharpness {
-    /// `None` of none.
+    /// The means; `None` without images.
     pub(crate) fn mean<'a>(images: impl Iterator<Item = &'a ImageSharpness>) -> Option<Self> {
         let images: Vec<_> = images.collect();
         let boundaries: Vec<_> = images.iter().filter_map(|i| i.boundary).collect();

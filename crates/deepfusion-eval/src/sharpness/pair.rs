@@ -1,27 +1,27 @@
 use crate::resample::{Axis, sample};
 use crate::{Grid, Prediction, Protocol, median};
 
-/// Below this share of known pixels the truth is not dense: scans cover some 5 % of an image, KITTI's annotated depth
-/// some 20 %, depth cameras and renderers most of it.
+/// With a smaller share of known pixels, the truth is not dense: scans cover some 5 % of an image, KITTI's annotated depth some 20 %, depth
+/// cameras and renderers most of it.
 const DENSE: f64 = 0.5;
-/// Nor is an image smaller than this, in pixels a side, one in which distances of up to 10 px say anything.
+/// Smallest side of an image, in pixels: in a smaller one, distances of up to 10 px mean nothing.
 const LEAST_PX: usize = 21;
 
-/// True and predicted depth of the compared window, pixel by pixel, in metres within the protocol's range.
+/// True and predicted depth in the compared window, pixel by pixel, in metres and within the protocol's range.
 #[derive(Debug, Clone)]
 pub(super) struct Pair {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// What lies beyond the cap, the sky too, is at the cap. No meaning where not `known`.
+    /// True depth. Everything beyond the cap, including the sky, is at the cap. Meaningless where not `known`.
     pub(super) truth: Vec<f64>,
-    /// Median-scaled, then clamped. No meaning where not `known`.
+    /// Predicted depth, median-scaled, then clamped. Meaningless where not `known`.
     pub(super) prediction: Vec<f64>,
-    /// Whether both have depth.
+    /// Whether both depths are known.
     pub(super) known: Vec<bool>,
 }
 
 impl Pair {
-    /// `None` where the truth is small or not dense, or nothing of it is within the range.
+    /// `None` if the truth is small or not dense, or none of it is within the range.
     pub(super) fn new(truth: &Grid, prediction: &Prediction, protocol: &Protocol) -> Option<Self> {
         let (rows, columns) = protocol.crop.window(truth.width(), truth.height());
         let (width, height) = (columns.len(), rows.len());
@@ -33,7 +33,7 @@ impl Pair {
             })
             .copied()
             .collect();
-        // Infinity is known: the sky.
+        // Infinity counts as known: it is the sky.
         let given = |depth: f64| depth > protocol.min_m;
         let count = values.iter().filter(|d| given(**d)).count();
         let large = width.min(height) >= LEAST_PX;
@@ -68,7 +68,7 @@ impl Pair {
                 .zip(&predicted)
                 .map(|(d, p)| given(*d) && p.is_some())
                 .collect(),
-            // A NaN stays one through `clamp`, and is not known.
+            // `clamp` keeps NaN, which counts as unknown.
             truth: values.iter().map(|d| clamp(*d)).collect(),
             prediction: predicted
                 .iter()

@@ -1,8 +1,8 @@
-/// Reach of the kernel in standard deviations, as in SciPy's and scikit-image's Gaussian filters.
+/// Radius of the kernel in standard deviations, as in SciPy's and scikit-image's Gaussian filters.
 const REACH: f64 = 4.0;
 
-/// Gaussian smoothing of H×W values by what is known alone: Σ g·v / Σ g over the known pixels in reach (normalised
-/// convolution), so that neither holes nor the image's border pull a value. 0 where nothing is in reach.
+/// Gaussian smoothing of H×W values that uses only known pixels: Σ g·v / Σ g over the known pixels within the kernel (normalised
+/// convolution), so that neither holes nor the image's border bias a value. 0 if none is within the kernel.
 pub(super) fn gaussian(
     values: &[f64],
     known: &[bool],
@@ -26,7 +26,7 @@ pub(super) fn gaussian(
         .collect()
 }
 
-/// exp(−x² / 2σ²) for x = 0, 1, … up to the reach, so that both sides together sum to 1.
+/// exp(−x² / 2σ²) for x = 0, 1, … up to the radius, normalised so that both sides together sum to 1.
 fn kernel(sigma: f64) -> Vec<f64> {
     let radius = (REACH * sigma + 0.5) as usize;
     let mut half: Vec<f64> = (0..=radius)
@@ -37,7 +37,7 @@ fn kernel(sigma: f64) -> Vec<f64> {
     half
 }
 
-/// With a symmetric kernel along rows or columns; beyond the border lies 0.
+/// Convolution with a symmetric kernel along rows or columns; 0 beyond the border.
 fn convolve(
     values: &[f64],
     (width, height): (usize, usize),

@@ -1,87 +1,87 @@
-//! The scale certificate: the bias of the metre, and how sure it is.
+//! The scale certificate: the scale bias and its uncertainty.
 
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::{SplitMix64, median};
 
-/// A metre is trusted where its whole interval is within this share of 1, either way.
+/// The scale is trusted if its whole interval is within this share of 1, in both directions.
 pub const TOLERANCE: f64 = 0.1;
-/// Fewest blocks that say how much they differ.
+/// Fewest blocks from which their spread can be estimated.
 const LEAST_BLOCKS: usize = 5;
-/// Resamples of the bootstrap, and its seed.
+/// Number of bootstrap resamples, and the seed.
 const RESAMPLES: usize = 4000;
 const SEED: u64 = 7;
 
-/// What one block of a drive, some tens of metres of road, says of the scale.
+/// The scale according to one block of a drive, some tens of metres of road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockScale {
-    /// Median over its scene points of ln(depth by the scene's movement / depth predicted).
+    /// Median over its scene points of ln(depth from the scene's motion / predicted depth).
     pub log_scale: f64,
-    /// The same of the nearer half of the points less that of the farther half.
+    /// The same median for the nearer half of the points minus that for the farther half.
     pub near_less_far: f64,
-    /// Scene points.
+    /// Number of scene points.
     pub points: usize,
 }
 
-/// A part of the interval's width.
+/// One source of the interval's width.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ErrorSource {
-    /// `blocks`: how much parts of the drives differ, by bootstrap. `ranges`: near and far depth want different factors. `speed`: what the
-    /// vehicle's speed itself may be off by, as given.
+    /// `blocks`: how much parts of the drives differ, by bootstrap. `ranges`: near and far depths need different factors. `speed`: the
+    /// error of the vehicle's speed itself, as given.
     pub name: SourceName,
-    /// Standard error of the bias.
+    /// Standard error of the bias from this source.
     pub sd: f64,
 }
 
-/// See [`ErrorSource::name`].
+/// The source's name, see [`ErrorSource::name`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SourceName {
-    /// Differences among blocks.
+    /// Differences between blocks.
     Blocks,
-    /// Differences among ranges.
+    /// Differences between depth ranges.
     Ranges,
-    /// The speed's own error.
+    /// The error of the speed itself.
     Speed,
 }
 
-/// Whether the metre can be trusted.
+/// Whether the scale can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScaleVerdict {
     /// The whole interval is within [`TOLERANCE`] of 1.
     Trusted,
-    /// It reaches over the edge of it, or there is no interval.
+    /// The interval crosses the tolerance, or there is no interval.
     Open,
-    /// The whole interval is outside.
+    /// The whole interval is outside the tolerance.
     Wrong,
 }
 
-/// The bias of the metre, without ground truth.
+/// The scale bias, measured without ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScaleCertificate {
-    /// What depth is to be multiplied by: comparable with `scale.median` of an evaluation with ground truth.
+    /// The factor that depth should be multiplied by: comparable with `scale.median` of an evaluation with ground truth.
     pub scale: f64,
-    /// Its 95 % interval.
+    /// The factor's 95 % interval.
     pub scale_ci95: Option<[f64; 2]>,
-    /// ln(depth predicted / depth by the scene's movement), the median over blocks: positive where things are seen too far away, as `scale.bias` is.
+    /// ln(predicted depth / depth from the scene's motion), the median over blocks: positive if predictions are too far, like `scale.bias`.
     pub bias: f64,
-    /// Its 95 % interval, from all `sources`; `None` below five blocks.
+    /// The bias's 95 % interval, from all `sources`; `None` for fewer than five blocks.
     pub ci95: Option<[f64; 2]>,
-    /// The same if the speed were exact.
+    /// The bias's 95 % interval if the speed were exact.
     pub ci95_given_speed: Option<[f64; 2]>,
-    /// Blocks.
+    /// Number of blocks.
     pub blocks: usize,
-    /// Scene points of all blocks.
+    /// Number of scene points in all blocks.
     pub points: usize,
-    /// What makes the interval as wide as it is.
+    /// What contributes to the interval's width.
     pub sources: Vec<ErrorSource>,
-    /// Whether the metre can be trusted.
+    /// Whether the scale can be trusted.
     pub verdict: ScaleVerdict,
 }
 
 impl ScaleCertificate {
-    /// From blocks that training did not see; `speed_sd` is the standard error of the vehicle's speed as a share of it. `None` of no blocks.
+    /// From blocks that training did not see; `speed_sd` is the relative standard error of the vehicle's speed. `None` without blocks.
     #[must_use]
     pub fn of(blocks: &[BlockScale], speed_sd: f64) -> Option<Self> {
         let scales: Vec<f64> = blocks.iter().map(|b| b.log_scale).collect();
@@ -90,7 +90,7 @@ impl ScaleCertificate {
         let enough = n >= LEAST_BLOCKS;
         let of_blocks = enough.then(|| bootstrap_median_sd(&scales));
         let differences: Vec<f64> = blocks.iter().map(|b| b.near_less_far).collect();
-        // Which part of the depth an error is asked for is open: a scale of the whole may lie anywhere between the two.
+        // The overall scale may lie anywhere between those of the near and the far half, uniformly distributed.
         let of_ranges = median(&differences).unwrap_or(0.0).abs() / 12.0_f64.sqrt();
         let mut sources = Vec::new();
         let named = |name, sd| ErrorSource { name, sd };
@@ -99,7 +99,7 @@ impl ScaleCertificate {
         sources.push(named(SourceName::Speed, speed_sd));
         let bias = -log_scale;
         let interval = |others: f64| {
-            // Few blocks know their own spread badly: Student's t for the part that is estimated from them.
+            // The spread estimated from few blocks is uncertain, so that part uses Student's t.
             let wide = (t_975(n - 1) * of_blocks?).hypot(1.96 * others);
             Some([bias - wide, bias + wide])
         };
@@ -144,7 +144,8 @@ fn bootstrap_median_sd(values: &[f64]) -> f64 {
     (squares / RESAMPLES as f64 - mean * mean).max(0.0).sqrt()
 }
 
-/// The 97.5 % quantile of Student's t (Fisher and Cornish's expansion about the normal one, within 1 % from 3 degrees of freedom on).
+/// The 97.5 % quantile of Student's t (Fisher and Cornish's expansion about the normal quantile, accurate to 1 % from 3 degrees of
+/// freedom).
 fn t_975(freedom: usize) -> f64 {
     let f = freedom.max(1) as f64;
     1.959_964 + 2.372_3 / f + 2.822_5 / f.powi(2) + 2.555_9 / f.powi(3)
@@ -172,7 +173,7 @@ mod tests {
 
     #[test]
     fn the_interval_holds_the_truth_as_often_as_it_says() {
-        // Blocks about a known bias; the interval of the statistics alone.
+        // Blocks with a known bias; the interval from the statistics alone.
         let mut random = SplitMix64(5);
         let mut uniform = || random.below(1 << 30) as f64 / f64::from(1 << 30);
         let mut normal = || -> f64 { (0..12).map(|_| uniform()).sum::<f64>() - 6.0 };
@@ -184,7 +185,7 @@ mod tests {
                 let [low, high] = certificate.ci95_given_speed.unwrap();
                 held += usize::from(low <= -0.2 && -0.2 <= high);
             }
-            // 95 % expected; a binomial of 150 is above 90 % and below 100 % nearly always.
+            // 95 % are expected; a binomial share of 150 is nearly always between 90 % and 100 %.
             let share = held as f64 / f64::from(tries);
             assert!((0.90..=1.0).contains(&share), "{n} blocks: {share}");
         }
@@ -215,7 +216,7 @@ mod tests {
         assert_eq!(of(0.08).verdict, ScaleVerdict::Open);
         let far = of(0.3);
         assert_eq!(far.verdict, ScaleVerdict::Wrong);
-        // True depth is larger than what was predicted: seen too near.
+        // True depth is larger than predicted: predictions are too near.
         assert!(far.bias < 0.0 && far.scale > 1.3);
         let [low, high] = far.scale_ci95.unwrap();
         assert!(low < far.scale && far.scale < high);

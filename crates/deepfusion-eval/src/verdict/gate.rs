@@ -1,4 +1,4 @@
-//! Whether a network that was learned on became worse, by what can be known without ground truth.
+//! Whether fine-tuning made a network worse, as far as that can be measured without ground truth.
 
 use std::fmt;
 
@@ -6,40 +6,41 @@ use serde::{Deserialize, Serialize};
 
 use super::Verdict;
 
-/// A share by which the reprojection error may rise: it is of thousands of pixels and hardly varies.
+/// The share by which the reprojection error may rise: it is an average over thousands of pixels and hardly varies.
 const REPROJECTION: f64 = 0.01;
-/// A share and an amount by which disagreements of depths may rise, whichever is more.
+/// The share and the amount by which disagreements between depths may rise, whichever is larger.
 const DISAGREEMENT: (f64, f64) = (0.15, 0.005);
-/// By how much the bias of the metre may grow.
+/// The amount by which the scale bias may grow.
 const BIAS: f64 = 0.02;
 
-/// A check that a network does not pass as well as the one before it.
+/// A check whose value became worse.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorsenedCheck {
-    /// The check.
+    /// The check that became worse.
     pub check: Check,
-    /// What it gave before.
+    /// Its value before.
     pub before: f64,
-    /// What it gives now; `None` where depth is so wrong, or so poor, that too few frames still give anything.
+    /// Its value now; `None` if the depth is so wrong that too few frames still give a value.
     pub after: Option<f64>,
 }
 
-/// What is compared.
+/// A quantity that is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Check {
-    /// How well the frames explain each other.
+    /// How well each frame is reconstructed from its neighbour.
     Reprojection,
-    /// Depth against the frame before.
+    /// Depth compared with that warped from the frame before.
     Consistency,
-    /// Depth against the mirrored image.
+    /// Depth compared with that of the mirrored image.
     Flip,
-    /// The size of the metre's bias.
+    /// The size of the scale bias.
     Scale,
 }
 
 impl Verdict {
-    /// The checks that `after` passes less well than this one, of the same frames, or gives no figure for any more; `None` where this one gave none.
+    /// The checks that are worse in `after`, or have no value there any more; both verdicts are of the same frames. `None` if this verdict
+    /// has no values.
     #[must_use]
     pub fn worse(&self, after: &Self) -> Option<Vec<WorsenedCheck>> {
         let checks = [
@@ -56,7 +57,7 @@ impl Verdict {
             };
             compared = true;
             let after = after.of(check).filter(|_| !self.lost_pairs(check, after));
-            // NaN is worse than any.
+            // NaN is worse than any number.
             if after.is_none_or(|after| after.is_nan() || after > check.most(before)) {
                 worse.push(WorsenedCheck {
                     check,
@@ -68,13 +69,14 @@ impl Verdict {
         compared.then_some(worse)
     }
 
-    /// Whether most of the pairs of frames that a figure was the mean of are in sight of each other no longer: the few that are say nothing of them.
+    /// Whether more than half of the pairs of frames behind a value have dropped out because the frames no longer overlap: the remaining
+    /// pairs are not representative.
     fn lost_pairs(&self, check: Check, after: &Self) -> bool {
         let pairs = |of: &Self| of.without_truth.reprojection.map_or(0, |r| r.pairs);
         check == Check::Reprojection && 2 * pairs(after) < pairs(self)
     }
 
-    /// What a check gives; lower is better.
+    /// The value of a check; lower is better.
     #[must_use]
     pub fn of(&self, check: Check) -> Option<f64> {
         let found = &self.without_truth;
@@ -103,7 +105,7 @@ impl fmt::Display for WorsenedCheck {
 }
 
 impl Check {
-    /// What it gives, as text.
+    /// The value as text.
     #[must_use]
     pub fn figure(self, value: f64) -> String {
         match self {
@@ -112,7 +114,7 @@ impl Check {
         }
     }
 
-    /// The most that does not count as worse than `before`: the same network gives as much on other frames of the same drive.
+    /// The largest value that does not count as worse than `before`: the same network varies that much between frames of one drive.
     #[must_use]
     pub fn most(self, before: f64) -> f64 {
         match self {
@@ -169,7 +171,7 @@ mod tests {
             names(before.worse(&verdict(0.08, 0.05, -0.2))),
             [Check::Flip, Check::Scale]
         );
-        // NaN is no better.
+        // NaN is not better either.
         assert_eq!(
             names(before.worse(&verdict(f64::NAN, 0.03, 0.05))),
             [Check::Reprojection]
@@ -177,7 +179,7 @@ mod tests {
         assert_eq!(Verdict::default().worse(&before), None);
     }
 
-    /// Depth so near that every pixel leaves the picture has no reprojection error at all.
+    /// Depth so near that every pixel is warped out of the image has no reprojection error at all.
     #[test]
     fn what_gives_no_figure_any_more_is_worse() {
         let before = verdict(0.10, 0.03, 0.05);

@@ -1,4 +1,4 @@
-//! The verdict as a person reads it.
+//! The verdict as text for people.
 
 use std::fmt;
 
@@ -139,11 +139,11 @@ impl fmt::Display for SourceName {
 impl fmt::Display for NoCertificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::MotionUnknown => "the recordings do not measure speed and turns",
-            Self::NoMovement => "the camera hardly moves between the frames",
-            Self::AllSeen => "training saw all of these frames: measure on another drive",
-            Self::SeenNotKnown => "whether training saw these frames is not known",
-            Self::FewPoints => "the scene shows too few points that can be followed",
+            Self::MotionUnknown => "the recordings do not contain speed and turns",
+            Self::NoMovement => "the camera hardly moves between frames",
+            Self::AllSeen => "training saw all of these frames: evaluate on another drive",
+            Self::SeenNotKnown => "it is not known whether training saw these frames",
+            Self::FewPoints => "the scene has too few points that can be tracked",
         })
     }
 }
@@ -154,7 +154,7 @@ impl fmt::Display for Check {
             Self::Reprojection => "reprojection error",
             Self::Consistency => "depth against the frame before",
             Self::Flip => "depth against the mirrored image",
-            Self::Scale => "bias of the metre",
+            Self::Scale => "scale bias",
         })
     }
 }

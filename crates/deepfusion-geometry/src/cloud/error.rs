@@ -1,4 +1,4 @@
-//! What can go wrong with a cloud or its file.
+//! What can go wrong with a point cloud or its file.
 
 mod size;
 
@@ -7,16 +7,16 @@ pub use self::size::SizeProblem;
 use deepfusion_hint::{Hint, system_hint};
 use std::path::PathBuf;
 
-/// What can go wrong with a cloud or its file.
+/// What can go wrong with a point cloud or its file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be opened, read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// Reading or writing a stream failed.
@@ -28,14 +28,14 @@ pub enum Error {
         path.display(), columns(*point)
     )]
     Truncated {
-        /// The scan.
+        /// Path of the scan.
         path: PathBuf,
-        /// Its length.
+        /// Length of the file, in bytes.
         bytes: u64,
-        /// The length of a point: KITTI's 16, nuScenes' 20.
+        /// Length of a point, in bytes: 16 for KITTI, 20 for nuScenes.
         point: usize,
     },
-    /// A PLY header or body is not what this reader takes.
+    /// A PLY header or body is not supported.
     #[error("PLY: {0}")]
     Ply(#[from] PlyProblem),
     /// A column, an image or a camera does not fit the points or the depth map.
@@ -46,7 +46,7 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What a point of a binary scan of this length holds.
+/// The values of a point in a binary scan with this point length.
 fn columns(point: usize) -> &'static str {
     if point == 20 {
         "x, y, z, intensity, ring"
@@ -61,68 +61,67 @@ impl Hint for Error {
             Self::File { source, .. } | Self::Stream(source) => {
                 Some(system_hint(source.kind()).into())
             }
-            Self::Truncated { .. } => {
-                Some("the scan was cut off while copying or unpacking: fetch it again".into())
-            }
+            Self::Truncated { .. } => Some("copy or unpack the scan again: it is cut off".into()),
             Self::Ply(_) => Some(
-                "readable are PLY files in binary_little_endian with float x, y, z in a vertex element".into(),
+                "give a PLY file in binary_little_endian with float x, y, z in its vertex element"
+                    .into(),
             ),
             Self::Size(_) => None,
         }
     }
 }
 
-/// Why a PLY file is not what is read.
+/// Why a PLY file cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlyProblem {
-    /// It is no PLY file.
+    /// The file is not a PLY file.
     #[error("does not begin with 'ply'")]
     NoPly,
-    /// Its header is cut off.
+    /// The header is cut off.
     #[error("ends within its header")]
     HeaderCut,
-    /// Its header is no text.
+    /// The header is not text.
     #[error("the header is not text")]
     NoText,
-    /// It has another format.
+    /// The format is not supported.
     #[error("format '{0}', expected binary_little_endian")]
     Format(String),
-    /// It does not say its format.
+    /// The header does not state the format.
     #[error("the header has no format line")]
     NoFormat,
-    /// It has no vertices.
+    /// The header has no vertex element.
     #[error("the header has no vertex element")]
     NoVertices,
-    /// The number of its vertices is none.
+    /// The number of vertices is not a number.
     #[error("'{0}' is not a number of vertices")]
     Count(String),
     /// Another element comes before the vertices.
-    #[error("element '{0}' comes before vertex, which should be the first")]
+    #[error("element '{0}' comes before vertex, expected vertex as the first element")]
     Order(String),
-    /// A vertex has a list.
-    #[error("a vertex with a list property")]
+    /// A vertex has a list property.
+    #[error("the vertex element has a list property")]
     List,
     /// A property has an unknown type.
     #[error("property {name}: unknown type '{kind}'")]
     Type {
         /// The property's name.
         name: String,
-        /// Its type.
+        /// The property's type.
         kind: String,
     },
-    /// A vertex lacks a property.
-    #[error("a vertex without property '{0}'")]
+    /// The vertex element lacks a property.
+    #[error("the vertex element has no property '{0}'")]
     NoProperty(&'static str),
-    /// A line of the header is unknown.
-    #[error("header line '{0}' is not understood")]
+    /// A header line is not known.
+    #[error("unknown header line '{0}'")]
     Line(String),
-    /// It ends within its vertices.
+    /// The file ends within its vertices.
     #[error("ends before vertex {vertex} of the {vertices} its header announces")]
     Cut {
-        /// A vertex that is not there any more.
+        /// Index of the first missing vertex.
         vertex: usize,
-        /// How many there should be.
+        /// Number of vertices according to the header.
         vertices: usize,
     },
 }

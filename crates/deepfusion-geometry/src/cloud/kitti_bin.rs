@@ -1,4 +1,5 @@
-//! Binary scans: KITTI's velodyne's (x, y, z, intensity as little-endian f32, nothing else), nuScenes' (a ring beside them).
+//! Binary scans: KITTI's velodyne scans (x, y, z, intensity as little-endian f32, nothing else) and those of nuScenes (with a ring index in
+//! addition).
 
 use super::{Error, PointCloud, Result};
 use std::io::Write;
@@ -17,8 +18,8 @@ impl PointCloud {
         Self::read_bin(path, POINT_BYTES)
     }
 
-    /// Reads a scan of nuScenes' LIDAR_TOP (`.pcd.bin`: x, y, z, intensity, ring), in metres, with intensity. The file's axes
-    /// (x right, y forward, z up) are turned to KITTI's (x forward, y left, z up).
+    /// Reads a scan of nuScenes' LIDAR_TOP (`.pcd.bin`: x, y, z, intensity, ring), in metres, with intensity. The file's axes (x right, y
+    /// forward, z up) are converted to KITTI's (x forward, y left, z up).
     ///
     /// # Errors
     /// As [`Self::read_kitti_bin`].
@@ -31,7 +32,7 @@ impl PointCloud {
         Ok(cloud)
     }
 
-    /// Points of `size` bytes, of which x, y, z and intensity are the first four values.
+    /// Reads points of `size` bytes, whose first four values are x, y, z and intensity.
     fn read_bin(path: &Path, size: usize) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|source| Error::File {
             path: path.to_owned(),
@@ -92,7 +93,7 @@ mod tests {
         assert_eq!(PointCloud::read_kitti_bin(file.path()).unwrap(), cloud);
     }
 
-    /// A point 12 m ahead and 3 m to the right, as nuScenes writes it.
+    /// A point 12 m ahead and 3 m to the right, as in a file of nuScenes.
     #[test]
     fn a_scan_of_nuscenes_is_turned_to_look_along_x() {
         let file = tempfile::NamedTempFile::new().unwrap();

@@ -1,4 +1,4 @@
-//! Point clouds: from depth maps, and as PLY, PCD and binary scans of KITTI and nuScenes.
+//! Point clouds from depth maps, and as PLY, PCD and binary scans of KITTI and nuScenes.
 //!
 //! Points are in metres, in the frame the cloud was made in: the camera's (x right, y down, z forward)
 //! for [`PointCloud::from_depth`], the sensor's (x forward, y left, z up) for a velodyne scan.

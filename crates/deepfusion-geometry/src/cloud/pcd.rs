@@ -5,8 +5,8 @@ use std::io::Write;
 use super::{PointCloud, Result};
 
 impl PointCloud {
-    /// Writes the cloud as a binary PCD: x, y, z as f32, and where the cloud has them `rgb` (packed as PCL does, 0x00RRGGBB in
-    /// the bits of an f32), `intensity`, `radial_velocity`, `confidence` and `sigma`.
+    /// Writes the cloud as a binary PCD: x, y, z as f32, and if the cloud has them `rgb` (packed as PCL does, 0x00RRGGBB in the bits of an
+    /// f32), `intensity`, `radial_velocity`, `confidence` and `sigma`.
     ///
     /// # Errors
     /// [`Error::Stream`](super::Error::Stream) if writing fails, [`Error::Size`](super::Error::Size) if a column does not

@@ -1,12 +1,12 @@
-//! PLY, binary little-endian: `x y z` as float, then `red green blue` as uchar, `intensity`, `radial_velocity`,
-//! `confidence` and `sigma` as float, each where the cloud has it.
+//! PLY, binary little-endian: `x y z` as float, then, if the cloud has them, `red green blue` as uchar, and `intensity`, `radial_velocity`,
+//! `confidence` and `sigma` as float.
 
 use super::{PlyProblem, PointCloud, Result};
 use std::io::{BufRead, Read, Write};
 
-/// Longest header line accepted, so that a binary file of another format is not read whole as one line.
+/// Longest header line accepted, so that a binary file of another format is not read completely as one line.
 const MAX_HEADER_LINE: u64 = 4096;
-/// Number of points read at a time: a wrong vertex count in the header must not allocate memory by itself.
+/// Number of points read at a time, so that a wrong vertex count in the header does not allocate memory.
 const CHUNK_POINTS: usize = 4096;
 
 impl PointCloud {
@@ -59,8 +59,8 @@ impl PointCloud {
         Ok(out.write_all(&bytes)?)
     }
 
-    /// Reads a binary little-endian PLY whose first element is `vertex` with scalar properties,
-    /// among them `x`, `y`, `z`. Properties it does not know, and elements after it, are skipped.
+    /// Reads a binary little-endian PLY whose first element is `vertex` with scalar properties, among them `x`, `y`, `z`. Unknown
+    /// properties and later elements are skipped.
     ///
     /// # Errors
     /// [`Error::Ply`](super::Error::Ply) for any other file and for one that ends early.
@@ -182,7 +182,7 @@ impl Property {
         }
     }
 
-    /// A colour channel as a byte; floating-point colours are in [0, 1] by custom.
+    /// A colour channel as a byte; floating-point colours are in [0, 1] by convention.
     fn colour(self, vertex: &[u8]) -> u8 {
         let value = self.value(vertex);
         let scaled = match self.kind {
@@ -273,7 +273,7 @@ impl Header {
     }
 }
 
-/// The next header line without its end; anything that is not text is an error.
+/// The next header line without its line end; anything that is not text is an error.
 fn next_line(input: &mut impl BufRead) -> Result<String> {
     let mut line = Vec::new();
     input
@@ -349,7 +349,7 @@ mod tests {
             let _ = PointCloud::read_ply(bytes.as_slice());
         }
 
-        /// Every cut of a good file is an error, never a shorter cloud.
+        /// Every truncation of a valid file is an error, never a shorter cloud.
         #[test]
         fn a_cut_file_is_an_error(cut in 0.0..1.0f64) {
             let mut bytes = Vec::new();

@@ -1,7 +1,7 @@
 use super::{Result, SizeProblem};
 use crate::{DepthMap, Intrinsics};
 
-/// Points and their attributes, column by column. Every column present has one entry per point.
+/// Points and their attributes, column by column. Every column that is present has one entry per point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
     /// Position, in metres.
@@ -10,11 +10,11 @@ pub struct PointCloud {
     pub rgb: Option<Vec<[u8; 3]>>,
     /// Strength of the return, in the sensor's own unit (KITTI: 0 to 1).
     pub intensity: Option<Vec<f32>>,
-    /// Speed at which it recedes from the sensor, in m/s; negative when it comes nearer.
+    /// Speed away from the sensor, in m/s; negative if the point approaches.
     pub radial_velocity: Option<Vec<f32>>,
-    /// How far the position can be trusted, 0 to 1.
+    /// Confidence of the position, 0 to 1.
     pub confidence: Option<Vec<f32>>,
-    /// Standard deviation of the depth that the point was made from, metres along the camera's axis.
+    /// Standard deviation of the depth that the point was made from, in metres along the camera's axis.
     pub sigma: Option<Vec<f32>>,
 }
 
@@ -25,7 +25,7 @@ impl PointCloud {
     /// `rgb` is the image of the same size, H×W×3 bytes.
     ///
     /// # Errors
-    /// [`Error::Size`](super::Error::Size) where the camera's or the image's size is not the depth map's.
+    /// [`Error::Size`](super::Error::Size) if the camera's or the image's size differs from the depth map's.
     pub fn from_depth(
         depth: &DepthMap,
         k: &Intrinsics,
@@ -38,11 +38,11 @@ impl PointCloud {
         }))
     }
 
-    /// As [`Self::from_depth`], from metric disparity (1/m) of the camera's size, row by row: one pass over
-    /// the pixels. Disparities that are not positive give no point.
+    /// As [`Self::from_depth`], from metric disparity (1/m) of the camera's size, row by row, in one pass over the pixels. Disparities that
+    /// are not positive give no point.
     ///
     /// # Errors
-    /// [`Error::Size`](super::Error::Size) where the disparity's or the image's size is not the camera's.
+    /// [`Error::Size`](super::Error::Size) if the disparity's or the image's size differs from the camera's.
     pub fn from_disparity(
         disparity: &[f32],
         k: &Intrinsics,
@@ -56,8 +56,8 @@ impl PointCloud {
         }))
     }
 
-    /// A column for the cloud that [`Self::from_depth`] makes of a depth: the values at the pixels that become points.
-    /// `values` belong to the pixels of `depth`, row by row.
+    /// A column for the cloud that [`Self::from_depth`] makes of a depth map: the values at the pixels that become points. `values`
+    /// contains one value per pixel of `depth`, row by row.
     #[must_use]
     pub fn column(values: &[f32], depth: &DepthMap, max_depth_m: f32) -> Vec<f32> {
         let pixels = depth.data.iter().zip(values);
@@ -136,7 +136,7 @@ fn is_point(z: f32, max_depth_m: f32) -> bool {
     (z > 0.0) & (z <= max_depth_m) & (z < f32::INFINITY)
 }
 
-/// Points of the pixels whose depth, `depth_of` their value, is above 0 and at most `max_depth_m`.
+/// Points of the pixels whose depth (`depth_of` of their value) is above 0 and at most `max_depth_m`.
 fn back_project(
     values: &[f32],
     k: &Intrinsics,
@@ -145,7 +145,7 @@ fn back_project(
     depth_of: impl Fn(f32) -> f32,
 ) -> PointCloud {
     let width = k.width as usize;
-    // K⁻¹ of a pixel is the column's x, the row's y and 1: computed once a column and once a row.
+    // K⁻¹ of a pixel is the column's x, the row's y and 1: computed once per column and once per row.
     let ray_x: Vec<f32> = (0..k.width)
         .map(|u| ((f64::from(u) - k.cx) / k.fx) as f32)
         .collect();
@@ -154,7 +154,7 @@ fn back_project(
         rgb: rgb.map(|_| Vec::with_capacity(values.len())),
         ..PointCloud::default()
     };
-    // A row at a time, in buffers that stay in the processor's nearest cache.
+    // One row at a time, in buffers that stay in the L1 cache.
     let mut depths = vec![0.0; width];
     let mut points = vec![[0.0; 3]; width];
     let mut colours = vec![[0; 3]; width];
@@ -164,8 +164,8 @@ fn back_project(
             let z = depth_of(*value);
             *depth = if is_point(z, max_depth_m) { z } else { 0.0 };
         }
-        // Every pixel is written where the next point goes and kept by counting it: whether a pixel is
-        // valid is noise to a branch predictor.
+        // Every pixel is written to the next free place, which advances only if the pixel is valid. A branch would be mispredicted too
+        // often.
         let mut count = 0;
         for (z, ray_x) in depths.iter().zip(&ray_x) {
             points[count] = [ray_x * z, ray_y * z, *z];
@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(cloud.len(), 2);
         let expected = PointCloud::from_depth(&depth, &k, Some(&rgb), 80.0).unwrap();
         assert_eq!(cloud, expected);
-        // Without a limit, what is infinitely far is still no point.
+        // Even without a limit, an infinite depth gives no point.
         let all = PointCloud::from_disparity(&disparity, &k, None, f32::INFINITY).unwrap();
         assert_eq!((all.len(), all.rgb), (3, None));
     }

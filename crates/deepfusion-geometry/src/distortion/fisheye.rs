@@ -1,20 +1,20 @@
-//! Fisheye lenses after Kannala and Brandt (IEEE TPAMI 28(8), 2006), with the four coefficients of `cv::fisheye`.
+//! Fisheye lenses by Kannala and Brandt (IEEE TPAMI 28(8), 2006), with the four coefficients of `cv::fisheye`.
 
 use nalgebra::Vector2;
 use std::f64::consts::FRAC_PI_2;
 
-/// Parts in which the angles up to 90 degrees are looked through for the first that appears at a radius.
+/// Number of parts of the range up to 90 degrees in which the first angle that appears at a radius is searched.
 const PARTS: u32 = 64;
-/// Halvings of such a part, to the last digit of a double.
+/// Number of bisections of such a part, down to the last digit of a double.
 const HALVINGS: u32 = 53;
 
-/// The angle from the axis at which a ray appears that is at `theta`; both in radians.
+/// The angle from the axis at which a ray at `theta` appears; both in radians.
 fn shown(k: &[f64; 4], theta: f64) -> f64 {
     let t2 = theta * theta;
     theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))))
 }
 
-/// Where the lens shows a point of z = 1.
+/// Where a point with z = 1 appears.
 pub(super) fn distort(k: &[f64; 4], ideal: &Vector2<f64>) -> Vector2<f64> {
     let r = ideal.norm();
     if r < 1e-12 {
@@ -23,14 +23,14 @@ pub(super) fn distort(k: &[f64; 4], ideal: &Vector2<f64>) -> Vector2<f64> {
     ideal * (shown(k, r.atan()) / r)
 }
 
-/// The point of z = 1 that the lens shows there; `None` for a ray at 90 degrees from the axis and beyond, which has no such point, and
-/// where the lens shows nothing.
+/// The point with z = 1 that appears at this position. `None` for a ray at 90 degrees from the axis or more, which has no such point, and
+/// for positions at which no ray appears.
 pub(super) fn undistort(k: &[f64; 4], seen: &Vector2<f64>) -> Option<Vector2<f64>> {
     let radius = seen.norm();
     if radius < 1e-12 {
         return Some(*seen);
     }
-    // The first angle that appears so far out, before the polynomial turns back: a root beyond the fold is not the lens'.
+    // The first angle that appears at this radius, before the polynomial turns back: a root beyond the fold is not physical.
     let (mut low, mut high) = (0.0, 0.0);
     for part in 1..=PARTS {
         high = FRAC_PI_2 * f64::from(part) / f64::from(PARTS);

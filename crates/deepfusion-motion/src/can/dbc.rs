@@ -8,7 +8,7 @@ use std::path::Path;
 pub struct Dbc(can_dbc::Dbc);
 
 impl Dbc {
-    /// Reads a file. It may be in UTF-8 or Latin-1 (units such as "°" are not always in UTF-8).
+    /// Reads a file in UTF-8 or Latin-1 (units such as "°" are not always in UTF-8).
     ///
     /// # Errors
     /// [`Error::File`]; [`Error::Dbc`] with the line that cannot be read.
@@ -36,7 +36,7 @@ impl Dbc {
             })
     }
 
-    /// All signals' names, "Message.Signal", in the file's order.
+    /// The names of all signals, "Message.Signal", in the file's order.
     pub fn names(&self) -> impl Iterator<Item = String> {
         self.0.messages.iter().flat_map(|message| {
             let signals = message.signals.iter();
@@ -44,7 +44,7 @@ impl Dbc {
         })
     }
 
-    /// The unit of a signal, as the file writes it; `None` where there is no such signal.
+    /// The unit of a signal, as written in the file; `None` if there is no such signal.
     #[must_use]
     pub fn unit(&self, name: &str) -> Option<&str> {
         self.find(name).ok().map(|(_, signal)| signal.unit.as_str())
@@ -53,7 +53,7 @@ impl Dbc {
     /// A signal by its name, "Message.Signal".
     ///
     /// # Errors
-    /// [`Error::NoSignal`] with the signals there are; [`Error::Layout`] for a signal that fits into no frame.
+    /// [`Error::NoSignal`], which lists the signals that exist; [`Error::Layout`] for a signal that does not fit into a frame.
     pub fn signal(&self, name: &str) -> Result<CanSignal> {
         let (message, signal) = self.find(name)?;
         let layout = self.layout(message, signal);
@@ -107,7 +107,7 @@ impl Dbc {
             (_, can_dbc::ValueType::Signed) => Number::Signed,
             (_, can_dbc::ValueType::Unsigned) => Number::Unsigned,
         };
-        // Beyond 16 bits is beyond any frame: refused when the layout is checked.
+        // More than 16 bits is beyond any frame and is refused when the layout is checked.
         let bits = |value: u64| u16::try_from(value).unwrap_or(u16::MAX);
         BitLayout {
             start_bit: bits(signal.start_bit),
@@ -136,8 +136,7 @@ impl Dbc {
         else {
             return;
         };
-        // `SG_MUL_VAL_` names the multiplexor and ranges; without it, there is one multiplexor and
-        // one value.
+        // `SG_MUL_VAL_` gives the multiplexor and ranges; without it, there is one multiplexor and one value.
         let mut extended = self.0.extended_multiplex.iter();
         let extended =
             extended.find(|e| e.message_id == message.id && e.signal_name == signal.name);
@@ -146,7 +145,7 @@ impl Dbc {
             None => s.multiplexer_indicator == MultiplexIndicator::Multiplexor,
         };
         let Some(switch) = message.signals.iter().find(is_switch) else {
-            // Nothing selects it, so that it can never be known to be present.
+            // Without a multiplexor, it is never known whether the signal is present.
             return found.push(MultiplexCondition {
                 switch: self.layout(message, signal),
                 ranges: Vec::new(),
@@ -176,7 +175,7 @@ fn id(id: MessageId) -> CanId {
         MessageId::Extended(id) => CanId::Extended { extended: id },
     }
 }
-/// The least and the greatest value; `[0|0]` is how a file says nothing of them.
+/// The smallest and the largest value; `[0|0]` means that the file gives no range.
 fn range(signal: &can_dbc::Signal) -> Option<[f64; 2]> {
     let number = |value: &NumericValue| match *value {
         NumericValue::Uint(value) => value as f64,

@@ -10,8 +10,7 @@ const MOST_BITS: u16 = 64 * 8;
 pub enum ByteOrder {
     /// Little-endian, `@1` in a DBC file: the start bit is the lowest.
     Intel,
-    /// Big-endian, `@0` in a DBC file: the start bit is the highest, and the next lower ones lie to
-    /// its right, then from bit 7 of the next byte on.
+    /// Big-endian, `@0` in a DBC file: the start bit is the highest. The lower bits follow to its right, then from bit 7 of the next byte.
     Motorola,
 }
 
@@ -133,7 +132,7 @@ impl BitLayout {
         Some(match self.byte_order {
             ByteOrder::Intel => (0..length).fold(0, |raw, i| raw | bit(start + i) << i),
             ByteOrder::Motorola => {
-                // Counted from the left instead, bits run straight on over the bytes.
+                // Counted from the left, the bits continue from one byte to the next without jumps.
                 let first = start / 8 * 8 + (7 - start % 8);
                 let from_left = |at: usize| bit(at / 8 * 8 + (7 - at % 8));
                 (first..first + length).fold(0, |raw, at| raw << 1 | from_left(at))
@@ -141,7 +140,7 @@ impl BitLayout {
         })
     }
 
-    /// The byte that holds the last bit. The length is at least 1.
+    /// Index of the byte with the last bit. The length is at least 1.
     fn last_byte(&self) -> usize {
         let start = usize::from(self.start_bit);
         let first = match self.byte_order {

@@ -20,7 +20,7 @@ pub enum CanId {
 /// A frame from the bus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CanFrame<'a> {
-    /// Time of reception, in seconds.
+    /// Time when it was received, in seconds.
     pub time_s: f64,
     /// Its identifier.
     pub id: CanId,
@@ -28,13 +28,13 @@ pub struct CanFrame<'a> {
     pub data: &'a [u8],
 }
 
-/// The condition of a multiplexed signal: another number of the frame selects it.
+/// The condition under which a multiplexed signal is present: another number of the frame selects it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MultiplexCondition {
     /// Position of the multiplexor (the number that selects).
     pub switch: BitLayout,
-    /// Its raw values for which the signal is present, first and last of each range.
+    /// The multiplexor's raw values for which the signal is present, first and last of each range.
     pub ranges: Vec<(u64, u64)>,
 }
 
@@ -49,12 +49,12 @@ pub struct CanSignal {
     /// Conditions that must all hold for the signal to be present.
     #[serde(default)]
     pub multiplexed: Vec<MultiplexCondition>,
-    /// The least and the greatest physical value that the signal has, where its description says them.
+    /// The smallest and the largest physical value of the signal, if its description gives them.
     #[serde(default)]
     pub range: Option<[f64; 2]>,
 }
 
-/// Different values at most by which a bus says that it has none.
+/// The largest number of distinct values that can mean "not available" or "error".
 const MOST_SENTINELS: usize = 3;
 
 impl CanSignal {
@@ -75,14 +75,14 @@ impl CanSignal {
         there.then(|| self.layout.decode(data)).flatten()
     }
 
-    /// Leaves out values beyond the [range](Self::range), by which a bus says that it has none or an error (J1939: all bits set, or all but the
-    /// last); returns how many. Where those are many different ones, or most, it is the range that is wrong, as in many a description, and all
-    /// stay.
+    /// Removes values outside the [range](Self::range), which mean "not available" or "error" (J1939: all bits set, or all but the last),
+    /// and returns their number. If there are more than a few distinct ones, or if they are most of the values, the range itself is wrong,
+    /// as in many descriptions, and all values are kept.
     pub fn keep_measured<T>(&self, values: &mut Vec<T>, value: impl Fn(&T) -> f64) -> usize {
         let Some([least, most]) = self.range.filter(|[least, most]| least < most) else {
             return 0;
         };
-        // A last digit more or less is rounding of the description's.
+        // The description's limits may be rounded in the last digit.
         let slack = 1e-6 * (most - least);
         let known = least - slack..=most + slack;
         let beyond = values
@@ -159,13 +159,13 @@ mod tests {
             .map(|step| frame(step, if step == 0 { &none[..] } else { &later[..] }))
             .collect();
         let count = |speed: &CanSignal| over_time(speed, frames.clone()).values().len();
-        assert_eq!(count(&speed), 5, "nothing says its range");
+        assert_eq!(count(&speed), 5, "the range is unknown");
         speed.range = Some([0.0, 70.0]);
         assert_eq!(count(&speed), 4);
-        // A description that has no car's speed within its range is wrong itself.
+        // If most of a car's speeds are outside the range, the range is wrong.
         speed.range = Some([0.0, 1.0]);
         assert_eq!(count(&speed), 5);
-        // So is one that only fits a car that stands.
+        // So is a range that only fits a standing car.
         let drives: Vec<[u8; 3]> = (0..20_u8).map(|i| [i.saturating_sub(12), 0, 0]).collect();
         let frames = (0..)
             .zip(&drives)

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | `processed_log/CAN/speed` | `t`, `value` (N×1) | forward speed, m/s |
 //! | `processed_log/CAN/steering_angle` | `t`, `value` (N) | steering wheel, degrees, positive to the left |
-//! | `processed_log/CAN/wheel_speed` | `t`, `value` (N×4) | where there is no `speed`: the mean of the four |
+//! | `processed_log/CAN/wheel_speed` | `t`, `value` (N×4) | their mean is the speed if there is no `speed` |
 //! | `processed_log/IMU/accelerometer`, `gyro` | `t`, `value` (N×3) | x forward, y right, z down of the device; m/s², rad/s |
 //! | `global_pose/frame_*` | times, positions, velocities (ECEF), orientations (`ecef_from_device`, w x y z) | the reference |
 //!
@@ -28,7 +28,7 @@ use std::path::Path;
 pub struct CommaSegment {
     /// Speed, steering wheel's angle and inertial unit (axes: [`crate::ImuMount::forward_right_down`]).
     pub sensors: VehicleSensors,
-    /// Speeds of the four wheels in m/s, where the segment has them, in the file's order.
+    /// Speeds of the four wheels in m/s, in the file's order, if the segment has them.
     pub wheel_speeds_mps: Vec<Signal>,
     /// The car's reference trajectory: `world_from_vehicle` over time. World: east, north, up at the
     /// first pose, in metres; vehicle: x forward, y left, z up of the **device**, which looks a few
@@ -42,8 +42,7 @@ impl CommaSegment {
     /// Reads a segment's folder. Steering, inertial unit and pose may be absent; the speed may not.
     ///
     /// # Errors
-    /// [`Error::File`] and [`Error::Array`] name the array that is missing or does not match the
-    /// layout.
+    /// [`Error::File`] and [`Error::Array`], naming the array that is missing or does not match the layout.
     pub fn open(folder: &Path) -> Result<Self> {
         let (sensors, wheel_speeds_mps) = recorded(folder)?;
         let (reference, frame_times_s) = reference::read(&folder.join("global_pose"))?;
@@ -56,7 +55,7 @@ impl CommaSegment {
     }
 }
 
-/// A segment's [`CommaSegment::sensors`] without its reference.
+/// Reads a segment's [`CommaSegment::sensors`] without its reference.
 ///
 /// # Errors
 /// As [`CommaSegment::open`].
@@ -64,15 +63,15 @@ pub fn sensors(folder: &Path) -> Result<VehicleSensors> {
     recorded(folder).map(|(sensors, _)| sensors)
 }
 
-/// The numbers of an array of N or N×1, such as `processed_log/CAN/speed/t`.
+/// Reads the numbers of an array with shape N or N×1, such as `processed_log/CAN/speed/t`.
 ///
 /// # Errors
-/// [`Error::File`]; [`Error::Array`] for what is no such array.
+/// [`Error::File`]; [`Error::Array`] if it is not such an array.
 pub fn numbers(path: &Path) -> Result<Vec<f64>> {
     Ok(Table::read(path, 1)?.values)
 }
 
-/// The sensors, and each wheel's speed.
+/// The sensors, and the speed of each wheel.
 fn recorded(folder: &Path) -> Result<(VehicleSensors, Vec<Signal>)> {
     let log = folder.join("processed_log");
     let wheels = optional(&log.join("CAN/wheel_speed"), 4)?;
@@ -143,7 +142,7 @@ fn column(stream: &Stream, index: usize) -> Signal {
     Signal::new(stream.rows().map(|(t, row)| (t, row[index])))
 }
 
-/// Accelerometer and gyro on the gyro's times: the two arrive together, but are listed apart.
+/// Accelerometer and gyro at the gyro's times: the two arrive together, but have separate files.
 fn join_imu(accelerometer: &Stream, gyro: &Stream) -> Vec<ImuSample> {
     let axes = [0, 1, 2].map(|i| column(accelerometer, i));
     let joined = gyro.rows().filter_map(|(time_s, rate)| {

@@ -6,7 +6,7 @@ use ndarray::ArrayD;
 use ndarray_npy::ReadNpyExt;
 use std::path::Path;
 
-/// Rows of `columns` numbers.
+/// Rows with `columns` numbers each.
 #[derive(Debug)]
 pub(super) struct Table {
     pub values: Vec<f64>,
@@ -40,7 +40,7 @@ impl Table {
             return Err(ArrayProblem::Shape { shape, columns });
         }
         Ok(Self {
-            // In logical order, whichever way the file stores it.
+            // In logical order, however the file stores it.
             values: array.iter().copied().collect(),
             columns,
         })
@@ -92,7 +92,7 @@ mod tests {
             "{error}"
         );
         assert_eq!(error.to_string(), "ends within its header");
-        // A shape of 2^40 rows with 16 bytes behind it.
+        // A shape of 2^40 rows, but only 16 bytes of data.
         let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, ), }\n";
         let mut file = b"\x93NUMPY\x01\x00".to_vec();
         file.extend((header.len() as u16).to_le_bytes());

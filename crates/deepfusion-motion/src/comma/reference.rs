@@ -59,7 +59,7 @@ fn rows<const N: usize>(folder: &Path, name: &str, expected: usize) -> Result<Ve
 /// Rotation from earth-centred axes to east, north, up at a position.
 fn enu_from_ecef(place: &Vector3<f64>) -> Matrix3<f64> {
     let longitude = place.y.atan2(place.x);
-    // Exact on the ellipsoid; some micro-radians off at a kilometre's height, which turns all alike.
+    // Exact on the ellipsoid; some micro-radians off at a height of one kilometre, which turns all positions alike.
     let latitude = place
         .z
         .atan2(place.x.hypot(place.y) * (1.0 - ECCENTRICITY_SQUARED));

@@ -1,48 +1,48 @@
-//! Why an array file of a recording is of no use.
+//! Why an array file of a recording cannot be used.
 
 use deepfusion_geometry::NpyHeaderProblem;
 use deepfusion_hint::count_of;
 use ndarray_npy::ReadNpyError;
 use std::fmt;
 
-/// Why an array file is not what a recording's layout says.
+/// Why an array file does not match a recording's layout.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArrayProblem {
-    /// It does not begin as an array file.
+    /// The file does not begin like an array file.
     #[error(transparent)]
     Header(#[from] NpyHeaderProblem),
-    /// It is shorter than its header says, or its items are no numbers.
+    /// The file is shorter than its header says, or its items are not numbers.
     #[error("has fewer numbers than its header says, or no numbers")]
     Cut,
-    /// It cannot be read as an array of numbers with a fraction.
-    #[error("no array of float64 or float32: {0}")]
+    /// The file does not contain floating-point numbers.
+    #[error("not an array of float64 or float32: {0}")]
     NoFloats(#[source] ReadNpyError),
-    /// It has another shape.
+    /// The array has another shape.
     #[error("is {}, expected N×{columns}", by_times(shape))]
     Shape {
-        /// Its shape.
+        /// Shape of the array.
         shape: Vec<usize>,
-        /// How many columns it should have.
+        /// Number of columns expected.
         columns: usize,
     },
-    /// It has another number of rows than its times.
+    /// The numbers of rows and of times differ.
     #[error("{}, but {times} has {expected}", count_of(*rows, "row"))]
     Rows {
-        /// How many it has.
+        /// Number of rows.
         rows: usize,
-        /// The array of times.
+        /// The array with the times.
         times: TimesArray,
-        /// How many times there are.
+        /// Number of times.
         expected: usize,
     },
 }
 
-/// An array with the times of others' rows.
+/// An array with the times for other arrays' rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TimesArray {
-    /// `t` beside the values of a sensor.
+    /// `t` in the folder of a sensor's values.
     Beside,
     /// `frame_times` of the reference.
     Frames,
@@ -51,7 +51,7 @@ pub enum TimesArray {
 impl fmt::Display for TimesArray {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Beside => "`t` beside it",
+            Self::Beside => "`t` in the same folder",
             Self::Frames => "frame_times",
         })
     }

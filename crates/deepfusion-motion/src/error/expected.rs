@@ -1,13 +1,13 @@
 //! What settings of sensors and layouts of signals must be.
 
-/// What a setting of a vehicle or sensor, or what is given to be aligned, must be.
+/// What a setting of a vehicle or sensor, or an image to be aligned, must be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedSetting {
     /// A number above 0.
     #[error("above 0")]
     AboveZero,
-    /// A number from one to the other, both included.
+    /// A number in a range, limits included.
     #[error("{from} to {to}")]
     Within {
         /// The smallest.
@@ -15,7 +15,7 @@ pub enum ExpectedSetting {
         /// The largest.
         to: f64,
     },
-    /// A length from one to the other, both included.
+    /// A length in a range, limits included.
     #[error("{from} to {to} m")]
     Metres {
         /// The smallest, metres.
@@ -23,7 +23,7 @@ pub enum ExpectedSetting {
         /// The largest, metres.
         to: f64,
     },
-    /// A time from one to the other, both included.
+    /// A time in a range, limits included.
     #[error("{from} to {to} s")]
     Seconds {
         /// The smallest, seconds.
@@ -31,23 +31,23 @@ pub enum ExpectedSetting {
         /// The largest, seconds.
         to: f64,
     },
-    /// A true speed over the measured one.
-    #[error("{from} to {to} (a unit is converted, not scaled)")]
+    /// A ratio of true to measured speed.
+    #[error("{from} to {to} (convert units instead of scaling)")]
     SpeedScale {
         /// The smallest.
         from: f64,
         /// The largest.
         to: f64,
     },
-    /// A steering wheel's angle over the road wheels', with any sign.
-    #[error("{from} to {to}, negative where the signal grows to the right")]
+    /// A ratio of the steering wheel's angle to the road wheels', with either sign.
+    #[error("{from} to {to}, negative if the signal grows to the right")]
     SteeringRatio {
-        /// The smallest, without its sign.
+        /// The smallest absolute value.
         from: f64,
-        /// The largest, without its sign.
+        /// The largest absolute value.
         to: f64,
     },
-    /// How a car understeers.
+    /// An understeer coefficient.
     #[error("{from} to {to} s²/m²")]
     Understeer {
         /// The smallest, s²/m².
@@ -61,21 +61,21 @@ pub enum ExpectedSetting {
     /// Angles about three axes.
     #[error("angles in radians")]
     Angles,
-    /// Where a sensor is.
-    #[error("a place on the vehicle, in metres")]
+    /// A sensor's position.
+    #[error("a position on the vehicle, in metres")]
     PlaceOnVehicle,
-    /// An angular rate, either way.
+    /// An angular rate of either sign.
     #[error("below {0} rad/s")]
     AngularRateBelow(f64),
-    /// A picture that can be aligned.
+    /// An image size that can be aligned.
     #[error("at least {width}×{height} pixels")]
     PictureSize {
-        /// Its least width.
+        /// Smallest width.
         width: usize,
-        /// Its least height.
+        /// Smallest height.
         height: usize,
     },
-    /// As many values as the picture has pixels.
+    /// One value per pixel.
     #[error("width × height")]
     AllPixels,
 }
@@ -84,7 +84,7 @@ pub enum ExpectedSetting {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedLayout {
-    /// The length of an integer.
+    /// Length of an integer.
     #[error("{from} to {to} bits")]
     Bits {
         /// The smallest.
@@ -92,16 +92,16 @@ pub enum ExpectedLayout {
         /// The largest.
         to: u16,
     },
-    /// The length of a number with a fraction.
+    /// Length of a floating-point number.
     #[error("{0} bits for float{0}")]
     FloatBits(u16),
-    /// A place in the frame.
-    #[error("one that ends within {bytes} bytes")]
+    /// A position in the frame.
+    #[error("a position that ends within {bytes} bytes")]
     EndsWithin {
         /// Length of the longest frame.
         bytes: u16,
     },
-    /// A number, neither NaN nor infinite.
+    /// A number that is neither NaN nor infinite.
     #[error("a finite number")]
     Finite,
 }
@@ -120,11 +120,11 @@ mod tests {
             (Expected::Seconds { from, to }, "0.05 to 60 s"),
             (
                 Expected::SpeedScale { from, to },
-                "0.05 to 60 (a unit is converted, not scaled)",
+                "0.05 to 60 (convert units instead of scaling)",
             ),
             (
                 Expected::SteeringRatio { from, to },
-                "0.05 to 60, negative where the signal grows to the right",
+                "0.05 to 60, negative if the signal grows to the right",
             ),
             (Expected::Understeer { from, to }, "0.05 to 60 s²/m²"),
             (Expected::AngularRateBelow(1.0), "below 1 rad/s"),
@@ -148,7 +148,7 @@ mod tests {
             (ExpectedLayout::FloatBits(32), "32 bits for float32"),
             (
                 ExpectedLayout::EndsWithin { bytes: 64 },
-                "one that ends within 64 bytes",
+                "a position that ends within 64 bytes",
             ),
             (ExpectedLayout::Finite, "a finite number"),
         ] {

@@ -1,21 +1,21 @@
-//! The least squares behind the identification.
+//! The least-squares fit of the identification.
 
 use super::problem::{BIAS, Covariance, PRODUCT, Parameters, Problem, RATIO, RATIO_RANGE, ZERO};
 use super::{Estimate, IdentifyConfig};
 use crate::Signal;
 
-/// The streams are averaged over this time, in seconds: it removes the noise of single samples and
-/// the difference of rates, and no driver steers faster.
+/// The streams are averaged over this time, in seconds. That removes the noise of single samples and the difference between the sample
+/// rates, and no driver steers faster.
 const STEP_S: f64 = 0.1;
-/// Least yaw rate that counts as turning, in rad/s.
+/// Smallest yaw rate that counts as turning, in rad/s.
 const TURNING_RADPS: f64 = 0.03;
-/// Initial ratios.
+/// Ratios from which the fit starts.
 const RATIOS: [f64; 6] = [1.0, 8.0, 12.0, 16.0, 20.0, 25.0];
 /// Largest angle of a road wheel, in radians.
 const LOCK_RAD: f64 = 1.1;
 const ITERATIONS: usize = 60;
 
-/// A step of the drive.
+/// The mean measurements over one time step of the drive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Observation {
     pub speed: f64,
@@ -23,14 +23,14 @@ pub(super) struct Observation {
     pub yaw_rate: f64,
 }
 
-/// The three streams averaged over steps that all of them cover.
+/// The three streams averaged over the time steps that all of them cover.
 pub(super) fn observations(
     speed: &Signal,
     steering: &Signal,
     yaw_rate: &Signal,
 ) -> Vec<Observation> {
     let mut found = Vec::new();
-    // Steps follow the samples, so that a time stamp gone astray costs one step, not a million.
+    // Steps follow the samples, so that a wrong time stamp costs one step, not a million.
     let mut from = f64::NEG_INFINITY;
     for &time in yaw_rate.times_s() {
         if time - from < STEP_S {
@@ -61,12 +61,12 @@ pub(super) fn turning_s(observations: &[Observation]) -> f64 {
 pub(super) struct Fit {
     parameters: Parameters,
     covariance: Covariance,
-    /// −1 where the steering signal grows to the right.
+    /// −1 if the steering signal grows to the right.
     sign: f64,
     fixed_wheelbase: Option<f64>,
-    /// Standard deviation of the residuals, robust, in rad/s.
+    /// Robust standard deviation of the residuals, in rad/s.
     pub sigma: f64,
-    /// Whether the ratio ran into the end of its range.
+    /// Whether the ratio reached a limit of its range.
     pub at_the_edge: bool,
     cost: f64,
 }
@@ -130,8 +130,8 @@ impl Fit {
                 let small = (next - parameters).norm() < 1e-10;
                 (parameters, cost) = (next, next_cost);
                 damping = (damping * 0.2f64).max(1e-9);
-                // The scale of the noise follows the first rounds, then stays: else the robust
-                // weights and the fit could chase each other.
+                // The noise level is estimated in the first rounds and then fixed: otherwise the robust weights and the fit might never
+                // settle.
                 if iteration < 20 {
                     sigma = problem.sigma(&parameters);
                     cost = problem.cost(&parameters, sigma);
@@ -155,7 +155,7 @@ impl Fit {
             sign,
             fixed_wheelbase: config.wheelbase_m,
             sigma,
-            // At one scale for all starts.
+            // At the same noise level for all starts.
             cost: problem.cost(&parameters, 1.0),
         })
         .filter(|fit| fit.parameters.iter().all(|p| p.is_finite()))

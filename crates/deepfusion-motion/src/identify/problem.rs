@@ -3,16 +3,15 @@
 use super::fit::Observation;
 use nalgebra::{SMatrix, SVector};
 
-/// Range of the ratio.
+/// Allowed range of the ratio.
 pub(super) const RATIO_RANGE: (f64, f64) = (0.7, 40.0);
-/// Priors of the steering's zero (at the road wheel, in radians) and of the gyro's bias (in rad/s).
-/// They keep the fit finite if a drive at one speed cannot separate the two, and are far wider than
-/// either.
+/// Prior standard deviations of the steering's zero (at the road wheel, in radians) and of the gyro's bias (in rad/s). They keep the fit
+/// finite if a drive at constant speed cannot separate the two, and are far larger than real values.
 const ZERO_PRIOR_RAD: f64 = 0.1;
 const BIAS_PRIOR_RADPS: f64 = 0.05;
-/// Huber's constant: 95 % efficient on normal noise.
+/// Huber's constant: 95 % efficient for normal noise.
 const HUBER: f64 = 1.345;
-/// Least noise of a gyro, in rad/s: it keeps weights finite on noiseless data.
+/// Smallest noise assumed for a gyro, in rad/s: it keeps weights finite on noiseless data.
 const LEAST_SIGMA: f64 = 1e-7;
 /// Parameters: ln(L·ρ), ln ρ, the zero at the road wheel s₀/ρ (rad), b (rad/s).
 pub(super) type Parameters = SVector<f64, 4>;
@@ -20,10 +19,10 @@ pub(super) const PRODUCT: usize = 0;
 pub(super) const RATIO: usize = 1;
 pub(super) const ZERO: usize = 2;
 pub(super) const BIAS: usize = 3;
-/// Their normal equations, or their inverse.
+/// The normal matrix of these parameters, or its inverse.
 pub(super) type Covariance = SMatrix<f64, 4, 4>;
 
-/// The observations and what is held fixed.
+/// The observations and the fixed values.
 pub(super) struct Problem<'a> {
     pub observations: &'a [Observation],
     pub understeer: f64,
@@ -32,7 +31,7 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// ω − model, and the model's derivatives.
+    /// ω − model, and the derivatives of the model.
     fn residual(&self, o: &Observation, p: &Parameters) -> (f64, Parameters) {
         let (product, ratio) = (p[PRODUCT].exp(), p[RATIO].exp());
         let x = o.steering / ratio - p[ZERO];
@@ -45,7 +44,7 @@ impl Problem<'_> {
         if self.ratio_is_known {
             derivative[RATIO] = 0.0;
         } else if self.wheelbase.is_some() {
-            // The product moves with the ratio.
+            // With a fixed wheelbase, the product follows the ratio.
             derivative[RATIO] += derivative[PRODUCT];
             derivative[PRODUCT] = 0.0;
         }
@@ -55,7 +54,7 @@ impl Problem<'_> {
         (o.yaw_rate - turning - p[BIAS], derivative)
     }
 
-    /// Parameters within their range, and tied where the wheelbase is known.
+    /// Parameters clamped to their ranges, and tied if the wheelbase is known.
     pub(super) fn allowed(&self, mut p: Parameters) -> Parameters {
         if !self.ratio_is_known {
             p[RATIO] = p[RATIO].clamp(RATIO_RANGE.0.ln(), RATIO_RANGE.1.ln());
@@ -83,7 +82,7 @@ impl Problem<'_> {
         (1.4826 * median).max(LEAST_SIGMA)
     }
 
-    /// Huber's loss over σ², and the priors.
+    /// Huber's loss divided by σ², plus the priors.
     pub(super) fn cost(&self, p: &Parameters, sigma: f64) -> f64 {
         let loss = |r: f64| {
             let scaled = r.abs() / sigma;
@@ -116,8 +115,7 @@ impl Problem<'_> {
         (normal, gradient)
     }
 
-    /// The covariance of the free parameters; a fixed one has none. With the wheelbase known, the
-    /// product's is the ratio's.
+    /// The covariance of the free parameters; that of a fixed one is 0. With a known wheelbase, the product's equals the ratio's.
     pub(super) fn free_inverse(&self, normal: &Covariance) -> Option<Covariance> {
         let mut padded = *normal;
         let fixed = |i: usize| normal[(i, i)] == 0.0;
@@ -137,8 +135,7 @@ impl Problem<'_> {
         Some(inverse)
     }
 
-    /// Factor by which correlated residuals widen the variance: (1 + r) / (1 − r), r the
-    /// correlation of neighbours.
+    /// Factor by which correlated residuals widen the variance: (1 + r) / (1 − r), where r is the correlation of neighbouring residuals.
     pub(super) fn runs(&self, p: &Parameters) -> f64 {
         let residuals: Vec<f64> = self
             .observations

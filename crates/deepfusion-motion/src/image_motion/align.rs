@@ -1,4 +1,4 @@
-//! Fits shift and growth to a pair of pictures.
+//! Fits shift and growth to a pair of images.
 
 mod blocks;
 
@@ -6,16 +6,16 @@ use nalgebra::{SMatrix, SVector};
 
 /// Rows that are aligned, as shares of the height: above the road's surface, below the sky's top.
 const ROWS: (f64, f64) = (0.08, 0.60);
-/// The coarsest picture is at least this wide and high, in pixels.
+/// The coarsest image is at least this wide and high, in pixels.
 const COARSEST: (usize, usize) = (32, 12);
 const ITERATIONS: usize = 12;
-/// Huber's constant: a difference larger than this many times the median counts less (cars, things that appear).
+/// Huber's constant: a difference larger than this many times the median has less weight (cars, things that appear).
 const HUBER: f64 = 1.5;
-/// Least mean squared horizontal gradient of a picture that can be aligned, in squared grey levels
-/// of 255 per pixel: a wall's noise is below it.
+/// Smallest mean squared horizontal gradient of an image that can be aligned, in squared grey levels of 255 per pixel: the noise of a blank
+/// wall is below it.
 const LEAST_SLOPE: f64 = 0.5;
 
-/// A single-channel picture.
+/// A single-channel image.
 #[derive(Debug, Clone)]
 pub(super) struct Plane {
     width: usize,
@@ -23,12 +23,12 @@ pub(super) struct Plane {
     values: Vec<f64>,
 }
 
-/// The warp from one picture to the next.
+/// The warp from one image to the next.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Warp {
     pub right: f64,
     pub down: f64,
-    /// Turn about the centre, to the right at the top, in radians.
+    /// Rotation about the centre, clockwise, in radians.
     pub clockwise: f64,
     pub growth: f64,
     brightness: f64,
@@ -43,7 +43,7 @@ impl Plane {
         }
     }
 
-    /// The picture at half the size, each pixel the mean of four; `None` where that is too small.
+    /// The image at half the size, each pixel the mean of four; `None` if that is too small.
     pub(super) fn half(&self) -> Option<Self> {
         let (width, height) = (self.width / 2, self.height / 2);
         if width < COARSEST.0 || height < COARSEST.1 {
@@ -62,7 +62,7 @@ impl Plane {
         })
     }
 
-    /// Whether its aligned rows are (nearly) all alike, or NaN.
+    /// Whether the aligned rows have (nearly) no texture, or contain NaN.
     fn is_plain(&self) -> bool {
         let rows = &self.values[aligned_rows(self.height).start * self.width
             ..aligned_rows(self.height).end * self.width];
@@ -97,12 +97,12 @@ fn aligned_rows(height: usize) -> std::ops::Range<usize> {
     (height as f64 * ROWS.0) as usize..(height as f64 * ROWS.1) as usize
 }
 
-/// The fixed point of growth: the middle of the picture.
+/// The centre of growth: the middle of the image.
 pub(super) fn centre(width: usize, height: usize) -> (f64, f64) {
     (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0))
 }
 
-/// Aligns two pyramids, coarse to fine.
+/// Aligns two image pyramids, coarse to fine.
 pub(super) fn align(before: &[Plane], after: &[Plane]) -> Option<Warp> {
     let plain = |pyramid: &[Plane]| pyramid.first().is_none_or(Plane::is_plain);
     if before.len() != after.len() || plain(before) || plain(after) {
@@ -115,7 +115,7 @@ pub(super) fn align(before: &[Plane], after: &[Plane]) -> Option<Warp> {
         }
         warp = refine(a, b, warp)?;
         if level > 0 {
-            // Twice the pixels: twice the shift.
+            // At twice the size, shifts are twice as large.
             warp.right *= 2.0;
             warp.down *= 2.0;
         }
@@ -125,7 +125,7 @@ pub(super) fn align(before: &[Plane], after: &[Plane]) -> Option<Warp> {
     (warp.right.abs() < limit && warp.growth.abs() < 0.5).then_some(warp)
 }
 
-/// One pixel's residual, I₀ + β − I₁, and I₁'s gradient (right, down).
+/// One pixel's residual, I₀ + β − I₁, and the gradient of I₁ (right, down).
 struct Reading {
     difference: f64,
     right: f64,
@@ -133,7 +133,7 @@ struct Reading {
 }
 
 impl Reading {
-    /// At a pixel of `before`, its distance from the centre given, for a growth of its own.
+    /// The residual at a pixel of `before`, given its distance from the centre, with a growth of its own.
     fn at(
         before: &Plane,
         after: &Plane,
@@ -159,7 +159,7 @@ impl Reading {
     }
 }
 
-/// Gauss–Newton on one level, with one growth for all.
+/// Gauss–Newton iterations on one level, with one growth for the whole image.
 fn refine(before: &Plane, after: &Plane, mut warp: Warp) -> Option<Warp> {
     let mut scale = f64::INFINITY;
     for _ in 0..ITERATIONS {

@@ -1,14 +1,12 @@
-//! The direction of up by a complementary filter: the gyro for short times, the accelerometer for
-//! long ones.
+//! The direction of up from a complementary filter: the gyro over short times, the accelerometer over long ones.
 
 use super::ImuSample;
 use crate::Signal;
 use nalgebra::Vector3;
 
-/// Half the time over which the speed is differentiated to acceleration, in seconds: a wheel's pulses
-/// make shorter differences noisy.
+/// Half the time over which the speed is differentiated to get the acceleration, in seconds: wheel pulses make shorter differences noisy.
 const SLOPE_S: f64 = 0.25;
-/// Without a speed, the accelerometer counts while its reading's norm is within this of gravity, in m/s².
+/// Without a speed, the accelerometer is used only while the norm of its reading is within this of gravity, in m/s².
 const CLOSE_TO_GRAVITY: f64 = 0.3;
 
 /// The direction of up in the vehicle's axes, over time.
@@ -21,7 +19,7 @@ pub(super) struct Attitude<'a> {
 }
 
 impl<'a> Attitude<'a> {
-    /// Starts at the mean direction over the samples of the first `start_s` seconds.
+    /// Starts with the mean direction over the samples of the first `start_s` seconds.
     pub(super) fn level(
         stretch: &[ImuSample],
         speed: &'a Signal,
@@ -42,15 +40,15 @@ impl<'a> Attitude<'a> {
         }
     }
 
-    /// Advances to the next sample: rotates back by the vehicle's rotation, then corrects towards
-    /// the accelerometer. Returns the new direction of up.
+    /// Advances to the next sample: rotates the direction against the vehicle's rotation, then corrects it towards the accelerometer's.
+    /// Returns the new direction of up.
     pub(super) fn advance(&mut self, sample: &ImuSample) -> Vector3<f64> {
         let dt = sample.time_s - self.last_s;
         self.last_s = sample.time_s;
-        // Trapezoidal: by the sample's own rate alone roll and pitch would be half an interval early.
+        // Trapezoidal rule: with the sample's own rate alone, roll and pitch would be half an interval early.
         let rate = 0.5 * (self.last_rate + sample.angular_rate_radps);
         self.last_rate = sample.angular_rate_radps;
-        // A direction fixed to the world, seen from a body that turns at ω, changes by −ω × it.
+        // Seen from a body that rotates at ω, a direction d fixed in the world changes by −ω × d.
         let mut up = self.up - rate.cross(&self.up) * dt;
         if let Some(measured) =
             gravity_reaction(sample, self.speed).and_then(|g| g.try_normalize(1e-6))
@@ -62,8 +60,8 @@ impl<'a> Attitude<'a> {
     }
 }
 
-/// The specific force without the vehicle's own acceleration: (v̇, v ω_z, 0) for wheels that do not
-/// slip. Without a speed the force itself, if its norm is about gravity's.
+/// The specific force without the vehicle's own acceleration, which is (v̇, v ω_z, 0) for wheels that do not slip. Without a speed: the
+/// specific force itself, if its norm is close to gravity.
 pub(super) fn gravity_reaction(sample: &ImuSample, speed: &Signal) -> Option<Vector3<f64>> {
     let force = sample.acceleration_mps2;
     if let Some((v, slope)) = speed_and_slope(speed, sample.time_s) {

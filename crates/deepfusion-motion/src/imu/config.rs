@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImuMount {
-    /// Axis-angle of the rotation that takes the unit's axes to the vehicle's (x forward, y left, z
-    /// up), in radians. A unit with x forward, y right, z down has (π, 0, 0).
+    /// Axis-angle of the rotation from the unit's axes to the vehicle's (x forward, y left, z up), in radians. A unit with x forward, y
+    /// right, z down has (π, 0, 0).
     pub rotation_rad: [f64; 3],
     /// The unit's position in the vehicle's frame (origin: middle of the rear axle), in metres.
     pub translation_m: [f64; 3],
@@ -24,7 +24,7 @@ impl ImuMount {
         }
     }
 
-    /// As a rigid motion.
+    /// The mount as a rigid motion.
     #[must_use]
     pub fn se3(&self) -> Se3 {
         Se3::from_axis_angle(
@@ -40,13 +40,12 @@ impl ImuMount {
 pub struct ImuConfig {
     /// The unit's mount.
     pub vehicle_from_imu: ImuMount,
-    /// Time constant of the attitude's complementary filter, in seconds: slower changes of up follow
-    /// the accelerometer, faster ones the gyro. The filter removes the vehicle's own acceleration by
-    /// means of the speed, so that it need not be long; with a long one the gyro's drift tilts the
-    /// horizon.
+    /// Time constant of the attitude's complementary filter, in seconds: slower changes of up follow the accelerometer, faster ones the
+    /// gyro. The filter removes the vehicle's own acceleration using the speed, so the time constant can be short; with a long one, the
+    /// gyro's drift tilts the horizon.
     pub attitude_time_s: f64,
-    /// The gyro's bias for recordings without a standstill, in rad/s about the vehicle's axes. If not given, the biases
-    /// of roll and pitch are estimated against gravity while driving, that of yaw against the steering if there is one.
+    /// The gyro's bias for recordings without a standstill, in rad/s about the vehicle's axes. If not given, the biases of roll and pitch
+    /// are estimated against gravity while driving, and that of yaw against the steering if the vehicle has a steering signal.
     pub gyro_bias_radps: Option<[f64; 3]>,
     /// The conditions for a standstill.
     pub standstill: StandstillConfig,
@@ -63,8 +62,8 @@ impl Default for ImuConfig {
     }
 }
 
-/// The conditions for a standstill: the speed is low, and the unit is quiet. Wheel sensors read 0
-/// below walking speed, so that the speed alone would count creeping as standing.
+/// The conditions for a standstill: the speed is low, and the unit is quiet. Wheel sensors read 0 below walking speed, so the speed alone
+/// would count creeping as standing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StandstillConfig {
@@ -94,7 +93,7 @@ impl ImuConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first field out of range.
+    /// [`Error::Config`], naming the first field out of range.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: f64, expected| {
             ok.then_some(()).ok_or(Error::Config {

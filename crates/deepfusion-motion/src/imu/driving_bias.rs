@@ -5,31 +5,31 @@ use super::attitude::gravity_reaction;
 use crate::Signal;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Longest window over which a bias counts as constant, in seconds: it follows the unit's temperature.
+/// Longest window in which a bias counts as constant, in seconds: the bias follows the unit's temperature.
 const WINDOW_S: f64 = 30.0;
 /// Shortest window, in seconds.
 const SHORTEST_S: f64 = 1.0;
-/// Typical bias, in rad/s.
+/// Prior standard deviation of the bias, in rad/s.
 const USUAL_BIAS: f64 = 0.008;
-/// Typical error of the accelerometer's direction of up, in radians, and its duration, in seconds: bumps, and errors of the
-/// acceleration from speed.
+/// Typical error of the accelerometer's direction of up, in radians, and how long it lasts, in seconds. It comes from bumps and from errors
+/// of the acceleration derived from speed.
 const UP_ERROR: f64 = 0.01;
 const UP_ERROR_S: f64 = 0.5;
 /// Typical error of the initial direction of up, in radians.
 const START_ERROR: f64 = 0.1;
 
-/// A sensor's bias in three axes, and the time it was estimated for.
+/// A sensor's bias in three axes, and the time of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DrivingBias {
     pub(crate) middle_s: f64,
     pub(crate) bias: Vector3<f64>,
 }
 
-/// The bias about roll and pitch by windows, vehicle axes, in rad/s; none about the vertical, which gravity does not
-/// determine.
+/// The biases about roll and pitch by window, in vehicle axes, in rad/s. The bias about the vertical is not included: gravity does not
+/// determine it.
 ///
-/// In each window the initial direction of up is rotated by the gyro alone; its deviation from the accelerometer's is
-/// linear in the initial error δ and in the bias b: up' = −(ω − b) × up.
+/// In each window, the initial direction of up is rotated by the gyro alone. Its deviation from the accelerometer's direction is linear in
+/// the initial error δ and in the bias b: up' = −(ω − b) × up.
 pub(super) fn tilt_biases(
     samples: &[ImuSample],
     speed: &Signal,
@@ -43,8 +43,7 @@ pub(super) fn tilt_biases(
     )
 }
 
-/// Applies `find` to each window: stretches without a gap, cut into parts of equal length. Windows shorter than a second
-/// are left out.
+/// Applies `find` to each window: stretches without a gap, cut into parts of equal length. Windows shorter than a second are left out.
 pub(crate) fn by_windows<T>(
     samples: &[T],
     time_s: impl Fn(&T) -> f64,
@@ -74,7 +73,7 @@ fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<Vector3<f64>> {
     let measured = |s: &ImuSample| gravity_reaction(s, speed)?.try_normalize(1e-6);
     let mut up = samples.iter().find_map(measured)?;
     let (mut by_start, mut by_bias) = (Matrix3::identity(), Matrix3::zeros());
-    // Unknowns: the first direction's error along x and y, the bias about x and y.
+    // Unknowns: the error of the initial direction along x and y, the bias about x and y.
     let priors = [START_ERROR, START_ERROR, USUAL_BIAS, USUAL_BIAS];
     let mut normal =
         SMatrix::<f64, 4, 4>::from_diagonal(&SVector::from(priors.map(|p| p.powi(-2))));
@@ -84,7 +83,7 @@ fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<Vector3<f64>> {
         let dt = sample.time_s - last_s;
         last_s = sample.time_s;
         let turn = -sample.angular_rate_radps.cross_matrix() * dt;
-        // Of the middle of the step, in the error as in what it depends on.
+        // Second order in the step, so that error and direction both refer to the step's middle.
         let step = Matrix3::identity() + turn + 0.5 * turn * turn;
         by_bias = step * by_bias - up.cross_matrix() * dt;
         (up, by_start) = (step * up, step * by_start);
@@ -105,7 +104,7 @@ fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<Vector3<f64>> {
     Some(Vector3::new(found[2], found[3], 0.0))
 }
 
-/// The bias at a time, interpolated between the estimates before and after; `None` without any.
+/// The bias at a time, interpolated between the estimates before and after; `None` if there are none.
 pub(crate) fn at(found: &[DrivingBias], time_s: f64) -> Option<Vector3<f64>> {
     let after = found.partition_point(|b| b.middle_s <= time_s);
     match (after.checked_sub(1).map(|i| found[i]), found.get(after)) {

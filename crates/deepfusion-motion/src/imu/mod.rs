@@ -1,5 +1,4 @@
-//! Distance and heading from an inertial unit (Eq. 23–25): rotated into the vehicle's axes, without
-//! bias and gravity.
+//! Distance and heading from an inertial unit (Eq. 23–25): its readings are rotated into the vehicle's axes and freed of bias and gravity.
 
 mod attitude;
 mod config;
@@ -17,14 +16,14 @@ use nalgebra::Vector3;
 /// Standard gravity, m/s².
 pub(crate) const GRAVITY: f64 = 9.806_65;
 
-/// Plausible norm of a drive's mean specific force, m/s²: gravity, with room for a drive that ends
-/// faster than it began and an accelerometer that is off by some percent.
+/// Plausible norm of a drive's mean specific force, m/s²: gravity, with tolerance for a drive that ends faster than it began and an
+/// accelerometer that is off by some percent.
 const GRAVITY_RANGE: std::ops::Range<f64> = 8.3..11.3;
-/// Largest tilt of a mount, in radians: beyond it, axes are swapped.
+/// Largest tilt of a mount, in radians: beyond it, axes are assumed to be swapped.
 const MOST_TILT_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Time constant of the filter for the body's roll and pitch, in seconds. It is long: over the second between two
-/// frames the gyro without bias is accurate to a thousandth of a radian, the accelerometer is not.
+/// Time constant of the filter for the body's roll and pitch, in seconds. It is long because over the second between two frames the
+/// unbiased gyro is accurate to a thousandth of a radian, and the accelerometer is not.
 const TILT_TIME_S: f64 = 15.0;
 
 /// One reading of an inertial unit.
@@ -32,8 +31,7 @@ const TILT_TIME_S: f64 = 15.0;
 pub struct ImuSample {
     /// Time, in seconds.
     pub time_s: f64,
-    /// Specific force along the unit's axes, in m/s²: gravity included, a unit at rest reads +9.81
-    /// along whichever axis points up.
+    /// Specific force along the unit's axes, in m/s². It includes gravity: a unit at rest reads +9.81 along the axis that points up.
     pub acceleration_mps2: Vector3<f64>,
     /// Angular rate about the unit's axes, in rad/s.
     pub angular_rate_radps: Vector3<f64>,
@@ -51,20 +49,20 @@ impl ImuSample {
 pub struct ImuTrack {
     forward_mps2: Signal,
     yaw_rate_radps: Signal,
-    /// About the vehicle's x (roll) and y (pitch).
+    /// Rates about the vehicle's x (roll) and y (pitch).
     tilt_rates_radps: [Signal; 2],
-    /// Roll and pitch against gravity.
+    /// Roll and pitch relative to gravity.
     tilt_rad: [Signal; 2],
     standstills: Vec<Standstill>,
 }
 
 impl ImuTrack {
-    /// Processes a recording. `speed` is the vehicle's speed in m/s on the same clock: it finds the
-    /// standstills (for the biases), and its derivative is removed from the specific force to find up.
+    /// Processes a recording. `speed` is the vehicle's speed in m/s on the same clock. It serves to find the standstills (for the biases),
+    /// and its derivative is removed from the specific force to find up.
     ///
     /// # Errors
-    /// [`Error::TooFewSamples`], [`Error::NotGravity`] (units, or gravity already removed),
-    /// [`Error::NotUp`] (a mount that does not fit: upside down, axes swapped), [`Error::Config`].
+    /// [`Error::TooFewSamples`], [`Error::NotGravity`] (wrong units, or gravity already removed), [`Error::NotUp`] (the mount is wrong:
+    /// upside down, axes swapped), [`Error::Config`].
     pub fn new(samples: &[ImuSample], speed: &Signal, config: &ImuConfig) -> Result<Self> {
         config.validate()?;
         let vehicle_from_imu = config.vehicle_from_imu.se3();
@@ -100,13 +98,13 @@ impl ImuTrack {
             sample.angular_rate_radps -= standstill::gyro_bias(&standstills, sample.time_s)
                 .or_else(|| bias_at(&driving, sample.time_s))
                 .unwrap_or(configured);
-            // The unit is not at the vehicle's origin: in a bend it feels ω × (ω × r) more. (ω̇ × r is
-            // left in: a gyro's derivative is noisier than the term is large.)
+            // The unit is not at the vehicle's origin: in a bend it measures ω × (ω × r) in addition. (ω̇ × r is not removed, since the
+            // noise of a differentiated gyro is larger than the term.)
             let omega = sample.angular_rate_radps;
             sample.acceleration_mps2 -= omega.cross(&omega.cross(&vehicle_from_imu.translation()));
         }
 
-        // The gaps are the same for all that is derived from the samples.
+        // All signals derived from the samples have the same gaps.
         let (mut forward, mut yaw) = (Vec::new(), Vec::new());
         let mut tilt = [Vec::new(), Vec::new()];
         for stretch in clean.chunk_by(|a, b| b.time_s - a.time_s <= max_gap_s) {
@@ -117,8 +115,8 @@ impl ImuTrack {
             for sample in stretch {
                 let up = attitude.advance(sample);
                 let slow_up = slow_attitude.advance(sample);
-                // Ahead, level: what the specific force has along it is the vehicle's acceleration
-                // alone. Standing or climbing, with the unit's nose up or down.
+                // The horizontal forward direction: the specific force along it is the vehicle's acceleration alone, whether the unit's
+                // nose points up or down.
                 let ahead = Vector3::x() - up * up.x;
                 let ahead = ahead / ahead.norm().max(1e-9);
                 forward.push((sample.time_s, sample.acceleration_mps2.dot(&ahead)));
@@ -146,54 +144,52 @@ impl ImuTrack {
         &self.yaw_rate_radps
     }
 
-    /// Roll (the left side up) and pitch (the nose down) against gravity at a time, in radians: from the gyro
-    /// over short times, from the accelerometer over long ones. Climbing counts as pitch. `None` if the recording
-    /// does not cover the time.
+    /// Roll (the left side up) and pitch (the nose down) relative to gravity at a time, in radians: from the gyro over short times, from
+    /// the accelerometer over long ones. Climbing counts as pitch. `None` if the recording does not cover the time.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
         let [roll, pitch] = &self.tilt_rad;
         Some([roll.at(time_s)?, pitch.at(time_s)?])
     }
 
-    /// Roll rate about the vehicle's x in rad/s, positive where the left side rises.
+    /// Roll rate about the vehicle's x in rad/s, positive if the left side rises.
     #[must_use]
     pub fn roll_rate(&self) -> &Signal {
         &self.tilt_rates_radps[0]
     }
 
-    /// Pitch rate about the vehicle's y in rad/s, positive where the nose goes down.
+    /// Pitch rate about the vehicle's y in rad/s, positive if the nose goes down.
     #[must_use]
     pub fn pitch_rate(&self) -> &Signal {
         &self.tilt_rates_radps[1]
     }
 
-    /// The standstills. Without any, the gyro's bias is that of the configuration, or estimated while driving.
+    /// The standstills. Without any, the gyro's bias comes from the configuration or is estimated while driving.
     #[must_use]
     pub fn standstills(&self) -> &[Standstill] {
         &self.standstills
     }
 
-    /// d_I in metres (Eq. 23–24): v_I(t) = v₀ + ∫a_x dt from the speed `v0_mps` at `from_s`, and its
-    /// integral. `None` where the recording does not cover the time.
+    /// d_I in metres (Eq. 23–24): v_I(t) = v₀ + ∫a_x dt from the speed `v0_mps` at `from_s`, and its integral. `None` if the recording does
+    /// not cover the time.
     #[must_use]
     pub fn distance(&self, from_s: f64, to_s: f64, v0_mps: f64) -> Option<f64> {
         Some(v0_mps * (to_s - from_s) + self.forward_mps2.double_integral(from_s, to_s)?)
     }
 
-    /// θ_I in radians (Eq. 25): ∫ω_z dt. `None` where the recording does not cover the time.
+    /// θ_I in radians (Eq. 25): ∫ω_z dt. `None` if the recording does not cover the time.
     #[must_use]
     pub fn yaw(&self, from_s: f64, to_s: f64) -> Option<f64> {
         self.yaw_rate_radps.integral(from_s, to_s)
     }
 }
 
-/// Checks that the mean specific force is one g upward: wrong units or a wrong mount are found
-/// before anything is integrated.
+/// Checks that the mean specific force is one g upward, so that wrong units or a wrong mount are found before anything is integrated.
 fn check_gravity(samples: &[ImuSample]) -> Result<()> {
     let sum: Vector3<f64> = samples.iter().map(|s| s.acceleration_mps2).sum();
     let mean = sum / samples.len() as f64;
     let norm = mean.norm();
-    // A sum that overflows is no gravity either.
+    // An overflowing sum is not gravity either.
     if !GRAVITY_RANGE.contains(&norm) {
         return Err(Error::NotGravity {
             found: mean.into(),

@@ -7,22 +7,22 @@ use nalgebra::Vector3;
 /// A stretch in which the vehicle stood still, and the unit's mean readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstill {
-    /// Begin, in seconds.
+    /// Start, in seconds.
     pub from_s: f64,
     /// End, in seconds.
     pub to_s: f64,
     /// Mean angular rate about the vehicle's axes, in rad/s: the gyro's bias.
     pub gyro_bias_radps: Vector3<f64>,
-    /// Mean specific force along the vehicle's axes, in m/s²: the direction of up. A bias across it
-    /// cannot be distinguished from a slope of the road, and counts as one.
+    /// Mean specific force along the vehicle's axes, in m/s²: the direction of up. A bias across it cannot be distinguished from a slope of
+    /// the road, and is treated as one.
     pub specific_force_mps2: Vector3<f64>,
     /// Norm of the specific force minus gravity, in m/s²: the only part of the accelerometer's bias
     /// that a standstill determines.
     pub up_bias_mps2: f64,
 }
 
-/// Finds the standstills of a recording in vehicle axes, by speed and by the unit's own variance.
-/// With an unknown speed the vehicle does not count as standing.
+/// Finds the standstills of a recording in vehicle axes, by the speed and by the unit's own variance. While the speed is unknown, the
+/// vehicle does not count as standing.
 #[must_use]
 pub fn standstills(
     samples: &[ImuSample],
@@ -43,8 +43,8 @@ pub fn standstills(
     found
 }
 
-/// The gyro's bias at a time, interpolated between the standstills before and after; `None` without
-/// any. Biases slowly follow the unit's temperature.
+/// The gyro's bias at a time, interpolated between the standstills before and after, because biases slowly follow the unit's temperature.
+/// `None` if there are none.
 pub(super) fn gyro_bias(standstills: &[Standstill], time_s: f64) -> Option<Vector3<f64>> {
     let middle = |s: &Standstill| 0.5 * (s.from_s + s.to_s);
     let after = standstills.partition_point(|s| middle(s) <= time_s);
@@ -57,7 +57,7 @@ pub(super) fn gyro_bias(standstills: &[Standstill], time_s: f64) -> Option<Vecto
     Some(before.gyro_bias_radps.lerp(&next.gyro_bias_radps, fraction))
 }
 
-/// The quiet windows of a slow stretch, neighbours joined.
+/// The quiet windows of a slow stretch, with adjacent ones joined.
 fn quiet_stretches(run: &[ImuSample], config: &StandstillConfig) -> Vec<Standstill> {
     let begin = run[0].time_s;
     let window = |s: &ImuSample| ((s.time_s - begin) / config.window_s) as u64;
@@ -65,7 +65,7 @@ fn quiet_stretches(run: &[ImuSample], config: &StandstillConfig) -> Vec<Standsti
     let mut last_quiet = None;
     for samples in run.chunk_by(|a, b| window(a) == window(b)) {
         let index = window(&samples[0]);
-        // The car still rocks in the first window after it stopped; the last one is rarely whole.
+        // The car still rocks in the first window after stopping, and the last window is rarely complete.
         let whole = samples[samples.len() - 1].time_s - samples[0].time_s > 0.5 * config.window_s;
         if index == 0 || !whole || !is_quiet(samples, config) {
             continue;
@@ -109,7 +109,7 @@ fn mean(samples: &[ImuSample], of: fn(&ImuSample) -> Vector3<f64>) -> Vector3<f6
 mod tests {
     use super::*;
 
-    /// 20 s at 100 Hz: standing from 5 to 10 s by the speed; `shake` is the unit's vibration then.
+    /// 20 s at 100 Hz: standing from 5 to 10 s according to the speed; `shake` is the unit's vibration then.
     fn drive(shake: f64) -> (Vec<ImuSample>, Signal) {
         let standing = |t: f64| (5.0..10.0).contains(&t);
         let samples = (0..2000)

@@ -1,4 +1,4 @@
-//! How the camera turned and where it headed between two images, by depth.
+//! The camera's rotation and direction of motion between two images, from the depth of one of them.
 
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -6,38 +6,38 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::{DepthImage, GreyPyramid};
 use crate::GreyImage;
 
-/// Steps at most at each size.
+/// Largest number of steps at each size.
 const STEPS: usize = 12;
-/// A step below this (radians, or shares of the way) ends a size.
+/// A smaller step (in radians, and in units of the typical depth) ends the iteration at a size.
 const SMALL: f64 = 1e-5;
-/// Pixels with a smaller gradient than this, in grey levels a pixel, say nothing.
+/// Pixels with a smaller gradient than this, in grey levels per pixel, are not used.
 const GRADIENT: f32 = 2.0;
-/// Pixels at most at each size; beyond, one in a few is taken.
+/// Largest number of pixels at each size; if there are more, they are thinned.
 const PIXELS: usize = 12_000;
 /// Fewest pixels for a result.
 const LEAST: usize = 400;
-/// Degrees of freedom of the t distribution that weighs residuals (Kerl, Sturm and Cremers, ICRA 2013).
+/// Degrees of freedom of the t distribution that weights the residuals (Kerl, Sturm and Cremers, ICRA 2013).
 const FREEDOM: f64 = 5.0;
-/// Unknowns: way, turn, gain and offset of brightness.
+/// Number of unknowns: translation (3), rotation (3), gain and offset of brightness.
 const N: usize = 8;
 
-/// How the camera moved, in units of the depth that it was found by.
+/// The camera's motion, in the units of the depth it was found with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
-    /// A point of the image with depth in the other image's camera; the translation is in units of the depth.
+    /// Maps a point from the camera of the image with depth to the other image's camera; the translation is in the units of the depth.
     pub source_from_target: Se3,
-    /// Root of the weighted mean square of the grey levels that remain, of 255.
+    /// Square root of the weighted mean squared residual, in grey levels of 255.
     pub residual: f64,
-    /// Share of the image's textured pixels that are seen in the other image.
+    /// Share of the image's textured pixels that are visible in the other image.
     pub seen: f64,
 }
 
-/// Finds the camera's motion from `guess` on: the image `target` with its depth is carried into the image `source` so that brightness
-/// agrees, coarse to fine (direct alignment by Gauss-Newton steps with robust weights; a gain and an offset of brightness are found beside it).
-/// `None` where the images show too little texture, or no step makes them agree better.
+/// Finds the camera's motion, starting from `guess`: the image `target` is warped by its depth into the image `source` so that brightness
+/// agrees, coarse to fine (direct alignment by Gauss-Newton steps with robust weights, together with a gain and an offset of brightness).
+/// `None` if the images have too little texture, or no step improves the agreement.
 ///
 /// # Panics
-/// When `depth` has another size than `target`, or `source` has.
+/// If `depth` or `source` differ in size from `target`.
 #[must_use]
 pub fn align(
     target: &GreyPyramid,
@@ -49,14 +49,14 @@ pub fn align(
     assert_eq!(
         (depth.width, depth.height),
         (full.width, full.height),
-        "the depth is of the target's size"
+        "the depth has the target's size"
     );
     assert_eq!(
         (source.full().width, source.full().height),
         (full.width, full.height),
-        "both images are of one size"
+        "both images have the same size"
     );
-    // The way is found in units of a typical depth: turn and way then are numbers of one kind.
+    // Translation in units of a typical depth has about the same magnitude as rotation in radians.
     let unit = typical(depth.data)?;
     let mut state = State {
         motion: scaled(guess, 1.0 / unit),
@@ -88,7 +88,7 @@ pub fn align(
     })
 }
 
-/// A pixel with texture: its point in the target's camera, in units of the typical depth, and its brightness.
+/// A pixel with texture: its point in the target's camera, in units of the typical depth, and its grey level.
 struct Point {
     at: Vector3<f64>,
     grey: f64,
@@ -101,7 +101,7 @@ struct State {
 }
 
 impl State {
-    /// Steps until they are small; gives the residual and the share of the points that are seen.
+    /// Iterates until the steps are small; returns the residual and the share of visible points.
     fn settle(
         &mut self,
         points: &[Point],
@@ -145,7 +145,7 @@ impl State {
         }
     }
 
-    /// The normal equations where the points come to lie now; `None` where too few are seen.
+    /// The normal equations at the points' current positions; `None` if too few points are visible.
     fn equations(
         &self,
         points: &[Point],
@@ -172,7 +172,7 @@ impl State {
                 self.gain * dv * camera.fy / at.z,
             );
             let towards = Vector3::new(gu, gv, -(gu * at.x + gv * at.y) / at.z);
-            // ∂X/∂turn = −[X]×, so that its row is X × ∂I/∂X.
+            // ∂X/∂rotation = −[X]×, so that its row is X × ∂I/∂X.
             let turning = at.cross(&towards);
             rows.push((towards, turning, grey, residual));
         }
@@ -218,7 +218,7 @@ impl Equations {
     }
 }
 
-/// 1.4826 × the median of the absolute values: the standard deviation of normal ones; at least one grey level.
+/// 1.4826 × the median of the absolute values, which estimates the standard deviation of normal ones; at least one grey level.
 fn spread(residuals: impl Iterator<Item = f64>) -> f64 {
     let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
     if sizes.is_empty() {
@@ -229,7 +229,7 @@ fn spread(residuals: impl Iterator<Item = f64>) -> f64 {
     (1.4826 * *median).max(1.0)
 }
 
-/// The median of the depths that are numbers above 0.
+/// The median of the valid depths (finite and above 0).
 fn typical(depth: &[f32]) -> Option<f64> {
     let mut known: Vec<f32> = depth.iter().copied().filter(|d| usable(*d)).collect();
     if known.is_empty() {
@@ -248,7 +248,7 @@ fn scaled(motion: &Se3, factor: f64) -> Se3 {
     Se3::from_parts(&motion.rotation(), motion.translation() * factor)
 }
 
-/// The pixels of a size that have texture, evenly thinned to at most [`PIXELS`].
+/// The textured pixels at one size, evenly thinned to at most [`PIXELS`].
 fn textured(image: &GreyImage, depth: &DepthImage<'_>, level: usize, unit: f64) -> Vec<Point> {
     let camera = depth
         .intrinsics
@@ -264,7 +264,7 @@ fn textured(image: &GreyImage, depth: &DepthImage<'_>, level: usize, unit: f64) 
             if gx * gx + gy * gy < GRADIENT * GRADIENT {
                 continue;
             }
-            // The depth at the middle of this size's pixel.
+            // The depth at the centre of the pixel at this size.
             let middle = |i: usize| (i << level) + (1 << level) / 2;
             let z = depth.data[middle(y) * depth.width + middle(x)];
             if usable(z) {

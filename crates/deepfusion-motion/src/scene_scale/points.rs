@@ -1,4 +1,4 @@
-//! The factor on the depth of single patches.
+//! Scale factors for the depth of single patches.
 
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::Vector3;
@@ -6,23 +6,23 @@ use rayon::prelude::*;
 
 use crate::GreyImage;
 
-/// Half the side of a patch, pixels.
+/// Half the side of a patch, in pixels.
 const HALF: usize = 4;
-/// From one patch's centre to the next, pixels.
+/// Distance between the centres of neighbouring patches, in pixels.
 const SPACING: usize = 10;
-/// Factors searched: from 1/2 to 2, as a logarithm.
+/// Largest factor searched, as a logarithm: factors from 1/2 to 2.
 const SEARCH: f64 = std::f64::consts::LN_2;
-/// A step of the search moves a patch by about this many pixels.
+/// One step of the search moves a patch by about this many pixels.
 const STEP_PX: f64 = 0.6;
-/// Least movement of a patch, in pixels for a change of its depth by a factor e.
+/// Smallest motion of a patch, in pixels per change of its depth by a factor e.
 const LEAST_PX: f64 = 4.0;
-/// Largest way towards a patch, as a share of its depth: beyond, it looks too different.
+/// Largest translation towards a patch, as a share of its depth: beyond, it looks too different.
 const LARGEST_WAY: f64 = 0.35;
-/// Least standard deviation of a patch's grey levels.
+/// Smallest standard deviation of a patch's grey levels.
 const TEXTURE: f32 = 4.0;
-/// Least correlation at which a patch is found again.
+/// Smallest correlation at which a patch counts as found.
 const FOUND: f32 = 0.85;
-/// A second place with a correlation this near to the best makes it ambiguous, if it is farther off than [`NEAR`].
+/// A second match whose correlation is within this of the best one makes it ambiguous, if it is farther away than [`NEAR`].
 const MARGIN: f32 = 0.05;
 /// See [`MARGIN`]; as a logarithm of the factor.
 const NEAR: f64 = 0.18;
@@ -30,11 +30,11 @@ const NEAR: f64 = 0.18;
 /// Depth of every pixel of an image.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthImage<'a> {
-    /// Pixels in a row.
+    /// Width, in pixels.
     pub width: usize,
-    /// Rows.
+    /// Height, in pixels.
     pub height: usize,
-    /// `width * height` depths (camera z, metres), row by row; what is not a number above 0 is not looked at.
+    /// `width * height` depths (camera z, metres), row by row; values that are not above 0 are ignored.
     pub data: &'a [f32],
     /// The camera at this size.
     pub intrinsics: Intrinsics,
@@ -43,30 +43,30 @@ pub struct DepthImage<'a> {
 /// Another image of the scene, and where it was taken.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
-    /// Of the same size as the image with depth.
+    /// The image, of the same size as the image with depth.
     pub image: &'a GreyImage,
-    /// A point of the image with depth in this image's camera; its translation is in metres as *measured*.
+    /// Maps a point from the camera of the image with depth to this image's camera; the translation is in metres as *measured*.
     pub source_from_target: Se3,
 }
 
-/// What a patch says of the depth.
+/// The scale factor found for a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneFactor {
     /// Column and row of the patch's centre.
     pub at: [usize; 2],
-    /// The depth there as it was given, metres.
+    /// The given depth there, in metres.
     pub depth_m: f32,
-    /// ln s\*: what the depth's logarithm is short of.
+    /// ln s\*: the logarithm of the factor that the depth should be multiplied by.
     pub log_factor: f64,
-    /// By how many pixels the patch moves for a factor e on its depth: the larger, the surer.
+    /// Motion of the patch in pixels per factor e on its depth: the larger, the more accurate.
     pub pixels: f64,
 }
 
-/// The factors of all patches of `target` that are found again in one of the `views`: of those that the camera did not come too near to a patch
-/// from, the one in which the patch moved most.
+/// The factors of all patches of `target` that are found in one of the `views`. Used is the view in which the patch moves most, among those
+/// whose camera did not come too close to it.
 ///
 /// # Panics
-/// When the images are not all of one size.
+/// If the images differ in size.
 #[must_use]
 pub fn scene_points(
     target: &GreyImage,
@@ -97,22 +97,22 @@ fn centres(size: usize) -> Vec<usize> {
         .collect()
 }
 
-/// A pixel of a patch: its ray times its depth, and its grey level less the patch's mean.
+/// A pixel of a patch: its ray times its depth, and its grey level minus the patch's mean.
 type Pixel = (Vector3<f64>, f32);
 
 struct Patch {
     at: [usize; 2],
     depth_m: f32,
-    /// The centre's point in the camera.
+    /// Position of the centre in the camera frame.
     centre: Vector3<f64>,
     pixels: Vec<Pixel>,
-    /// Root of the sum of squares of the grey levels.
+    /// Square root of the sum of squares of the grey levels.
     norm: f32,
     camera: Intrinsics,
 }
 
 impl Patch {
-    /// `None` for one without texture or depth.
+    /// `None` for a patch without texture or depth.
     fn of(
         image: &GreyImage,
         depth: &DepthImage<'_>,
@@ -172,14 +172,14 @@ impl Patch {
         })
     }
 
-    /// Where the patch's centre is seen with a factor on its depth.
+    /// Where the patch's centre appears if its depth is multiplied by a factor.
     fn seen(&self, view: &View<'_>, factor: f64) -> Option<[f64; 2]> {
         let at = view.source_from_target.transform(&(self.centre * factor));
         let pixel = self.camera.project(&at)?;
         Some([pixel.x, pixel.y])
     }
 
-    /// Pixels for a factor e, from a small one.
+    /// Motion in pixels per factor e, from a small change.
     fn movement(&self, view: &View<'_>) -> f64 {
         const SMALL: f64 = 0.02;
         let [a, b] = [-SMALL, SMALL].map(|log| self.seen(view, log.exp()));
@@ -189,7 +189,7 @@ impl Patch {
         (ub - ua).hypot(vb - va) / (2.0 * SMALL)
     }
 
-    /// The logarithm of the factor at which the patch is found; `None` where it is not, at one place and clearly.
+    /// The logarithm of the factor at which the patch matches; `None` without a single clear match.
     fn search(&self, view: &View<'_>, pixels: f64) -> Option<f64> {
         let steps = ((2.0 * SEARCH * pixels / STEP_PX).ceil() as usize).clamp(16, 96);
         let log = |i: f64| -SEARCH + 2.0 * SEARCH * i / steps as f64;
@@ -217,10 +217,10 @@ impl Patch {
         Some(log(best as f64 + shift.clamp(-0.5, 0.5)))
     }
 
-    /// Zero-mean normalised cross-correlation of the patch and where it is seen; −1 where it is not in the image.
+    /// Zero-mean normalised cross-correlation of the patch with its warped position; −1 if that is outside the image.
     fn correlation(&self, view: &View<'_>, factor: f64) -> f32 {
         let (image, motion) = (view.image, &view.source_from_target);
-        // A point s·X is at s·R·X + t.
+        // The scaled point s·X is at s·R·X + t.
         let (rotation, way) = (motion.rotation() * factor, motion.translation());
         let (mut sum, mut square, mut product) = (0.0f32, 0.0f32, 0.0f32);
         for (point, grey) in &self.pixels {
@@ -247,7 +247,7 @@ impl Patch {
         if variance <= 0.25 * TEXTURE * TEXTURE * count {
             return -1.0;
         }
-        // The patch's own grey levels have mean 0.
+        // The grey levels of the patch have mean 0.
         product / (self.norm * variance.sqrt())
     }
 }

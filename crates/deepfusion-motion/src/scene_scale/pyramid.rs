@@ -4,20 +4,20 @@ use std::sync::Arc;
 
 use crate::GreyImage;
 
-/// Fewest rows of the smallest level.
+/// Smallest number of rows of the smallest level.
 const LEAST_ROWS: usize = 20;
-/// Levels at most: full size, a half, a quarter.
+/// Largest number of levels: full size, a half, a quarter.
 const LEVELS: usize = 3;
 
-/// A grey image, its half and its quarter. Made once, it serves all pairs that the image is in.
+/// A grey image, its half and its quarter. Computed once, it serves all pairs that contain the image.
 #[derive(Debug, Clone)]
 pub struct GreyPyramid {
-    /// Full size first.
+    /// The levels, full size first.
     levels: Arc<Vec<GreyImage>>,
 }
 
 impl GreyPyramid {
-    /// Of an image with values from 0 to 255.
+    /// Makes the pyramid of an image with values from 0 to 255.
     #[must_use]
     pub fn new(image: GreyImage) -> Self {
         let mut levels = vec![image];

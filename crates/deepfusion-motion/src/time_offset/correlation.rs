@@ -4,7 +4,7 @@ use super::OffsetConfig;
 use crate::{ImageMotion, Signal};
 use std::collections::BTreeMap;
 
-/// Step of the search, in seconds; the peak is interpolated between.
+/// Step of the search, in seconds; the peak is interpolated between steps.
 const STEP_S: f64 = 0.01;
 /// Length of a resampled block, in seconds: longer than a wiggle of the road.
 const BLOCK_S: f64 = 1.5;
@@ -21,9 +21,9 @@ type Sums = [f64; 6];
 
 /// One comparison, such as shift with yaw rate.
 pub(super) struct Channel {
-    /// Per block (by its number since the first picture), per offset.
+    /// Sums per block (numbered from the first image), per offset.
     blocks: BTreeMap<u64, Vec<Sums>>,
-    /// Whether the vehicle's side changes enough to compare anything.
+    /// Whether the vehicle's signal changes enough for a comparison.
     pub changes: bool,
     pairs: usize,
     /// Share of the pairs that count as independent.
@@ -125,18 +125,18 @@ impl Channel {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peak {
     pub offset_s: f64,
-    /// Whether it is the first or last offset searched.
+    /// Whether the peak is at the first or last offset searched.
     pub at_the_end: bool,
     /// Second derivative of the logarithm of the likelihood, 1/s².
     curvature: f64,
 }
 
-/// The peak over the whole drive.
+/// The peak for the whole drive.
 pub(super) fn peak(channels: &[&Channel]) -> Option<Peak> {
     peak_of(channels, &blocks(channels))
 }
 
-/// The numbers of the blocks that any channel has.
+/// The numbers of the blocks present in any channel.
 fn blocks(channels: &[&Channel]) -> Vec<u64> {
     let mut blocks: Vec<u64> = channels
         .iter()
@@ -193,12 +193,12 @@ pub(super) fn std_error(channels: &[&Channel], peak: &Peak, search_s: f64) -> f6
     let mut offsets: Vec<f64> = (0..RESAMPLES)
         .map(|_| {
             let blocks: Vec<u64> = all.iter().map(|_| all[random.below(all.len())]).collect();
-            // No peak at all: anywhere.
+            // Without a peak, the offset could be anywhere.
             peak_of(channels, &blocks).map_or(search_s, |p| p.offset_s)
         })
         .collect();
     offsets.sort_by(f64::total_cmp);
-    // Half of what holds the middle 68 %: a stray resample does not count, many do.
+    // Half the width of the middle 68 %, which a few outlying resamples do not change.
     let at = |share: f64| offsets[(share * (RESAMPLES - 1) as f64).round() as usize];
     let resampled = 0.5 * (at(0.84) - at(0.16));
     let curved = if peak.curvature < 0.0 {
@@ -247,7 +247,7 @@ fn independent_share(values: &[f64]) -> f64 {
     (1.0 - r) / (1.0 + r)
 }
 
-/// Vigna's SplitMix64: a resample needs no better, and stays the same from run to run.
+/// Vigna's SplitMix64: good enough for resampling, and reproducible.
 struct SplitMix(u64);
 
 impl SplitMix {

@@ -1,4 +1,4 @@
-//! A KITTI raw drive, as far as motion needs it.
+//! A KITTI raw drive, as far as needed for motion.
 
 use deepfusion_motion::{
     GreyFrame, ImageMotion, ImuSample, Signal, VehicleSensors, VehicleTrack, image_motions,
@@ -14,7 +14,7 @@ pub(crate) struct Packet {
 }
 
 impl Packet {
-    /// East and north in metres, by Mercator's projection at the drive's latitude, as KITTI's own tools.
+    /// East and north in metres, by Mercator's projection at the drive's latitude, as in KITTI's own tools.
     pub(crate) fn place(&self, latitude_deg: f64) -> [f64; 2] {
         const RADIUS: f64 = 6_378_137.0;
         let scale = latitude_deg.to_radians().cos();
@@ -34,7 +34,7 @@ impl Packet {
     }
 }
 
-/// Seconds of the day of every line of a time stamp file.
+/// Seconds of the day for every line of a time stamp file.
 fn times(path: &Path) -> Vec<f64> {
     let text = fs::read_to_string(path).unwrap();
     let seconds = |line: &str| {
@@ -100,7 +100,7 @@ pub(crate) fn path_length_m(packets: &[Packet], step: usize) -> f64 {
     places.windows(2).map(step).sum()
 }
 
-/// How the pictures of camera 2 move, at 160×48.
+/// The image motion of camera 2, at 160×48.
 pub(crate) fn image_motion(drive: &Path) -> Vec<ImageMotion> {
     let times = times(&drive.join("image_02/timestamps.txt"));
     let frame = |(i, time_s): (usize, &f64)| {

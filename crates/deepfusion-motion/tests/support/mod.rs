@@ -1,11 +1,10 @@
-//! Real recordings for tests and the example: where they are, and how a motion is compared with a
-//! reference.
+//! Real recordings for the tests and the example: where they are, and how a motion is compared with a reference.
 
 #![allow(
     dead_code,
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "the example has a part of it, too"
+    reason = "the example uses only a part of it"
 )]
 
 pub(crate) mod kitti;
@@ -14,8 +13,8 @@ use deepfusion_geometry::Trajectory;
 use deepfusion_motion::{FusedTrack, MotionParts, Signal};
 use std::path::{Path, PathBuf};
 
-/// A folder of real recordings: below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says
-/// so and gives nothing where it is absent.
+/// A folder of real recordings: below `DEEPFUSION_DATA`, or in `../shared/data` beside the workspace. Prints a note and returns `None` if
+/// it is absent.
 pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = std::env::var_os("DEEPFUSION_DATA")
@@ -31,7 +30,7 @@ pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
     None
 }
 
-/// What is true about one interval.
+/// The true motion in one interval.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Truth {
     pub from_s: f64,
@@ -40,8 +39,8 @@ pub(crate) struct Truth {
     pub yaw_rad: f64,
 }
 
-/// Every interval of `length_s` of a reference path, one starting every `every_s`. Distance is the sum
-/// of the steps between poses, yaw the change of heading.
+/// All intervals of `length_s` along a reference trajectory, one starting every `every_s`. Distance is the sum of the steps between poses,
+/// yaw the change of heading.
 pub(crate) fn windows(reference: &Trajectory, length_s: f64, every_s: f64) -> Vec<Truth> {
     let poses = reference.poses();
     let (mut along, mut heading) = (vec![0.0], vec![0.0]);
@@ -69,7 +68,7 @@ pub(crate) fn windows(reference: &Trajectory, length_s: f64, every_s: f64) -> Ve
     found
 }
 
-/// A path cut in two at half its time.
+/// Cuts a trajectory in two at half its time.
 pub(crate) fn halves(path: &Trajectory) -> (Trajectory, Trajectory) {
     let poses = path.poses();
     let (first, second) = poses.split_at(poses.len() / 2);
@@ -79,7 +78,7 @@ pub(crate) fn halves(path: &Trajectory) -> (Trajectory, Trajectory) {
     )
 }
 
-/// The path's length over the speed's integral.
+/// The trajectory's length divided by the speed's integral.
 pub(crate) fn speed_scale(speed: &Signal, path: &Trajectory) -> f64 {
     let poses = path.poses();
     let integral = speed.integral(poses[0].time_s, poses[poses.len() - 1].time_s);
@@ -89,18 +88,18 @@ pub(crate) fn speed_scale(speed: &Signal, path: &Trajectory) -> f64 {
 /// Errors over windows.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Errors {
-    /// Mean of the signed error of the distance, over the mean distance.
+    /// Mean of the signed error of the distance, divided by the mean distance.
     pub distance_bias: f64,
-    /// Mean of its absolute value, in metres.
+    /// Mean of the distance's absolute error, in metres.
     pub distance_m: f64,
     /// Mean of the signed error of the yaw, in radians.
     pub yaw_bias_rad: f64,
-    /// Mean of its absolute value, in radians.
+    /// Mean of the yaw's absolute error, in radians.
     pub yaw_rad: f64,
     pub windows: usize,
 }
 
-/// The errors of distances and yaws, each window's as (distance in m, yaw in rad).
+/// The errors of distances and yaws; each window's prediction is (distance in m, yaw in rad).
 pub(crate) fn errors(truths: &[Truth], of: impl Fn(&Truth) -> Option<(f64, f64)>) -> Errors {
     let mut sum = Errors::default();
     let mut driven = 0.0;

@@ -1,5 +1,4 @@
-//! Objects that stand in a row by themselves: a person, a pillar's base, a trolley. A car that is visible from side to
-//! side is larger.
+//! Objects in a row that are not part of a car: a person, a pillar's base, a trolley. A car that is visible from side to side is larger.
 
 use super::View;
 use crate::Detection;
@@ -9,13 +8,13 @@ use crate::obstacles::NONE;
 /// Number of columns beside an object that are checked.
 const BESIDE: u32 = 2;
 
-/// Whether a detection is small and nothing nearer hides its continuation on either side: then it is not part of a car.
+/// Whether a detection is small and nothing nearer hides a continuation on either side: then it is not part of a car.
 pub(super) fn stands_alone(detection: &Detection, view: &View) -> bool {
     let small = detection.place.footprint.iter().all(|side| *side <= SMALL);
     small && is_open(detection, view)
 }
 
-/// Whether both its ends are visible: what is beside it lies farther back, in most of its rows.
+/// Whether both its ends are visible: in most of its rows, what is beside it is farther away.
 fn is_open(detection: &Detection, view: &View) -> bool {
     let width = view.rays.x.len() as u32;
     let (mut rows, mut closed) = (0, [0; 2]);
@@ -34,7 +33,7 @@ fn is_open(detection: &Detection, view: &View) -> bool {
     rows > 0 && closed.iter().all(|closed| 3 * closed <= rows)
 }
 
-/// Whether the object in one pixel may continue at another: something nearer stands there, or an obstacle at the same distance.
+/// Whether the object in one pixel may continue at another: something nearer is there, or an obstacle at the same distance.
 fn may_go_on(from: usize, at: usize, view: &View) -> bool {
     let (here, there) = (view.depth[from], view.depth[at]);
     let step = 0.4 + 0.01 * here;
@@ -56,13 +55,13 @@ mod tests {
             stands_alone(&scene.detection(boxes[0]), &scene.view())
         };
         assert!(alone(&[small]));
-        // Farther away, what stands beside it hides nothing.
+        // If it is farther away, the object beside it hides nothing.
         assert!(alone(&[small, person([-0.5, 14.0])]));
         beside.footprint = [1.0, 1.0];
         assert!(!alone(&[small, beside]), "hidden on the left");
         assert!(
             !alone(&[small, person([0.5, 12.0])]),
-            "goes on to the right"
+            "continues to the right"
         );
         let mut large = small;
         large.footprint = [1.8, 0.5];

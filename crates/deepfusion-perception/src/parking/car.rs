@@ -1,4 +1,4 @@
-//! A car of a row: a box of usual size, square to it.
+//! A car of a row: a box of typical size, at a right angle to the row.
 
 use super::segments::RowPoint;
 use super::{Row, View};
@@ -7,15 +7,15 @@ use crate::clusters::Cluster;
 use crate::outermost::ends;
 use crate::{Detection, GroundBox, Run};
 
-/// Range of a car's near end relative to the row's middle, away from the lane, metres.
+/// Range of a car's near end relative to the row's middle, away from the lane, in metres.
 const FRONT_M: [f32; 2] = [-3.0, -1.5];
-/// Least visible share of the length that is assumed: the row gives orientation and position.
+/// Smallest visible share of the length that is assumed: the row gives orientation and position.
 const KNOWN: f32 = 0.4;
 
-/// Least height of a car, metres: of some only the lower part is visible.
+/// Smallest height of a car, in metres: of some cars only the lower part is visible.
 const LOWEST_M: f32 = 1.3;
 
-/// The car at a position along a row, from its points, and whether its front is visible, which fixes its position.
+/// The car at a position along a row, from its points, and whether its front is visible, which determines its position.
 pub(super) fn car(
     along: f32,
     points: &[&RowPoint],

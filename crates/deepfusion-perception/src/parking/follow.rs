@@ -6,10 +6,10 @@ use super::row::{Parked, Row};
 use super::segments::ObstaclePoints;
 use crate::Detection;
 
-/// Weight of a car found by its row for the row's continuation, in sightings.
+/// Weight of a car found by its row for the continuation of the row, in sightings.
 const FOUND: f32 = 2.0;
 
-/// Follows a row from its near to its far end: each car that is visible enough updates the row's direction.
+/// Follows a row from its near to its far end: each car of which enough is visible updates the row's direction.
 pub(super) fn follow(row: &mut Row, standing: &ObstaclePoints, view: &View) -> Vec<Detection> {
     let mut found = Vec::new();
     let mut done = f32::NEG_INFINITY;
@@ -44,7 +44,7 @@ pub(super) fn follow(row: &mut Row, standing: &ObstaclePoints, view: &View) -> V
                 found.push(car);
             }
             if updated {
-                // It may go on otherwise than was thought.
+                // From here the row may continue differently than expected.
                 break;
             }
         }

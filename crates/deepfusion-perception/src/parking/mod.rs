@@ -1,9 +1,9 @@
-//! Cars side by side, as in a car park: those that are clearly visible show where the others stand, of which only a
-//! corner, a hood or a strip of a door is visible.
+//! Cars side by side, as in a car park: clearly visible cars show where the others stand, of which only a corner, a hood or a strip of a
+//! door is visible.
 //!
-//! A row is a line through the middles of cars that stand across the lane; the rows on both sides of a lane are
-//! parallel. What stands on such a line is split at its gaps, and each segment is a car of typical size, at a right
-//! angle to the row. Cars are remembered, so that a row continues ahead of those already passed.
+//! A row is a line through the middles of cars that stand across the lane; the rows on both sides of a lane are parallel. The obstacles on
+//! such a line are split at their gaps, and each segment is a car of typical size, at a right angle to the row. Cars are remembered, so
+//! that a row continues ahead of those already passed.
 
 mod alone;
 mod car;
@@ -24,30 +24,30 @@ use remembered::{RememberedCar, distance, heading, merge, on_ground, parked};
 use row::{Heading, Parked, Row};
 use segments::ObstaclePoints;
 
-/// From this share of a detection's pixels, or of the smaller footprint, within a car of a row, it is part of that car:
-/// that is likelier than another object in the car's place.
+/// If at least this share of a detection's pixels, or of the smaller footprint, is within a car of a row, the detection is part of that
+/// car: that is more likely than another object in the car's place.
 const PART: f32 = 0.2;
-/// From this share of the smaller footprint within another detection, a car of a row is that detection.
+/// If at least this share of the smaller footprint is within another detection, a car of a row is that detection.
 const SAME: f32 = 0.4;
-/// Within this distance of a dynamic track a detection counts as dynamic, metres.
+/// Within this distance of a dynamic track, in metres, a detection counts as dynamic.
 const MOVING_M: f32 = 1.5;
 /// Half of a row's depth, metres.
 const HALF_M: f32 = 2.8;
-/// Number of cars seen often, over all rows, before rows are used: on a street, hedges and driveways look like a row.
+/// Number of cars seen often, over all rows, before rows are used: on a street, hedges and driveways look like rows.
 const LEAST_SURE: usize = 3;
-/// Distance range across the lane from a row's line to the cars of the other side, metres.
+/// Range of the distance across the lane from a row's line to the cars on the other side, in metres.
 const ACROSS_M: [f32; 2] = [8.6, 15.0];
 
 /// Completes rows of parked cars, frame by frame.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Parking {
     remembered: Vec<RememberedCar>,
-    /// Those cars as seen from the present pose, and the rows with two certain cars.
+    /// These cars as seen from the present pose, and the rows with two certain cars.
     cars: Vec<Parked>,
     rows: Vec<Row>,
 }
 
-/// What is seen.
+/// The image data of a frame.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub depth: &'a [f32],
@@ -86,9 +86,9 @@ impl Parking {
         angle.map_or(Turn::ahead(), |angle| Turn::new(angle, 1.0))
     }
 
-    /// Replaces detections that are parts of parked cars by the cars of their row. Everything else is kept: what is dynamic
-    /// (`moving`, in the world), what has a class, what stands in a row by itself, and what no car of a row explains. Without a
-    /// pose nothing is remembered and no rows are used.
+    /// Replaces detections that are parts of parked cars by the cars of their row. All others are kept: dynamic ones (`moving`, in the
+    /// world), those with a class, those that stand in a row by themselves, and those that no car of a row explains. Without a pose,
+    /// nothing is remembered and no rows are used.
     pub(crate) fn complete(
         &mut self,
         detections: Vec<Detection>,
@@ -143,7 +143,7 @@ impl Parking {
     }
 }
 
-/// What the cars of rows explain of an image: their footprints and their pixels.
+/// The part of an image that the cars of rows explain: their footprints and their pixels.
 struct ExplainedByRows<'a> {
     cars: &'a [Detection],
     pixels: Vec<bool>,
@@ -175,7 +175,7 @@ impl<'a> ExplainedByRows<'a> {
     }
 }
 
-/// The rows of some cars, if enough of the cars were seen often.
+/// The rows of these cars, if enough of the cars were seen often.
 fn believed(cars: &[Parked]) -> Vec<Row> {
     let mut rows = Row::all(cars);
     if rows.iter().map(Row::sure).sum::<usize>() < LEAST_SURE {
@@ -212,7 +212,7 @@ mod tests {
     use crate::instances::Kind;
     use scene::{Scene, person};
 
-    /// A car of a row 6 m to the right, square to the lane.
+    /// A car of a row 6 m to the right, at a right angle to the lane.
     fn car(forward: f32) -> GroundBox {
         GroundBox {
             middle: [6.0, forward],
@@ -253,7 +253,7 @@ mod tests {
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
         parking.begin_frame(scene.view().ground, Some(&pose));
-        // Beside its neighbour only a strip of its front is seen: across it.
+        // Beside its neighbour only a strip of its front is visible, which looks like a box across it.
         let mut wrong = car(17.4);
         wrong.angle = 1.2;
         wrong.seen = [0.1, 0.2];
@@ -273,7 +273,7 @@ mod tests {
     fn a_row_is_believed_once_its_cars_were_seen_again_and_only_with_a_pose() {
         let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
-        // A strip of the next car, taken for something else.
+        // A strip of the next car, detected as something else.
         let mut strip = car(17.4);
         strip.angle = 1.2;
         strip.seen = [0.1, 0.2];
@@ -300,7 +300,7 @@ mod tests {
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
         parking.begin_frame(scene.view().ground, Some(&pose));
-        // On the row's line, where nothing tells of a car.
+        // On the row's line, where the image shows no car.
         let seen = vec![detection(car(17.0))];
         let found = parking.complete(seen.clone(), &[], scene.view(), Some(&pose));
         assert_eq!(found, seen);
@@ -309,7 +309,7 @@ mod tests {
     #[test]
     fn who_stands_in_a_row_or_before_a_car_of_it_stays() {
         let cars = [8.0, 11.0, 14.0].map(car);
-        // Beyond the last car; between two; before the hood of one, at whose place the row has a car.
+        // Beyond the last car; between two cars; in front of the hood of a car that the row contains.
         for middle in [[4.0, 19.0], [3.5, 12.5], [3.3, 13.9]] {
             let standing = person(middle);
             let scene = Scene::of(&[cars[0], cars[1], cars[2], standing]);
@@ -321,7 +321,7 @@ mod tests {
             seen.push(who.clone());
             let found = parking.complete(seen, &[], scene.view(), Some(&pose));
             assert!(found.contains(&who), "{middle:?}: {found:?}");
-            // And it is no car, nor does it hide one.
+            // It is not taken for a car, and it hides no car.
             let at = |forward: f32| {
                 let near = |d: &&Detection| distance(d.place.middle, [6.0, forward]) < 0.6;
                 found.iter().filter(near).count()
@@ -346,7 +346,7 @@ mod tests {
         let there = scene.view().ground.place([6.0, 11.3, 0.0]).map(f64::from);
         let kept = parking.complete(seen, &[there.into()], scene.view(), Some(&pose));
         assert_eq!(kept[..2], [named, detection(car(11.0))]);
-        // The row's own in the place of the third.
+        // The third is replaced by the row's car.
         assert_eq!(kept.len(), 3, "{kept:?}");
         assert!(kept[2].pixels != 500, "{kept:?}");
     }
@@ -359,7 +359,7 @@ mod tests {
         parking.begin_frame(scene.view().ground, Some(&pose));
         let turned = |at: [f32; 2]| parking.usual_turn(at).angle();
         assert!(turned([6.0, 14.0]).sin().abs() < 0.1);
-        // Across the lane from it too, but not in the lane.
+        // Also across the lane from the row, but not in the lane.
         assert!(turned([-6.0, 9.0]).sin().abs() < 0.1);
         assert!(turned([0.5, 9.0]).sin().abs() > 0.9);
     }

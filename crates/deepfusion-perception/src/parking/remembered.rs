@@ -6,29 +6,29 @@ use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// Lengths, widths and heights of boxes that may be cars of a row, metres.
+/// Limits of length, width and height of boxes that may be cars of a row, in metres.
 const LENGTHS_M: [f32; 2] = [3.2, 5.6];
 /// See [`LENGTHS_M`].
 const WIDTHS_M: [f32; 2] = [1.4, 2.3];
 /// See [`LENGTHS_M`].
 const HIGHEST_M: f32 = 2.15;
-/// Least visible shares of length and width of a car that may start a row.
+/// Smallest visible shares of length and width of a car that may start a row.
 const SEEN: [f32; 2] = [0.02, 0.3];
-/// Up to this visible share of its length, hardly more than one flat face of a car is visible.
+/// Up to this visible share of its length, little more than one flat face of a car is visible.
 const FLAT: f32 = 0.1;
-/// Least height of such a car, metres: a hedge looks the same but is lower.
+/// Smallest height of such a car, in metres: a hedge looks the same but is lower.
 const FLAT_HEIGHT_M: f32 = 1.3;
-/// Largest deviation of a car of a row from a right angle to the lane, radians.
+/// Largest deviation of a row's car from a right angle to the lane, in radians.
 const TURN: f32 = 0.6;
-/// Least lateral distance of a row from the camera, metres.
+/// Smallest lateral distance of a row from the camera, in metres.
 const BESIDE_M: f32 = 3.0;
-/// Within this distance it is the same car, metres.
+/// Within this distance, in metres, two sightings are of the same car.
 const SAME_M: f32 = 1.2;
-/// Limit on the sightings of one car.
+/// Largest number of sightings counted for one car.
 const MOST_SIGHTINGS: f32 = 4.0;
 /// How far behind the camera cars are remembered, metres.
 const BEHIND_M: f32 = 15.0;
-/// Least distance of a vehicle that drives along the lane ahead, metres, and its largest angle to the lane, radians.
+/// Smallest distance of a vehicle that drives along the lane ahead, in metres, and its largest angle to the lane, in radians.
 const AHEAD_M: f32 = 4.0;
 /// See [`AHEAD_M`].
 const ASTRAY: f32 = 0.6;
@@ -36,14 +36,14 @@ const ASTRAY: f32 = 0.6;
 /// A car of a row, remembered.
 #[derive(Debug, Clone)]
 pub(super) struct RememberedCar {
-    /// Its middle and the row's direction, in the world's axes.
+    /// Its middle and the row's direction, in world axes.
     middle: Vector3<f64>,
     along: Vector3<f64>,
     sightings: f32,
 }
 
 impl RememberedCar {
-    /// A car on this ground, seen by a camera at this pose.
+    /// A car on this ground, seen by a camera with this pose.
     pub(super) fn new(car: &Parked, ground: &Ground, world_from_cam: &Se3) -> Self {
         let in_world = |at: [f32; 2]| {
             let p = ground.place([at[0], at[1], 0.0]);
@@ -73,7 +73,7 @@ impl RememberedCar {
     }
 }
 
-/// A box as a car of a row, if it passes the limits.
+/// A box as a car of a row, if it is within the limits.
 pub(super) fn parked(place: &GroundBox) -> Option<Parked> {
     let off = (place.angle + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
     let [length, width] = place.footprint;
@@ -92,7 +92,7 @@ pub(super) fn parked(place: &GroundBox) -> Option<Parked> {
     })
 }
 
-/// Merges a car into the known ones.
+/// Merges a car into the known cars.
 pub(super) fn merge(cars: &mut Vec<Parked>, car: Parked) {
     let same = |other: &&mut Parked| distance(other.middle, car.middle) < SAME_M;
     let Some(known) = cars.iter_mut().find(same) else {
@@ -106,7 +106,7 @@ pub(super) fn merge(cars: &mut Vec<Parked>, car: Parked) {
     known.weight = weight.min(MOST_SIGHTINGS);
 }
 
-/// The lane's direction at a dynamic box, if that is a vehicle along the lane: pedestrians walk in any direction.
+/// The lane's direction at a dynamic box, if that is a vehicle driving along the lane: pedestrians walk in any direction.
 pub(super) fn heading(place: &GroundBox) -> Option<Heading> {
     let off = place.angle.rem_euclid(PI) - FRAC_PI_2;
     let [_, forward] = place.middle;
@@ -123,7 +123,7 @@ pub(super) fn on_ground(ground: &Ground, p: &Vector3<f64>) -> [f32; 2] {
     [right, forward]
 }
 
-/// Distance of two points on the ground, metres.
+/// Distance between two points on the ground, in metres.
 pub(super) fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
@@ -132,7 +132,7 @@ pub(super) fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
 mod tests {
     use super::*;
 
-    /// A car square to the way, of which most is seen.
+    /// A car at a right angle to the lane, of which most is visible.
     fn place() -> GroundBox {
         GroundBox {
             middle: [6.0, 12.0],
@@ -193,7 +193,7 @@ mod tests {
         driven.angle = FRAC_PI_2 - 0.2;
         let shown = heading(&driven).unwrap();
         assert!((shown.slope - 0.2f32.tan()).abs() < 1e-6, "{shown:?}");
-        // The same, turned round.
+        // The same car, turned by half a turn.
         driven.angle += PI;
         assert!((heading(&driven).unwrap().slope - shown.slope).abs() < 1e-5);
         let mut across = driven;

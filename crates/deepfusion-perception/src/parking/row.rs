@@ -6,55 +6,55 @@ use nalgebra::{Matrix4, Vector4};
 /// A car that stands across the lane, in the ground's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parked {
-    /// Its middle: right, forward, in metres.
+    /// Position of its middle: right, forward, in metres.
     pub middle: [f32; 2],
     /// Direction of the row at the car, right over forward: at a right angle to the car.
     pub slope: f32,
-    /// About how often it was seen.
+    /// Approximate number of sightings.
     pub weight: f32,
 }
 
-/// Limits for two neighbours: the offset of their middles from a common line, and their distance along it, metres.
+/// Limits for two neighbours, in metres: the offset of their middles from a common line, and their distance along it.
 const OFF_M: f32 = 0.9;
 /// See [`OFF_M`].
 const APART_M: [f32; 2] = [1.5, 14.0];
-/// Largest angle between two neighbours, radians.
+/// Largest angle between two neighbours, in radians.
 const TURN: f32 = 0.35;
-/// Weight of a car's orientation relative to its position: that of a position at this distance, metres.
+/// Weight of a car's orientation relative to its position: that of a position at this distance, in metres.
 const TURN_M: f32 = 12.0;
-/// Prior weights for a straight row, and for one along the lane.
+/// Prior weights of a straight row, and of one along the lane.
 const STRAIGHT: f32 = 4.0;
 /// See [`STRAIGHT`].
 const AHEAD: f32 = 1.0;
 /// Unit of a row's curvature: 1/this per metre.
 const BEND: f32 = 10.0;
-/// Distance along a row over which its cars count, metres: a lane's curvature varies. Beyond it a small weight remains.
+/// Distance along a row within which its cars count, in metres, because a lane's curvature varies. Beyond it a small weight remains.
 const COUNTS_M: f32 = 15.0;
 /// See [`COUNTS_M`].
 const LEFT: f32 = 0.02;
-/// Sightings from which on a car is certain.
+/// Number of sightings from which a car is certain.
 const SURE: f32 = 2.0;
-/// How far a row is searched before its first car, and beyond the last car of its own or across the lane, metres.
+/// How far a row is searched before its first car, and beyond its last car or the last one across the lane, in metres.
 const BEFORE_M: f32 = 10.0;
 /// See [`BEFORE_M`].
 const GOES_ON_M: f32 = 15.0;
-/// Weight of a vehicle driving along the lane for its curvature, in sightings of a car, at any distance.
+/// Weight of a vehicle driving along the lane for the lane's curvature, in sightings of a car, at any distance.
 const DRIVEN: f32 = 2.0;
-/// Two rows are at least so far apart, metres.
+/// Smallest distance between two rows, in metres.
 const ROWS_M: f32 = 5.0;
 
 /// The lane's direction at a point, as shown by a vehicle driving along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Heading {
-    /// The point, forward in metres.
+    /// Position of the point, forward in metres.
     pub forward: f32,
-    /// Its direction, right over forward.
+    /// The lane's direction there, right over forward.
     pub slope: f32,
 }
 
-/// A row of cars, side by side along the way: right = p₀ + p₁ q + p₂ q² / 10 with q = forward − `from`.
+/// A row of cars, side by side along the lane: right = p₀ + p₁ q + p₂ q² / 10 with q = forward − `from`.
 ///
-/// The row across the lane, if there is one, has the same p₁ and p₂ and its own p₀.
+/// The row across the lane, if there is one, has the same p₁ and p₂ but its own p₀.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
     cars: Vec<Parked>,
@@ -68,11 +68,11 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The rows of some cars, the most certain first: of at least two cars each, or of one across the lane from such a row.
+    /// The rows of these cars, the most certain first: each of at least two cars, or of one car across the lane from such a row.
     pub(super) fn all(cars: &[Parked]) -> Vec<Self> {
         let mut groups: Vec<Vec<Parked>> = Vec::new();
         for car in cars {
-            // Those that it belongs to become one.
+            // The groups that the car belongs to are merged.
             let (own, others): (Vec<_>, Vec<_>) = groups
                 .into_iter()
                 .partition(|group| group.iter().any(|other| beside(car, other)));
@@ -129,7 +129,7 @@ impl Row {
             .any(|at| (self.at(*at) - other.at(*at)).abs() < ROWS_M)
     }
 
-    /// Takes the other row's cars into the fit, if it is across the lane.
+    /// Includes the other row's cars in the fit, if that row is across the lane.
     pub(super) fn align_with(&mut self, other: &Self) {
         let [from, to] = self.reach();
         let [other_from, other_to] = other.reach();
@@ -141,7 +141,7 @@ impl Row {
         }
     }
 
-    /// Takes the headings of vehicles along the lane into the fit.
+    /// Includes the headings of vehicles along the lane in the fit.
     pub(super) fn keep_to(&mut self, lane: &[Heading]) {
         self.lane = lane.to_vec();
         self.fit();
@@ -164,7 +164,7 @@ impl Row {
         let weight: f32 = self.cars.iter().map(|c| c.weight).sum();
         let forward = |c: &Parked| c.weight * c.middle[1];
         self.from = self.cars.iter().map(forward).sum::<f32>() / weight;
-        // Without a row across nothing else would hold its place.
+        // Without a row across the lane, nothing else determines its p₀.
         let least = Vector4::new(0.0, AHEAD.powi(2), STRAIGHT.powi(2), 1e-3);
         let mut normal = Matrix4::from_diagonal(&least);
         let mut sum = Vector4::zeros();
@@ -193,7 +193,7 @@ impl Row {
         }
     }
 
-    /// Lateral position of its cars' middles, right in metres, at this forward position.
+    /// Lateral position of its cars' middles at this forward position, right in metres.
     pub(super) fn at(&self, forward: f32) -> f32 {
         let q = forward - self.from;
         self.line[0] + self.line[1] * q + self.line[2] * q * q / BEND
@@ -240,7 +240,7 @@ impl Row {
         self.cars.iter().filter(|car| car.weight >= SURE).count()
     }
 
-    /// A point in the row's coordinates: position along it (as forward, on its line), and offset from the line to the right.
+    /// A point in the row's coordinates: position along the row (as forward, on its line), and offset from the line to the right.
     pub(super) fn locate(&self, [right, forward]: [f32; 2]) -> [f32; 2] {
         let off = right - self.at(forward);
         [forward + self.slope(forward) * off, off]
@@ -258,7 +258,7 @@ impl Row {
     }
 }
 
-/// Whether two stand side by side.
+/// Whether two cars stand side by side.
 fn beside(a: &Parked, b: &Parked) -> bool {
     let apart = a.middle[1] - b.middle[1];
     let slope = 0.5 * (a.slope + b.slope);
@@ -313,7 +313,7 @@ mod tests {
         let row = Row::through(vec![car(5.0, 5.0, 0.1), car(5.3, 8.0, 0.1)]);
         assert!((row.slope(10.0) - 0.1).abs() < 0.02, "{row:?}");
         let [along, off] = row.locate([row.at(10.0) + 1.0, 10.0]);
-        // A metre to the right, square to the row, is a little less off it and a little farther along.
+        // A point one metre to the right is a little less than a metre off the row, and a little farther along it.
         assert!(
             (along - 10.1).abs() < 0.02 && (off - 1.0).abs() < 0.01,
             "{along} {off}"
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_row_bends_as_the_one_across_the_lane_does() {
-        // A bend of 40 m radius, of which the left row shows more.
+        // A bend of 40 m radius; the left row shows more of it.
         let turn = |forward: f32| forward / 40.0;
         let on = |right: f32, forward: f32| {
             car(right + forward * forward / 80.0, forward, turn(forward))

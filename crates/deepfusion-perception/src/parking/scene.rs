@@ -1,14 +1,14 @@
-//! For the tests: upright boxes before a level camera.
+//! Test scenes: upright boxes in front of a level camera.
 
 use super::View;
 use crate::obstacles::NONE;
 use crate::{Detection, Ground, GroundBox, Obstacles, PerceptionConfig, Rays, Run};
 use deepfusion_geometry::Intrinsics;
 
-/// Height of the camera over the ground, metres.
+/// Height of the camera above the ground, in metres.
 const CAMERA_M: f32 = 1.6;
 
-/// What a camera of 640×192 sees of some boxes.
+/// The image of some boxes, from a camera of 640×192.
 pub(super) struct Scene {
     depth: Vec<f32>,
     obstacles: Obstacles,
@@ -18,7 +18,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Sees these boxes.
+    /// Renders these boxes.
     pub(super) fn of(boxes: &[GroundBox]) -> Self {
         let (width, height) = (640, 192);
         let rays = Rays::of(&Intrinsics {
@@ -49,7 +49,7 @@ impl Scene {
         scene
     }
 
-    /// One of the boxes as it is found, with the pixels that show it.
+    /// A detection of one of the boxes, with the pixels that show it.
     pub(super) fn detection(&self, place: GroundBox) -> Detection {
         let width = self.rays.x.len();
         let shows = |pixel: &usize| {
@@ -73,7 +73,7 @@ impl Scene {
         }
     }
 
-    /// What is seen.
+    /// The image data for the code under test.
     pub(super) fn view(&self) -> View<'_> {
         View {
             depth: &self.depth,
@@ -85,7 +85,7 @@ impl Scene {
     }
 }
 
-/// Somebody who stands there: right, forward in metres.
+/// A standing person: right, forward in metres.
 pub(super) fn person(middle: [f32; 2]) -> GroundBox {
     GroundBox {
         middle,
@@ -97,7 +97,7 @@ pub(super) fn person(middle: [f32; 2]) -> GroundBox {
     }
 }
 
-/// How far forward a ray (x, y, 1) meets a side of a box, metres.
+/// Forward distance at which a ray (x, y, 1) meets a side of a box, in metres.
 fn hit(seen: &GroundBox, x: f32, y: f32) -> Option<f32> {
     let (sin, cos) = seen.angle.sin_cos();
     let [right, forward] = seen.middle;

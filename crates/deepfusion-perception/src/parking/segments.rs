@@ -1,4 +1,4 @@
-//! What stands on the line of a row, split at its gaps.
+//! The obstacles on the line of a row, split at their gaps.
 
 use super::{HALF_M, Row, View};
 use crate::Detection;
@@ -6,34 +6,34 @@ use crate::box_fit::CAR;
 use crate::obstacles::NONE;
 use crate::outermost::ends;
 
-/// Size of the cells in which objects that reach the ceiling are found, metres, and the number of cells to the sides and ahead.
+/// Size of the cells in which objects that reach the ceiling are found, in metres, and the number of cells to each side and ahead.
 const CELL_M: f32 = 0.25;
 /// See [`CELL_M`].
 const CELLS: [usize; 2] = [160, 280];
-/// What rises above this is a pillar, metres; a car does not.
+/// Anything higher than this, in metres, is a pillar; a car is not as high.
 const TALL_M: f32 = 2.1;
-/// Heights between which points of a car lie, metres.
+/// Heights between which points of a car lie, in metres.
 const HEIGHTS_M: [f32; 2] = [0.1, 2.0];
-/// Largest lateral distance, metres.
+/// Largest lateral distance, in metres.
 const SIDE_M: f32 = 14.0;
-/// Size of the bins along a row, and least width of a gap, metres.
+/// Size of the bins along a row, and smallest width of a gap, in metres.
 const PLACE_M: f32 = 0.1;
 /// See [`PLACE_M`].
 const GAP_M: f32 = 0.25;
-/// Widest segment that is a single car, and spacing of cars, metres.
+/// Widest segment that is a single car, and spacing of cars, in metres.
 const WIDEST_M: f32 = 2.4;
 /// See [`WIDEST_M`].
 const BAY_M: f32 = 2.6;
-/// More cars than this in one segment are a wall or a hedge.
+/// A segment with more cars than this is a wall or a hedge.
 const MOST_CARS: usize = 3;
-/// Least depth of a segment across the row, of one car and of several, metres: a fence has less.
+/// Smallest depth of a segment across the row, for one car and for several, in metres: a fence is thinner.
 const DEPTH_M: [f32; 2] = [0.15, 0.5];
-/// A segment as wide as this shows both ends of a car, metres.
+/// A segment at least this wide, in metres, shows both ends of a car.
 const WHOLE_M: f32 = 1.4;
-/// Least visible length of a car's side for its near end to be known, metres.
+/// Smallest visible length of a car's side for its near end to be known, in metres.
 const SIDE_SEEN_M: f32 = 0.5;
-/// For the direction of a side: the width of the strips across the row whose nearest points are used, their number, how
-/// many must show the side, and their largest distance from a line, metres.
+/// For the direction of a side: the width of the strips across the row whose nearest points are used, their number, how many must show the
+/// side, and their largest distance from a line, in metres.
 const STRIP_M: f32 = 0.25;
 /// See [`STRIP_M`].
 const STRIPS: usize = 24;
@@ -51,13 +51,13 @@ struct Point {
     pixel: u32,
 }
 
-/// The obstacle points, without what reaches the ceiling.
+/// The obstacle points, without objects that reach the ceiling.
 pub(super) struct ObstaclePoints {
     points: Vec<Point>,
 }
 
 impl ObstaclePoints {
-    /// Finds them in an image, leaving out the pixels of `others`, which are known not to be parked.
+    /// Finds these points in an image, leaving out the pixels of `others`, which are known not to be parked.
     pub(super) fn find<'a>(view: &View, others: impl Iterator<Item = &'a Detection>) -> Self {
         let width = view.rays.x.len();
         let mut taken = vec![false; view.depth.len()];
@@ -150,13 +150,13 @@ fn cell([right, forward]: [f32; 2]) -> Option<usize> {
     inside.then(|| y as usize * CELLS[0] + x as usize)
 }
 
-/// A point in its row's coordinates, metres.
+/// A point in its row's coordinates, in metres.
 pub(super) struct RowPoint {
-    /// Along the line.
+    /// Position along the line.
     pub along: f32,
-    /// To the right of the row's line.
+    /// Offset to the right of the row's line.
     pub off: f32,
-    /// Over the ground.
+    /// Height above the ground.
     pub height: f32,
     /// Index of its pixel.
     pub pixel: u32,
@@ -170,7 +170,7 @@ pub(super) struct Segment {
 }
 
 impl Segment {
-    /// Its cars: the position of each one's middle along the row, and its points.
+    /// Its cars: for each one the position of its middle along the row, and its points.
     pub(super) fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&RowPoint>)> {
         let [from, to] = self.along;
         let width = to - from;
@@ -201,14 +201,14 @@ impl Segment {
         ends(&mut off, 20).map_or(0.0, |[low, high]| high - low)
     }
 
-    /// Position of a single car's middle along the row: inwards of the end that is its own.
+    /// Position of a single car's middle along the row: a half width inwards from the segment's visible end.
     fn middle(&self, row: &Row, view: &View) -> f32 {
         let [near, far] = self.along;
         let by_near = near + 0.5 * CAR[1];
         if far - near > WHOLE_M || self.shows_side() {
             return by_near;
         }
-        // What is nearer along the row is farther out in the image.
+        // Points nearer along the row are farther out in the image.
         let outwards = if row.at(near) > 0.0 { 1 } else { -1 };
         match [
             self.is_hidden(near, outwards, view),
@@ -228,7 +228,7 @@ impl Segment {
         high - low > SIDE_SEEN_M
     }
 
-    /// Whether something nearer, or the image's border, hides its continuation at an end, `step` columns farther.
+    /// Whether something nearer, or the image's border, hides a continuation at an end, `step` columns farther.
     fn is_hidden(&self, end: f32, step: i64, view: &View) -> bool {
         let width = view.rays.x.len() as i64;
         let (mut hidden, mut all) = (0, 0);
@@ -262,7 +262,7 @@ impl Segment {
         if side.len() < SIDE_STRIPS {
             return None;
         }
-        // The median over pairs: a hood or a roof lies behind.
+        // The median over pairs, because a hood or a roof lies farther back.
         let pairs = side
             .iter()
             .enumerate()
@@ -288,7 +288,7 @@ mod tests {
     use crate::parking::row::Parked;
     use crate::parking::scene::Scene;
 
-    /// What is seen between two places on a row 6 m to the right, so deep across it, metres.
+    /// The segments between two positions on a row 6 m to the right; boxes have this depth across the row, in metres.
     fn standing(pieces: &[[f32; 3]]) -> ObstaclePoints {
         let mut points = Vec::new();
         for [from, to, deep] in pieces {
@@ -326,7 +326,7 @@ mod tests {
         };
         assert!((along - 12.3).abs() < 0.15, "{along}");
         assert!(points.len() > 400);
-        // Only what lies between the ends asked for.
+        // Only segments between the positions given.
         assert_eq!(
             standing.segments(&row(), [6.0, 11.0], &scene.view()).len(),
             1
@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(count([9.0, 10.9, 2.0]), 1);
         assert_eq!(count([9.0, 13.6, 2.0]), 2);
         assert_eq!(count([9.0, 16.1, 2.0]), 3);
-        // Longer than three cars, or a fence: neither is cars.
+        // Longer than three cars, or a fence: neither consists of cars.
         assert_eq!(count([9.0, 24.0, 2.0]), 0);
         assert_eq!(count([9.0, 13.6, 0.2]), 0);
     }
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn a_side_that_is_seen_says_how_the_row_is_turned() {
         let scene = Scene::of(&[]);
-        // The side towards the camera, turned by 0.15 as the whole car.
+        // The side towards the camera, turned by 0.15 like the whole car.
         let points = (0..400).map(|i| {
             let across = (i / 5) as f32 * 0.05;
             Point {

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
 
-/// Expected acceleration of a target, m/s²: a car that brakes comfortably.
+/// Typical acceleration of a target, m/s²: a car that brakes gently.
 const ACCELERATION: f64 = 1.5;
 /// Standard deviation of the speed of a new target, m/s.
 const UNKNOWN_SPEED: f64 = 8.0;
@@ -14,7 +14,7 @@ pub(super) struct Kalman {
 }
 
 impl Kalman {
-    /// A filter at a measured position with its covariance, of unknown velocity.
+    /// A filter at a measured position with its covariance, with unknown velocity.
     pub(super) fn new(place: Vector2<f64>, noise: &Matrix2<f64>) -> Self {
         let mut covariance = Matrix4::identity() * UNKNOWN_SPEED.powi(2);
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(noise);
@@ -50,7 +50,7 @@ impl Kalman {
         let gain = self.covariance * observe.transpose() * inverse;
         self.state += gain * (place - self.place());
         self.covariance = (Matrix4::identity() - gain * observe) * self.covariance;
-        // Rounding must not turn it lopsided over thousands of frames.
+        // Rounding must not make it asymmetric over thousands of frames.
         self.covariance = 0.5 * (self.covariance + self.covariance.transpose());
     }
 
@@ -98,7 +98,7 @@ mod tests {
         let noise = Matrix2::identity() * 0.04;
         let truth = Vector2::new(-3.0, 9.0);
         let at = |i: i32| Vector2::new(2.0, 20.0) + truth * 0.1 * f64::from(i);
-        // A fixed pattern of errors about as large as the noise says.
+        // A fixed pattern of errors about as large as the assumed noise.
         let error =
             |i: i32| Vector2::new((f64::from(i) * 2.1).sin(), (f64::from(i) * 1.3).cos()) * 0.2;
         let mut filter = Kalman::new(at(0) + error(0), &noise);

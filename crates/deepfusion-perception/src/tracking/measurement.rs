@@ -10,7 +10,7 @@ pub(super) struct Measurement<'a> {
     pub detection: &'a Detection,
     /// Angle of its length in the world's horizontal axes, x to z, radians.
     pub heading: f64,
-    /// Weight of its heading: metres of it that were seen.
+    /// Weight of its heading: the visible length in metres.
     pub heading_weight: f64,
     ground: &'a Ground,
     world_from_cam: &'a Se3,
@@ -38,7 +38,7 @@ impl<'a> Measurement<'a> {
         }
     }
 
-    /// Centre of the box in the world with this length and width, metres.
+    /// Centre in the world of the box with this length and width, in metres.
     pub(super) fn centre_with(&self, extents: [f64; 2]) -> Vector3<f64> {
         let [right, forward] = self.detection.place.middle_with(extents.map(|e| e as f32));
         let [low, high] = self.detection.place.heights;
@@ -47,8 +47,8 @@ impl<'a> Measurement<'a> {
             .transform(&Vector3::from(p.map(f64::from)))
     }
 
-    /// Covariance of the centre in the world's horizontal axes: the error of depth along the ray, from these pixels or
-    /// else the configured one, and the part of the box that had to be completed.
+    /// Covariance of the centre in the world's horizontal axes: the error of depth along the ray, from the box's pixels or else as
+    /// configured, and the part of the box that had to be completed.
     pub(super) fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
         let place = &self.detection.place;
         let ray = self
@@ -66,7 +66,7 @@ impl<'a> Measurement<'a> {
             .map(|i| f64::from(place.footprint[i] * (1.0 - place.seen[i])))
             .sum();
         let across = 0.1 + 0.004 * distance + 0.1 * unseen;
-        // An object's pixels err together: their mean is no better than one of them.
+        // The errors of an object's pixels are correlated: their mean is no better than one of them.
         let relative = self.detection.relative_error;
         let relative = f64::from(relative.unwrap_or(config.relative_error));
         let along = across.hypot(relative * distance);

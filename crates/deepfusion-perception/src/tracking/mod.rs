@@ -1,4 +1,4 @@
-//! Tracking: associates the boxes of this frame with those of the last, and estimates their velocity over ground.
+//! Tracking: associates the boxes of a frame with those of the previous frame, and estimates their velocity over ground.
 
 mod kalman;
 mod measurement;

@@ -9,18 +9,18 @@ use std::f64::consts::{FRAC_PI_2, PI};
 const MOVING_MPS: [f64; 2] = [1.0, 0.5];
 /// Largest standard deviation of the speed for that decision, m/s.
 const MAX_SPEED_SIGMA_MPS: f64 = 0.7;
-/// Standard deviations of the speed by which what is in doubt must be faster to count as dynamic: at two, boxes that predicted depth throws about
-/// do.
+/// An uncertain speed must exceed the limit by this many standard deviations to count as dynamic; at two, even boxes that jitter with
+/// predicted depth do.
 const IN_DOUBT: f64 = 4.0;
-/// Weight of a value that was completed, not measured.
+/// Weight of a value that was completed and not measured.
 const GUESS: f64 = 0.05;
 /// Largest weight of a size or a heading, so that it can still change.
 const MOST_WEIGHT: f64 = 40.0;
 
-/// The same of the height of a dynamic target.
+/// Largest weight of the height of a dynamic target.
 const MOVING_HEIGHT_WEIGHT: f64 = 6.0;
 
-/// Largest sum of a class' votes, in sightings of score 1, so that it can still change.
+/// Largest sum of a class's votes, in sightings of score 1, so that it can still change.
 const MOST_VOTES: f32 = 5.0;
 
 /// A weighted running mean.
@@ -65,7 +65,7 @@ pub(super) struct Track {
     y: Mean,
     /// Length, width, height.
     size: [Mean; 3],
-    /// Twice the heading as a vector: a box looks the same after half a turn.
+    /// The heading, as a vector with twice the angle, because a box looks the same after half a turn.
     heading: Vector2<f64>,
     /// Frames in which it was seen.
     pub hits: u32,
@@ -73,13 +73,13 @@ pub(super) struct Track {
     pub unseen_s: f64,
     /// Whether it counts as dynamic.
     moving: Option<bool>,
-    /// Whether that was decided by a speed that was known well.
+    /// Whether that was decided by an accurately known speed.
     motion_sure: bool,
     /// Confidence of the last detection.
     confidence: f64,
     /// The class with the most votes, and their sum.
     kind: Option<Kind>,
-    /// Standard deviation of its depth over itself when it was last seen, if known.
+    /// Standard deviation of its depth divided by the depth when it was last seen, if known.
     relative_error: Option<f32>,
     /// How it was seen in the last frame, if it was.
     pub seen: Option<Sighting>,
@@ -131,13 +131,12 @@ impl Track {
         0.5 * self.heading.y.atan2(self.heading.x)
     }
 
-    /// The measured centre, given this track's size and heading, and whether the measurement's length is this track's
-    /// width.
+    /// The measured centre, given this track's size and heading, and whether the measurement's length is this track's width.
     fn centre_of(&self, measurement: &Measurement) -> (Vector3<f64>, bool) {
         let off = (measurement.heading - self.axis()).rem_euclid(PI);
         let crossed = (off - FRAC_PI_2).abs() < 0.25 * PI;
         let place = &measurement.detection.place;
-        // An extent that was measured now counts as much as all that was known before.
+        // An extent measured now has as much weight as everything before.
         let extent = |i: usize, k: usize| {
             let mut mean = self.size[k];
             mean.add(
@@ -154,7 +153,7 @@ impl Track {
         (measurement.centre_with(extents), crossed)
     }
 
-    /// Squared distance of a measurement in standard deviations and in metres.
+    /// Squared distance of a measurement, in standard deviations and in metres.
     pub(super) fn distance2(&self, measurement: &Measurement, noise: &Matrix2<f64>) -> (f64, f64) {
         let (centre, _) = self.centre_of(measurement);
         let place = Vector2::new(centre.x, centre.z);
@@ -169,7 +168,7 @@ impl Track {
         self.filter.update(Vector2::new(centre.x, centre.z), noise);
         let place = &measurement.detection.place;
         if self.is_moving() {
-            // On a slope it climbs, and the world's down is the first camera's: the height follows within a few frames.
+            // On a slope the target climbs relative to the first camera's vertical, so its height adapts within a few frames.
             self.y.weight = self.y.weight.min(MOVING_HEIGHT_WEIGHT);
         }
         self.y.add(centre.y, 4.0);
@@ -180,7 +179,7 @@ impl Track {
         self.size[2].add(f64::from(place.heights[1] - place.heights[0]), 1.0);
         let turn = if crossed { FRAC_PI_2 } else { 0.0 };
         let (sin, cos) = (2.0 * (measurement.heading + turn)).sin_cos();
-        // Taken for its own side, a box is a poor witness of the heading.
+        // If length and width are swapped, the box is poor evidence of the heading.
         let weight = measurement.heading_weight * if crossed { 0.2 } else { 1.0 };
         self.heading += Vector2::new(cos, sin) * weight;
         let norm = self.heading.norm();
@@ -212,7 +211,7 @@ impl Track {
         let doubt = self.filter.speed_deviation();
         let speed = self.filter.velocity().norm();
         if doubt > MAX_SPEED_SIGMA_MPS {
-            // A car far away is known to drive long before its speed is known well, as long as it looks like that.
+            // A distant car is known to drive long before its speed is accurate, and counts as dynamic while the evidence lasts.
             if !self.motion_sure {
                 let surely = speed > MOVING_MPS[0] + IN_DOUBT * doubt;
                 self.moving = surely.then_some(true);
@@ -224,13 +223,13 @@ impl Track {
         self.moving = Some(speed > limit.max(2.0 * doubt));
     }
 
-    /// Centre in the world, metres.
+    /// Centre in the world, in metres.
     pub(super) fn centre(&self) -> Vector3<f64> {
         let place = self.filter.place();
         Vector3::new(place.x, self.y.value, place.y)
     }
 
-    /// Half its diagonal on the ground, metres.
+    /// Half its diagonal on the ground, in metres.
     pub(super) fn reach(&self) -> f64 {
         0.5 * self.size[0].value.hypot(self.size[1].value)
     }
@@ -252,7 +251,7 @@ impl Track {
         let likely = cam_from_world.rotate(&Vector3::new(velocity.x, 0.0, velocity.y));
         let velocity = match self.moving {
             None => None,
-            // What stands has no speed; the filter's is what its box was off from frame to frame.
+            // A static target has no speed; the filter's speed comes from the jitter of its box.
             Some(false) => Some(Vector3::zeros()),
             Some(true) => Some(likely),
         };
@@ -291,7 +290,7 @@ impl Track {
     }
 }
 
-/// Nine tenths seen counts as measured, half seen as a guess.
+/// The weight of an extent: nine tenths visible counts as measured, half visible as a guess.
 fn weight_of(seen: f32) -> f64 {
     GUESS + (1.0 - GUESS) * f64::from(seen).powi(6)
 }

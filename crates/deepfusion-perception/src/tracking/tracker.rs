@@ -4,15 +4,15 @@ use crate::{Detection, Ground, PerceptionConfig, Rays, Target};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
-/// The gate of the association: squared standard deviations, and metres.
+/// The gate for association: squared standard deviations, and metres.
 const GATE: (f64, f64) = (16.0, 3.5);
-/// How long a track continues unseen, seconds: while it is hidden, and while it should be visible but is not.
+/// How long a track continues unseen, in seconds: while it is hidden, and while it should be visible but is not.
 const HIDDEN_S: f64 = 1.5;
 /// See [`HIDDEN_S`].
 const MISSED_S: f64 = 0.35;
 /// Number of frames in which a track must have been seen before it is reported while unseen.
 const CONFIRMED: u32 = 3;
-/// A longer pause than this, in seconds, drops all tracks.
+/// A pause longer than this, in seconds, drops all tracks.
 const LONGEST_PAUSE_S: f64 = 2.0;
 
 /// Time, pose and content of a frame.
@@ -103,7 +103,7 @@ impl Tracker {
             for (j, measurement) in measurements.iter().enumerate() {
                 let (deviations2, metres2) = track.distance2(measurement, &noises[j]);
                 if deviations2 < GATE.0 && metres2 < GATE.1 * GATE.1 {
-                    // Old tracks first where two are about as near: they know more.
+                    // If two tracks are about equally near, the older one is preferred, as its estimates are better.
                     let cost =
                         deviations2 + metres2 + if track.hits < CONFIRMED { 2.0 } else { 0.0 };
                     pairs.push((cost, i, j));
@@ -129,12 +129,12 @@ impl Tracker {
     }
 }
 
-/// The visibility of the position where a track should be.
+/// Visibility of the position where a track should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Visibility {
-    /// Nothing stands before it.
+    /// Nothing is in front of it.
     InSight,
-    /// Something nearer does, or the image ends before its middle.
+    /// Something nearer is in front of it, or the image ends before its middle.
     Hidden,
     /// It is beside the image or behind the camera.
     OutOfView,

@@ -10,16 +10,16 @@ pub(crate) fn camera() -> Intrinsics {
     Intrinsics::from_numbers([370.0, 370.0, 319.5, 80.0], (SIZE.0 as u32, SIZE.1 as u32))
 }
 
-/// A box: from left, front to right, back on a level ground, and so high, metres.
+/// A box on a level ground: (left, front), (right, back) and height, in metres.
 pub(crate) type Block = ([f64; 2], [f64; 2], f64);
 
-/// Two cars doors to doors, fronts in one line: a single wall to the depth.
+/// Two cars door to door with their fronts in line: a single wall in the depth image.
 pub(crate) const CARS: [Block; 2] = [
     ([-2.6, 10.0], [-0.8, 14.2], 1.5),
     ([-0.8, 10.0], [1.0, 14.2], 1.5),
 ];
 
-/// Depth of each pixel, and which block it sees.
+/// Depth of each pixel, and the block that it shows.
 pub(crate) fn scene(blocks: &[Block]) -> (DepthMap, Vec<Option<usize>>) {
     let k = camera();
     let (width, height) = SIZE;
@@ -29,7 +29,7 @@ pub(crate) fn scene(blocks: &[Block]) -> (DepthMap, Vec<Option<usize>>) {
             .then(|| HEIGHT_M / ray.y)
             .filter(|z| *z < 80.0);
         let hit = |(n, (low, high, tall)): (usize, &Block)| {
-            // Entering and leaving between the planes of each axis.
+            // Where the ray enters and leaves between the planes of each axis.
             let slab = |from: f64, to: f64, along: f64| {
                 let (a, b) = (from / along, to / along);
                 (a.min(b), a.max(b))

@@ -8,10 +8,10 @@ use deepfusion_perception::{
 use deepfusion_sim::{ObjectClass, SceneObject, SimConfig, SimFrame, Simulation};
 use nalgebra::Vector3;
 
-/// Fewest visible pixels of a target at 640×192.
+/// Smallest number of visible pixels of a target at 640×192.
 const VISIBLE: usize = 50;
 
-/// The boxes of a frame as its camera sees them; cars of which enough is visible count.
+/// The boxes of a frame as its camera sees them; cars count if enough of them is visible.
 pub(crate) fn labels(simulation: &Simulation, number: usize, frame: &SimFrame) -> Vec<Label> {
     let cam_from_world = frame.world_from_cam.inverse();
     let k = simulation.intrinsics();

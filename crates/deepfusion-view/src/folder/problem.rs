@@ -129,7 +129,7 @@ mod tests {
                     name: "fx",
                     value: 0.0,
                 }),
-                "the sidecar's camera cannot be: fx is 0, a focal length is positive",
+                "the sidecar's camera cannot be: fx is 0, expected a focal length above 0",
             ),
         ] {
             assert_eq!(problem.to_string(), said);

@@ -168,7 +168,7 @@ mod tests {
                     name: "fx",
                     value: 0.0,
                 }),
-                "fx is 0, a focal length is positive",
+                "fx is 0, expected a focal length above 0",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

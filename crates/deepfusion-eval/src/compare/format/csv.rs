@@ -2,8 +2,8 @@ use crate::compare::Result;
 use crate::compare::table::{Tables, Value};
 
 impl Tables {
-    /// One table of all: `table`, the union of all columns (empty where a table has none), `flags`, `source`. Numbers in full
-    /// precision.
+    /// All rows as one CSV table: `table`, the union of all columns (a cell is empty if its table lacks the column), `flags`, `source`.
+    /// Numbers have full precision.
     ///
     /// # Errors
     /// [`crate::compare::Error::Csv`].

@@ -3,8 +3,8 @@ use std::fmt::Write as _;
 use crate::compare::table::{Rank, Table, Tables, Value};
 
 impl Tables {
-    /// For a paper: a `table` each in booktabs' style (`\usepackage{booktabs}`), the best bold, the second underlined, footnotes
-    /// by letter.
+    /// For a paper: one `table` each in the style of booktabs (`\usepackage{booktabs}`), the best in bold, the second best underlined,
+    /// footnotes numbered by letters.
     #[must_use]
     pub fn to_latex(&self) -> String {
         let mut out = String::from("% needs \\usepackage{booktabs}\n");
@@ -73,7 +73,7 @@ fn table_latex(out: &mut String, table: &Table) {
     out.push_str("\\end{table}\n");
 }
 
-/// 1 is a, 26 is z, 27 is aa.
+/// 1 is a, 26 is z, 27 is aa, and so on.
 fn letter(mut number: usize) -> String {
     let mut letters = Vec::new();
     while number > 0 {
@@ -83,7 +83,7 @@ fn letter(mut number: usize) -> String {
     letters.iter().rev().collect()
 }
 
-/// Text that LaTeX prints as it is, in text mode.
+/// Escapes text so that LaTeX prints it literally, in text mode.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

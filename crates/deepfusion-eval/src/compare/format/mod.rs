@@ -1,4 +1,4 @@
-//! The forms in which tables are printed. HTML is `deepfusion-render`'s: `HtmlReport::comparison`.
+//! The output formats of tables. HTML is in `deepfusion-render`: `HtmlReport::comparison`.
 
 mod csv;
 mod latex;

@@ -2,11 +2,11 @@ use std::fmt::Write as _;
 
 use crate::compare::table::{Rank, Table, Tables};
 
-/// Footnotes are broken into lines of about this many letters.
+/// Notes are wrapped at about this many characters.
 const LINE: usize = 116;
 
 impl Tables {
-    /// For a terminal: columns in line, `*` behind the best and `+` behind the second, footnotes by number.
+    /// For a terminal: aligned columns, `*` after the best and `+` after the second best, numbered footnotes.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut out = String::new();
@@ -21,7 +21,7 @@ impl Tables {
         }
         let ranked = self.tables.iter().flat_map(Table::ranks).flatten();
         if ranked.into_iter().any(|r| r != Rank::None) {
-            out.push_str("\n* best, + second of its column, by the printed digits; impossible rows (!) do not compete\n");
+            out.push_str("\n* best, + second best in its column, by the printed digits; impossible rows (!) are not ranked\n");
         }
         out
     }
@@ -62,7 +62,7 @@ fn table_text(out: &mut String, table: &Table) {
     for (i, (line, tail)) in lines.iter().zip(&tails).enumerate() {
         let mut text = String::from(" ");
         for ((cell, width), column) in line.iter().zip(&widths).zip(&table.columns) {
-            // A heading ends above the digits, not above the mark.
+            // A heading ends above the last digit, not above the mark.
             let cell = if i == 0 && column.better.is_some() {
                 format!("{cell} ")
             } else {
@@ -86,7 +86,7 @@ fn table_text(out: &mut String, table: &Table) {
     }
 }
 
-/// Adds text in lines of [`LINE`] letters.
+/// Appends text, wrapped at [`LINE`] characters.
 fn wrapped(out: &mut String, indent: &str, text: &str) {
     let mut line = String::from(indent);
     for word in text.split_whitespace() {

@@ -1,31 +1,31 @@
-//! What there is to say against a row, or for its reader.
+//! Why a row is flagged.
 
 use crate::PostProcess;
 use crate::compare::evaluation::in_words;
 
-/// What there is to say against a row, or for its reader.
+/// Why a row is flagged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FlagReason {
     /// A figure is infinite, NaN or below 0.
     #[error("{metric} is {value}")]
     OutOfRange {
-        /// The metric.
+        /// The metric's name.
         metric: &'static str,
         /// Its figure.
         value: f64,
     },
     /// A share is above 1.
-    #[error("{metric} is {value}, and a share is at most 1")]
+    #[error("{metric} is {value}, but a share is at most 1")]
     AboveOne {
-        /// The metric.
+        /// The metric's name.
         metric: &'static str,
         /// Its figure.
         value: f64,
     },
-    /// More pixels are within a narrower bound than within a wider one.
+    /// A narrower bound contains more pixels than a wider one.
     #[error(
-        "{narrow} = {within} above {wide} = {within_wide}: whoever is within the narrower bound is within the wider"
+        "{narrow} = {within} above {wide} = {within_wide}: pixels within the narrower bound are also within the wider one"
     )]
     Order {
         /// The share of the narrower bound.
@@ -37,70 +37,70 @@ pub enum FlagReason {
         /// Its figure.
         within_wide: f64,
     },
-    /// RMSE log is lower than the shares allow.
-    #[error("RMSE log = {rmse_log}, and these δ need at least {least:.3}")]
+    /// RMSE log is lower than the shares δ allow.
+    #[error("RMSE log = {rmse_log}, but these δ require at least {least:.3}")]
     RmseLog {
-        /// Its figure.
+        /// The RMSE log of the row.
         rmse_log: f64,
-        /// What they need.
+        /// The least that the shares allow.
         least: f64,
     },
-    /// RMSE log is lower than the shares allow of images alike.
+    /// RMSE log is lower than the shares δ allow if all images are alike.
     #[error(
-        "RMSE log = {rmse_log}: images alike with these δ have at least {alike:.3} (and any at least {least:.3})"
+        "RMSE log = {rmse_log}: with these δ, similar images have at least {alike:.3} (and any images at least {least:.3})"
     )]
     RmseLogOfAlike {
-        /// Its figure.
+        /// The RMSE log of the row.
         rmse_log: f64,
-        /// What images alike have.
+        /// The least for images that are alike.
         alike: f64,
-        /// What any have.
+        /// The least for any images.
         least: f64,
     },
-    /// Abs Rel is lower than the shares allow.
-    #[error("Abs Rel = {abs_rel}, and these δ need at least {least:.3}")]
+    /// Abs Rel is lower than the shares δ allow.
+    #[error("Abs Rel = {abs_rel}, but these δ require at least {least:.3}")]
     AbsRel {
-        /// Its figure.
+        /// The Abs Rel of the row.
         abs_rel: f64,
-        /// What they need.
+        /// The least that the shares allow.
         least: f64,
     },
     /// RMSE is higher than Sq Rel allows.
-    #[error("RMSE = {rmse} m, and this Sq Rel allows at most {most:.3} m up to {cap_m} m")]
+    #[error("RMSE = {rmse} m, but this Sq Rel allows at most {most:.3} m up to {cap_m} m")]
     Rmse {
-        /// Its figure, metres.
+        /// The RMSE of the row, in metres.
         rmse: f64,
-        /// What that allows, metres.
+        /// The most that Sq Rel allows, in metres.
         most: f64,
-        /// The farthest depth that counts, metres.
+        /// The largest depth that counts, in metres.
         cap_m: f64,
     },
     /// Sq Rel is higher than Abs Rel allows.
-    #[error("Sq Rel = {sq_rel} m, and this Abs Rel allows at most {most:.3} m up to {cap_m} m")]
+    #[error("Sq Rel = {sq_rel} m, but this Abs Rel allows at most {most:.3} m up to {cap_m} m")]
     SqRel {
-        /// Its figure, metres.
+        /// The Sq Rel of the row, in metres.
         sq_rel: f64,
-        /// What that allows, metres.
+        /// The most that Abs Rel allows, in metres.
         most: f64,
-        /// The farthest depth that counts, metres.
+        /// The largest depth that counts, in metres.
         cap_m: f64,
     },
     /// Another row has the same figures.
     #[error("every figure equals those of `{row}`")]
     Twin {
-        /// Its name.
+        /// The other row's name.
         row: String,
     },
-    /// The checkpoint that was measured is not there any more.
-    #[error("{checkpoint} is another file by now than the one that was measured: evaluate again")]
+    /// The checkpoint has changed since it was measured.
+    #[error("{checkpoint} has changed since it was measured: evaluate again")]
     Outdated {
-        /// Its name in the run's folder.
+        /// The checkpoint's name in the run's folder.
         checkpoint: String,
     },
     /// Each image was predicted several times.
     #[error("{}: {}", in_words(*how), how.explained())]
     PostProcessed {
-        /// How.
+        /// The test-time augmentation.
         how: PostProcess,
     },
     /// Ground truth was left out.
@@ -109,13 +109,13 @@ pub enum FlagReason {
         100.0 * share
     )]
     NoPrediction {
-        /// Which share of it.
+        /// The share that was left out, 0 to 1.
         share: f64,
     },
-    /// Points lie on the z axis alone.
-    #[error("distances along z: the camera was not known")]
+    /// The camera was unknown, so that distances of points are along the z axis only.
+    #[error("distances along z: the camera is unknown")]
     AlongZ,
-    /// What a table of published figures says of its row.
+    /// A remark of the table of published figures on its row.
     #[error("{0}")]
     Published(String),
 }
@@ -140,7 +140,7 @@ mod tests {
                     metric: "a1",
                     value: 88.0,
                 },
-                "a1 is 88, and a share is at most 1",
+                "a1 is 88, but a share is at most 1",
             ),
             (
                 FlagReason::Order {
@@ -149,14 +149,14 @@ mod tests {
                     wide: "δ₂",
                     within_wide: 0.968,
                 },
-                "δ₁ = 0.977 above δ₂ = 0.968: whoever is within the narrower bound is within the wider",
+                "δ₁ = 0.977 above δ₂ = 0.968: pixels within the narrower bound are also within the wider one",
             ),
             (
                 FlagReason::RmseLog {
                     rmse_log: 0.01,
                     least: 0.07809,
                 },
-                "RMSE log = 0.01, and these δ need at least 0.078",
+                "RMSE log = 0.01, but these δ require at least 0.078",
             ),
             (
                 FlagReason::RmseLogOfAlike {
@@ -164,14 +164,14 @@ mod tests {
                     alike: 0.1273,
                     least: 0.0381,
                 },
-                "RMSE log = 0.075: images alike with these δ have at least 0.127 (and any at least 0.038)",
+                "RMSE log = 0.075: with these δ, similar images have at least 0.127 (and any images at least 0.038)",
             ),
             (
                 FlagReason::AbsRel {
                     abs_rel: 0.01,
                     least: 0.0624,
                 },
-                "Abs Rel = 0.01, and these δ need at least 0.062",
+                "Abs Rel = 0.01, but these δ require at least 0.062",
             ),
             (
                 FlagReason::Rmse {
@@ -179,7 +179,7 @@ mod tests {
                     most: 4.005,
                     cap_m,
                 },
-                "RMSE = 5 m, and this Sq Rel allows at most 4.005 m up to 80 m",
+                "RMSE = 5 m, but this Sq Rel allows at most 4.005 m up to 80 m",
             ),
             (
                 FlagReason::SqRel {
@@ -187,7 +187,7 @@ mod tests {
                     most: 8.04,
                     cap_m,
                 },
-                "Sq Rel = 9 m, and this Abs Rel allows at most 8.040 m up to 80 m",
+                "Sq Rel = 9 m, but this Abs Rel allows at most 8.040 m up to 80 m",
             ),
             (
                 FlagReason::Twin {
@@ -207,13 +207,13 @@ mod tests {
                 FlagReason::Outdated {
                     checkpoint: "best.safetensors".into(),
                 },
-                "best.safetensors is another file by now than the one that was measured: evaluate again",
+                "best.safetensors has changed since it was measured: evaluate again",
             ),
             (
                 FlagReason::PostProcessed {
                     how: PostProcess::Flip,
                 },
-                "post-processed: the mean with the mirrored image's prediction, which takes two passes of the network",
+                "post-processed: averaged with the mirrored image's prediction, which takes two passes of the network",
             ),
             (
                 FlagReason::NoPrediction { share: 0.0123 },
@@ -221,7 +221,7 @@ mod tests {
             ),
             (
                 FlagReason::AlongZ,
-                "distances along z: the camera was not known",
+                "distances along z: the camera is unknown",
             ),
             (
                 FlagReason::Published("read off a figure".into()),

@@ -1,21 +1,20 @@
-//! The last refinement: every block of the picture has its own growth, and the picture may roll.
+//! The last refinement: every block of the image has its own growth, and the image may roll.
 //!
-//! Near objects grow faster than far ones: with a single growth, a house on one side looks like a
-//! turn to the other side. A turn moves all pixels alike, and a roll rotates them about the centre;
-//! driving moves each along its own ray from the centre by its own amount. With a growth per block,
-//! only what driving cannot explain is left to shift, drop and roll.
+//! Near objects grow faster than far ones: with a single growth, a house on one side looks like a turn to the other side. A turn moves all
+//! pixels alike, and a roll rotates them about the centre; driving moves each pixel along its own ray from the centre by its own amount.
+//! With a growth per block, shift, drop and roll only explain what driving cannot.
 
 use super::{Plane, Reading, Warp, aligned_rows, centre};
 use nalgebra::{Matrix4, Vector4};
 
-/// Blocks across and down.
+/// Number of blocks across and down.
 const GRID: (usize, usize) = (10, 3);
 /// Prior standard deviation of the blocks' growths, per pair of frames.
 const SPREAD: f64 = 0.1;
 const ITERATIONS: usize = 8;
 
-/// The normal equations: shift, drop, roll and brightness are shared, the growths are not, so each is
-/// eliminated by itself (Schur's complement).
+/// The normal equations. Shift, drop, roll and brightness are shared, but growths are not, so each growth is eliminated separately (Schur's
+/// complement).
 #[derive(Clone, Copy, Default)]
 struct Block {
     growth: f64,
@@ -24,7 +23,7 @@ struct Block {
     gradient: f64,
 }
 
-/// Refines a warp; its growth stays that of the whole picture.
+/// Refines a warp; its growth remains that of the whole image.
 pub(super) fn refine(before: &Plane, after: &Plane, mut warp: Warp) -> Option<Warp> {
     let start = Block {
         growth: warp.growth,
@@ -89,7 +88,7 @@ fn step(
         return None;
     }
     let usual = (differences / count).max(1e-3);
-    // Blocks without structure stay near the picture's growth.
+    // Blocks without texture stay near the whole image's growth.
     let prior = (usual / SPREAD).powi(2);
     for block in blocks.iter_mut() {
         block.own += prior;
