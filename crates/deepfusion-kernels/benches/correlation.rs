@@ -1,5 +1,5 @@
-//! Local correlation of radius 4, forward and both gradients, at the flow decoder's three sizes: `cargo bench -p deepfusion-kernels --bench
-//! correlation`. `benches/peers/torch_correlation.py` measures PyTorch for comparison.
+//! Local correlation of radius 4, forward and both gradients, at the flow decoder's three sizes:
+//! `cargo bench -p deepfusion-kernels --bench correlation`. `benches/peers/torch_correlation.py` measures PyTorch for comparison.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deepfusion_kernels::{

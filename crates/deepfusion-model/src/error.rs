@@ -241,7 +241,7 @@ pub enum SettingProblem {
         key: String,
     },
     /// An index beyond the end of a list.
-    #[error("there is no `{key}[{place}]`: the list has {}, the first is [0]", count_of(*length, "element"))]
+    #[error("there is no `{key}[{place}]`: the list has {}, numbered from 0", count_of(*length, "element"))]
     BeyondList {
         /// The list's key.
         key: String,
@@ -271,7 +271,7 @@ pub enum SettingProblem {
         part: String,
     },
     /// An element to be removed from a list.
-    #[error("`{key}` cannot remove one element of a list: set the whole list instead")]
+    #[error("`{key}` is one element of a list: set the whole list instead")]
     ElementOfList {
         /// The element's key.
         key: String,
@@ -324,6 +324,6 @@ pub enum CheckpointLacks {
     #[error("the checkpoint has no flow decoder, but the configuration trains one")]
     FlowDecoder,
     /// PoseNet.
-    #[error("the checkpoint has no PoseNet, but the configuration trains one")]
+    #[error("the checkpoint has no PoseNet, but the configuration has one")]
     PoseNet,
 }

@@ -176,7 +176,7 @@ impl RunFolder {
     /// The configuration as the networks need it: settings left open are filled in from the run's findings.
     ///
     /// # Errors
-    /// As [`TrainConfig::read`].
+    /// As for [`TrainConfig::read`].
     pub fn read_config(&self) -> Result<TrainConfig, Error> {
         Ok(self.read_findings()?.complete(self.read_settings()?))
     }
@@ -184,7 +184,7 @@ impl RunFolder {
     /// The configuration as set by the user.
     ///
     /// # Errors
-    /// As [`TrainConfig::read`].
+    /// As for [`TrainConfig::read`].
     pub fn read_settings(&self) -> Result<TrainConfig, Error> {
         TrainConfig::read(&self.config_path())
     }
@@ -226,7 +226,7 @@ impl RunFolder {
     /// run learns its camera, the camera at that step.
     ///
     /// # Errors
-    /// As [`Self::read_config`].
+    /// As for [`Self::read_config`].
     pub fn camera_of(
         &self,
         state: &Checkpoint,

@@ -27,7 +27,7 @@ impl StoredNetwork {
     /// the data sets it was trained on, if there are several.
     ///
     /// # Errors
-    /// As [`RunFolder::open`], [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
+    /// As for [`RunFolder::open`], [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
     pub fn of_run(path: &Path, set: Option<&str>) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
         Self::of_checkpoint(&folder, kind.unwrap_or_else(|| folder.preferred()), set)

@@ -34,7 +34,7 @@ impl DepthEstimator {
     /// each data set has its own metric scale.
     ///
     /// # Errors
-    /// As [`ModelSource::named`] and [`ModelSource::load`].
+    /// As for [`ModelSource::named`] and [`ModelSource::load`].
     pub fn load(model: impl AsRef<Path>) -> Result<Self, Error> {
         let network = ModelSource::named(model.as_ref())?.load(None)?;
         Self::fused(network, Precision::F32)
@@ -43,7 +43,7 @@ impl DepthEstimator {
     /// An estimator for a stored network in the fused engine.
     ///
     /// # Errors
-    /// As [`FusedRunner::with_calibration`].
+    /// As for [`FusedRunner::with_calibration`].
     pub fn fused(network: StoredNetwork, precision: Precision) -> Result<Self, Error> {
         let int8 = match precision {
             Precision::Int8 => network.int8.clone()?,
@@ -102,7 +102,7 @@ impl DepthEstimator {
     /// With the fused engine, the packed weights are shared for the first 24 other input sizes; each session of ONNX Runtime packs its own.
     ///
     /// # Errors
-    /// As [`DepthRunner::another`].
+    /// As for [`DepthRunner::another`].
     pub fn another(&self) -> Result<Self, Error> {
         let others = self.others.as_ref().map(OtherSizes::another);
         Ok(Self {
@@ -178,7 +178,7 @@ impl DepthEstimator {
     /// as good as that assumption.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn estimate(
         &mut self,
         image: &RgbImage,
@@ -190,7 +190,7 @@ impl DepthEstimator {
     /// Like [`Self::estimate`], but writes the depth in metres, at the image's own size, into `depth`.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn estimate_into(
         &mut self,
         image: &RgbImage,
@@ -205,7 +205,7 @@ impl DepthEstimator {
     /// [`Preparer::prepare`], then [`Self::infer`].
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn predict(
         &mut self,
         image: &RgbImage,
@@ -222,7 +222,7 @@ impl DepthEstimator {
     /// prediction, not of the mean disparity.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn infer(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
         self.mean_over_views(image, |of, view| of.infer_view(view, image.flip))
     }
@@ -231,7 +231,7 @@ impl DepthEstimator {
     /// by pixel.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn infer_mirrored(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
         self.mean_over_views(image, Self::run_mirrored)
     }

@@ -25,7 +25,7 @@ impl FusedRunner {
     /// The network with this configuration and these weights, in f32 or bf16.
     ///
     /// # Errors
-    /// As [`Self::with_calibration`].
+    /// As for [`Self::with_calibration`].
     pub fn new(
         config: &TrainConfig,
         weights: Weights,

@@ -56,7 +56,7 @@ impl OtherSizes {
     /// The same sizes for another thread.
     ///
     /// # Errors
-    /// As [`DepthRunner::another`].
+    /// As for [`DepthRunner::another`].
     pub(crate) fn another(&self) -> Result<Self, Error> {
         let made = self.made.iter();
         let made = made.map(|(size, runner)| Ok((*size, runner.another()?)));

@@ -36,7 +36,7 @@ pub trait DepthRunner: Debug + Send + Sync {
     /// Like [`Self::run`], but returns only the metric disparity.
     ///
     /// # Errors
-    /// As [`Self::run`].
+    /// As for [`Self::run`].
     fn disparity(&mut self, image: &[f32]) -> Result<Vec<f32>, Error> {
         let mut output = NetworkOutput::default();
         self.run(image, &mut output)?;

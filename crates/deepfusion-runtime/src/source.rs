@@ -34,7 +34,7 @@ impl ModelSource {
     /// The default embedded network; `None` if this build has none.
     ///
     /// # Errors
-    /// As [`deepfusion_weights::find`], for a network that exists.
+    /// As for [`deepfusion_weights::find`], for a network that exists.
     pub fn embedded_default() -> Result<Option<Self>, Error> {
         let network = embedded(Path::new(DEFAULT))?;
         Ok(network.map(|network| Self::Packed {
@@ -93,7 +93,7 @@ impl ModelSource {
     /// Loads configuration and weights; `set` names one of the data sets it was trained on, if there are several.
     ///
     /// # Errors
-    /// As [`StoredNetwork::of_checkpoint`] and [`StoredNetwork::packed`].
+    /// As for [`StoredNetwork::of_checkpoint`] and [`StoredNetwork::packed`].
     pub fn load(&self, set: Option<&str>) -> Result<StoredNetwork, deepfusion_model::Error> {
         match self {
             Self::Run { folder, kind, .. } => StoredNetwork::of_checkpoint(folder, *kind, set),
@@ -120,7 +120,7 @@ impl ModelSource {
     /// recordings stated theirs. `set` as in [`Self::load`].
     ///
     /// # Errors
-    /// As [`RunFolder::read_config`] and [`RunFolder::read_state`], [`deepfusion_model::Error::ConfigFile`].
+    /// As for [`RunFolder::read_config`] and [`RunFolder::read_state`], [`deepfusion_model::Error::ConfigFile`].
     pub fn assumed_camera(
         &self,
         set: Option<&str>,
@@ -163,7 +163,7 @@ impl ModelSource {
 /// The embedded network named `model`; `None` if there is none.
 ///
 /// # Errors
-/// As [`deepfusion_weights::find`], for a network that exists.
+/// As for [`deepfusion_weights::find`], for a network that exists.
 pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
     let name = deepfusion_weights::names().find(|name| Path::new(name) == model);
     let network = name.map(deepfusion_weights::find).transpose()?;
@@ -173,7 +173,7 @@ pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights
 /// Like [`embedded`], but `None` if a folder of that name contains a run or the remains of one.
 ///
 /// # Errors
-/// As [`embedded`].
+/// As for [`embedded`].
 pub fn embedded_unless_run(
     model: &Path,
 ) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
@@ -225,7 +225,7 @@ pub fn embedded_names() -> Vec<&'static str> {
 /// A packed network's configuration and weights; `set` as in [`ModelSource::load`].
 ///
 /// # Errors
-/// As [`StoredNetwork::packed`].
+/// As for [`StoredNetwork::packed`].
 pub fn unpacked(
     network: &Shipped,
     set: Option<&str>,

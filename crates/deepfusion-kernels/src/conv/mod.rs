@@ -4,7 +4,7 @@
 //! ([`lattice`]); one register-blocked loop then reads it through a table of offsets ([`product`]):
 //! - forward: Y\[o, q\] = b\[o\] + Σ_k W\[o, k\]·X\[q + offset k\],
 //! - input gradient: the same over ∂Y with transposed weights; with stride s, one such product for each of the s×s remainders of the
-//! input's rows and columns,
+//!   input's rows and columns,
 //! - weight gradient: ∂W\[o, k\] = Σ_q ∂Y\[o, q\]·X\[q + offset k\].
 //!
 //! All three use [another form](winograd) if kernels are 3×3 and the images large enough.

@@ -92,7 +92,7 @@ pub enum AskedBy {
     #[error("false if no data set has known depth: the head learns from nothing else")]
     NoKnownDepth,
     /// A data set teaches nothing but depth.
-    #[error("above 0 (or depth_net.uncertainty = true) if a data set has learn = \"depth\"")]
+    #[error("above 0 (or depth_net.uncertainty = true) if any recordings have learn = \"depth\"")]
     DepthAlone,
     /// The depth network is not a ResNet.
     #[error("0 unless the depth network is a ResNet, whose features the flow decoder reads")]

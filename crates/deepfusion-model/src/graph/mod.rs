@@ -39,7 +39,7 @@ pub fn depth_graph(config: &DepthNetConfig, mut weights: Weights) -> Result<Grap
 /// Like [`depth_graph`], but a network with an uncertainty head has ln b at full size as a second output.
 ///
 /// # Errors
-/// As [`depth_graph`].
+/// As for [`depth_graph`].
 pub fn depth_graph_with_uncertainty(
     config: &DepthNetConfig,
     weights: Weights,

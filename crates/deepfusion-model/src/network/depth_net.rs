@@ -27,7 +27,7 @@ impl InputSize {
     /// A valid input size.
     ///
     /// # Errors
-    /// As [`Self::validate`].
+    /// As for [`Self::validate`].
     pub fn new(width: usize, height: usize) -> Result<Self, NetworkError> {
         let size = Self { width, height };
         size.validate()?;

@@ -222,7 +222,7 @@ impl Hint for NetworkError {
             Self::MissingTensor { .. }
             | Self::UnexpectedTensor { .. }
             | Self::TensorShape { .. } => {
-                "compare the encoder (`resnet18`…), the widths and the preset of both configurations"
+                "use weights of the same architecture: compare the encoder (`resnet18`…), the widths and the preset of both configurations"
             }
             Self::NotFinite { .. } => {
                 "take an earlier checkpoint: the training diverged before this one was written"

@@ -166,7 +166,7 @@ impl TrainConfig {
     /// The configuration as TOML, with a comment above each key that explains it. Keys that are not set appear as comments.
     ///
     /// # Errors
-    /// As [`TrainConfig::to_toml`].
+    /// As for [`TrainConfig::to_toml`].
     pub fn to_commented_toml(&self) -> Result<String, Error> {
         let all = config_keys();
         let mut written = BTreeSet::new();

@@ -261,16 +261,16 @@ mod tests {
         let value = || Some(Value::Integer(1));
         assert_eq!(
             said("data.sets[2].learn", value()),
-            "there is no `data.sets[2]`: the list has 2 elements, the first is [0]"
+            "there is no `data.sets[2]`: the list has 2 elements, numbered from 0"
         );
         assert_eq!(
             said("frames[7]", None),
-            "there is no `frames[7]`: the list has 2 elements, the first is [0]"
+            "there is no `frames[7]`: the list has 2 elements, numbered from 0"
         );
         // An empty list is left out.
         assert_eq!(
             said("augmentation.sizes[0].width", value()),
-            "there is no `augmentation.sizes[0]`: the list has 0 elements, the first is [0]"
+            "there is no `augmentation.sizes[0]`: the list has 0 elements, numbered from 0"
         );
         assert_eq!(
             said("augmentation.seizes[0].width", value()),
@@ -301,7 +301,7 @@ mod tests {
         );
         assert_eq!(
             said("frames[0]", None),
-            "`frames[0]` cannot remove one element of a list: set the whole list instead"
+            "`frames[0]` is one element of a list: set the whole list instead"
         );
     }
 

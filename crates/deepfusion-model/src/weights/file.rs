@@ -67,7 +67,7 @@ pub fn read_safetensors(path: &Path) -> Result<Weights, NetworkError> {
 /// even read: a checkpoint also contains the optimiser's state.
 ///
 /// # Errors
-/// As [`read_safetensors`].
+/// As for [`read_safetensors`].
 pub fn read_safetensors_under(path: &Path, prefix: &str) -> Result<Weights, NetworkError> {
     if FileKind::of(path)? == FileKind::PyTorch {
         return Err(format_error(path, FormatProblem::PyTorch));

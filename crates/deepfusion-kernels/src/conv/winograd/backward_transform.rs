@@ -40,8 +40,8 @@ fn taps_axis<S: Simd>(simd: S, g: [S::f32s; IN]) -> [S::f32s; 3] {
     ]
 }
 
-/// A y Aᵀ of neighbouring tiles' output gradients with interleaved channels: `to[p·to_pitch + t·channels + c]` from `from[row·pitch + (4·t
-/// + column)·channels + c]`.
+/// A y Aᵀ of neighbouring tiles' output gradients with interleaved channels: `to[p·to_pitch + t·channels + c]` from
+/// `from[row·pitch + (4·t + column)·channels + c]`.
 pub(super) struct TransformGradients<'a> {
     pub(super) from: &'a [f32],
     pub(super) pitch: usize,

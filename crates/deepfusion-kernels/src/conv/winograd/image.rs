@@ -141,8 +141,8 @@ impl WithSimd for Gather<'_> {
     }
 }
 
-/// Calls `write` with each line of outputs in an image of `size`: its row, its first column and its values, from `from[(4·row +
-/// column)·pitch + tile]`.
+/// Calls `write` with each line of outputs in an image of `size`: its row, its first column and its values, from
+/// `from[(4·row + column)·pitch + tile]`.
 pub(super) fn scatter(
     size: (usize, usize),
     runs: &[Run],
