@@ -9,7 +9,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let folder = |name: &str| PathBuf::from(std::env::var_os(name).unwrap_or_default());
     let weights = folder("CARGO_MANIFEST_DIR").join("weights");
-    // A folder stands for all that is in it, however deep.
+    // A folder is watched with everything in it, at any depth.
     println!("cargo::rerun-if-changed={}", weights.display());
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=src/scan.rs");

@@ -322,7 +322,7 @@ def test_this_machines_processor_need_not_compute_as_the_workers_do(monkeypatch)
 
     def uncalibrated(model, *, precision="f32", **options):
         if precision == "int8":
-            raise deepfusion.DeepFusionError("int8: the network was not calibrated")
+            raise deepfusion.DeepFusionError("int8: the network is not calibrated")
         return load(model, **options)
 
     monkeypatch.setattr(deepfusion, "load", uncalibrated)

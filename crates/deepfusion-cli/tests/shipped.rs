@@ -160,7 +160,7 @@ fn a_packed_network_stands_for_its_run() {
     fails(
         at,
         "weights pack --model run --name None --out y",
-        &["None", "a letter first"],
+        &["None", "starts with a letter"],
     );
 
     starts_runs(at);
@@ -259,7 +259,7 @@ fn what_is_not_there_is_an_error_that_names_what_is() {
     fails(
         at,
         "predict --model street sim --out out",
-        &["street", "no config.toml"],
+        &["street", "config.toml is missing"],
     );
     // A folder of something else does not hide the network of its name.
     fs::rename(

@@ -457,7 +457,7 @@ fn what_cannot_be_trained_on_is_an_error() {
         "train --data empty --without speed --view-motion vehicle",
     );
     assert_eq!(contradiction.code, 1, "{}", contradiction.stderr);
-    for part in ["`view_motion`", "posenet where loss.speed is 0", "vehicle"] {
+    for part in ["`view_motion`", "posenet if loss.speed is 0", "vehicle"] {
         let named = contradiction.stderr.contains(part);
         assert!(named, "{part}: {}", contradiction.stderr);
     }

@@ -1,4 +1,4 @@
-//! Activations on vectors, and on rows that were just written and lie in the first cache.
+//! Activations on vectors, and on rows that were just written and are still in the L1 cache.
 
 use pulp::Simd;
 
@@ -10,7 +10,7 @@ use deepfusion_kernels::{GELU_END, GELU_SERIES};
 pub(crate) fn exp_negative<S: Simd>(simd: S, v: S::f32s) -> S::f32s {
     let by = |factor: f32| simd.splat_f32s(factor);
     let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
-    // Adding 1.5·2²³ rounds to the nearest integer, which then stands in the lowest bits.
+    // Adding 1.5·2²³ rounds to the nearest integer, which is then in the lowest bits.
     let round = by(12_582_912.0);
     let v = simd.max_f32s(by(-87.0), v);
     let rounded = madd(v, by(std::f32::consts::LOG2_E), round);
@@ -31,14 +31,14 @@ impl Activation {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
         match self {
             Self::Identity => v,
-            // Constants first: x86 then keeps NaN.
+            // Constants first, so that x86 keeps NaN.
             Self::Relu => simd.max_f32s(zero, v),
             Self::Elu => {
                 let negative = exp_negative(simd, simd.min_f32s(zero, v));
                 simd.add_f32s(simd.max_f32s(zero, v), simd.sub_f32s(negative, one))
             }
             Self::Gelu => {
-                // Constants first: x86 then keeps NaN.
+                // Constants first, so that x86 keeps NaN.
                 let end = simd.splat_f32s(GELU_END);
                 let near = simd.min_f32s(end, simd.max_f32s(simd.neg_f32s(end), v));
                 let scale = simd.splat_f32s(2.0 / (GELU_END * GELU_END));
@@ -55,7 +55,7 @@ impl Activation {
                 simd.mul_add_f32s(below, simd.splat_f32s(0.01), simd.max_f32s(zero, v))
             }
             Self::Tanh => {
-                // (1 − e^−2|x|) / (1 + e^−2|x|) near 0 loses what the subtraction cancels: 1e-7, as in a sum of f32s near 1.
+                // Near 0, the subtraction in (1 − e^−2|x|) / (1 + e^−2|x|) cancels digits and loses 1e-7, as in a sum of f32s near 1.
                 let e = exp_negative(simd, simd.mul_f32s(simd.splat_f32s(-2.0), simd.abs_f32s(v)));
                 let t = simd.div_f32s(simd.sub_f32s(one, e), simd.add_f32s(one, e));
                 simd.select_f32s(simd.less_than_f32s(v, zero), simd.neg_f32s(t), t)
@@ -70,7 +70,7 @@ impl Activation {
         }
     }
 
-    /// Applies it in place.
+    /// Applies the activation in place.
     ///
     /// # Safety
     /// `row` must hold `len` values.
@@ -78,7 +78,7 @@ impl Activation {
     pub(crate) unsafe fn apply<S: Simd>(self, simd: S, row: *mut f32, len: usize) {
         let whole = len / S::F32_LANES * S::F32_LANES;
         for i in (0..whole).step_by(S::F32_LANES) {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             unsafe {
                 let at = row.add(i).cast::<S::f32s>();
                 at.write_unaligned(self.of(simd, at.read_unaligned()));
@@ -127,7 +127,7 @@ mod tests {
         };
         check(Activation::Identity, |x| x, 0.0);
         check(Activation::Relu, |x| x.max(0.0), 0.0);
-        // eˣ − 1 loses what the subtraction cancels.
+        // eˣ − 1 loses the digits that the subtraction cancels.
         check(
             Activation::Elu,
             |x| if x > 0.0 { x } else { x.exp_m1() },
@@ -135,13 +135,13 @@ mod tests {
         );
         check(Activation::Sigmoid, |x| 1.0 / (1.0 + (-x).exp()), 2e-7);
         check(Activation::Tanh, f64::tanh, 3e-7);
-        // A hundredth of up to 100, rounded to f32.
+        // A hundredth of a value up to 100, rounded to f32.
         check(
             Activation::LeakyRelu,
             |x| if x > 0.0 { x } else { 0.01 * x },
             1e-7,
         );
-        // Values of up to 100, rounded to f32.
+        // Values up to 100, rounded to f32.
         check(Activation::Gelu, deepfusion_kernels::gelu_exact, 6e-6);
     }
 

@@ -1,4 +1,4 @@
-//! Memory that starts at a cache line: a vector or a row of a tile then touches one line, not two.
+//! Memory aligned to cache lines, so that a vector or a row of a tile is in one line, not two.
 
 use std::ops::{Deref, DerefMut};
 
@@ -9,7 +9,7 @@ use crate::element::Plain;
 #[repr(C, align(64))]
 struct Line([u8; 64]);
 
-/// Numbers of a fixed count, the first at a multiple of 64 bytes.
+/// A fixed number of values, the first at a multiple of 64 bytes.
 #[derive(Debug)]
 pub(crate) struct Aligned<T> {
     lines: Vec<Line>,
@@ -18,7 +18,7 @@ pub(crate) struct Aligned<T> {
 }
 
 impl<T: Plain> Aligned<T> {
-    /// Zeros; `None` where there is no memory for them.
+    /// Zeros; `None` if there is not enough memory.
     pub(crate) fn try_zeros(len: usize) -> Option<Self> {
         let bytes = len.checked_mul(size_of::<T>())?;
         let count = bytes.div_ceil(size_of::<Line>());
@@ -32,19 +32,19 @@ impl<T: Plain> Aligned<T> {
         })
     }
 
-    /// Zeros, as many as follow from what is in memory already.
+    /// Zeros, for sizes that follow from data already in memory.
     ///
     /// # Panics
-    /// When there is no memory for them.
+    /// If there is not enough memory.
     #[expect(
         clippy::expect_used,
-        reason = "as `vec!`: no memory for what follows from a network in memory"
+        reason = "like `vec!`: fails only if there is no memory for data as large as a loaded network"
     )]
     pub(crate) fn zeros(len: usize) -> Self {
         Self::try_zeros(len).expect("memory for a network's weights")
     }
 
-    /// The same numbers, aligned.
+    /// An aligned copy of the values.
     pub(crate) fn from_slice(values: &[T]) -> Self {
         let mut aligned = Self::zeros(values.len());
         aligned.copy_from_slice(values);
@@ -56,8 +56,8 @@ impl<T: Plain> Deref for Aligned<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        // SAFETY: the lines have room for `len` numbers, at a multiple of their alignment, and any bits are a number
-        // (the promise of `Plain`).
+        // SAFETY: the lines have room for `len` values, at a multiple of their alignment, and any bits are a valid value (the contract of
+        // `Plain`).
         unsafe { std::slice::from_raw_parts(self.lines.as_ptr().cast(), self.len) }
     }
 }

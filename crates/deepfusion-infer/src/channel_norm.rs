@@ -10,10 +10,10 @@ use crate::element::Element;
 use crate::tile::LANES;
 use crate::view::{Shared, View};
 
-/// y = (x − μ) / √(σ² + ε) over the channels at the places `channels`; the others become 0.
+/// y = (x − μ) / √(σ² + ε) over the channels at the indices `channels`; the others become 0.
 ///
 /// # Safety
-/// The views must lie in the arena, apart from each other, and nobody else use `to` or write `from`, which have the same channels.
+/// The views must be in the arena and must not overlap; they must have the same channels. Nobody else may use `to` or write `from`.
 pub(crate) unsafe fn channel_norm<E: Element>(
     arena: Shared<E>,
     from: &View,
@@ -59,7 +59,7 @@ impl<E: Element> WithSimd for Row<'_, E> {
         let share = 1.0 / count as f32;
         let gaps = count < to.channels;
         for x in 0..from.width {
-            // SAFETY: a pixel of the view, which nobody writes, and one of `to`, whose row is this task's alone (the promise of
+            // SAFETY: a pixel of the view, which nobody writes, and one of `to`, whose row is used by this task only (the contract of
             // `channel_norm`).
             let (pixel, out) = unsafe {
                 (
@@ -84,7 +84,7 @@ impl<E: Element> WithSimd for Row<'_, E> {
     }
 }
 
-/// Σ term(v) in lanes.
+/// Σ term(v) for each lane.
 #[inline(always)]
 fn sum<E: Element>(pixel: &[E], channels: &[Range<usize>], term: impl Fn(f32) -> f32) -> f32 {
     let mut sums = [0.0_f32; LANES];

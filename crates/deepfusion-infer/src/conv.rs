@@ -1,5 +1,4 @@
-//! What every form of a convolution can do, and what all share: its geometry on views, the runs of its inputs, and the division
-//! into tasks.
+//! The trait of all forms of a convolution, and what they share: the geometry on views, the runs of inputs, and the division into tasks.
 
 use std::ops::Range;
 
@@ -12,21 +11,21 @@ use crate::{Activation, Border, Conv};
 pub(crate) trait ConvForm<E> {
     fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self;
 
-    /// Elements that it may read behind a buffer's last pixel, whose pixels are `pitch` elements apart.
+    /// Number of elements that it may read beyond the last pixel of a buffer whose pixels are `pitch` elements apart.
     fn overread(pitch: usize) -> usize;
 
-    /// What profiles call it.
+    /// Its name in profiles.
     fn name(&self) -> &'static str;
 
     fn geometry(&self) -> &Geometry;
 
-    /// Its runs, if it also reads elements that belong to none of its inputs (`None` as a source). A form's results
-    /// depend on nothing but its inputs and the elements listed here.
+    /// Its runs, if it also reads elements that are none of its inputs (`None` as a source). A form's results depend only on its inputs and
+    /// the elements listed here.
     fn reads_on(&self) -> Option<(&Geometry, &Runs)>;
 
     /// # Safety
-    /// `arena` must hold every view of the geometry, its border and `overread` behind its buffer included; nobody else
-    /// may use the output meanwhile, or write the others.
+    /// `arena` must contain every view of the geometry, with its border and `overread` elements beyond its buffer. Nobody else may use the
+    /// output during the call, or write the others.
     unsafe fn run(&self, arena: Shared<E>);
 }
 
@@ -41,47 +40,47 @@ pub(crate) struct Geometry {
     pub(crate) dilation: usize,
     pub(crate) border: Border,
     pub(crate) activation: Activation,
-    /// The range of the input that int8 divides into steps, where it is to be computed in int8.
+    /// The range of the input that int8 divides into steps, if it is to be computed in int8.
     pub(crate) input_range: Option<[f32; 2]>,
 }
 
 impl Geometry {
-    /// Where the first tap of output pixel (0, 0) lies.
+    /// Offset of the first tap of output pixel (0, 0).
     pub(crate) fn corner(&self) -> usize {
         let reach = self.kernel / 2 * self.dilation;
         self.input.offset - reach * (self.input.row + self.input.pitch)
     }
 
-    /// Where the first tap of an output pixel lies.
+    /// Offset of the first tap of an output pixel.
     pub(crate) fn first_tap(&self, x: usize, y: usize) -> usize {
         self.corner() + self.stride * (y * self.input.row + x * self.input.pitch)
     }
 
-    /// Whether a tap that lies `k` steps along an axis of `n` pixels ever meets one of them: a wide kernel's
-    /// outermost taps may see nothing but a border of zeros.
+    /// Whether the tap at index `k`, along an axis of `n` pixels, ever reads a pixel: a wide kernel's outermost taps may read nothing but
+    /// the zeros of the border.
     fn sees(&self, k: usize, n: usize) -> bool {
         let off = k.abs_diff(self.kernel / 2) * self.dilation;
         self.border == Border::Reflect || off < n
     }
 
-    /// The rows of the kernel whose taps count.
+    /// The kernel's rows with taps that ever read a pixel.
     fn tap_rows(&self) -> impl Iterator<Item = usize> {
         (0..self.kernel).filter(|ky| self.sees(*ky, self.input.height))
     }
 
-    /// How many taps count.
+    /// Number of taps that ever read a pixel.
     pub(crate) fn taps(&self) -> usize {
         let columns = (0..self.kernel).filter(|kx| self.sees(*kx, self.input.width));
         self.tap_rows().count() * columns.count()
     }
 
-    /// From the first tap of a pixel to another.
+    /// Distance from a pixel's first tap to another tap.
     fn tap(&self, ky: usize, kx: usize) -> usize {
         self.dilation * (ky * self.input.row + kx * self.input.pitch)
     }
 }
 
-/// Pixels row by row from one on, as x and y: a division for the first of them, not for each.
+/// All pixels from one on, row by row, as x and y. It divides for the first of them only.
 #[cfg(target_arch = "x86_64")]
 pub(crate) fn pixels_from(first: usize, width: usize) -> impl Iterator<Item = (usize, usize)> {
     let (mut x, mut y) = (first % width, first / width);
@@ -95,30 +94,28 @@ pub(crate) fn pixels_from(first: usize, width: usize) -> impl Iterator<Item = (u
     })
 }
 
-/// Inputs of one output pixel that lie one after the other in memory.
+/// Runs of one output pixel's inputs, each contiguous in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Runs {
-    /// Where each run starts, from the output pixel's own input pixel less half a kernel.
+    /// Start of each run, relative to the first tap of the output pixel.
     pub(crate) offsets: Vec<usize>,
-    /// Elements of a run.
+    /// Elements of each run.
     pub(crate) len: usize,
-    /// Elements from a pixel's first to the end of the last run.
+    /// Elements from the first tap of a pixel to the end of the last run.
     pub(crate) extent: usize,
-    /// For each run and element, which input channel and tap (ky·kernel + kx) it is; none where it only
-    /// fills up.
+    /// For each run and element: its input channel and tap (ky·kernel + kx); `None` for padding.
     pub(crate) sources: Vec<Option<(usize, usize)>>,
 }
 
 impl Runs {
-    /// Whether some of the elements are none of the inputs.
+    /// Whether some of the elements are padding.
     #[cfg(target_arch = "x86_64")]
     pub(crate) fn read_on(&self) -> bool {
         self.sources.iter().any(Option::is_none)
     }
 
-    /// The runs of a convolution over a view whose first channels are the logical ones named by
-    /// `channel_of` (physical → logical); runs are at most `most` long and multiples of `multiple`, of which fewer
-    /// than one only fill up.
+    /// The runs of a convolution over a view, of which `channel_of` maps physical to logical channels. Their length is a multiple of
+    /// `multiple` and at most `most`; each is padded by less than `multiple`.
     pub(crate) fn new(
         g: &Geometry,
         channel_of: &[Option<usize>],
@@ -126,7 +123,7 @@ impl Runs {
         multiple: usize,
     ) -> Self {
         let channels = channel_of.len();
-        // Where nothing stands between two pixels' channels, a row of the kernel is one run.
+        // If there are no gaps between pixels' channels, a row of the kernel is one run.
         let neighbours = channels == g.input.pitch && g.dilation == 1;
         let joined = if neighbours { g.kernel } else { 1 };
         let whole = channels * joined;
@@ -154,8 +151,8 @@ impl Runs {
         runs.measured()
     }
 
-    /// Runs of `len` channels each, all taps of the same channels together: neighbouring taps see the same
-    /// pixels, which then still lie in the first cache.
+    /// Runs of `len` channels each, ordered so that all taps of the same channels are adjacent: neighbouring taps read the same pixels,
+    /// which are then still in the L1 cache.
     pub(crate) fn by_channels(g: &Geometry, channel_of: &[Option<usize>], len: usize) -> Self {
         let mut runs = Self::empty(len);
         for first in (0..channel_of.len()).step_by(len) {
@@ -187,8 +184,8 @@ impl Runs {
     }
 }
 
-/// Elements of each run where `whole` of them are cut into runs of at most `most`: a multiple of `multiple`, and all
-/// runs alike, so that no more is filled up than the last multiple.
+/// The length of equal runs, at most `most` and a multiple of `multiple`, into which `whole` elements are cut, so that only the last
+/// multiple is padded.
 fn run_length(whole: usize, most: usize, multiple: usize) -> usize {
     let units = whole.div_ceil(multiple);
     let mut lengths = (1..=(most / multiple).min(units)).rev();
@@ -196,7 +193,7 @@ fn run_length(whole: usize, most: usize, multiple: usize) -> usize {
     length.unwrap_or(1) * multiple
 }
 
-/// One weight of a convolution, 0 where there is none.
+/// One weight of a convolution; 0 for padding.
 pub(crate) fn weight(conv: &Conv, out: usize, source: Option<(usize, usize)>) -> f32 {
     match source {
         Some((channel, tap)) if out < conv.channels_out => {
@@ -207,15 +204,15 @@ pub(crate) fn weight(conv: &Conv, out: usize, source: Option<(usize, usize)>) ->
     }
 }
 
-/// The bias, filled up with zeros.
+/// The bias, padded with zeros.
 pub(crate) fn padded_bias(conv: &Conv, channels: usize) -> Vec<f32> {
     let mut bias = conv.bias.clone();
     bias.resize(channels, 0.0);
     bias
 }
 
-/// `pixels` × `groups` cut into tasks: pieces of about `most` pixels, and of fewer groups where there would
-/// be too few tasks for the threads.
+/// `pixels` × `groups` divided into tasks of about `most` pixels each, and of fewer groups if there would otherwise be too few tasks for
+/// the threads.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tasks {
     pixels: usize,
@@ -226,7 +223,7 @@ pub(crate) struct Tasks {
 }
 
 impl Tasks {
-    /// Pieces are multiples of `multiple` pixels, the last one excepted.
+    /// Pixels are divided at multiples of `multiple`.
     pub(crate) fn new(pixels: usize, most: usize, multiple: usize, groups: usize) -> Self {
         let even = pixels.div_ceil(pixels.div_ceil(most));
         let piece = even.next_multiple_of(multiple);
@@ -241,7 +238,7 @@ impl Tasks {
         }
     }
 
-    /// Runs every task, each with its pixels and its groups.
+    /// Runs every task with its pixels and its groups.
     pub(crate) fn run(self, task: impl Fn(Range<usize>, Range<usize>) + Sync) {
         (0..self.pieces * self.parts).into_par_iter().for_each(|i| {
             let (part, start) = (i / self.pieces, i % self.pieces * self.piece);

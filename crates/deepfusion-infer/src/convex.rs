@@ -1,5 +1,5 @@
-//! Convex enlargement (RAFT, Teed and Deng, ECCV 2020): each pixel of the large image is a weighted mean of the 3×3 pixels around
-//! its place in the small one, with weights that the network gives for each.
+//! Convex upsampling (RAFT, Teed and Deng, ECCV 2020): each pixel of the large image is a weighted mean of the 3×3 pixels around its place
+//! in the small one, with weights that the network predicts for each pixel.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -9,24 +9,24 @@ use crate::dispatch::dispatch;
 use crate::element::Element;
 use crate::view::{Shared, View};
 
-/// Pixels that are weighed.
+/// Number of pixels in a weighted mean.
 const TAPS: usize = 9;
 
-/// The enlargement of one channel by 2 to the `halvings`.
+/// Upsampling of one channel by a factor of 2 to the power of `halvings`.
 #[derive(Debug)]
 pub(crate) struct ConvexUpsample {
-    /// In its first channel.
+    /// The values, in its first channel.
     pub(crate) input: View,
-    /// 9·4^halvings channels: for each tap (row by row) and each pixel of a block (row by row) a weight's logarithm.
+    /// The weights' logarithms, 9·4^halvings channels: for each tap (row by row), one for each pixel of a block (row by row).
     pub(crate) weights: View,
     pub(crate) halvings: u32,
-    /// One channel.
+    /// The output, one channel.
     pub(crate) out: View,
 }
 
 impl ConvexUpsample {
     /// # Safety
-    /// The views must lie in the arena, apart from each other, and nobody else use the output or write the others.
+    /// The views must be in the arena and must not overlap. Nobody else may use the output or write the others.
     pub(crate) unsafe fn run<E: Element>(&self, arena: Shared<E>) {
         (0..self.input.height).into_par_iter().for_each(|y| {
             dispatch(Row {
@@ -38,7 +38,7 @@ impl ConvexUpsample {
     }
 }
 
-/// A row of blocks.
+/// Computes a row of blocks.
 struct Row<'a, E> {
     step: &'a ConvexUpsample,
     arena: Shared<'a, E>,
@@ -53,12 +53,12 @@ impl<E: Element> WithSimd for Row<'_, E> {
         let Self { step, arena, y } = self;
         let (input, side) = (&step.input, 1_usize << step.halvings);
         let block = side * side;
-        // A tap's weights in whole vectors; what fills the last one up is computed and dropped.
+        // A tap's weights as whole vectors; results for the padding of the last one are discarded.
         let padded = block.next_multiple_of(S::F32_LANES);
         let mut logits = vec![0.0_f32; TAPS * padded];
         let mut mixed = vec![0.0_f32; padded];
         for x in 0..input.width {
-            // SAFETY: a pixel's weights, which nobody writes (the promise of `run`).
+            // SAFETY: a pixel's weights, which nobody writes (the contract of `run`).
             let weights = unsafe { arena.read(step.weights.at(x, y), TAPS * block) };
             for (to, from) in logits
                 .chunks_exact_mut(padded)
@@ -75,7 +75,7 @@ impl<E: Element> WithSimd for Row<'_, E> {
                         // SAFETY: as above.
                         unsafe { arena.read(input.at(column, row), 1)[0].value() }
                     }
-                    // Beyond the edge there are zeros.
+                    // Zeros beyond the edge.
                     _ => 0.0,
                 }
             });
@@ -94,7 +94,7 @@ impl<E: Element> WithSimd for Row<'_, E> {
             for (row, values) in mixed[..block].chunks_exact(side).enumerate() {
                 for (column, value) in values.iter().enumerate() {
                     let at = step.out.at(side * x + column, side * y + row);
-                    // SAFETY: a pixel of the output; a row's blocks are this task's alone.
+                    // SAFETY: a pixel of the output; a row of blocks is used by this task only.
                     unsafe { arena.write(at, 1)[0] = E::of(*value) };
                 }
             }

@@ -13,12 +13,12 @@ const SQUARED_LENGTH_EPSILON: f32 = 1e-24;
 /// The attention of every head, ready to run.
 #[derive(Debug)]
 pub(crate) struct CrossCovarianceStep {
-    /// Queries, keys and values, one after the other.
+    /// Queries, keys and values, in this order.
     pub(crate) input: View,
     pub(crate) out: View,
-    /// Channels of all heads.
+    /// Channels of all heads together.
     pub(crate) channels: usize,
-    /// One for each head.
+    /// One temperature for each head.
     pub(crate) temperature: Vec<f32>,
 }
 
@@ -27,13 +27,13 @@ impl CrossCovarianceStep {
         self.channels / self.temperature.len()
     }
 
-    /// Two passes over the image: similarities of all channels of a head, then values mixed by them.
+    /// Two passes over the image: the similarities of all channels of a head, then the values weighted by them.
     ///
     /// # Safety
-    /// The views must lie in the arena, apart from each other, and nobody else use the output or write the input.
+    /// The views must be in the arena and must not overlap. Nobody else may use the output or write the input.
     pub(crate) unsafe fn run<E: Element>(&self, arena: Shared<E>) {
         let each = self.each();
-        // For each head and value channel, a row of its shares in all of the head's outputs.
+        // For each head and value channel: a row of its weights in all of the head's outputs.
         let mut shares = vec![0.0_f32; self.channels * each];
         shares
             .par_chunks_mut(each * each)
@@ -57,7 +57,7 @@ impl CrossCovarianceStep {
     }
 }
 
-/// A head's shares.
+/// The attention weights of a head.
 struct Similarities<'a, E> {
     step: &'a CrossCovarianceStep,
     arena: Shared<'a, E>,
@@ -82,12 +82,12 @@ impl<E: Element> WithSimd for Similarities<'_, E> {
         let mut row_lengths = vec![0.0_f32; 2 * each];
         shares.fill(0.0);
         for y in 0..view.height {
-            // A row by itself: few roundings of a small number on a large one.
+            // Each row is summed separately, so that few small numbers are rounded when added to a large one.
             row.fill(0.0);
             row_lengths.fill(0.0);
             for x in 0..view.width {
                 let at = view.at(x, y) + head * each;
-                // SAFETY: channels of a pixel of the view, which nobody writes (the promise of `run`).
+                // SAFETY: channels of a pixel of the view, which nobody writes (the contract of `run`).
                 let (queries, keys) =
                     unsafe { (arena.read(at, each), arena.read(at + step.channels, each)) };
                 for (query, sums) in queries.iter().zip(row.chunks_exact_mut(each)) {
@@ -115,7 +115,7 @@ impl<E: Element> WithSimd for Similarities<'_, E> {
             }
             softmax(similar);
         }
-        // From a row an output to a row a value.
+        // From a row per output to a row per value.
         for i in 0..each {
             for j in 0..i {
                 shares.swap(i * each + j, j * each + i);
@@ -144,7 +144,7 @@ fn softmax(values: &mut [f32]) {
     }
 }
 
-/// A row of the image.
+/// Computes a row of the image.
 struct Mix<'a, E> {
     step: &'a CrossCovarianceStep,
     arena: Shared<'a, E>,
@@ -152,7 +152,7 @@ struct Mix<'a, E> {
     y: usize,
 }
 
-/// Channels of a head that are mixed at once.
+/// Number of a head's channels that are computed at once.
 const AT_ONCE: usize = 32;
 
 impl<E: Element> WithSimd for Mix<'_, E> {
@@ -169,9 +169,9 @@ impl<E: Element> WithSimd for Mix<'_, E> {
         let each = step.each();
         for x in 0..step.out.width {
             let from = step.input.at(x, y) + 2 * step.channels;
-            // SAFETY: a pixel of the output, whose row is this task's alone (the promise of `run`).
+            // SAFETY: a pixel of the output, whose row is used by this task only (the contract of `run`).
             let out = unsafe { arena.write(step.out.at(x, y), step.out.channels) };
-            // What fills up.
+            // Padding.
             out[step.channels..].fill(E::of(0.0));
             let heads = out[..step.channels].chunks_exact_mut(each);
             for (head, out) in heads.enumerate() {

@@ -1,4 +1,4 @@
-//! Depthwise convolution: every channel has a kernel of its own.
+//! Depthwise convolution: every channel has its own kernel.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -21,12 +21,12 @@ pub(crate) struct DepthwiseStep {
     kernel: usize,
     stride: usize,
     dilation: usize,
-    /// For each physical channel its bias and then its taps, tap by tap: rows of channels.
+    /// For each physical channel its bias, then its taps: one row of channels for each.
     rows: Aligned<f32>,
 }
 
 impl DepthwiseStep {
-    /// `channel_of` names the logical channel of each physical one; those that fill up have zeros.
+    /// `channel_of` maps physical to logical channels; padding has zeros.
     pub(crate) fn new(
         op: &Depthwise,
         input: View,
@@ -53,8 +53,7 @@ impl DepthwiseStep {
     }
 
     /// # Safety
-    /// The views and the input's border must lie in the arena, apart from each other, and nobody else use the output or write the
-    /// input.
+    /// The views and the input's border must be in the arena and must not overlap. Nobody else may use the output or write the input.
     pub(crate) unsafe fn run<E: Element>(&self, arena: Shared<E>) {
         (0..self.out.height).into_par_iter().for_each(|y| {
             dispatch(Row {
@@ -94,7 +93,7 @@ impl<E: Element> WithSimd for Row<'_, E> {
         let taps: [usize; TAPS] =
             std::array::from_fn(|tap| if whole > 0 { tap_at(tap) } else { 0 });
         for first in (0..whole).step_by(LANES) {
-            // All of a vector's weights at once: they stay in registers along the row.
+            // All weights of a vector of channels at once: they stay in registers along the row.
             let row = |i: usize| -> [f32; LANES] {
                 std::array::from_fn(|lane| step.rows[i * channels + first + lane])
             };
@@ -103,13 +102,13 @@ impl<E: Element> WithSimd for Row<'_, E> {
             for x in 0..out.width {
                 let mut sums = bias;
                 for (tap, weights) in taps.iter().zip(&weights) {
-                    // SAFETY: channels of a pixel of the input or its border, which nobody writes (the promise of `run`).
+                    // SAFETY: channels of a pixel of the input or its border, which nobody writes (the contract of `run`).
                     let values = unsafe { arena.read(corner + x * across + tap + first, LANES) };
                     for ((sum, value), weight) in sums.iter_mut().zip(values).zip(weights) {
                         *sum += value.value() * weight;
                     }
                 }
-                // SAFETY: channels of a pixel of the output, whose row is this task's alone.
+                // SAFETY: channels of a pixel of the output, whose row is used by this task only.
                 let to = unsafe { arena.write(out.at(x, y) + first, LANES) };
                 for (to, sum) in to.iter_mut().zip(sums) {
                     *to = E::of(sum);

@@ -1,4 +1,4 @@
-//! A convolution in f32, pixel by pixel, without unfolding.
+//! A convolution in f32, pixel by pixel, without im2col.
 
 use pulp::{Simd, WithSimd};
 
@@ -10,9 +10,9 @@ use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::Shared;
 use crate::{Activation, Conv};
 
-/// Inputs summed before the sums go back to memory: their weights stay in the first cache.
+/// Inputs summed before the sums are written to memory, so that their weights stay in the L1 cache.
 const INPUTS_AT_ONCE: usize = 160;
-/// Output pixels of a task: their inputs and outputs stay in the second cache.
+/// Output pixels of a task, so that their inputs and outputs stay in the L2 cache.
 const PIXELS_AT_ONCE: usize = 480;
 
 /// A convolution ready to run.
@@ -20,7 +20,7 @@ const PIXELS_AT_ONCE: usize = 480;
 pub(crate) struct Direct {
     pub(crate) geometry: Geometry,
     runs: Runs,
-    /// For each group of [`GROUP`] output channels: a row of them for every input of every run.
+    /// For each group of [`GROUP`] output channels: a row of weights for every input of every run.
     panels: Aligned<f32>,
     bias: Vec<f32>,
 }
@@ -48,8 +48,8 @@ impl Direct {
     }
 
     /// # Safety
-    /// `arena` must hold every view of the geometry, its border included, and nobody else may use the
-    /// output meanwhile or write the others.
+    /// `arena` must contain every view of the geometry, with its border. Nobody else may use the output during the call, or write the
+    /// others.
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
         let groups = self.bias.len().div_ceil(GROUP);
         Tasks::new(self.geometry.out.pixels(), PIXELS_AT_ONCE, 6, groups).run(|pixels, groups| {
@@ -93,7 +93,7 @@ impl WithSimd for Task<'_> {
         places.clear();
         let mut p = pixels.start;
         while p < pixels.end {
-            // The rest of the task in this row.
+            // The task's remaining pixels in this row.
             let (x, y) = (p % g.out.width, p / g.out.width);
             let count = (g.out.width - x).min(pixels.end - p);
             let input = corner + y * g.stride * g.input.row;
@@ -130,13 +130,13 @@ impl WithSimd for Task<'_> {
                     },
                     relu: i == last && g.activation == Activation::Relu,
                 };
-                // SAFETY: every pixel's inputs, outputs and residual lie in the arena, as `at` has checked, and nobody
-                // else uses the outputs (the promise of `run`); the panel has a row for every input.
+                // SAFETY: every pixel's inputs, outputs and residual are in the arena, as `at` has checked, and nobody else uses the
+                // outputs (the contract of `run`); the panel has a row for every input.
                 unsafe { tiles(simd, &sum, width, places, shift) };
             }
             if !matches!(g.activation, Activation::Identity | Activation::Relu) {
                 for place in places.iter() {
-                    // SAFETY: `width` of its columns, written just now, by this task alone.
+                    // SAFETY: `width` of its columns, just written, by this task only.
                     unsafe { g.activation.apply(simd, place.out.add(first), width) };
                 }
             }

@@ -1,14 +1,14 @@
-//! The choice of instructions, at run time.
+//! The choice of an instruction set at run time.
 
 use pulp::{Arch, WithSimd};
 
-/// Runs `work` in the widest instructions that the processor has.
+/// Runs `work` with the widest instructions that the processor has.
 #[cfg(not(test))]
 pub(crate) fn dispatch<W: WithSimd>(work: W) -> W::Output {
     Arch::new().dispatch(work)
 }
 
-/// In tests, in those that the thread was given.
+/// In tests: with those set for the thread.
 #[cfg(test)]
 pub(crate) fn dispatch<W: WithSimd>(work: W) -> W::Output {
     use pulp::Simd;

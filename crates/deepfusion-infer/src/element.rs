@@ -1,20 +1,20 @@
 //! The element type of the arena: f32, or bf16 (the upper half of an f32).
 
-/// A number that plain memory can hold.
+/// A plain number that may be read from any memory.
 ///
 /// # Safety
-/// Any bits must be such a number, zeros the default one; it has no padding, and its size and alignment are a power of
-/// two of at most 64 bytes. [`crate::aligned::Aligned`] makes numbers of plain memory and counts on it.
+/// Any bits must be a valid value, and all zeros the default one. It must have no padding, and its size and alignment must be a power of
+/// two of at most 64 bytes. [`crate::aligned::Aligned`] creates values from plain memory and relies on this.
 pub(crate) unsafe trait Plain: Copy + Default + 'static {}
 
-// SAFETY: four bytes, of which any are a float; zeros are 0.
+// SAFETY: four bytes, of which any are a valid float; zeros are 0.
 unsafe impl Plain for f32 {}
-// SAFETY: a byte, of which any bits are a number; zeros are 0.
+// SAFETY: a byte, of which any is a valid number; zero is 0.
 unsafe impl Plain for i8 {}
-// SAFETY: it is a `u16`, of which any bits are a number; zeros are 0.
+// SAFETY: a `u16`, of which any bits are a valid number; zeros are 0.
 unsafe impl Plain for Bf16 {}
 
-/// A number as it is stored between the operations.
+/// A number as stored between operations.
 pub(crate) trait Element: Plain + Send + Sync + PartialOrd {
     fn of(value: f32) -> Self;
     fn value(self) -> f32;
@@ -45,11 +45,11 @@ impl PartialOrd for Bf16 {
 }
 
 impl Element for Bf16 {
-    /// To the nearest, ties to even.
+    /// Rounds to nearest, ties to even.
     #[inline(always)]
     fn of(value: f32) -> Self {
         if value.is_nan() {
-            // Rounding up could carry through to a zero.
+            // Rounding up could carry and turn NaN into zero.
             return Self(0x7fc0);
         }
         let bits = value.to_bits();
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn bf16_rounds_to_the_nearest_and_keeps_nan() {
         let rounded = |v: f32| Bf16::of(v).value();
-        // Between 1 and 2 the step is 2⁻⁷; halfway goes to the even one.
+        // Between 1 and 2 the step is 2⁻⁷; ties go to the even one.
         assert_eq!(rounded(1.0 + 0.6 / 128.0), 1.0 + 1.0 / 128.0);
         assert_eq!(rounded(1.0 + 0.5 / 128.0), 1.0);
         assert_eq!(rounded(1.0 + 1.5 / 128.0), 1.0 + 2.0 / 128.0);

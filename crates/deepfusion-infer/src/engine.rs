@@ -1,5 +1,4 @@
-//! The engine: a graph laid out and packed for one image size, run again and again without allocating
-//! buffers.
+//! The engine: a graph laid out and packed for one image size, which runs any number of times without allocating buffers.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -23,8 +22,8 @@ pub enum Precision {
     F32,
     /// Weights and the values between operations in bf16 (8 bits of mantissa), sums in f32.
     Bf16,
-    /// Convolutions of 8-bit integers, weights and inputs, where the graph has the ranges of what they read
-    /// ([`Graph::set_input_ranges`]); everything else as in bf16.
+    /// Convolutions of 8-bit integers, weights and inputs, if the graph has their input ranges ([`Graph::set_input_ranges`]); everything
+    /// else as in bf16.
     Int8,
 }
 
@@ -40,7 +39,7 @@ impl Precision {
     }
 }
 
-/// An executable network: a plan with packed weights, which [`Engine::another`] shares, and its own buffers.
+/// An executable network: a plan with packed weights, shared with [`Engine::another`], and buffers of its own.
 #[derive(Debug)]
 pub struct Engine {
     runner: Runner,
@@ -54,7 +53,7 @@ enum Runner {
     Int8(Typed<Bf16, Int8Conv>),
 }
 
-/// A network laid out and packed for images of one size, without buffers: any number of engines run on it, on any threads.
+/// A network laid out and packed for images of one size, without buffers. Any number of engines can use it, on any threads.
 #[derive(Debug, Clone)]
 pub struct EnginePlan {
     packed: PackedFor,
@@ -69,7 +68,7 @@ enum PackedFor {
 }
 
 impl EnginePlan {
-    /// An engine on it, with buffers of its own.
+    /// An engine with this network, and buffers of its own.
     ///
     /// # Errors
     /// [`Error::Memory`] if there is no memory for them.
@@ -89,9 +88,9 @@ impl Engine {
     /// Packs the graph for images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] if the graph cannot run on such images, [`Error::Graph`] if a residual or a mask's operand
-    /// is a concatenation or the image, [`Error::Memory`] if there is not enough memory, [`Error::NoBf16`], [`Error::NoInt8`],
-    /// [`Error::Ranges`] for int8 without ranges.
+    /// [`Error::Size`] if the graph cannot run on such images, [`Error::Graph`] if a residual or a mask's operand is a concatenation or the
+    /// image, [`Error::Memory`] if there is not enough memory, [`Error::NoBf16`] or [`Error::NoInt8`] if the processor lacks the
+    /// instructions, [`Error::Ranges`] for int8 without ranges.
     pub fn new(
         graph: Graph,
         width: usize,
@@ -136,7 +135,7 @@ impl Engine {
         self.plan().engine()
     }
 
-    /// What it shares with its like: the packed weights, without its buffers.
+    /// The packed weights, without buffers, which engines can share.
     #[must_use]
     pub fn plan(&self) -> EnginePlan {
         let packed = match &self.runner {
@@ -156,21 +155,21 @@ impl Engine {
         self.size
     }
 
-    /// Runs the network on an image; afterwards [`Self::output`] gives the results.
+    /// Runs the network on an image; [`Self::output`] then returns the results.
     ///
     /// # Shapes
     /// - `image`: 3 × height × width, RGB in [0, 1]
     ///
     /// # Panics
-    /// When the image has another size.
+    /// If the image has another size.
     pub fn run(&mut self, image: &[f32]) {
         self.run_steps(image, |_, _| {});
     }
 
-    /// As [`Self::run`]; returns each step's name (its node and its kind) and duration.
+    /// Like [`Self::run`]; returns each step's name (its node and its kind) and duration.
     ///
     /// # Panics
-    /// As [`Self::run`].
+    /// As for [`Self::run`].
     pub fn profile(&mut self, image: &[f32]) -> Vec<(String, Duration)> {
         let mut times = Vec::new();
         let mut start = Instant::now();
@@ -181,10 +180,10 @@ impl Engine {
         times
     }
 
-    /// As [`Self::run`], and counts the values that each convolution reads.
+    /// Like [`Self::run`], and adds the values that each convolution reads to `seen`.
     ///
     /// # Panics
-    /// As [`Self::run`].
+    /// As for [`Self::run`].
     pub fn observe(&mut self, image: &[f32], seen: &mut SeenInputs) {
         self.check(image);
         rayon::scope(|_| match &mut self.runner {
@@ -206,7 +205,7 @@ impl Engine {
 
     fn run_steps(&mut self, image: &[f32], after: impl FnMut(&str, &str) + Send) {
         self.check(image);
-        // On one of rayon's threads: from outside, every single step would be handed over to them.
+        // On one of rayon's threads: from outside, each step would be handed over to them.
         rayon::scope(|_| match &mut self.runner {
             Runner::F32(runner) => runner.run(image, after),
             Runner::Bf16(runner) => runner.run(image, after),
@@ -217,7 +216,7 @@ impl Engine {
     /// The values of an output after the last run: channel by channel, row by row.
     ///
     /// # Panics
-    /// When the graph has no such output.
+    /// If the graph has no such output.
     #[must_use]
     pub fn output(&self, index: usize) -> Vec<f32> {
         let mut values = Vec::new();
@@ -225,10 +224,10 @@ impl Engine {
         values
     }
 
-    /// As [`Self::output`], written into `values`.
+    /// Like [`Self::output`], but written into `values`.
     ///
     /// # Panics
-    /// As [`Self::output`].
+    /// As for [`Self::output`].
     pub fn read_output(&self, index: usize, values: &mut Vec<f32>) {
         match &self.runner {
             Runner::F32(runner) => runner.read_output(index, values),
@@ -238,11 +237,11 @@ impl Engine {
     }
 }
 
-/// What engines share.
+/// The part of an engine that is shared.
 #[derive(Debug)]
 pub(crate) struct Packed<C> {
     plan: Plan<C>,
-    /// Values of the arena that each engine has.
+    /// Number of elements in each engine's arena.
     arena: usize,
     normalisation: Normalisation,
 }
@@ -269,7 +268,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         Ok(Self { packed, arena })
     }
 
-    /// On a plan; `None` where memory has no room for another arena.
+    /// An engine with a shared plan; `None` if there is no memory for another arena.
     fn on(packed: &Arc<Packed<C>>) -> Option<Self> {
         Some(Self {
             packed: Arc::clone(packed),
@@ -294,22 +293,22 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         );
     }
 
-    /// `before` sees each step and the arena as it finds it.
+    /// `before` is called before each step, with the step and the arena.
     fn run_watched(
         &mut self,
         image: &[f32],
         mut before: impl FnMut(&str, &Step<C>, Shared<E>),
         mut after: impl FnMut(&str, &str),
     ) {
-        // An image may overflow and leave NaN in the arena; nothing of that may reach the next one.
+        // An image may overflow and leave NaN in the arena, which must not affect the next one.
         for places in &self.packed.plan.stale {
             self.arena[places.clone()].fill(E::default());
         }
         let arena = Shared::new(&mut self.arena);
         for (name, step) in &self.packed.plan.steps {
             before(name, step, arena);
-            // SAFETY: the plan's views lie in the arena, which is borrowed here alone; steps run one after the other,
-            // and the output of each lies apart from what it reads.
+            // SAFETY: the plan's views are in the arena, which is borrowed here only; steps run one after the other, and the output of each
+            // is separate from its inputs.
             unsafe {
                 match step {
                     Step::Image(to) => self.packed.normalisation.run(image, arena, to),
@@ -375,7 +374,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         let value = |at: usize| {
             if view.result {
                 let slots = &self.arena[at..at + size_of::<f32>() / size_of::<E>()];
-                // SAFETY: the slice is as large as an f32, of which any bits are one, and need not be aligned.
+                // SAFETY: the slice is as large as an f32, of which any bits are valid, and the pointer need not be aligned.
                 unsafe { slots.as_ptr().cast::<f32>().read_unaligned() }
             } else {
                 self.arena[at].value()

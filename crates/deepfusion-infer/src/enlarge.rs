@@ -1,4 +1,4 @@
-//! Bilinear ×2, and the constants that say where a pixel is.
+//! Bilinear enlargement by 2, and constants that encode a pixel's position.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -7,13 +7,13 @@ use crate::dispatch::dispatch;
 use crate::element::Element;
 use crate::view::{Shared, View};
 
-/// Twice the size with half-pixel centres: each pixel becomes 2×2, three quarters of it and a quarter of its neighbour along each
-/// axis; at the border a pixel is its own neighbour.
+/// Twice the size with half-pixel centres: each output pixel is three quarters of the nearest input pixel and a quarter of the next along
+/// each axis. Pixels beyond the border repeat those at the border.
 ///
 /// # Safety
-/// The views must lie in the arena, apart from each other, and nobody else use `to` or write `from`.
+/// The views must be in the arena and must not overlap. Nobody else may use `to` or write `from`.
 pub(crate) unsafe fn enlarge<E: Element>(arena: Shared<E>, from: &View, to: &View) {
-    // The rows of outputs between two rows of inputs, beyond the first and the last one too.
+    // The output rows between two input rows, including those before the first and after the last.
     (0..from.height + 1).into_par_iter().for_each(|gap| {
         dispatch(Gap {
             arena,
@@ -50,7 +50,7 @@ impl<E: Element> WithSimd for Gap<'_, E> {
             let (left, right) = (side.saturating_sub(1), side.min(from.width - 1));
             let columns = [side > 0, side < from.width];
             let corner = |x: usize, y: usize| {
-                // SAFETY: a pixel of the view, which nobody writes (the promise of `enlarge`).
+                // SAFETY: a pixel of the view, which nobody writes (the contract of `enlarge`).
                 unsafe { arena.read(from.at(x, y), channels) }
             };
             let [a, b, c, d] = [
@@ -70,7 +70,7 @@ impl<E: Element> WithSimd for Gap<'_, E> {
                     }
                     let across = [0.25, 0.75][column];
                     let (x, y) = (2 * side + column - 1, 2 * gap + row - 1);
-                    // SAFETY: a pixel of `to`; the two rows of a gap are this task's alone.
+                    // SAFETY: a pixel of `to`; the two rows of a gap are used by this task only.
                     let out = unsafe { arena.write(to.at(x, y), channels) };
                     let corners = a.iter().zip(b).zip(c.iter().zip(d));
                     for (out, ((a, b), (c, d))) in out.iter_mut().zip(corners) {
@@ -84,15 +84,15 @@ impl<E: Element> WithSimd for Gap<'_, E> {
     }
 }
 
-/// Writes constants, a pixel's after the other's.
+/// Writes constants, pixel by pixel.
 ///
 /// # Safety
-/// `to` must lie in the arena and nobody else use it.
+/// `to` must be in the arena, and nobody else may use it.
 pub(crate) unsafe fn constants<E: Element>(arena: Shared<E>, values: &[f32], to: &View) {
     (0..to.height).into_par_iter().for_each(|y| {
         for x in 0..to.width {
             let values = &values[(y * to.width + x) * to.channels..][..to.channels];
-            // SAFETY: a pixel of `to`, whose row is this task's alone (the caller's promise).
+            // SAFETY: a pixel of `to`, whose row is used by this task only (guaranteed by the caller).
             let out = unsafe { arena.write(to.at(x, y), to.channels) };
             for (out, value) in out.iter_mut().zip(values) {
                 *out = E::of(*value);

@@ -6,21 +6,21 @@ mod graph;
 
 pub use self::graph::{GraphProblem, Misfit};
 
-/// What can go wrong before a network runs; running it cannot fail.
+/// What can go wrong before a network runs. Running it cannot fail.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A graph that means no network.
+    /// An invalid graph.
     #[error("network graph, node {node} ({name}): {reason}")]
     Graph {
-        /// Which node, counted from 0.
+        /// Index of the node, from 0.
         node: usize,
         /// The node's name.
         name: String,
-        /// What is wrong with it.
+        /// What is wrong with the node.
         reason: GraphProblem,
     },
-    /// An image size that the graph cannot work on.
+    /// An image size that the graph cannot run on.
     #[error(
         "network input of {width}x{height} pixels: width and height must be multiples of {step}, at least {least}"
     )]
@@ -29,14 +29,14 @@ pub enum Error {
         width: usize,
         /// Height in pixels.
         height: usize,
-        /// What both must be multiples of.
+        /// Width and height must be multiples of this, in pixels.
         step: usize,
-        /// The smallest side.
+        /// Smallest width and height, in pixels.
         least: usize,
     },
-    /// Images so large that the network's values have no room in memory.
+    /// Images so large that there is no memory for the network's values.
     #[error(
-        "network input of {width}x{height} pixels: no memory for its values at this size; choose a smaller one"
+        "network input of {width}x{height} pixels: not enough memory for its values at this size; choose a smaller one"
     )]
     Memory {
         /// Width in pixels.
@@ -44,22 +44,24 @@ pub enum Error {
         /// Height in pixels.
         height: usize,
     },
-    /// A precision that this processor has no instructions for.
+    /// The processor has no instructions for bf16.
     #[error("bf16 needs a processor with AMX or AVX512-BF16; this one has neither")]
     NoBf16,
-    /// The same of int8.
-    #[error("int8 needs a processor with AVX512-VNNI and AVX512-BF16; this one has not both")]
+    /// The processor has no instructions for int8.
+    #[error(
+        "int8 needs a processor with AVX512-VNNI and AVX512-BF16; this one lacks at least one of them"
+    )]
     NoInt8,
-    /// Int8 without the ranges of what its convolutions read, or with another network's.
+    /// Int8 without ranges of its convolutions' inputs, or with those of another network.
     #[error("int8: {reason}")]
     Ranges {
-        /// What is wrong with them.
+        /// What is wrong with the ranges.
         reason: RangesProblem,
     },
 }
 
 impl Hint for Error {
-    /// The messages say it themselves.
+    /// The messages already contain what to do.
     fn hint(&self) -> Option<String> {
         None
     }

@@ -6,7 +6,7 @@ use crate::head::Head;
 use crate::view::Shared;
 use crate::winograd::Winograd;
 
-/// In f32.
+/// The forms of a convolution in f32.
 #[derive(Debug)]
 pub(crate) enum F32Conv {
     Direct(Direct),
@@ -25,7 +25,7 @@ impl ConvForm<f32> for F32Conv {
         }
     }
 
-    /// All are exact.
+    /// All forms read exactly their inputs.
     fn overread(_: usize) -> usize {
         0
     }
@@ -46,14 +46,13 @@ impl ConvForm<f32> for F32Conv {
         }
     }
 
-    /// All are exact: the direct form and the head read their inputs alone, Winograd's tiles pixels of the image and
-    /// its border.
+    /// All are exact: the direct form and the head read their inputs only, Winograd's tiles only pixels of the image and its border.
     fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
         None
     }
 
     unsafe fn run(&self, arena: Shared<f32>) {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             match self {
                 Self::Direct(conv) => conv.run(arena),
@@ -64,7 +63,7 @@ impl ConvForm<f32> for F32Conv {
     }
 }
 
-/// In bf16.
+/// The forms of a convolution in bf16.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug)]
 pub(crate) enum Bf16Conv {
@@ -80,7 +79,7 @@ impl Bf16Conv {
         crate::bf16::has_dot()
     }
 
-    /// The form by dot products of pairs.
+    /// The form with dot products of pairs.
     pub(crate) fn without_matrix_unit(
         conv: &Conv,
         geometry: Geometry,
@@ -131,14 +130,14 @@ impl ConvForm<Bf16> for Bf16Conv {
     fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
         match self {
             Self::Amx(conv) => conv.reads_on(),
-            // The head reads its inputs alone, Winograd's tiles pixels of the image and its border.
+            // The head reads its inputs only, Winograd's tiles only pixels of the image and its border.
             Self::Head(_) | Self::Winograd(_) => None,
             Self::Dot(conv) => conv.reads_on(),
         }
     }
 
     unsafe fn run(&self, arena: Shared<Bf16>) {
-        // SAFETY: the caller's promise; `new` is only called where `available` holds.
+        // SAFETY: guaranteed by the caller; `new` is only called if `available` is true.
         unsafe {
             match self {
                 Self::Amx(conv) => conv.run(arena),
@@ -150,7 +149,7 @@ impl ConvForm<Bf16> for Bf16Conv {
     }
 }
 
-/// Other processors' forms of bf16 and int8 are not written yet.
+/// bf16 and int8 are not implemented for other processors.
 #[cfg(not(target_arch = "x86_64"))]
 #[derive(Debug)]
 pub(crate) enum Unwritten {}
@@ -165,7 +164,7 @@ impl Unwritten {
 #[cfg(not(target_arch = "x86_64"))]
 impl ConvForm<Bf16> for Unwritten {
     fn new(_: &Conv, _: Geometry, _: &[Option<usize>]) -> Self {
-        unreachable!("the engine asks `available` first")
+        unreachable!("the engine checks `available` first")
     }
 
     fn overread(_: usize) -> usize {

@@ -8,7 +8,7 @@ use crate::{Border, Error, GraphProblem, Node, Op, ValueId, ValueShape};
 
 /// A network from an RGB image to one or more outputs.
 ///
-/// The first node sees (x − `mean`) / `std` for x in [0, 1].
+/// The input of the first node is (x − `mean`) / `std` for x in [0, 1].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Graph {
     mean: [f32; 3],
@@ -16,7 +16,7 @@ pub struct Graph {
     nodes: Vec<Node>,
     shapes: Vec<ValueShape>,
     outputs: Vec<ValueId>,
-    /// Of the nodes, where they were calibrated.
+    /// Input ranges of the nodes, if they were calibrated.
     input_ranges: Option<Vec<Option<[f32; 2]>>>,
 }
 
@@ -38,11 +38,11 @@ impl Graph {
         }
     }
 
-    /// Gives the graph what its convolutions read, for [`Precision::Int8`](crate::Precision::Int8). A convolution without a range is computed in
+    /// Sets the input ranges of convolutions for [`Precision::Int8`](crate::Precision::Int8). A convolution without a range is computed in
     /// bf16.
     ///
     /// # Errors
-    /// [`Error::Ranges`] for a name of no convolution that int8 computes, which is another network's, and a range that cannot be one.
+    /// [`Error::Ranges`] for a name that no convolution in int8 has (it belongs to another network), or an invalid range.
     pub fn set_input_ranges(&mut self, ranges: &InputRanges) -> Result<(), Error> {
         let mut found = vec![None; self.nodes.len()];
         let computed = self.int8_nodes();
@@ -53,7 +53,7 @@ impl Graph {
             let node = node.ok_or_else(|| Error::Ranges {
                 reason: RangesProblem::NoSuchConvolution { name: name.clone() },
             })?;
-            // The width too: two ends may each be a number, and their distance none.
+            // The width, too: with two finite ends it may still be infinite.
             if !((high - low).is_finite() && low <= high) {
                 return Err(Error::Ranges {
                     reason: RangesProblem::NoRange {
@@ -68,7 +68,7 @@ impl Graph {
         Ok(())
     }
 
-    /// The convolutions that int8 computes, by name.
+    /// Names of the convolutions that int8 computes.
     pub fn computed_in_int8(&self) -> impl Iterator<Item = &str> {
         let computed = self.int8_nodes();
         let each = self.nodes.iter().zip(computed);
@@ -76,8 +76,8 @@ impl Graph {
             .map(|(node, _)| node.name.as_str())
     }
 
-    /// Whether each node is a convolution for int8: the first, which sees the image, and the heads, whose output is the result, are not, nor
-    /// are those whose input's channels are not whole vectors as they lie in memory.
+    /// Whether each node is a convolution for int8. Not among them are the first, whose input is the image; the heads, whose output is the
+    /// result; and those whose input channels are not whole vectors in memory.
     fn int8_nodes(&self) -> Vec<bool> {
         let channels = channels_in_memory(self);
         let computed = |node: &Node| {
@@ -91,13 +91,13 @@ impl Graph {
         self.nodes.iter().map(computed).collect()
     }
 
-    /// What a node reads, where int8 computes it.
+    /// The input of a node that int8 computes.
     pub(crate) fn input_range(&self, index: usize) -> Option<[f32; 2]> {
         *self.input_ranges.as_ref()?.get(index)?
     }
 
     /// # Errors
-    /// [`Error::Ranges`] of a graph without them.
+    /// [`Error::Ranges`] for a graph without them.
     pub(crate) fn check_input_ranges(&self) -> Result<(), Error> {
         match &self.input_ranges {
             Some(ranges) if ranges.len() == self.nodes.len() => Ok(()),
@@ -126,14 +126,13 @@ impl Graph {
     /// Makes a value an output of the graph; the order of calls is the order of outputs.
     ///
     /// # Panics
-    /// When there is no such value.
+    /// If there is no such value.
     pub fn add_output(&mut self, value: ValueId) {
         assert!(value.0 < self.shapes.len(), "no value {}", value.0);
         self.outputs.push(value);
     }
 
-    /// That what is added or multiplied lies channel by channel beside its partner, without the gaps of a
-    /// concatenation.
+    /// Checks that both operands of an addition or multiplication have the same layout of channels, without the gaps of a concatenation.
     ///
     /// # Errors
     /// [`Error::Graph`] naming the first operation whose operand is a concatenation, an extent or the image.
@@ -168,12 +167,12 @@ impl Graph {
         }
     }
 
-    /// Whether a value's channels lie as a convolution's.
+    /// Whether a value's channels have the layout of a convolution's output.
     fn is_plain(&self, value: ValueId) -> bool {
         match value.0.checked_sub(1).map(|i| &self.nodes[i].op) {
             Some(Op::Conv(_) | Op::CrossCovariance { .. } | Op::Position { .. }) => true,
             Some(Op::Depthwise(op)) => self.is_plain(op.input),
-            // A single channel is not filled up.
+            // A single channel is not padded.
             Some(Op::Enlarge { input }) => self.shape(*input).channels > 1 && self.is_plain(*input),
             Some(
                 Op::MaxPool { input }
@@ -188,34 +187,34 @@ impl Graph {
                 Op::UpsampleConcat { .. }
                 | Op::Concat { .. }
                 | Op::ChannelExtent { .. }
-                // Nothing is filled up.
+                // Its channels are not padded.
                 | Op::DepthToSpace { .. }
-                // A single channel, not filled up.
+                // Its single channel is not padded.
                 | Op::ConvexUpsample { .. },
             )
             | None => false,
         }
     }
 
-    /// Subtracted from red, green and blue in [0, 1].
+    /// Mean that is subtracted from red, green and blue in [0, 1].
     #[must_use]
     pub fn mean(&self) -> [f32; 3] {
         self.mean
     }
 
-    /// The divisors of red, green and blue.
+    /// Standard deviation by which red, green and blue are divided.
     #[must_use]
     pub fn std(&self) -> [f32; 3] {
         self.std
     }
 
-    /// The operations, in an order in which they can run.
+    /// The operations in an executable order.
     #[must_use]
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
-    /// The operations alone; a weight can be dropped once it is used.
+    /// The operations, by value, so that weights can be dropped after use.
     pub(crate) fn into_nodes(self) -> Vec<Node> {
         self.nodes
     }
@@ -235,14 +234,14 @@ impl Graph {
     /// Shape of a value.
     ///
     /// # Panics
-    /// When there is no such value.
+    /// If there is no such value.
     #[must_use]
     pub fn shape(&self, value: ValueId) -> ValueShape {
         self.shapes[value.0]
     }
 
-    /// Multiplications with addition in each node's convolution, or its products of channels, for an image of this size; taps
-    /// that only see a border of zeros included.
+    /// Multiply-adds of each node's convolution, or of its products of channels, for an image of this size, including taps that only read
+    /// zeros of the border.
     #[must_use]
     pub fn multiply_adds(&self, width: usize, height: usize) -> Vec<u64> {
         let of = |(i, node): (usize, &Node)| {
@@ -262,8 +261,8 @@ impl Graph {
         self.nodes.iter().enumerate().map(of).collect()
     }
 
-    /// How often an operation wants the image to be halved without a rest. Convolutions round up, and what follows them may be cut;
-    /// what is doubled is doubled whole.
+    /// How many exact halvings of the image an operation requires. Convolutions round up, and what follows them may be cropped, but
+    /// enlargements double the size exactly.
     fn exact_halvings(&self, node: usize, op: &Op) -> u32 {
         match op {
             Op::UpsampleConcat { input, .. }
@@ -279,7 +278,7 @@ impl Graph {
     /// Checks that the graph can run on images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] unless every halving that has to be is exact and every reflected border has pixels to mirror.
+    /// [`Error::Size`] unless every halving that must be exact is, and every reflected border has enough pixels to mirror.
     pub fn check_size(&self, width: usize, height: usize) -> Result<(), Error> {
         let nodes = self.nodes.iter().enumerate();
         let deepest = nodes

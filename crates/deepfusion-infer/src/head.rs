@@ -1,4 +1,4 @@
-//! A convolution to one channel: lanes along the inputs.
+//! A convolution to one channel, with vectors along the inputs.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ pub(crate) struct Head {
 
 impl Head {
     /// # Panics
-    /// When there is more than one output channel.
+    /// If there is more than one output channel.
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
         assert_eq!(conv.channels_out, 1, "a head has one channel");
         let runs = Runs::new(&geometry, channel_of, usize::MAX, 1);
@@ -34,7 +34,7 @@ impl Head {
     }
 
     /// # Safety
-    /// As [`crate::direct::Direct::run`].
+    /// As for [`crate::direct::Direct::run`].
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
         (0..self.geometry.out.height).into_par_iter().for_each(|y| {
             dispatch(Row {
@@ -66,26 +66,26 @@ impl WithSimd for Row<'_> {
             let mut weights = head.weights.as_ptr();
             let (mut sum, mut rest) = (simd.splat_f32s(0.0), head.bias);
             for &run in &head.runs.offsets {
-                // SAFETY: the runs lie within their extent, which nobody writes (the promise of `run`); weights are as
-                // many as the runs' inputs.
+                // SAFETY: the runs are within their extent, which nobody writes (the contract of `run`); there are as many weights as the
+                // runs have inputs.
                 unsafe {
                     for k in (0..whole).step_by(S::F32_LANES) {
                         let w = weights.add(k).cast::<S::f32s>().read_unaligned();
                         let x = pixel.add(run + k).cast::<S::f32s>().read_unaligned();
                         sum = simd.mul_add_f32s(w, x, sum);
                     }
-                    // Of the image or an extent, whose channels are not whole vectors.
+                    // Inputs from the image or an extent, whose channels are not whole vectors.
                     for k in whole..head.runs.len {
                         rest += *weights.add(k) * *pixel.add(run + k);
                     }
                     weights = weights.add(head.runs.len);
                 }
             }
-            // SAFETY: a pixel of the output, whose row is this task's alone.
+            // SAFETY: a pixel of the output, whose row is used by this task only.
             unsafe { *arena.at(g.out.at(x, y), 1) = simd.reduce_sum_f32s(sum) + rest };
         }
         let row = arena.at(g.out.at(0, y), g.out.width);
-        // SAFETY: a head's output has one channel a pixel and no border: that many values of this task's row.
+        // SAFETY: a head's output has one channel per pixel and no border, so these values are in this task's row.
         unsafe { g.activation.apply(simd, row, g.out.width) };
     }
 }

@@ -4,25 +4,25 @@ use crate::tile::LANES;
 use crate::view::View;
 use crate::{Graph, Op, ValueId, ValueShape};
 
-/// A buffer holds one value, or a concatenation with the values that are its parts.
+/// A buffer contains one value, or a concatenation together with the values that are its parts.
 #[derive(Debug, Clone)]
 pub(crate) struct Buffer {
     /// Physical channels.
     channels: usize,
-    /// Of its values, whose size it has.
+    /// Shape of its values, which all have the same size.
     shape: ValueShape,
     pub(crate) border: usize,
-    /// First and last step that uses it.
+    /// First and last step that uses the buffer.
     live: Option<(usize, usize)>,
     offset: usize,
 }
 
-/// A value's place: some channels of a buffer.
+/// The place of a value: some channels of a buffer.
 #[derive(Debug, Clone)]
 pub(crate) struct Home {
     pub(crate) buffer: usize,
     first: usize,
-    /// For each physical channel the logical one; none for those that fill up.
+    /// The logical channel of each physical one; `None` for padding.
     pub(crate) channel_of: Vec<Option<usize>>,
     result: bool,
 }
@@ -33,14 +33,13 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// A home for every value: what is appended in a concatenation is written there from the start.
-    /// A result takes `slots` elements.
+    /// A home for every value. Parts of a concatenation are written to their place in it directly. A result takes `slots` elements.
     pub(crate) fn new(graph: &Graph, slots: usize) -> Self {
         let count = graph.nodes().len() + 1;
         let mut homes: Vec<Option<Home>> = vec![None; count];
         let mut buffers = Vec::new();
         let channels = channels(graph, slots);
-        // The last ones first: a concatenation's parts come before it.
+        // From the last to the first, as a concatenation comes after its parts.
         for value in (0..count).rev() {
             let channel_of = channels[value].clone();
             let home = homes[value].get_or_insert_with(|| {
@@ -77,7 +76,7 @@ impl Layout {
         Self { buffers, homes }
     }
 
-    /// Whether a value was given its place in a concatenation, from channel `first` on.
+    /// Whether a value is stored in a concatenation, from channel `first` on.
     pub(crate) fn lies_in(&self, part: ValueId, concat: ValueId, first: usize) -> bool {
         let (part, concat) = (&self.homes[part.0], &self.homes[concat.0]);
         part.buffer == concat.buffer && part.first == concat.first + first
@@ -89,10 +88,10 @@ impl Layout {
         *live = Some((first.min(step), last.max(step)));
     }
 
-    /// Gives every buffer an offset; buffers that are never alive together may share memory. Each has room behind it
-    /// for what kernels read on: `overread` elements, by the distance of its pixels. Results lie behind them all: what is
-    /// read on, times zero, must not meet the halves of an f32, which may be NaN. Returns the size of the whole;
-    /// `None` where that is more than can be counted.
+    /// Gives every buffer an offset. Buffers that are never in use at the same time may share memory. Each is followed by as many elements
+    /// as kernels may read beyond it: `overread`, given the distance of its pixels. Results come after all buffers: an element that is read
+    /// beyond the inputs and multiplied by zero must not be half of an f32, which may be NaN. Returns the total size; `None` if it
+    /// overflows.
     pub(crate) fn place(
         &mut self,
         width: usize,
@@ -109,7 +108,7 @@ impl Layout {
             all.checked_next_multiple_of(64)
         };
         let sizes: Vec<usize> = self.buffers.iter().map(size_of).collect::<Option<_>>()?;
-        // Side by side they need no more than this; if that can be counted, so can every offset below.
+        // An upper limit: all buffers side by side. If it does not overflow, no offset below can.
         sizes
             .iter()
             .try_fold(0_usize, |all, s| all.checked_add(*s))?;
@@ -120,7 +119,7 @@ impl Layout {
                     .any(|home| home.buffer == b && home.result)
             })
             .collect();
-        // Large ones first: the small ones fill the gaps.
+        // Large buffers first, so that the small ones fill the gaps.
         order.sort_by_key(|i| std::cmp::Reverse(sizes[*i]));
         let mut placed: Vec<usize> = Vec::new();
         let mut end = 0;
@@ -157,7 +156,7 @@ impl Layout {
         Some(end)
     }
 
-    /// Where each logical channel of a value lies in a pixel.
+    /// Index in a pixel of each logical channel of a value.
     pub(crate) fn places(&self, value: ValueId) -> Vec<usize> {
         let channels = self.homes[value.0].channel_of.iter().enumerate();
         channels.filter_map(|(i, c)| c.map(|_| i)).collect()
@@ -182,13 +181,12 @@ impl Layout {
     }
 }
 
-/// How many channels each value has as it lies in memory, where values are in bf16.
+/// Number of channels of each value in memory, if values are in bf16.
 pub(crate) fn channels_in_memory(graph: &Graph) -> Vec<usize> {
     channels(graph, 2).iter().map(Vec::len).collect()
 }
 
-/// For each value and each of its physical channels the logical one; none for those that fill up. A result takes
-/// `slots` elements.
+/// The logical channel of each value's physical channels; `None` for padding. A result takes `slots` elements.
 fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
     let mut all: Vec<Vec<Option<usize>>> = vec![(0..3).map(Some).collect()];
     for (index, node) in graph.nodes().iter().enumerate() {
@@ -230,8 +228,7 @@ fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
     all
 }
 
-/// The values whose channels a concatenation joins, in order, and whether each can be written there from the start:
-/// what is enlarged cannot.
+/// The parts of a concatenation, in order, and whether each can be written into it directly; an enlarged part cannot.
 pub(crate) fn parts(graph: &Graph, value: ValueId) -> Vec<(ValueId, bool)> {
     match value.0.checked_sub(1).map(|i| &graph.nodes()[i].op) {
         Some(Op::UpsampleConcat { input, skip }) => {
@@ -243,15 +240,15 @@ pub(crate) fn parts(graph: &Graph, value: ValueId) -> Vec<(ValueId, bool)> {
     }
 }
 
-/// A single channel that a convolution without a residual gives and nothing reads.
+/// Whether a value is a single channel computed by a convolution without a residual, and no operation reads it.
 fn is_result(graph: &Graph, value: ValueId) -> bool {
     let node = value.0.checked_sub(1).map(|i| &graph.nodes()[i].op);
     let plain = matches!(node, Some(Op::Conv(conv)) if conv.residual.is_none());
     plain && graph.shape(value).channels == 1 && !graph.is_read(value)
 }
 
-/// Whether a part of a concatenation is a convolution of another part: in one buffer, what it reads on could be what it
-/// writes.
+/// Whether a part of a concatenation is a convolution of another part. In one buffer, the elements that it reads beyond its inputs could be
+/// its own output.
 fn reads_part_of(graph: &Graph, part: ValueId, concat: ValueId) -> bool {
     match part.0.checked_sub(1).map(|i| &graph.nodes()[i].op) {
         Some(Op::Conv(conv)) => parts(graph, concat).iter().any(|p| p.0 == conv.input),

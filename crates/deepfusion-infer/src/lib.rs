@@ -1,4 +1,4 @@
-//! A trained network as a graph, and the engine that runs it fast. Nothing here knows Burn.
+//! A trained network as a graph, and a fast engine that runs it. Independent of Burn.
 
 mod activate;
 mod aligned;

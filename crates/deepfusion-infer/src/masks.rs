@@ -1,4 +1,4 @@
-//! Operations of a single pixel or a mask on every pixel of a value: attention and aggregation.
+//! Operations that apply a single pixel or a mask to every pixel of a value: attention and aggregation.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -10,11 +10,11 @@ use crate::view::{Shared, View};
 /// y = x ⊙ (s · c), or x ⊙ (1 + s · c) with `residual`.
 #[derive(Debug)]
 pub(crate) struct Gate {
-    /// x.
+    /// x, the input.
     pub(crate) input: View,
-    /// s, in its first channel.
+    /// s, the spatial mask, in its first channel.
     pub(crate) spatial: View,
-    /// c, one pixel.
+    /// c, the channel mask, a single pixel.
     pub(crate) channel: View,
     pub(crate) residual: bool,
     pub(crate) out: View,
@@ -22,7 +22,7 @@ pub(crate) struct Gate {
 
 impl Gate {
     /// # Safety
-    /// The views must lie in the arena, the output apart from the others, and nobody else use it or write those.
+    /// The views must be in the arena, and the output must not overlap the others. Nobody else may use the output or write the others.
     pub(crate) unsafe fn run<E: Element>(&self, arena: Shared<E>) {
         let shift = if self.residual { 1.0 } else { 0.0 };
         (0..self.out.height).into_par_iter().for_each(|y| {
@@ -33,7 +33,7 @@ impl Gate {
                 out: &self.out,
                 y,
                 apply: |x: usize, value: f32, channel: f32| {
-                    // SAFETY: a pixel of the mask, which nobody writes (the caller's promise).
+                    // SAFETY: a pixel of the mask, which nobody writes (guaranteed by the caller).
                     let spatial = unsafe { arena.read(self.spatial.at(x, y), 1) };
                     value * (shift + spatial[0].value() * channel)
                 },
@@ -45,7 +45,7 @@ impl Gate {
 /// y = x + v at every pixel.
 ///
 /// # Safety
-/// As [`Gate::run`].
+/// As for [`Gate::run`].
 pub(crate) unsafe fn add_pixel<E: Element>(
     arena: Shared<E>,
     input: &View,
@@ -64,14 +64,14 @@ pub(crate) unsafe fn add_pixel<E: Element>(
     });
 }
 
-/// A row of an operation on every pixel's channels and those of one pixel.
+/// One row of an operation that combines every pixel's channels with those of a single pixel.
 struct Row<'a, E, F> {
     arena: Shared<'a, E>,
     input: &'a View,
     pixel: &'a View,
     out: &'a View,
     y: usize,
-    /// Of the column, a value, and the pixel's value of that channel.
+    /// Takes the column, a value, and the single pixel's value for that channel.
     apply: F,
 }
 
@@ -89,10 +89,10 @@ impl<E: Element, F: Fn(usize, f32, f32) -> f32> WithSimd for Row<'_, E, F> {
             apply,
         } = self;
         let count = out.channels;
-        // SAFETY: a pixel's channels, which nobody writes (the promise of `run`).
+        // SAFETY: a pixel's channels, which nobody writes (the contract of `run`).
         let pixel = unsafe { arena.read(pixel.offset, count) };
         for x in 0..out.width {
-            // SAFETY: as above; the output's row is this task's alone.
+            // SAFETY: as above; the output's row is used by this task only.
             let (from, to) = unsafe {
                 (
                     arena.read(input.at(x, y), count),

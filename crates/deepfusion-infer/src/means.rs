@@ -1,4 +1,4 @@
-//! Means and maxima: over the image of each channel, over the channels of each pixel.
+//! Means and maxima: of each channel over the image, and of each pixel over its channels.
 
 use std::ops::Range;
 
@@ -13,11 +13,11 @@ use crate::view::{Shared, View};
 /// Channels that a task averages: four vectors, whose sums stay in registers.
 const AT_ONCE: usize = 4 * LANES;
 
-/// The mean of every channel.
+/// Computes the mean of every channel.
 ///
 /// # Safety
-/// The views must lie in the arena, apart from each other, and nobody else use `to`, which is one pixel of as
-/// many channels as `from`.
+/// The views must be in the arena and must not overlap. Nobody else may use `to`, which must be one pixel with as many channels as `from`,
+/// or write `from`.
 pub(crate) unsafe fn global_mean<E: Element>(arena: Shared<E>, from: &View, to: &View) {
     let tasks = from.channels.div_ceil(AT_ONCE);
     (0..tasks).into_par_iter().for_each(|task| {
@@ -52,13 +52,13 @@ impl<E: Element> WithSimd for Mean<'_, E> {
         let count = channels.len();
         let mut sums = [0.0_f32; AT_ONCE];
         for y in 0..from.height {
-            // A row by itself: few roundings of a small number on a large one.
+            // Each row is summed separately, so that few small numbers are rounded when added to a large one.
             let mut row = [0.0_f32; AT_ONCE];
             for x in 0..from.width {
-                // SAFETY: channels of a pixel of the view, which nobody writes (the promise of `global_mean`).
+                // SAFETY: channels of a pixel of the view, which nobody writes (the contract of `global_mean`).
                 let pixel = unsafe { arena.read(from.at(x, y) + channels.start, count) };
                 match pixel.as_array::<AT_ONCE>() {
-                    // A fixed length becomes vectors without a rest.
+                    // A fixed length compiles to whole vectors.
                     Some(pixel) => add(&mut row, pixel),
                     None => add(&mut row[..count], pixel),
                 }
@@ -66,7 +66,7 @@ impl<E: Element> WithSimd for Mean<'_, E> {
             add(&mut sums, &row);
         }
         let share = 1.0 / from.pixels() as f32;
-        // SAFETY: channels of `to`'s pixel, which are this task's alone.
+        // SAFETY: channels of `to`'s pixel, which are used by this task only.
         let out = unsafe { arena.write(to.offset + channels.start, count) };
         for (out, sum) in out.iter_mut().zip(sums) {
             *out = E::of(sum * share);
@@ -81,10 +81,10 @@ fn add<E: Element>(sums: &mut [f32], values: &[E]) {
     }
 }
 
-/// Each pixel's mean and maximum over the channels at the places `channels`.
+/// Each pixel's mean and maximum over the channels at the indices `channels`.
 ///
 /// # Safety
-/// As [`global_mean`], with two channels in `to`.
+/// As for [`global_mean`], with two channels in `to`.
 pub(crate) unsafe fn channel_extent<E: Element>(
     arena: Shared<E>,
     from: &View,
@@ -128,7 +128,7 @@ impl<E: Element> WithSimd for Extent<'_, E> {
             let mut sums = [0.0_f32; LANES];
             let mut most = [f32::NEG_INFINITY; LANES];
             for run in channels {
-                // SAFETY: channels of a pixel of the view, which nobody writes (the promise of `channel_extent`).
+                // SAFETY: channels of a pixel of the view, which nobody writes (the contract of `channel_extent`).
                 let values = unsafe { arena.read(from.at(x, y) + run.start, run.len()) };
                 let (whole, rest) = values.as_chunks::<LANES>();
                 for values in whole {
@@ -138,7 +138,7 @@ impl<E: Element> WithSimd for Extent<'_, E> {
             }
             let sum: f32 = sums.iter().sum();
             let most = most.into_iter().fold(f32::NEG_INFINITY, greater);
-            // SAFETY: a pixel of `to`, whose row is this task's alone.
+            // SAFETY: a pixel of `to`, whose row is used by this task only.
             let out = unsafe { arena.write(to.at(x, y), 2) };
             out.copy_from_slice(&[E::of(sum * share), E::of(most)]);
         }
@@ -154,7 +154,7 @@ fn extend<E: Element>(sums: &mut [f32; LANES], most: &mut [f32; LANES], values: 
     }
 }
 
-/// The greater of two; NaN wins.
+/// The greater of two values; NaN if one of them is.
 #[inline(always)]
 fn greater(most: f32, value: f32) -> f32 {
     if most >= value || most.is_nan() {

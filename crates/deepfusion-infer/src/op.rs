@@ -1,8 +1,8 @@
-//! The operations that a network's graph is made of.
+//! The operations of a network's graph.
 
 use crate::ValueId;
 
-/// Applied to a convolution's sum.
+/// An activation function, applied to a convolution's sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Activation {
     /// y = x.
@@ -13,7 +13,7 @@ pub enum Activation {
     Elu,
     /// y = 1 / (1 + e⁻ˣ).
     Sigmoid,
-    /// y = x·Φ(x), Φ the normal distribution.
+    /// y = x·Φ(x), with Φ the cumulative normal distribution.
     Gelu,
     /// y = x where x > 0, x/100 elsewhere.
     LeakyRelu,
@@ -21,24 +21,24 @@ pub enum Activation {
     Tanh,
 }
 
-/// The border of a convolution's input.
+/// How a convolution's input is padded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Border {
-    /// Zeros.
+    /// With zeros.
     Zero,
-    /// The image mirrored at its outermost pixels, which are not repeated.
+    /// By mirroring the image at its outermost pixels, which are not repeated.
     Reflect,
 }
 
-/// A convolution with square kernels that keeps the size (`kernel` odd, padded by half of its reach) or halves it
-/// (`stride` 2, rounding up), then adds a residual and applies an activation: y = a(w ⋆ x + b + r).
+/// A convolution with square kernels: y = a(w ⋆ x + b + r). It keeps the size (`kernel` is odd, padded by half of its reach) or, with
+/// `stride` 2, halves it, rounding up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conv {
-    /// Its input.
+    /// The input x.
     pub input: ValueId,
-    /// Out × in × kernel × kernel, row-major; batch normalisation folded in.
+    /// Weights w: output × input channels × kernel × kernel, row-major; batch normalisation folded in.
     pub weight: Vec<f32>,
-    /// One value per output channel.
+    /// Biases b, one per output channel.
     pub bias: Vec<f32>,
     /// Input channels.
     pub channels_in: usize,
@@ -46,37 +46,37 @@ pub struct Conv {
     pub channels_out: usize,
     /// Side of the kernel in pixels, odd.
     pub kernel: usize,
-    /// 1 or 2.
+    /// Stride, 1 or 2.
     pub stride: usize,
     /// Distance of the kernel's taps in pixels, at least 1.
     pub dilation: usize,
-    /// The border of the input.
+    /// Padding of the input.
     pub border: Border,
-    /// r, of the output's shape; or a single pixel, which is added everywhere.
+    /// Residual r, of the output's shape, or a single pixel that is added everywhere.
     pub residual: Option<ValueId>,
-    /// a.
+    /// Activation a.
     pub activation: Activation,
 }
 
-/// A depthwise convolution, each channel with a kernel of its own and a border of zeros, that keeps the size or halves it
-/// (`stride` 2): y = w ⋆ x + b.
+/// A depthwise convolution, each channel with its own kernel, padded with zeros: y = w ⋆ x + b. It keeps the size or, with `stride` 2,
+/// halves it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Depthwise {
-    /// Its input.
+    /// The input x.
     pub input: ValueId,
-    /// Channels × kernel × kernel, row-major; batch normalisation folded in.
+    /// Weights w: channels × kernel × kernel, row-major; batch normalisation folded in.
     pub weight: Vec<f32>,
-    /// One value per channel.
+    /// Biases b, one per channel.
     pub bias: Vec<f32>,
     /// Side of the kernels in pixels, odd.
     pub kernel: usize,
-    /// 1 or 2.
+    /// Stride, 1 or 2.
     pub stride: usize,
     /// Distance of the kernels' taps in pixels, at least 1.
     pub dilation: usize,
 }
 
-/// One operation.
+/// An operation of a graph.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Op {
     /// A convolution.
@@ -85,99 +85,102 @@ pub enum Op {
     Depthwise(Box<Depthwise>),
     /// The maximum over 3×3 pixels at stride 2, padded by one.
     MaxPool {
-        /// Its input.
+        /// The input.
         input: ValueId,
     },
-    /// Every pixel becomes 2×2, and the channels of `skip` are appended.
+    /// Repeats every pixel 2×2 times, then appends the channels of `skip`.
     UpsampleConcat {
-        /// The input, which is enlarged.
+        /// The input to be enlarged.
         input: ValueId,
-        /// Appended, twice the size of the input.
+        /// The value to append, twice the size of the input.
         skip: Option<ValueId>,
     },
-    /// The channels of several values of one size, one after the other.
+    /// Concatenates the channels of several values of the same size.
     Concat {
-        /// At least one.
+        /// The values, at least one.
         inputs: Vec<ValueId>,
     },
-    /// The mean over the image: a single pixel.
+    /// The mean over the image, a single pixel.
     GlobalMean {
-        /// Its input.
+        /// The input.
         input: ValueId,
     },
     /// Each pixel's mean and maximum over the channels: two channels.
     ChannelExtent {
-        /// Its input.
+        /// The input.
         input: ValueId,
     },
-    /// y = x ⊙ (s · c), or x ⊙ (1 + s · c): attention.
+    /// Attention masks: y = x ⊙ (s · c), or x ⊙ (1 + s · c).
     Gate {
-        /// x.
+        /// The input x.
         input: ValueId,
-        /// s, one channel.
+        /// Spatial mask s, one channel.
         spatial: ValueId,
-        /// c, a single pixel.
+        /// Channel mask c, a single pixel.
         channel: ValueId,
         /// Whether 1 is added.
         residual: bool,
     },
-    /// y = x + v at every pixel.
+    /// Adds a single pixel everywhere: y = x + v.
     AddPixel {
-        /// x.
+        /// The input x.
         input: ValueId,
-        /// v, a single pixel.
+        /// The pixel v.
         pixel: ValueId,
     },
-    /// Twice the size, bilinearly with half-pixel centres; a pixel at the border is its own neighbour.
+    /// Twice the size, bilinearly with half-pixel centres; pixels beyond the border repeat those at the border.
     Enlarge {
-        /// Its input.
+        /// The input.
         input: ValueId,
     },
-    /// y = (x − μ) / √(σ² + ε), μ and σ² over each pixel's channels: layer normalisation without its factors.
+    /// Layer normalisation without scale and offset: y = (x − μ) / √(σ² + ε), μ and σ² over each pixel's channels.
     ChannelNorm {
-        /// x.
+        /// The input x.
         input: ValueId,
-        /// ε, above 0.
+        /// Epsilon ε, above 0.
         epsilon: f32,
     },
-    /// y = softmax(τ·q̂·k̂ᵀ)·v of each head, rows channels and columns pixels, q̂ and k̂ of length 1: cross-covariance attention.
+    /// Cross-covariance attention: y = softmax(τ·q̂·k̂ᵀ)·v for each head, with channels as rows and pixels as columns, q̂ and k̂ of length
+    /// 1.
     CrossCovariance {
-        /// Queries, keys and values: three times the output's channels, in each the heads one after the other.
+        /// Queries, keys and values: three times the output's channels; each of the three has the heads in order.
         input: ValueId,
-        /// τ of each head.
+        /// Temperature τ of each head.
         temperature: Vec<f32>,
     },
-    /// y = a ⊙ b, of one shape.
+    /// The product y = a ⊙ b of two values of the same shape.
     Multiply {
-        /// a and b.
+        /// The factors a and b.
         inputs: [ValueId; 2],
     },
-    /// y = (1 − z) ⊙ h + z ⊙ q, of one shape: how a gated recurrent unit goes on.
+    /// The update of a gated recurrent unit: y = (1 − z) ⊙ h + z ⊙ q, all of the same shape.
     Blend {
-        /// h.
+        /// Previous state h.
         state: ValueId,
-        /// q.
+        /// Candidate q.
         candidate: ValueId,
-        /// z.
+        /// Share z.
         share: ValueId,
     },
-    /// One channel at 2 to the `halvings` times its size, each pixel a weighted mean of the 3×3 around its place in the small image (zeros
-    /// beyond its edge): RAFT's convex upsampling. The weights of a pixel are the softmax of its nine.
+    /// RAFT's convex upsampling of one channel by a factor of 2 to the power of `halvings`. Each pixel is a weighted mean of the 3×3 pixels
+    /// around its place in the small image, with zeros beyond the edge. Its nine weights are a softmax.
     ConvexUpsample {
-        /// One channel.
+        /// The input, one channel.
         input: ValueId,
-        /// 9·4^`halvings` channels of the input's size: tap by tap (row by row), in each a block's pixels row by row.
+        /// The weights' logarithms, 9·4^`halvings` channels of the input's size: tap by tap (row by row), and for each tap the pixels of a
+        /// block row by row.
         weights: ValueId,
-        /// 1 to 3.
+        /// Exponent of the factor, 1 to 3.
         halvings: u32,
     },
-    /// Every pixel's channels become 2×2 pixels of a quarter as many: channel (2·i + j)·C + c is channel c of the one at row i and column j.
-    /// Cut to the size of a value that is halved once less. After a convolution to 4·C channels this is a transposed one of stride 2.
+    /// Depth to space: rearranges every pixel's channels into 2×2 pixels with a quarter as many. Channel (2·i + j)·C + c becomes channel c
+    /// of the pixel at row i and column j. The result is cropped to the size of a value that is halved once less. After a convolution to
+    /// 4·C channels this is a transposed convolution of stride 2.
     DepthToSpace {
-        /// Four times the output's channels.
+        /// The input, with four times the output's channels.
         input: ValueId,
     },
-    /// Where each pixel is, in sines and cosines ([`deepfusion_kernels::position_code`]): depends on no other value.
+    /// The position of each pixel as sines and cosines ([`deepfusion_kernels::position_code`]); depends on no other value.
     Position {
         /// Channels for each axis.
         per_axis: usize,
@@ -202,7 +205,7 @@ impl Conv {
     }
 }
 
-/// An operation with a name, for messages and for exported files.
+/// An operation with a name, for messages and exported files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
     /// Its path in the network, such as `encoder.layer1.0.conv1`.

@@ -1,4 +1,4 @@
-//! From a graph to steps over one block of memory: the layout of values and the order of steps.
+//! Turns a graph into steps over one block of memory: the layout of values and the order of steps.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use crate::view::View;
 use crate::{Border, Error, Graph, Node, Op, ValueId};
 use deepfusion_kernels::position_code;
 
-/// What a step does; the engine gives each convolution its form.
+/// A step of the plan; `C` is the engine's form of a convolution.
 #[derive(Debug)]
 pub(crate) enum Step<C> {
     /// Writes the normalised image.
@@ -32,49 +32,49 @@ pub(crate) enum Step<C> {
     Upsample(View, View),
     Copy(View, View),
     GlobalMean(View, View),
-    /// With the places of the channels that count.
+    /// The input, the indices of its logical channels, and the output.
     ChannelExtent(View, Vec<Range<usize>>, View),
     Gate(Gate),
-    /// Added to the first, into the last.
+    /// The input, the single pixel, and the output.
     AddPixel(View, View, View),
-    /// Bilinearly.
+    /// Bilinear enlargement by 2.
     Enlarge(View, View),
     ChannelNorm {
         from: View,
-        /// The places of the channels that count.
+        /// Indices of the logical channels.
         channels: Vec<Range<usize>>,
         epsilon: f32,
         to: View,
     },
     CrossCovariance(CrossCovarianceStep),
-    /// The same for every image, a pixel's channels after the other's.
+    /// Values that are the same for every image, pixel by pixel.
     Constants(Vec<f32>, View),
-    /// The first two, into the last.
+    /// The two factors, and the output.
     Multiply([View; 2], View),
-    /// State, candidate and share, into the last.
+    /// State, candidate and share, and the output.
     Blend([View; 3], View),
     ConvexUpsample(ConvexUpsample),
-    /// Channels to pixels.
+    /// Depth to space.
     DepthToSpace(View, View),
 }
 
 /// A graph laid out for one image size.
 #[derive(Debug)]
 pub(crate) struct Plan<C> {
-    /// With their names.
+    /// The steps with their names.
     pub(crate) steps: Vec<(String, Step<C>)>,
-    /// What is read of the arena before it is written, to be cleared before each image.
+    /// Ranges of the arena that are read before they are written; cleared before each image.
     pub(crate) stale: Vec<Range<usize>>,
-    /// Where the outputs lie, and for each of their channels its place in a pixel.
+    /// The views of the outputs, and for each of their channels its index in a pixel.
     pub(crate) outputs: Vec<(View, Vec<usize>)>,
 }
 
 impl<C> Plan<C> {
-    /// Lays the graph out for images of this size (which the graph must accept) in an arena; each convolution takes its
-    /// form, and its weights are dropped.
+    /// Lays the graph out for images of this size (which the graph must accept) in an arena. Each convolution is converted to its form, and
+    /// the graph's weights are dropped.
     ///
     /// # Errors
-    /// [`Error::Memory`] where there is no room for the values of such images.
+    /// [`Error::Memory`] if there is no memory for the values of such images.
     pub(crate) fn new<E: Element>(
         graph: Graph,
         width: usize,
@@ -86,7 +86,7 @@ impl<C> Plan<C> {
         let mut layout = Layout::new(&graph, size_of::<f32>() / size_of::<E>());
         let outline = outline(&mut layout, &graph);
         let arena = layout.place(width, height, C::overread);
-        // Before all else that is as large as an image.
+        // Allocated first, as it is the largest.
         let arena = arena.and_then(Aligned::try_zeros);
         let arena = arena.ok_or(Error::Memory { width, height })?;
         let view = |value: ValueId| layout.view(value, width, height);
@@ -141,7 +141,7 @@ impl<C> Plan<C> {
             Outline::AddPixel(from, pixel, to) => Step::AddPixel(view(from), view(pixel), view(to)),
             Outline::Enlarge(from, to) => {
                 let mut from = view(from);
-                // A single channel is not filled up.
+                // A single channel is not padded.
                 from.channels = from.channels.min(view(to).channels);
                 Step::Enlarge(from, view(to))
             }
@@ -224,14 +224,14 @@ impl<C> Plan<C> {
     }
 }
 
-/// A step before places are known.
+/// A step before the layout is known.
 enum Outline {
     Image,
     Border(ValueId, usize, Border),
     Conv(usize),
     MaxPool(ValueId, ValueId),
     Upsample(ValueId, ValueId),
-    /// A value into a concatenation, whose channels it takes from this one on.
+    /// Copies a value into a concatenation, from this channel on.
     Copy(ValueId, ValueId, usize),
     GlobalMean(ValueId, ValueId),
     ChannelExtent(ValueId, ValueId),
@@ -241,17 +241,17 @@ enum Outline {
     Enlarge(ValueId, ValueId),
     ChannelNorm(ValueId, f32, ValueId),
     CrossCovariance(usize),
-    /// With its channels for each axis.
+    /// The number of channels for each axis, and the output.
     Position(usize, ValueId),
     Multiply([ValueId; 2], ValueId),
     Blend([ValueId; 3], ValueId),
-    /// A value by weights, that many times doubled.
+    /// The value and its weights, the number of doublings, and the output.
     ConvexUpsample([ValueId; 2], u32, ValueId),
     DepthToSpace(ValueId, ValueId),
 }
 
 impl Outline {
-    /// What the step writes, or whose border it fills.
+    /// The value that the step writes, or whose border it fills.
     fn value(&self) -> ValueId {
         match self {
             Self::Image => ValueId::IMAGE,
@@ -277,11 +277,11 @@ impl Outline {
     }
 }
 
-/// The steps in order; notes how far each buffer's border reaches and when it is used.
+/// The steps in order. Records each buffer's border and when it is used.
 fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
     let mut steps = vec![Outline::Image];
     layout.used(ValueId::IMAGE, 0);
-    // What stands in each value's border.
+    // The content of each value's border.
     let mut borders: Vec<Option<(usize, Border)>> = vec![None; layout.homes.len()];
     for (index, node) in graph.nodes().iter().enumerate() {
         let value = ValueId(index + 1);
@@ -290,13 +290,13 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
             let there = borders[input.0];
             let enough = there.is_some_and(|(r, b)| b == border && r >= reach);
             if reach > 0 && !enough {
-                // The parts of a concatenation share its border.
+                // Parts of a concatenation share its border.
                 for other in 0..borders.len() {
                     if layout.homes[other].buffer == home {
                         borders[other] = None;
                     }
                 }
-                // Once for all that read it.
+                // Filled once for all convolutions that read it.
                 let reach = widest(graph, input, border);
                 borders[input.0] = Some((reach, border));
                 steps.push(Outline::Border(input, reach, border));
@@ -358,7 +358,7 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
     steps
 }
 
-/// The widest border of a kind that any convolution wants around a value.
+/// The widest border of this kind that any convolution needs around a value.
 fn widest(graph: &Graph, value: ValueId, border: Border) -> usize {
     let reach = |node: &Node| match window(&node.op) {
         Some((input, reach, kind)) if input == value && kind == border => reach,
@@ -367,7 +367,7 @@ fn widest(graph: &Graph, value: ValueId, border: Border) -> usize {
     graph.nodes().iter().map(reach).max().unwrap_or(0)
 }
 
-/// What a convolution reads, how far beyond the pixel itself, and over which border.
+/// The input of a convolution, its reach beyond a pixel, and the kind of border.
 fn window(op: &Op) -> Option<(ValueId, usize, Border)> {
     match op {
         Op::Conv(conv) => Some((conv.input, conv.reach(), conv.border)),
@@ -376,7 +376,7 @@ fn window(op: &Op) -> Option<(ValueId, usize, Border)> {
     }
 }
 
-/// The position's code, a pixel's channels after the other's, at the places `channels` of a view's; zeros elsewhere.
+/// The positional encoding, pixel by pixel, at the indices `channels` of a view's pixel; zeros elsewhere.
 fn position(per_axis: usize, channels: &[usize], to: &View) -> Vec<f32> {
     let code = position_code(per_axis, to.height, to.width);
     let mut values = vec![0.0; to.pixels() * to.channels];
@@ -388,7 +388,7 @@ fn position(per_axis: usize, channels: &[usize], to: &View) -> Vec<f32> {
     values
 }
 
-/// Increasing places as runs without gaps.
+/// Increasing indices as contiguous ranges.
 fn runs_of(places: &[usize]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for &place in places {

@@ -1,37 +1,37 @@
-//! What convolutions read, as ranges that int8 divides into 255 steps, and how they are found.
+//! Ranges of convolutions' inputs, which int8 divides into 255 steps, and how they are determined.
 
 use std::collections::BTreeMap;
 
 use crate::element::Element;
 use crate::view::{Shared, View};
 
-/// Why ranges are not those of a network.
+/// Why input ranges do not belong to a network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RangesProblem {
-    /// There are none.
-    #[error("the network was not calibrated")]
+    /// The graph has no ranges.
+    #[error("the network is not calibrated")]
     NotCalibrated,
-    /// A name that no convolution has, or none that int8 computes.
-    #[error("`{name}` is no convolution of this network that int8 computes")]
+    /// The name does not belong to a convolution that int8 computes.
+    #[error("`{name}` is not a convolution that int8 computes in this network")]
     NoSuchConvolution {
         /// The name.
         name: String,
     },
-    /// Two numbers that are no range.
-    #[error("{} to {} is no range of what `{name}` reads", ends[0], ends[1])]
+    /// The two numbers are not a range.
+    #[error("{} to {} is not a valid input range of `{name}`", ends[0], ends[1])]
     NoRange {
-        /// The convolution.
+        /// Name of the convolution.
         name: String,
-        /// The two ends.
+        /// The two numbers.
         ends: [f32; 2],
     },
 }
 
-/// For each convolution, by its name, the ends of the range of its input that is divided into steps; what lies beyond is held at them.
+/// For each convolution, by its name: the ends of its input range, which is divided into steps. Values outside are clamped to the ends.
 pub type InputRanges = BTreeMap<String, [f32; 2]>;
 
-/// How often convolutions read which values, over the images that [`Engine::observe`](crate::Engine::observe) saw.
+/// Histograms of the values that convolutions read, over the images that [`Engine::observe`](crate::Engine::observe) ran on.
 #[derive(Debug, Clone, Default)]
 pub struct SeenInputs {
     of: BTreeMap<String, Histogram>,
@@ -39,14 +39,14 @@ pub struct SeenInputs {
 }
 
 impl SeenInputs {
-    /// How many images were seen.
+    /// Number of images.
     #[must_use]
     pub fn images(&self) -> usize {
         self.images
     }
 
-    /// For each convolution the range whose 255 steps lose least: the squares of what is rounded within it, and of what is cut off
-    /// beyond it, are least in sum. Few values are far greater than all others, and steps as wide as those need would be wide for all.
+    /// For each convolution, the range with the smallest error of 255 steps: the sum of squares of rounding errors inside and clipping
+    /// errors outside. A few values are far larger than all others, and steps wide enough for them would be too coarse for the rest.
     #[must_use]
     pub fn ranges(&self) -> InputRanges {
         let each = self.of.iter();
@@ -59,12 +59,12 @@ impl SeenInputs {
     }
 }
 
-/// Bits of an f32 that stay: sign, exponent and the first four of the mantissa.
+/// Bits of an f32 that are kept: sign, exponent and the first four of the mantissa.
 const KEPT_BITS: u32 = 13;
-/// Ends of ranges that are tried, on each side of 0.
+/// Number of candidates for an end of the range, on each side of 0.
 const ENDS: i32 = 64;
 
-/// Counts of values, in sixteen bins from each power of two to the next.
+/// Counts of values, in sixteen bins for each factor of two.
 #[derive(Debug, Clone)]
 pub(crate) struct Histogram {
     counts: Vec<u64>,
@@ -82,11 +82,11 @@ impl Histogram {
     /// Counts the values of a view.
     ///
     /// # Safety
-    /// The view must lie in the arena, and nobody may write it meanwhile.
+    /// The view must be in the arena, and nobody may write it during the call.
     pub(crate) unsafe fn add<E: Element>(&mut self, arena: Shared<E>, view: &View) {
         for y in 0..view.height {
             for x in 0..view.width {
-                // SAFETY: the caller's promise.
+                // SAFETY: guaranteed by the caller.
                 for value in unsafe { arena.read(view.at(x, y), view.channels) } {
                     self.count(value.value());
                 }
@@ -100,7 +100,7 @@ impl Histogram {
         }
     }
 
-    /// Values in the middle of their bins, with their counts; those next to 0 are 0.
+    /// The centres of the bins, with their counts; those next to 0 count as 0.
     fn values(&self) -> Vec<(f64, f64)> {
         let half = 1_u32 << (31 - KEPT_BITS);
         let counted = self.counts.iter().enumerate().filter(|(_, n)| **n > 0);
@@ -143,7 +143,7 @@ impl Histogram {
     }
 }
 
-/// What the 255 steps of a range lose of the values, as a sum of squares.
+/// Error of the 255 steps of a range, as a sum of squares over the values.
 fn lost(values: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
     let step = (high - low) / 255.0;
     let rounded = step * step / 12.0;
@@ -176,7 +176,7 @@ mod tests {
         );
     }
 
-    /// Of a million values below 1 and a single one of 100, an end c costs (100 − c)² + 10⁶·(c/255)²/12: least at c = 43.9.
+    /// With a million values below 1 and a single one of 100, an end c costs (100 − c)² + 10⁶·(c/255)²/12, which is smallest at c = 43.9.
     #[test]
     fn what_is_rare_and_great_is_cut_off() {
         let many = (0..1_000_000).map(|i| (i % 1000) as f32 * 0.001);

@@ -1,4 +1,4 @@
-//! Products of values of one shape, pixel by pixel: the gates of a recurrent network.
+//! Pixel-wise products of values of the same shape: the gates of a recurrent network.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -10,25 +10,26 @@ use crate::view::{Shared, View};
 /// y = a ⊙ b.
 ///
 /// # Safety
-/// The views must lie in the arena, `out` apart from the others, and nobody else use it or write those; all have the same channels.
+/// The views must be in the arena, all with the same channels, and `out` must not overlap the others. Nobody else may use `out` or write
+/// the others.
 pub(crate) unsafe fn multiply<E: Element>(arena: Shared<E>, [a, b]: [&View; 2], out: &View) {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { rows(arena, [a, b, b], out, |a, b, _| a * b) }
 }
 
 /// y = (1 − z) ⊙ h + z ⊙ q.
 ///
 /// # Safety
-/// As [`multiply`].
+/// As for [`multiply`].
 pub(crate) unsafe fn blend<E: Element>(arena: Shared<E>, [h, q, z]: [&View; 3], out: &View) {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { rows(arena, [h, q, z], out, |h, q, z| h + z * (q - h)) }
 }
 
-/// What `apply` makes of three values of each channel of each pixel.
+/// Applies a function to three values of each channel of each pixel.
 ///
 /// # Safety
-/// As [`multiply`].
+/// As for [`multiply`].
 unsafe fn rows<E: Element>(
     arena: Shared<E>,
     from: [&View; 3],
@@ -68,7 +69,7 @@ impl<E: Element, F: Fn(f32, f32, f32) -> f32> WithSimd for Row<'_, E, F> {
         } = self;
         let count = out.channels;
         for x in 0..out.width {
-            // SAFETY: a pixel of each view, which nobody writes, and one of `out`, whose row is this task's alone (the promise of
+            // SAFETY: a pixel of each view, which nobody writes, and one of `out`, whose row is used by this task only (the contract of
             // `multiply` and `blend`).
             let ([a, b, c], to) = unsafe {
                 (

@@ -1,4 +1,4 @@
-//! Memory that a thread keeps from task to task, so that an image costs no allocation.
+//! Memory that a thread keeps from task to task, so that an image needs no allocation.
 
 use std::cell::RefCell;
 
@@ -8,7 +8,7 @@ use crate::element::Bf16;
 use crate::element::Plain;
 use crate::tile::Pixel;
 
-/// Buffers that only grow; each task overwrites what it takes.
+/// Buffers that only grow; each task overwrites the part that it uses.
 #[derive(Default)]
 pub(crate) struct Scratch {
     pub(crate) first: GrowingBuffer<f32>,
@@ -18,7 +18,7 @@ pub(crate) struct Scratch {
     pub(crate) pixels: Vec<Pixel>,
 }
 
-/// Numbers as many as were ever asked for at once.
+/// Values, as many as the largest request so far.
 pub(crate) struct GrowingBuffer<T>(Aligned<T>);
 
 impl<T: Plain> Default for GrowingBuffer<T> {
@@ -28,7 +28,7 @@ impl<T: Plain> Default for GrowingBuffer<T> {
 }
 
 impl<T: Plain> GrowingBuffer<T> {
-    /// The first `len` numbers, whatever they are.
+    /// The first `len` values, with arbitrary content.
     pub(crate) fn take(&mut self, len: usize) -> &mut [T] {
         if self.0.len() < len {
             self.0 = Aligned::zeros(len);
@@ -37,7 +37,7 @@ impl<T: Plain> GrowingBuffer<T> {
     }
 }
 
-/// Lends the thread's buffers to a task. Tasks do not start others, so nobody else has them.
+/// Lends the thread's buffers to a task. Tasks do not start other tasks, so nobody else uses them.
 pub(crate) fn with_scratch<R>(task: impl FnOnce(&mut Scratch) -> R) -> R {
     thread_local! {
         static SCRATCH: RefCell<Scratch> = RefCell::default();

@@ -2,10 +2,10 @@
 
 use crate::{Conv, Depthwise, GraphProblem, Misfit, Op, ValueId, ValueShape};
 
-/// What a shape is, or why there is none.
+/// A shape, or why the operation does not fit.
 type Shape = Result<ValueShape, GraphProblem>;
 
-/// The shape that `op` gives where these are the values before it; else why it does not fit them.
+/// The output shape of `op`, given the shapes of the values before it; or why the operation does not fit them.
 pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Shape {
     let shape = |value: ValueId| {
         let known = shapes.get(value.0).copied();
@@ -42,7 +42,7 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Shape {
             })
         }
         Op::Position { per_axis, halvings } => {
-            // More channels are no network's, and would not fit in memory.
+            // More channels are implausible, and would not fit in memory.
             if !(1..=1024).contains(per_axis) {
                 return Err(GraphProblem::PositionChannels {
                     per_axis: *per_axis,
@@ -124,7 +124,7 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Shape {
     }
 }
 
-/// The shape of all of them.
+/// The shape that all values must have.
 fn alike<const N: usize>(first: ValueShape, others: [ValueShape; N]) -> Shape {
     let first = image(first)?;
     match others.into_iter().find(|other| *other != first) {
@@ -199,7 +199,7 @@ fn check_window(kernel: usize, stride: usize, dilation: usize) -> Result<(), Gra
     if !matches!(stride, 1 | 2) {
         return Err(GraphProblem::Stride { stride });
     }
-    // A border as wide as this is no network's; wider ones would not fit in memory.
+    // A wider border is implausible, and would not fit in memory.
     if dilation == 0 || dilation > 256 {
         return Err(GraphProblem::Dilation { dilation });
     }
@@ -243,7 +243,7 @@ fn after_conv(conv: &Conv, input: ValueShape, residual: Option<ValueShape>) -> S
     }
 }
 
-/// A value of which there is more than a pixel.
+/// Checks that a value is an image, not a single pixel.
 fn image(shape: ValueShape) -> Shape {
     if shape.pooled {
         return Err(GraphProblem::SinglePixel);
@@ -251,7 +251,7 @@ fn image(shape: ValueShape) -> Shape {
     Ok(shape)
 }
 
-/// A value that a single pixel acts on.
+/// Checks that `pixel` is a single pixel that can be applied to a value.
 fn with_pixel(input: ValueShape, pixel: ValueShape) -> Shape {
     if !pixel.pooled || pixel.channels != input.channels {
         return Err(Misfit::Pixel { pixel, input }.into());
@@ -259,7 +259,7 @@ fn with_pixel(input: ValueShape, pixel: ValueShape) -> Shape {
     Ok(input)
 }
 
-/// The channels of one value behind those of another.
+/// The shape of two values whose channels are concatenated.
 fn appended(first: ValueShape, second: ValueShape) -> Shape {
     if (first.halvings, first.pooled) != (second.halvings, second.pooled) {
         return Err(Misfit::Appended { second, first }.into());
@@ -270,7 +270,7 @@ fn appended(first: ValueShape, second: ValueShape) -> Shape {
     })
 }
 
-/// One halving more; no image is so large that it could be halved more often.
+/// One more halving, if an image can be halved that often.
 fn halved(halvings: u32, again: bool) -> Result<u32, GraphProblem> {
     const MOST: u32 = 20;
     match halvings + u32::from(again) {

@@ -1,8 +1,8 @@
 //! Elements that kernels read before they are written for the current image.
 //!
-//! Where its inputs do not fill a whole run, a bf16 kernel reads on and multiplies by zero. Those elements may hold
-//! values of the previous image, and zero times NaN is NaN: an image that overflowed would affect the next one. So
-//! these elements, and only these, are cleared before each image.
+//! If a convolution's inputs do not fill a whole run, a bf16 kernel reads beyond them and multiplies by zero. Those elements may still
+//! contain values of the previous image, and zero times NaN is NaN: an image that overflowed would affect the next one. So exactly these
+//! elements are cleared before each image.
 
 use std::ops::Range;
 
@@ -54,7 +54,7 @@ pub(crate) fn stale<E: Element, C: ConvForm<E>>(
     ranges
 }
 
-/// What happens to an element first.
+/// The first access to an element.
 #[derive(Clone, Copy, PartialEq)]
 enum FirstUse {
     Untouched,
@@ -62,7 +62,7 @@ enum FirstUse {
     Stale,
 }
 
-/// Calls `read` for everything that a convolution multiplies by zero because no input stands for it.
+/// Calls `read` for every element that a convolution multiplies by zero because it is none of its inputs.
 fn idle(g: &Geometry, runs: &Runs, mut read: impl FnMut(usize)) {
     let inputs = runs.offsets.iter().zip(runs.sources.chunks(runs.len));
     let taps: Vec<usize> = inputs
@@ -79,7 +79,7 @@ fn idle(g: &Geometry, runs: &Runs, mut read: impl FnMut(usize)) {
     }
 }
 
-/// Calls `write` with the offset and count of everything that a step writes.
+/// Calls `write` with the offset and count of all elements that a step writes.
 fn written<E: Element, C: ConvForm<E>>(step: &Step<C>, mut write: impl FnMut(usize, usize)) {
     let mut all = |view: &View, channels: usize| {
         for y in 0..view.height {

@@ -2,37 +2,37 @@
 
 use pulp::Simd;
 
-/// Channels come in multiples of this, the lanes of the widest vectors.
+/// Channels are padded to a multiple of this, the lanes of the widest vectors.
 pub(crate) const LANES: usize = 16;
-/// Output channels whose weights lie together, one row of them for every input.
+/// Output channels whose weights are stored together, one row for every input.
 pub(crate) const GROUP: usize = 64;
 
-/// What a tile of outputs is summed from: `out[r][o] = Σ_run Σ_k input[r][run + k] · panel[k'][o]`.
+/// The terms of a tile of outputs: `out[r][o] = Σ_run Σ_k input[r][run + k] · panel[k'][o]`.
 #[derive(Clone, Copy)]
 pub(crate) struct Sum<'a> {
-    /// Where each run of inputs starts, seen from a pixel.
+    /// Start of each run of inputs, relative to a pixel.
     pub(crate) runs: &'a [usize],
-    /// Inputs in a run, one after the other in memory.
+    /// Contiguous inputs in a run.
     pub(crate) len: usize,
     /// A row of `stride` weights for each input of each run.
     pub(crate) panel: *const f32,
     /// Weights in a row of the panel.
     pub(crate) stride: usize,
-    /// What the sum starts at.
+    /// Initial value of the sum.
     pub(crate) start: Start,
-    /// Whether negative sums become 0 in the end.
+    /// Whether negative sums become 0 at the end.
     pub(crate) relu: bool,
 }
 
-/// What a sum starts at.
+/// Initial value of a sum.
 #[derive(Clone, Copy)]
 pub(crate) enum Start {
     Zero,
-    /// What is in `out`.
+    /// The current content of `out`.
     Out,
     /// A value for each output channel.
     Bias(*const f32),
-    /// The same, and each pixel's residual.
+    /// A value for each output channel, and each pixel's residual.
     BiasAndResidual(*const f32),
 }
 
@@ -46,17 +46,17 @@ impl Start {
     }
 }
 
-/// Where one pixel is read and written.
+/// Pointers to one pixel's inputs and outputs.
 #[derive(Clone, Copy)]
 pub(crate) struct Pixel {
     pub(crate) input: *const f32,
     pub(crate) out: *mut f32,
-    /// Read where a sum starts at it.
+    /// Read only if the sum starts at the residual.
     pub(crate) residual: *const f32,
 }
 
 /// # Safety
-/// Everything the sum names must be readable, everything of `out` writable.
+/// Everything that the sum refers to must be readable, and all of `out` writable.
 #[inline(always)]
 unsafe fn tile<S: Simd, const R: usize, const V: usize>(
     simd: S,
@@ -64,14 +64,14 @@ unsafe fn tile<S: Simd, const R: usize, const V: usize>(
     pixels: &[Pixel],
     shift: Shift,
 ) {
-    // Short loops without branches within: the compiler unrolls them all and keeps `sums` in registers.
+    // Short loops without inner branches: the compiler unrolls all of them and keeps `sums` in registers.
     let zero = simd.splat_f32s(0.0);
     let mut sums = [[zero; V]; R];
     let mut inputs = [std::ptr::null::<f32>(); R];
     for (input, pixel) in inputs.iter_mut().zip(pixels) {
         *input = pixel.input.wrapping_add(shift.input);
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         let load = |from: *const f32, v: usize| from.cast::<S::f32s>().add(v).read_unaligned();
         match sum.start {
@@ -126,12 +126,12 @@ unsafe fn tile<S: Simd, const R: usize, const V: usize>(
     }
 }
 
-/// Vectors of a tile, where registers allow.
+/// Maximum number of vectors of a tile, given the registers.
 fn most_vectors<S: Simd>() -> usize {
     if S::REGISTER_COUNT >= 32 { 4 } else { 2 }
 }
 
-/// Pixels of a tile of that many vectors: sums, weights and one input fill the registers.
+/// Number of pixels of a tile with that many vectors: sums, weights and one input fill the registers.
 fn most_pixels<S: Simd>(vectors: usize) -> usize {
     if S::REGISTER_COUNT >= 32 && vectors < 4 {
         8
@@ -157,20 +157,18 @@ macro_rules! with_size {
     };
 }
 
-/// What is added to every pixel's pointers.
+/// Offsets added to every pixel's pointers.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Shift {
     pub(crate) input: usize,
-    /// Of `out` and `residual`.
+    /// Offset for `out` and `residual`.
     pub(crate) out: usize,
 }
 
-/// The sum for all pixels and `columns` output channels (a multiple of [`LANES`], at most the panel's
-/// stride).
+/// Computes the sum for all pixels and `columns` output channels (a multiple of [`LANES`], at most the panel's stride).
 ///
 /// # Safety
-/// Everything the sum names must be readable, everything of the pixels' `out` writable, for `columns`
-/// values each.
+/// Everything that the sum refers to must be readable, and all of the pixels' `out` writable, `columns` values each.
 #[inline(always)]
 pub(crate) unsafe fn tiles<S: Simd>(
     simd: S,
@@ -192,7 +190,7 @@ pub(crate) unsafe fn tiles<S: Simd>(
             ..shift
         };
         for pixels in pixels.chunks(most_pixels::<S>(vectors)) {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             with_size!(pixels.len(), vectors, |R, V| unsafe {
                 tile::<S, R, V>(simd, &part, pixels, shift);
             });

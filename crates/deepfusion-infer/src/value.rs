@@ -16,12 +16,12 @@ pub struct ValueShape {
     pub channels: usize,
     /// The image's width and height are divided by 2 this many times, rounding up.
     pub halvings: u32,
-    /// Whether it is a single pixel instead, a mean over the image; `halvings` is then 0.
+    /// Whether it is a single pixel, a mean over the image; `halvings` is then 0.
     pub pooled: bool,
 }
 
 impl ValueShape {
-    /// Width and height for an image of this size.
+    /// Width and height of the value for an image of this size.
     #[must_use]
     pub fn size(&self, width: usize, height: usize) -> (usize, usize) {
         if self.pooled {

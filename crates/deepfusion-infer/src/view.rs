@@ -1,26 +1,25 @@
-//! Views of values: images with interleaved channels (H×W×C), inside one block of memory.
+//! Views of values: images with interleaved channels (H×W×C) in one block of memory.
 
 use std::marker::PhantomData;
 
-/// An image's place in the arena: pixel (x, y), channel c lies at `offset + y·row + x·pitch + c`.
+/// An image's place in the arena: channel c of pixel (x, y) is at `offset + y·row + x·pitch + c`.
 ///
-/// A border of `border` pixels lies around it, before and after each row too, so that a kernel may reach
-/// over the edge.
+/// The image has a border of `border` pixels on every side, including before and after each row, so that a kernel may reach over the edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct View {
-    /// Of pixel (0, 0), in elements.
+    /// Offset of pixel (0, 0), in elements.
     pub(crate) offset: usize,
-    /// Elements from a row to the next.
+    /// Elements from one row to the next.
     pub(crate) row: usize,
-    /// Elements from a pixel to the next.
+    /// Elements from one pixel to the next.
     pub(crate) pitch: usize,
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Channels, those that only fill up a vector included.
+    /// Number of channels, including padding to whole vectors.
     pub(crate) channels: usize,
-    /// Pixels around the image on every side.
+    /// Width of the border on every side, in pixels.
     pub(crate) border: usize,
-    /// Whether it is one channel stored as f32 whatever the elements are: a result that nothing reads.
+    /// Whether it is a result: one channel, stored as f32 whatever the element type, which no operation reads.
     pub(crate) result: bool,
 }
 
@@ -29,12 +28,12 @@ impl View {
         self.offset + y * self.row + x * self.pitch
     }
 
-    /// Of pixel (−border, −border).
+    /// Offset of pixel (−border, −border), in elements.
     pub(crate) fn start(&self) -> usize {
         self.offset - self.border * (self.row + self.pitch)
     }
 
-    /// The same pixel wherever one looks.
+    /// A view in which every pixel is the same.
     pub(crate) fn everywhere(self) -> Self {
         Self {
             row: 0,
@@ -48,10 +47,10 @@ impl View {
     }
 }
 
-/// The arena as the threads of a step share it: each writes where no other reads or writes.
+/// The arena, shared by the threads of a step: each writes where no other reads or writes.
 ///
-/// It borrows the arena for as long as it lives. Every access is checked to lie in the arena; that accesses of
-/// different threads do not collide is what the unsafe ones ask of their callers.
+/// It borrows the arena during its lifetime. Every access is checked to be within the arena. Callers of the unsafe functions must ensure
+/// that accesses of different threads do not collide.
 pub(crate) struct Shared<'a, T> {
     first: *mut T,
     len: usize,
@@ -66,8 +65,7 @@ impl<T> Clone for Shared<'_, T> {
 
 impl<T> Copy for Shared<'_, T> {}
 
-// SAFETY: it is a `&mut [T]` handed out in parts; what is read and written through it is for the callers of its unsafe
-// functions to keep apart.
+// SAFETY: it is a `&mut [T]` that is accessed in parts; callers of its unsafe functions keep reads and writes apart.
 unsafe impl<T: Send + Sync> Send for Shared<'_, T> {}
 // SAFETY: as above.
 unsafe impl<T: Send + Sync> Sync for Shared<'_, T> {}
@@ -81,41 +79,41 @@ impl<'a, T> Shared<'a, T> {
         }
     }
 
-    /// A pointer to `len` elements from `offset` on, all of the arena.
+    /// A pointer to `len` elements from `offset` on, all of them in the arena.
     ///
     /// # Panics
-    /// When they are not.
+    /// If they are not all in the arena.
     #[inline(always)]
     pub(crate) fn at(self, offset: usize, len: usize) -> *mut T {
         let inside = offset <= self.len && len <= self.len - offset;
         assert!(inside, "a view beyond the arena");
-        // SAFETY: no farther than the arena's end, as was just checked.
+        // SAFETY: within the arena, as was just checked.
         unsafe { self.first.add(offset) }
     }
 
     /// `len` elements from `offset` on.
     ///
     /// # Safety
-    /// Nobody may write them while the slice lives.
+    /// Nobody may write them during the lifetime of the slice.
     ///
     /// # Panics
-    /// As [`Self::at`].
+    /// As for [`Self::at`].
     #[inline(always)]
     pub(crate) unsafe fn read(self, offset: usize, len: usize) -> &'a [T] {
-        // SAFETY: they lie in the arena, which is borrowed for `'a`; that nobody writes them is the caller's promise.
+        // SAFETY: they are in the arena, which is borrowed for `'a`; nobody writes them (guaranteed by the caller).
         unsafe { std::slice::from_raw_parts(self.at(offset, len), len) }
     }
 
-    /// The same to be written.
+    /// Like [`Self::read`], for writing.
     ///
     /// # Safety
-    /// Nobody else may read or write them while the slice lives.
+    /// Nobody else may read or write them during the lifetime of the slice.
     ///
     /// # Panics
-    /// As [`Self::at`].
+    /// As for [`Self::at`].
     #[inline(always)]
     pub(crate) unsafe fn write(self, offset: usize, len: usize) -> &'a mut [T] {
-        // SAFETY: they lie in the arena, which is borrowed for `'a`; that nobody else uses them is the caller's promise.
+        // SAFETY: they are in the arena, which is borrowed for `'a`; nobody else uses them (guaranteed by the caller).
         unsafe { std::slice::from_raw_parts_mut(self.at(offset, len), len) }
     }
 }

@@ -17,9 +17,9 @@ use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::{Shared, View};
 use crate::winograd_tiles::{TileOrigin, Tiles};
 
-/// Channels transformed at once, at most.
+/// Maximum number of channels transformed at once.
 const CHANNELS_AT_ONCE: usize = 128;
-/// Values of transformed inputs and products that a task holds: they stay in the second cache.
+/// Number of transformed inputs and products of a task, so that they stay in the L2 cache.
 const VALUES_AT_ONCE: usize = 280_000;
 
 /// G: a kernel's three taps at the points 0, 1, −1, 2, −2, ∞.
@@ -36,25 +36,24 @@ const G: [[f64; 3]; IN] = [
 #[derive(Debug)]
 pub(crate) struct Winograd {
     pub(crate) geometry: Geometry,
-    /// Physical input channels, cut into parts of at most [`CHANNELS_AT_ONCE`].
+    /// Physical input channels, divided into parts of at most [`CHANNELS_AT_ONCE`].
     parts: Vec<std::ops::Range<usize>>,
-    /// For each part, each of the 36 products and each group of [`GROUP`] output channels: a row of them
-    /// for every input channel.
+    /// For each part, each of the 36 products and each group of [`GROUP`] output channels: a row of weights for every input channel.
     panels: Aligned<f32>,
     bias: Vec<f32>,
-    /// Tiles of a task.
+    /// Number of tiles in a task.
     tiles: usize,
 }
 
 impl Winograd {
-    /// Whether this form pays for a convolution: 3×3 at stride 1, on enough pixels to share the
-    /// transformed weights, which are four times as many. Input channels must be whole vectors.
+    /// Whether this form is faster for a convolution: 3×3 at stride 1, with enough pixels to share the transformed weights, which are four
+    /// times as large. Input channels must be whole vectors.
     pub(crate) fn fits(conv: &Conv, geometry: &Geometry, channel_of: &[Option<usize>]) -> bool {
         let pixels = geometry.out.pixels();
         if conv.kernel != 3 || conv.stride != 1 || pixels < 1024 {
             return false;
         }
-        // Products with the pixels that only fill up tiles, of which a phase of few pixels has many.
+        // Including the products of pixels that only complete tiles, which are many if a phase has few pixels.
         let products = AREA * Tiles::new(geometry, OUT).count();
         channel_of.len().is_multiple_of(LANES) && 2 * products <= geometry.taps() * pixels
     }
@@ -100,10 +99,10 @@ impl Winograd {
     }
 
     /// # Safety
-    /// As [`crate::direct::Direct::run`].
+    /// As for [`crate::direct::Direct::run`].
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
         let all = Tiles::new(&self.geometry, OUT).count();
-        // Whole rounds for all threads, where there are few tasks.
+        // The number of tasks is a multiple of the number of threads, which matters if there are few.
         let rounds = all
             .div_ceil(self.tiles)
             .next_multiple_of(rayon::current_num_threads());
@@ -123,7 +122,7 @@ impl Winograd {
         });
     }
 
-    /// Channels of the widest part.
+    /// Number of channels of the widest part.
     fn widest(&self) -> usize {
         self.parts.iter().map(|part| part.len()).max().unwrap_or(0)
     }
@@ -148,9 +147,9 @@ struct Task<'a> {
     conv: &'a Winograd,
     arena: Shared<'a, f32>,
     tiles: std::ops::Range<usize>,
-    /// Of each tile, 36 × channels.
+    /// For each tile: 36 × channels.
     inputs: &'a mut [f32],
-    /// Of each tile, 36 × output channels.
+    /// For each tile: 36 × output channels.
     products: &'a mut [f32],
     rows: &'a mut Vec<Pixel>,
 }
@@ -179,7 +178,7 @@ impl WithSimd for Task<'_> {
             };
             for (t, tile) in range.clone().enumerate() {
                 let to = &mut inputs[t * AREA * size..][..AREA * size];
-                // SAFETY: nobody writes the input (the promise of `run`).
+                // SAFETY: nobody writes the input (the contract of `run`).
                 unsafe { transform_input(simd, arena, &input, places.of(tile), to) };
             }
             rows.clear();
@@ -204,7 +203,7 @@ impl WithSimd for Task<'_> {
                         start: if i == 0 { Start::Zero } else { Start::Out },
                         relu: false,
                     };
-                    // SAFETY: inputs and products hold `count` tiles, the panel a row for every channel.
+                    // SAFETY: inputs and products have `count` tiles, and the panel has a row for every channel.
                     unsafe { tiles(simd, &sum, width, rows, shift) };
                 }
             }
@@ -221,7 +220,7 @@ impl WithSimd for Task<'_> {
 /// `to[(i·6 + j)·channels + c]`.
 ///
 /// # Safety
-/// Nobody may write the view meanwhile; its channels must be whole vectors.
+/// Nobody may write the view during the call; its channels must be whole vectors.
 #[inline(always)]
 unsafe fn transform_input<S: Simd>(
     simd: S,
@@ -232,18 +231,18 @@ unsafe fn transform_input<S: Simd>(
 ) {
     assert_eq!(to.len(), AREA * view.channels, "a tile's products");
     let to = to.as_mut_ptr();
-    // What lies beyond the border only reaches outputs beyond the image.
+    // Inputs beyond the border only affect outputs outside the image.
     let column = |i: usize| (x + i * step).min(view.width - 1 + 2 * step) * view.pitch;
     let row = |i: usize| (y + i * step).min(view.height - 1 + 2 * step) * view.row;
     let corner = view.offset - step * (view.row + view.pitch);
     let columns: [usize; IN] = std::array::from_fn(column);
-    // The last pixel's last channel included: rows and columns only grow.
+    // Includes the last pixel's last channel, as rows and columns only increase.
     let from = arena.at(corner, row(IN - 1) + columns[IN - 1] + view.channels);
     for c in (0..view.channels).step_by(S::F32_LANES) {
         let zero = simd.splat_f32s(0.0);
         let mut half = [[zero; IN]; IN];
-        // SAFETY: what is read lies in the arena, as was just checked, and nobody writes it (the caller's promise);
-        // `to` has a value for every product of every channel.
+        // SAFETY: the inputs read are in the arena, as was just checked, and nobody writes them (guaranteed by the caller); `to` has room
+        // for every product of every channel.
         unsafe {
             for j in 0..IN {
                 let d = std::array::from_fn(|i| {
@@ -298,8 +297,8 @@ impl Winograd {
         let zero = simd.splat_f32s(0.0);
         for c in (0..columns).step_by(S::F32_LANES) {
             let mut half = [[zero; IN]; OUT];
-            // SAFETY: the products have a value for every product of every column, the bias one a column; the tile's
-            // pixels lie in the arena, as was just checked, and nobody else uses them (the caller's promise).
+            // SAFETY: the products have a value for every product of every column, and the bias has one per column; the tile's pixels are
+            // in the arena, as was just checked, and nobody else uses them (guaranteed by the caller).
             unsafe {
                 let bias = self.bias.as_ptr().add(c).cast::<S::f32s>().read_unaligned();
                 for j in 0..IN {

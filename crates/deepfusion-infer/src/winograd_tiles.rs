@@ -1,6 +1,7 @@
-//! How Winograd's forms cut an image into tiles.
+//! How Winograd's forms divide an image into tiles.
 //!
-//! A kernel dilated by r sees an image as r×r images, each every r-th row and column (phases): its tiles take every r-th pixel.
+//! For a kernel dilated by r, an image consists of r×r images (phases) of every r-th row and column. Their tiles consist of every r-th
+//! pixel.
 
 use crate::conv::Geometry;
 
@@ -9,15 +10,15 @@ use crate::conv::Geometry;
 pub(crate) struct Tiles {
     /// Outputs of a tile along one side.
     side: usize,
-    /// Tiles of a phase.
+    /// Number of tiles in a phase, along x.
     across: usize,
-    /// The same down.
+    /// Number of tiles in a phase, along y.
     down: usize,
-    /// Pixels from one of a phase to the next.
+    /// Distance between neighbouring pixels of a phase, in pixels.
     step: usize,
 }
 
-/// A tile's first output pixel, and the step to the next.
+/// A tile's first output pixel, and the distance to the next.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileOrigin {
     pub(crate) x: usize,
@@ -26,7 +27,7 @@ pub(crate) struct TileOrigin {
 }
 
 impl Tiles {
-    /// Of `side` × `side` outputs each.
+    /// Tiles of `side` × `side` outputs each.
     pub(crate) fn new(g: &Geometry, side: usize) -> Self {
         let of = |length: usize| length.div_ceil(g.dilation).div_ceil(side);
         Self {
@@ -56,7 +57,7 @@ impl Tiles {
 }
 
 impl TileOrigin {
-    /// How many of a tile's outputs across and down are pixels of the image.
+    /// Number of a tile's outputs, along x and y, that are pixels of the image.
     pub(crate) fn inside(self, g: &Geometry, side: usize) -> (usize, usize) {
         let within =
             |first: usize, all: usize| side.min(all.saturating_sub(first).div_ceil(self.step));

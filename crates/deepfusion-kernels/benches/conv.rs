@@ -1,5 +1,5 @@
-//! Convolutions of the networks, forward and backward: `cargo bench -p deepfusion-kernels`. Throughput is
-//! in multiply-adds; a multiply-add is two floating-point operations.
+//! Convolutions of the networks, forward and backward: `cargo bench -p deepfusion-kernels`. Throughput is in multiply-adds, each of which
+//! is two floating-point operations.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use deepfusion_kernels::{
@@ -78,7 +78,7 @@ fn conv(criterion: &mut Criterion) {
     }
 }
 
-// The macro makes a public function that cannot be documented.
+// The macro creates a public function that cannot be documented.
 #[allow(missing_docs)]
 mod group {
     use super::{Criterion, conv, criterion_group};

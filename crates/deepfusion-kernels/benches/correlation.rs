@@ -1,5 +1,5 @@
 //! Local correlation of radius 4, forward and both gradients, at the flow decoder's three sizes:
-//! `cargo bench -p deepfusion-kernels --bench correlation`. The peer is `benches/peers/torch_correlation.py`.
+//! `cargo bench -p deepfusion-kernels --bench correlation`. `benches/peers/torch_correlation.py` measures PyTorch for comparison.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deepfusion_kernels::{
@@ -44,7 +44,7 @@ fn correlation(criterion: &mut Criterion) {
     }
 }
 
-// The macro makes a public function that cannot be documented.
+// The macro creates a public function that cannot be documented.
 #[allow(missing_docs)]
 mod group {
     use super::{correlation, criterion_group};

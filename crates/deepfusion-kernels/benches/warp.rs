@@ -1,5 +1,5 @@
 //! The bilinear warp, forward and backward for image and coordinates: `cargo bench -p deepfusion-kernels --bench warp`.
-//! The peer is `benches/peers/torch_warp.py`.
+//! `benches/peers/torch_warp.py` measures PyTorch for comparison.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use deepfusion_kernels::{WarpShape, warp, warp_backward_coords, warp_backward_image};
@@ -9,8 +9,7 @@ const CHANNELS: usize = 3;
 const HEIGHT: usize = 192;
 const WIDTH: usize = 640;
 
-/// Four RGB images of 640×192 read at coordinates as a drive's views have them: smooth, a few pixels away, some
-/// beyond the border.
+/// Four RGB images of 640×192, sampled at coordinates as in view synthesis: smooth, a few pixels away, some beyond the border.
 fn warp_640x192(criterion: &mut Criterion) {
     let area = HEIGHT * WIDTH;
     let shape = WarpShape {
@@ -44,7 +43,7 @@ fn warp_640x192(criterion: &mut Criterion) {
     });
 }
 
-// The macro makes a public function that cannot be documented.
+// The macro creates a public function that cannot be documented.
 #[allow(missing_docs)]
 mod group {
     use super::{criterion_group, warp_640x192};

@@ -4,16 +4,16 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Values handled by one task.
+/// Number of values per task.
 const CHUNK: usize = 1 << 14;
 
-/// The sum of every channel over images and pixels: the gradient of a bias.
+/// The sum of every channel over images and pixels, which is the gradient of a bias.
 ///
 /// # Shapes
 /// `x` N×C×`area`, `out` C, overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn channel_sums(x: &[f32], batch: usize, area: usize, out: &mut [f32]) {
     let channels = out.len();
     assert_eq!(x.len(), batch * channels * area, "input length");
@@ -24,8 +24,8 @@ pub fn channel_sums(x: &[f32], batch: usize, area: usize, out: &mut [f32]) {
     });
 }
 
-/// exp(v) for v ≤ 0, to 2 units in the last place: 2ⁿ·p(r), v = n·ln2 + r. Written so that the
-/// compiler turns a loop over it into vector code, which a call of libm's `exp` prevents.
+/// exp(v) for v ≤ 0, to 2 units in the last place: 2ⁿ·p(r), v = n·ln2 + r. Written so that the compiler vectorises loops over it, which a
+/// call of libm's `exp` would prevent.
 #[inline]
 pub(crate) fn exp_negative(v: f32) -> f32 {
     let v = v.max(-87.0);
@@ -45,7 +45,7 @@ pub(crate) fn exp_negative(v: f32) -> f32 {
 /// ELU, α = 1: y = x where x > 0, eˣ − 1 elsewhere.
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn elu(x: &[f32], out: &mut [impl Slot]) {
     assert_eq!(x.len(), out.len(), "output length");
     room(out)
@@ -54,7 +54,7 @@ pub fn elu(x: &[f32], out: &mut [impl Slot]) {
         .for_each(|(out, x)| {
             let elu = |x: &f32| {
                 let negative = exp_negative(x.min(0.0)) - 1.0;
-                // NaN stays NaN: a minimum would make 0 of it, and of a run that diverged a loss like any other.
+                // NaN stays NaN: a minimum would turn it into 0, and the loss of a run that diverged would look normal.
                 if *x > 0.0 || x.is_nan() { *x } else { negative }
             };
             filled(out, x.iter().map(elu));
@@ -64,7 +64,7 @@ pub fn elu(x: &[f32], out: &mut [impl Slot]) {
 /// Gradient of [`elu`] from its output: ∂x = ∂y where y > 0, ∂y·(y + 1) elsewhere.
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn elu_backward(y: &[f32], grad_out: &[f32], grad_x: &mut [impl Slot]) {
     assert_eq!(y.len(), grad_out.len(), "output gradient length");
     assert_eq!(y.len(), grad_x.len(), "input gradient length");
@@ -105,7 +105,7 @@ mod tests {
             } else {
                 f64::from(*x).exp_m1()
             };
-            // Absolute: near zero, e^x - 1 loses what the subtraction cancels.
+            // Absolute tolerance: near zero, the subtraction in e^x - 1 cancels digits.
             assert!((f64::from(*y) - exact).abs() < 3e-7, "elu({x}) = {y}");
         }
     }

@@ -1,7 +1,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Values handled by one task.
+/// Number of values per task.
 const CHUNK: usize = 1 << 15;
 
 /// The settings of a step of Adam.
@@ -19,9 +19,9 @@ pub struct AdamStep {
     pub correction1: f32,
     /// 1 − β₂ᵗ.
     pub correction2: f32,
-    /// The gradient is multiplied by this first.
+    /// Factor that is applied to the gradient first.
     pub gradient_scale: f32,
-    /// λ of AdamW: p ← p − α·λ·p beside Adam's own step; 0: Adam.
+    /// λ of AdamW: p ← p − α·λ·p in addition to Adam's step; 0 for Adam.
     pub weight_decay: f32,
 }
 
@@ -29,7 +29,7 @@ pub struct AdamStep {
 /// p ← (1 − αλ)·p − α·(m/c₁)/(√(v/c₂) + ε) (Kingma and Ba, Algorithm 1; λ by Loshchilov and Hutter).
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn adam(
     step: &AdamStep,
     parameter: &mut [f32],
@@ -61,7 +61,7 @@ pub fn adam(
         });
 }
 
-/// The step on a part of the values. The loop is compiled for each instruction set.
+/// The step for a part of the values. The loop is compiled for each instruction set.
 struct Update<'a> {
     step: &'a AdamStep,
     parameter: &'a mut [f32],
@@ -77,7 +77,7 @@ impl WithSimd for Update<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let s = *self.step;
         let keep = 1.0 - s.learning_rate * s.weight_decay;
-        // One division and one root a value: with three divisions they, not the memory, would set the pace.
+        // One division and one square root per value. With three divisions, they would be the bottleneck instead of memory.
         let rate = s.learning_rate / s.correction1;
         let shrink = 1.0 / s.correction2.sqrt();
         let moments = self.first.iter_mut().zip(self.second);
@@ -146,7 +146,7 @@ mod tests {
         );
     }
 
-    /// Without a gradient a parameter shrinks by αλ, whatever its size, and the moments stay.
+    /// Without a gradient, a parameter shrinks by the factor 1 − αλ, whatever its value, and the moments stay.
     #[test]
     fn weights_decay_apart_from_the_gradient() {
         let (mut p, mut m, mut v) = ([1.0_f32, -200.0], [0.0; 2], [0.0; 2]);

@@ -26,7 +26,7 @@ fn planes(len: usize, channels: usize, area: usize) -> usize {
     len / (channels * area)
 }
 
-/// The sum of (v − shift)² in lanes.
+/// The sum of (v − shift)², with one partial sum per lane.
 fn sum_squares(values: &[f32], shift: f32) -> f32 {
     let mut lanes = [0.0f32; 16];
     let (chunks, rest) = values.as_chunks::<16>();
@@ -39,13 +39,13 @@ fn sum_squares(values: &[f32], shift: f32) -> f32 {
     lanes.iter().sum::<f32>() + rest.iter().map(|v| (v - shift) * (v - shift)).sum::<f32>()
 }
 
-/// Normalises with the batch's own statistics.
+/// Normalises with the statistics of the batch.
 ///
 /// # Shapes
 /// `x` and `out` N×C×`area`, `gamma` and `beta` C.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn batch_norm(
     x: &[f32],
     gamma: &[f32],
@@ -87,7 +87,7 @@ pub fn batch_norm(
 
 fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [MaybeUninit<f32>]) {
     let floor = if relu { 0.0 } else { f32::NEG_INFINITY };
-    // `f32::max` would make a number of NaN, and a loss of NaN would look like a number.
+    // `f32::max` would replace NaN by a number, and hide a loss of NaN.
     let normalised = |x: &f32| {
         let y = (x - mean) * scale + beta;
         if y < floor { floor } else { y }
@@ -95,14 +95,14 @@ fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [May
     filled(out, x.iter().map(normalised));
 }
 
-/// Gradients of [`batch_norm`]: with M values a channel and g = ∂y (zero where the ReLU cut),
-/// ∂β = Σg, ∂γ = Σg·x̂, ∂x = γ/σ·(g − ∂β/M − x̂·∂γ/M). Returns (∂γ, ∂β).
+/// Gradients of [`batch_norm`]: with M values per channel and g = ∂y (zero where the ReLU is inactive), ∂β = Σg, ∂γ = Σg·x̂, ∂x = γ/σ·(g −
+/// ∂β/M − x̂·∂γ/M). Returns (∂γ, ∂β).
 ///
 /// # Shapes
 /// `x`, `grad_out` and `grad_x` N×C×`area`; `grad_x` is overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn batch_norm_backward(
     x: &[f32],
     gamma: &[f32],
@@ -168,7 +168,7 @@ mod tests {
     const C: usize = 4;
     const AREA: usize = 35;
 
-    /// The definition in f64.
+    /// The definition, in f64.
     fn exact(x: &[f64], gamma: &[f64], beta: &[f64], relu: bool) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         for c in 0..C {
@@ -193,8 +193,7 @@ mod tests {
         values.iter().map(|v| f64::from(*v)).collect()
     }
 
-    /// Central differences of `loss` at `at` with a step of 1e-7 in f64, too small to move one of
-    /// these values over the ReLU's kink.
+    /// Central differences of `loss` at `at` with a step of 1e-7 in f64, too small to move one of these values across the ReLU's kink.
     fn assert_gradient(name: &str, at: &[f64], gradient: &[f32], loss: &dyn Fn(&[f64]) -> f64) {
         for i in 0..at.len() {
             let mut moved = at.to_vec();

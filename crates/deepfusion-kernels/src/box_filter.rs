@@ -6,7 +6,7 @@ fn third<T: Float>() -> T {
     T::one() / (T::one() + T::one() + T::one())
 }
 
-/// One row of the 3-tap mean along x; the row mirrors at its ends (index −1 is 1).
+/// One row of the 3-tap mean along x, mirrored at its ends (index −1 is 1).
 fn mean_row<T: Float>(from: &[T], to: &mut [T]) {
     let (n, third) = (from.len(), third::<T>());
     to[0] = (from[0] + from[1] + from[1]) * third;
@@ -28,7 +28,7 @@ fn adjoint_row<T: Float>(from: &[T], to: &mut [T]) {
     to[n - 2] = to[n - 2] + from[n - 1] * third;
 }
 
-/// 3×3 mean over a `width`-wide plane with a mirrored border. Planes are at least 2×2.
+/// The 3×3 mean of a plane of the given width, with a mirrored border. Planes are at least 2×2.
 pub(crate) fn mean3x3<T: Float>(from: &[T], width: usize, rows: &mut [T], to: &mut [T]) {
     for (from, to) in from.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
         mean_row(from, to);
@@ -53,7 +53,7 @@ pub(crate) fn adjoint3x3<T: Float>(from: &[T], width: usize, rows: &mut [T], to:
     }
     let (height, third) = (from.len() / width, third::<T>());
     for y in 0..height {
-        // Row 1 was also read as the mirror of row −1, and row H−2 as that of row H.
+        // Row 1 was also read as the mirror of row −1, and row H−2 as the mirror of row H.
         let twice_above = if y == 1 { T::one() } else { T::zero() };
         let twice_below = if y + 2 == height { T::one() } else { T::zero() };
         let zero = T::zero();

@@ -1,18 +1,18 @@
-//! Depthwise convolution: every channel has a kernel of its own.
+//! Depthwise convolution: every channel has its own kernel.
 
 use crate::lanes::sum_product;
 use crate::sizes::product;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// A depthwise convolution at stride 1 with a border of zeros that keeps the size, over N×C×H×W images.
+/// A depthwise convolution of N×C×H×W images at stride 1, padded with zeros so that it keeps the size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DepthwiseShape {
-    /// C.
+    /// Number of channels, C.
     pub channels: usize,
-    /// H.
+    /// Height, H.
     pub height: usize,
-    /// W.
+    /// Width, W.
     pub width: usize,
     /// Side of the kernels in pixels, odd.
     pub kernel: usize,
@@ -20,7 +20,7 @@ pub struct DepthwiseShape {
     pub dilation: usize,
 }
 
-/// A tap that sees some of the image: which outputs, and where it reads for them.
+/// A tap that reads some of the image: for which outputs, and where.
 struct Tap {
     weight: usize,
     rows: Range<usize>,
@@ -46,14 +46,14 @@ impl DepthwiseShape {
         assert!(image > 0 && x.is_multiple_of(image), "whole images");
     }
 
-    /// The taps that see anything; with `turned`, those of the transpose: each reads on the other side.
+    /// The taps that read any pixel; with `turned`, those of the transpose, which read on the opposite side.
     fn taps(&self, turned: bool) -> Vec<Tap> {
         let side = self.kernel as isize;
         let shift = |k: isize| {
             let shift = (k - side / 2) * self.dilation as isize;
             if turned { -shift } else { shift }
         };
-        // Outputs whose input lies within n pixels.
+        // Outputs whose input is within n pixels.
         let seen = |shift: isize, n: usize| {
             let n = n as isize;
             ((-shift).clamp(0, n) as usize)..((n - shift).clamp(0, n) as usize)
@@ -79,7 +79,7 @@ impl DepthwiseShape {
         taps
     }
 
-    /// The row of `plane` that a tap reads for an output row, as far as it sees it.
+    /// The part of `plane`'s row that a tap reads for an output row.
     fn read<'a>(&self, plane: &'a [f32], tap: &Tap, y: usize) -> &'a [f32] {
         let row = y.strict_add_signed(tap.down) * self.width;
         &plane[row + tap.columns.start.strict_add_signed(tap.right)..][..tap.columns.len()]
@@ -113,7 +113,7 @@ impl DepthwiseShape {
 /// `x` and `out` N×C×H×W, `weight` C×k×k; `out` is overwritten.
 ///
 /// # Panics
-/// When a length does not fit, or the kernels have an even side.
+/// If a length does not match, or the kernels have an even side.
 pub fn depthwise(shape: &DepthwiseShape, x: &[f32], weight: &[f32], out: &mut [f32]) {
     shape.sum(x, weight, false, out);
 }
@@ -134,7 +134,7 @@ pub fn depthwise_backward_input(
     shape.sum(grad_out, weight, true, grad_x);
 }
 
-/// Gradient of its weights.
+/// Gradient of the weights of [`depthwise`].
 ///
 /// # Shapes
 /// `x` and `grad_out` N×C×H×W, `grad_weight` C×k×k, overwritten.
@@ -157,7 +157,8 @@ pub fn depthwise_backward_weight(
         .for_each(|(channel, grad_weight)| {
             grad_weight.fill(0.0);
             for tap in &taps {
-                // A row by itself, and rows in double precision: few roundings of a small number on a large one.
+                // Each row is summed separately, and rows are added in f64, so that few small numbers are rounded when added to a large
+                // one.
                 let mut total = 0.0;
                 for image in 0..images {
                     let plane = (image * shape.channels + channel) * area;
@@ -179,7 +180,7 @@ mod tests {
 
     const BATCH: usize = 2;
 
-    /// Kernels within the image and beyond it, wide and narrow images, a single pixel.
+    /// Kernels smaller and larger than the image, wide and narrow images, a single pixel.
     const SHAPES: [(usize, usize, usize, usize, usize); 6] = [
         (3, 6, 9, 3, 1),
         (2, 5, 40, 3, 3),
@@ -231,8 +232,8 @@ mod tests {
         }
     }
 
-    /// The gradient of a sum of products is exact here: ∂/∂a of Σ a·b·g is Σ b·g. Finite differences of it are the same
-    /// numbers, and are below.
+    /// The gradient of a sum of products is exact here: ∂/∂a of Σ a·b·g is Σ b·g. It equals finite differences, which another test below
+    /// checks.
     #[test]
     fn values_and_gradients_are_those_of_the_definition() {
         for shape in shapes() {
@@ -275,7 +276,7 @@ mod tests {
             let (mut of_x, mut of_weight) = (vec![0.0; len], vec![0.0; weight.len()]);
             depthwise_backward_input(&shape, &weight, &grad, &mut of_x);
             depthwise_backward_weight(&shape, &x, &grad, &mut of_weight);
-            // Linear in each: a wide step has no error but rounding.
+            // Linear in each argument, so a large step has no error but rounding.
             let check = |at: usize, values: &[f32], gradient: f32, f: &dyn Fn(&[f32]) -> f64| {
                 let moved = |by: f32| {
                     let mut values = values.to_vec();

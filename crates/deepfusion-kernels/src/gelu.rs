@@ -1,18 +1,18 @@
-//! GELU, y = x·Φ(x), Φ the normal distribution (Hendrycks and Gimpel, arXiv 1606.08415), in its exact form.
+//! GELU, y = x·Φ(x), with Φ the cumulative normal distribution (Hendrycks and Gimpel, arXiv 1606.08415), in its exact form.
 
 use crate::activation::exp_negative;
 use crate::slot::{Slot, filled, room};
 use rayon::prelude::*;
 
-/// Values handled by one task.
+/// Number of values per task.
 const CHUNK: usize = 1 << 14;
 
 /// Beyond ± this, Φ is 0 or 1 to within 2e-8.
 pub const GELU_END: f32 = 5.5;
 
-/// (Φ(x) − ½)/x as a polynomial in u = 2·(x/[`GELU_END`])² − 1, lowest power first: the Chebyshev interpolation of degree 15
-/// on |x| ≤ [`GELU_END`]. Evaluated in f32, x·Φ(x) is then within 2e-7·max(1, |x|).
-#[allow(clippy::unreadable_literal, reason = "a table, as it was computed")]
+/// (Φ(x) − ½)/x as a polynomial in u = 2·(x/[`GELU_END`])² − 1, lowest power first: the Chebyshev interpolation of degree 15 on |x| ≤
+/// [`GELU_END`]. Evaluated in f32, x·Φ(x) is within 2e-7·max(1, |x|) of the exact value.
+#[allow(clippy::unreadable_literal, reason = "a table of computed values")]
 pub const GELU_SERIES: [f32; 16] = [
     0.12855193,
     -0.06417231,
@@ -47,7 +47,7 @@ fn below(x: f32) -> f32 {
 /// y = x·Φ(x).
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn gelu(x: &[f32], out: &mut [impl Slot]) {
     assert_eq!(x.len(), out.len(), "output length");
     room(out)
@@ -61,7 +61,7 @@ pub fn gelu(x: &[f32], out: &mut [impl Slot]) {
 /// Gradient of [`gelu`] from its input: ∂x = ∂y·(Φ(x) + x·φ(x)), φ(x) = e^(−x²/2)/√(2π).
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn gelu_backward(x: &[f32], grad_out: &[f32], grad_x: &mut [impl Slot]) {
     assert_eq!(x.len(), grad_out.len(), "output gradient length");
     assert_eq!(x.len(), grad_x.len(), "input gradient length");
@@ -79,7 +79,7 @@ pub fn gelu_backward(x: &[f32], grad_out: &[f32], grad_x: &mut [impl Slot]) {
         });
 }
 
-/// [`gelu`] of a number in double precision, slowly: what faster forms are compared with.
+/// [`gelu`] of an f64, computed slowly, for comparison with faster forms.
 ///
 /// Φ(x) = ½ + φ(x)·(x + x³/3 + x⁵/(3·5) + …), whose terms all have x's sign (Abramowitz and Stegun 26.2.11).
 #[must_use]
@@ -102,7 +102,7 @@ pub fn gelu_exact(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Values of the normal distribution in print: Φ(1), Φ(−2), Φ(3).
+    /// Published values of the normal distribution: Φ(1), Φ(−2), Φ(3).
     #[test]
     fn the_slow_form_has_the_values_of_the_tables() {
         for (x, share) in [
@@ -114,7 +114,7 @@ mod tests {
         }
         assert_eq!(gelu_exact(0.0), 0.0);
         assert_eq!([gelu_exact(20.0), gelu_exact(-20.0)], [20.0, 0.0]);
-        // No step where the two forms meet.
+        // There is no step where the two forms join.
         assert!((gelu_exact(9.000_001) - gelu_exact(8.999_999) - 2e-6).abs() < 1e-12);
     }
 

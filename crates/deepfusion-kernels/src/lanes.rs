@@ -1,5 +1,4 @@
-//! Sums in lanes: fast, since the compiler keeps one vector of partial sums, and independent of the number
-//! of threads.
+//! Sums with one partial sum per vector lane: fast, as the compiler keeps them in registers, and independent of the number of threads.
 
 use num_traits::Float;
 

@@ -1,9 +1,8 @@
-//! Numeric kernels of the networks on plain slices, forward and backward: convolution, bilinear
-//! warp, local correlation, photometric error, batch normalisation, activations, depthwise convolution;
-//! and resizing of an image's bytes.
+//! Numeric kernels of the networks on plain slices, forward and backward: convolution, bilinear warp, local correlation, photometric error,
+//! batch normalisation, activations, depthwise convolution; and resizing of an image's bytes.
 //!
-//! Nothing here knows Burn. Networks' images are N×C×H×W, contiguous; work is distributed over rayon's
-//! threads, and every result is independent of their number.
+//! Independent of Burn. Images are N×C×H×W, contiguous. Work is distributed over rayon's threads, and every result is independent of their
+//! number.
 
 mod activation;
 mod adam;

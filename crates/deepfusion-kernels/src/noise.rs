@@ -1,4 +1,4 @@
-//! Test values: reproducible, without structure.
+//! Reproducible pseudo-random test values.
 
 /// `len` values in [0, 1).
 pub(crate) fn noise(len: usize, seed: u64) -> Vec<f64> {

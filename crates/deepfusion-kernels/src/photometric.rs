@@ -4,9 +4,9 @@ use crate::box_filter::{adjoint3x3, mean3x3};
 use num_traits::Float;
 use rayon::prelude::*;
 
-/// The first constant of SSIM, (0.01·L)² for values up to L = 1: it steadies the quotient of the means.
+/// The first constant of SSIM, (0.01·L)² for values up to L = 1, which stabilises the quotient of the means.
 pub const SSIM_C1: f64 = 1e-4;
-/// The second constant of SSIM, (0.03·L)²: it steadies the quotient of the variances.
+/// The second constant of SSIM, (0.03·L)², which stabilises the quotient of the variances.
 pub const SSIM_C2: f64 = 9e-4;
 
 /// Sizes and weights of the photometric error.
@@ -18,11 +18,11 @@ pub struct PhotometricShape {
     pub height: usize,
     /// Width, at least 2.
     pub width: usize,
-    /// Weight of the structural term; the absolute difference has the rest.
+    /// Weight of the structural term; the rest is the weight of the absolute difference.
     pub alpha: f64,
 }
 
-/// Planes that the computation of one channel needs.
+/// Intermediate planes for one channel.
 struct Planes<T> {
     mean_a: Vec<T>,
     mean_b: Vec<T>,
@@ -107,7 +107,7 @@ impl PhotometricShape {
         );
         assert_eq!(a, b, "both images have the same size");
         assert_eq!(a % (self.channels * self.area()), 0, "whole images");
-        assert_eq!(out * self.channels, a, "one error a pixel");
+        assert_eq!(out * self.channels, a, "one error per pixel");
     }
 }
 
@@ -117,7 +117,7 @@ impl PhotometricShape {
 /// `a`, `b` N×C×H×W, `out` N×1×H×W.
 ///
 /// # Panics
-/// When a length does not fit, or a side is below 2.
+/// If a length does not match, or a side is below 2.
 pub fn photometric_error<T: Float + Send + Sync>(
     shape: &PhotometricShape,
     a: &[T],
@@ -164,7 +164,7 @@ pub fn photometric_error<T: Float + Send + Sync>(
 /// `a`, `b`, `grad_a` N×C×H×W, `grad_out` N×1×H×W; `grad_a` is overwritten.
 ///
 /// # Panics
-/// When a length does not fit, or a side is below 2.
+/// If a length does not match, or a side is below 2.
 pub fn photometric_error_backward<T: Float + Send + Sync>(
     shape: &PhotometricShape,
     a: &[T],
@@ -199,12 +199,11 @@ pub fn photometric_error_backward<T: Float + Send + Sync>(
                             planes.mean_ab[i],
                         );
                         let ssim = t.ssim();
-                        // Outside the clamp the gradient is zero.
+                        // Where the value is clamped, the gradient is zero.
                         let inside = ssim < T::one() && ssim > -T::one();
                         let g = if inside { alpha * grad[i] } else { T::zero() };
                         let denominator = t.b1 * t.b2;
-                        // ∂SSIM/∂μ_a, ∂SSIM/∂E[a²], ∂SSIM/∂E[ab]; they replace the planes they
-                        // were computed from.
+                        // ∂SSIM/∂μ_a, ∂SSIM/∂E[a²], ∂SSIM/∂E[ab]; they replace the planes they were computed from.
                         let d_mean = two * mu_b * (t.a2 - t.a1) / denominator
                             - ssim * two * mu_a * (T::one() / t.b1 - T::one() / t.b2);
                         planes.mean_a[i] = g * d_mean;
@@ -318,7 +317,7 @@ mod tests {
         assert!(out.iter().all(|e| e.abs() < 1e-12));
     }
 
-    /// Random images are away from the kinks: |a − b| > 1e-5 and SSIM within (−1, 1).
+    /// Random images are not at the kinks: |a − b| > 1e-5 and SSIM within (−1, 1).
     #[test]
     fn gradient_equals_finite_differences() {
         let (a, b, weights) = (noise(2 * 105, 4), noise(2 * 105, 5), noise(70, 6));

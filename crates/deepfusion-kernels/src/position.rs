@@ -1,13 +1,12 @@
-//! Where a pixel is, in sines and cosines.
+//! The positional encoding of pixels as sines and cosines.
 
 use std::f64::consts::TAU;
 
-/// Wavelengths go from one image to this many (Vaswani et al.).
+/// Wavelengths range from the size of the image to this many times that (Vaswani et al.).
 const LONGEST: f64 = 10_000.0;
 
-/// The Fourier encoding of pixels (DETR's, as XCiT and Lite-Mono use it): first m channels of rows, then m of columns. With
-/// p = 2π·(i + 1)/n for row or column i of n, channel k is sin(p / 10,000^(k/m)) for an even k and the cosine of k − 1's angle
-/// for an odd one.
+/// The Fourier encoding of pixels (as in DETR, XCiT and Lite-Mono): first m channels of rows, then m of columns. With p = 2π·(i + 1)/n for
+/// row or column i of n, channel k is sin(p / 10,000^(k/m)) for an even k, and the cosine of channel k − 1's angle for an odd one.
 ///
 /// # Shapes
 /// - output: 2·`per_axis` × `height` × `width`
@@ -43,7 +42,7 @@ pub fn position_code(per_axis: usize, height: usize, width: usize) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// Two channels an axis, an image of 2×4, by hand: rows are at π and 2π, columns at π/2, π, …
+    /// Two channels per axis, an image of 2×4, by hand: rows are at π and 2π, columns at π/2, π, …
     #[test]
     fn rows_come_first_and_the_last_pixel_is_a_whole_turn() {
         let code = position_code(2, 2, 4);
@@ -59,7 +58,7 @@ mod tests {
         assert_eq!(code.len(), 32);
     }
 
-    /// Later channels turn slower: the third by √10,000.
+    /// Later channels vary more slowly: the third by √10,000.
     #[test]
     fn wavelengths_grow() {
         let code = position_code(4, 1, 1);

@@ -1,7 +1,7 @@
 //! Projects the pixels of one view into another, from disparity (the paper's Eq. 3–5).
 //!
-//! p' ~ H·p̃ + d·s with d = 1/D, H = K·R·K⁻¹ and s = K·t: the camera's matrices are multiplied once per
-//! image, and disparity, the network's prediction, is never inverted.
+//! p' ~ H·p̃ + d·s with d = 1/D, H = K·R·K⁻¹ and s = K·t. The camera's matrices are multiplied once per image, and disparity, which the
+//! network predicts, is never inverted.
 
 use crate::{
     lanes::{sum, sum_product},
@@ -10,11 +10,11 @@ use crate::{
 use num_traits::Float;
 use rayon::prelude::*;
 
-/// Points nearer than this to the camera's plane, in metres, have no pixel.
+/// Points closer to the camera's plane than this, in metres, have no projection.
 pub const MIN_DEPTH_M: f64 = 1e-3;
-/// The coordinate of pixels without a projection: outside of every image.
+/// The coordinate of pixels without a projection, outside of every image.
 pub const NOWHERE: f64 = -1e6;
-/// Rows handled by one task.
+/// Number of rows per task.
 const ROWS: usize = 16;
 
 /// The motion of one image's pixels: H (row-major) and s.
@@ -31,7 +31,7 @@ impl<T: Float> Motion<T> {
         }
     }
 
-    /// Row i of H·p̃ at x = 0, and its step a pixel.
+    /// Row i of H·p̃ at x = 0, and its change per pixel.
     fn row(&self, i: usize, y: T) -> (T, T) {
         (self.h[3 * i + 1] * y + self.h[3 * i + 2], self.h[3 * i])
     }
@@ -43,19 +43,18 @@ fn number<T: Float>(v: f64) -> T {
 
 fn check(batch: usize, area: usize, homography: usize, shift: usize, coords: usize) {
     assert!(area > 0, "images have pixels");
-    assert_eq!(homography, 9 * batch, "a matrix an image");
-    assert_eq!(shift, 3 * batch, "a vector an image");
-    assert_eq!(coords, 2 * batch * area, "two coordinates a pixel");
+    assert_eq!(homography, 9 * batch, "one matrix per image");
+    assert_eq!(shift, 3 * batch, "one vector per image");
+    assert_eq!(coords, 2 * batch * area, "two coordinates per pixel");
 }
 
-/// coords(p) = the pixel of the other view. Points behind it, or nearer than a millimetre, are sent far
-/// outside of every image.
+/// coords(p) = the pixel of the other view. Points behind it, or closer than a millimetre, get coordinates far outside of every image.
 ///
 /// # Shapes
 /// `disparity` N×H×W (1/m), `homography` N×3×3, `shift` N×3 (pixels × m), `coords` N×2×H×W.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn project<T: Float + Send + Sync>(
     (height, width): (usize, usize),
     disparity: &[T],
@@ -105,19 +104,19 @@ pub fn project<T: Float + Send + Sync>(
 /// Gradients of [`project`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProjectGradients<T> {
-    /// N×3×3.
+    /// ∂L/∂H, N×3×3.
     pub homography: Vec<T>,
-    /// N×3.
+    /// ∂L/∂s, N×3.
     pub shift: Vec<T>,
 }
 
-/// Gradients of [`project`]; that of the disparity goes to `grad_depth`, overwritten.
+/// Gradients of [`project`]. The gradient of the disparity is written to `grad_depth`, which is overwritten.
 ///
 /// # Shapes
-/// As [`project`]; `coords` is its output, `grad_coords` N×2×H×W, `grad_depth` N×H×W.
+/// As for [`project`]; `coords` is its output, `grad_coords` N×2×H×W, `grad_depth` N×H×W.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn project_backward<T: Float + Send + Sync>(
     (height, width): (usize, usize),
     disparity: &[T],
@@ -196,15 +195,15 @@ pub fn project_backward<T: Float + Send + Sync>(
     gradients
 }
 
-/// 1 where a coordinate lies inside an image of `height` × `width`, 0 elsewhere.
+/// 1 where a coordinate is inside an image of `height` × `width`, 0 elsewhere.
 ///
 /// # Shapes
 /// `coords` N×2×`area`, `out` N×`area`.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn in_view((height, width): (usize, usize), coords: &[f32], area: usize, out: &mut [f32]) {
-    assert_eq!(coords.len(), 2 * out.len(), "two coordinates a pixel");
+    assert_eq!(coords.len(), 2 * out.len(), "two coordinates per pixel");
     let last = |size: usize| number::<f32>((size - 1) as f64);
     let (right, bottom) = (last(width), last(height));
     out.par_chunks_mut(area)
@@ -226,7 +225,7 @@ mod tests {
     const SIZE: (usize, usize) = (5, 20);
     const AREA: usize = 100;
 
-    /// A camera that turns a little and drives; the second image has points behind the camera.
+    /// A camera that turns slightly and moves forward; the second image has points behind the camera.
     fn inputs() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let depths = noise(2 * AREA, 5).iter().map(|d| 0.05 + 0.3 * d).collect();
         let homography = vec![
@@ -269,7 +268,7 @@ mod tests {
         assert!(seen > 100 && behind > 5, "{seen} {behind}");
     }
 
-    /// `gradient` is that of `loss` at `point`, by central differences.
+    /// Checks by central differences that `gradient` is the gradient of `loss` at `point`.
     fn check_gradient(
         what: &str,
         point: &[f64],
@@ -290,7 +289,7 @@ mod tests {
         }
     }
 
-    /// Central differences in f64; points whose w is small are left out, where the function is steep.
+    /// Central differences in f64. Points with a small w, where the function is steep, are left out.
     #[test]
     fn gradients_equal_finite_differences() {
         let (mut depths, h, s) = inputs();

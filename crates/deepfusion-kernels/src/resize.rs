@@ -1,28 +1,27 @@
-//! RGB bytes of another size. The filters are compiled here alone: they are a megabyte of code in each crate that calls them.
+//! Resizes RGB bytes. The filters are compiled in this crate only: each crate that called them would contain a megabyte of code.
 
 use fast_image_resize::images::{TypedCroppedImage, TypedImage, TypedImageRef};
 use fast_image_resize::pixels::U8x3;
 use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions};
 
-/// How pixels between pixels are found. Both have half-pixel centres.
+/// How values between pixels are computed. Both have half-pixel centres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Filter {
-    /// From the nearest four, antialiased by nothing.
+    /// Bilinear, from the nearest four pixels, without antialiasing.
     Bilinear,
-    /// Lanczos of three lobes, antialiased when shrinking.
+    /// Lanczos with three lobes, with antialiasing when shrinking.
     Lanczos3,
 }
 
-/// Resizes RGB bytes, with the buffers that it reuses.
+/// Resizes RGB bytes, reusing its buffers.
 #[derive(Debug, Default)]
 pub struct Resizer(fast_image_resize::Resizer);
 
 impl Resizer {
-    /// Brings a part (x, y, width, height) of `from`, H×W×3 bytes of an image of `size` (width, height), to `to`, which has
-    /// `to_size`.
+    /// Resizes a part (x, y, width, height) of `from`, H×W×3 bytes of an image of `size` (width, height), to `to`, an image of `to_size`.
     ///
     /// # Panics
-    /// Where the bytes are not as many as the sizes say, the part reaches out of the image, or anything is empty.
+    /// If a number of bytes does not match its size, the part extends beyond the image, or anything is empty.
     #[expect(clippy::expect_used, reason = "documented")]
     pub fn resize(
         &mut self,
@@ -35,15 +34,15 @@ impl Resizer {
             Filter::Lanczos3 => ResizeAlg::Convolution(FilterType::Lanczos3),
         };
         let whole = TypedImageRef::<U8x3>::from_buffer(size.0, size.1, from)
-            .expect("the image holds width x height x 3 bytes");
+            .expect("the image has width x height x 3 bytes");
         let [x, y, width, height] = part;
-        let part =
-            TypedCroppedImage::new(whole, x, y, width, height).expect("the part lies in the image");
+        let part = TypedCroppedImage::new(whole, x, y, width, height)
+            .expect("the part is within the image");
         let mut to = TypedImage::<U8x3>::from_buffer(to_size.0, to_size.1, to)
-            .expect("the result holds width x height x 3 bytes");
-        // Not `resize`: that one compiles every pixel type there is, for minutes.
+            .expect("the result has width x height x 3 bytes");
+        // Not `resize`, which compiles code for all pixel types and takes minutes.
         self.0
             .resize_typed(&part, &mut to, &ResizeOptions::new().resize_alg(algorithm))
-            .expect("neither image is empty, the only reason to refuse");
+            .expect("it fails only for empty images, and neither is empty");
     }
 }

@@ -1,9 +1,9 @@
 use std::marker::PhantomData;
 
-/// A mutable buffer that several tasks write to at disjoint places, for as long as it is borrowed.
+/// A mutable buffer that several tasks write to at disjoint places, for the duration of the borrow.
 ///
-/// Rayon's closures may not share `&mut [T]`; where the parts a task writes are not one contiguous
-/// chunk (a tile of columns of every row), the split cannot be said with slices.
+/// Rayon's closures cannot share `&mut [T]`. If a task's parts are not one contiguous chunk (a tile of columns of every row), slices cannot
+/// express the split.
 pub(crate) struct SharedMut<'a, T> {
     pointer: *mut T,
     len: usize,
@@ -18,7 +18,7 @@ impl<T> Clone for SharedMut<'_, T> {
 
 impl<T> Copy for SharedMut<'_, T> {}
 
-// SAFETY: it is a `&mut [T]` handed out in parts; that no two of them overlap is the promise of each use.
+// SAFETY: it is a `&mut [T]` that is accessed in parts; each use guarantees that no two of them overlap.
 unsafe impl<T: Send> Send for SharedMut<'_, T> {}
 // SAFETY: as above.
 unsafe impl<T: Send> Sync for SharedMut<'_, T> {}
@@ -38,11 +38,11 @@ impl<'a, T> SharedMut<'a, T> {
     /// No two live slices from this buffer may overlap.
     ///
     /// # Panics
-    /// When it reaches beyond the buffer.
+    /// If it extends beyond the buffer.
     pub(crate) unsafe fn slice(&self, start: usize, len: usize) -> &'a mut [T] {
         let inside = start <= self.len && len <= self.len - start;
         assert!(inside, "range outside the buffer");
-        // SAFETY: in bounds by the assertion, of a buffer that is borrowed for `'a`; not aliased by the caller's promise.
+        // SAFETY: in bounds by the assertion, of a buffer that is borrowed for `'a`; not aliased (guaranteed by the caller).
         unsafe { std::slice::from_raw_parts_mut(self.pointer.add(start), len) }
     }
 }

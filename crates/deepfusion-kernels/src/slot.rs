@@ -2,18 +2,18 @@
 
 use std::mem::MaybeUninit;
 
-/// A destination of results: floats, or uninitialised memory for floats. Clearing memory that is overwritten anyway
-/// took a fourteenth of a training step.
+/// A destination of results: floats, or uninitialised memory for floats. Clearing memory that is overwritten anyway took a fourteenth of a
+/// training step.
 ///
-/// A kernel writes every value, and reads none that it has not written.
+/// A kernel writes all values, and reads only those that it has written.
 ///
 /// # Safety
-/// It must be laid out as an `f32`, and any `f32` must be one.
+/// It must have the layout of an `f32`, and any `f32` must be a valid value.
 pub unsafe trait Slot: Copy + Send + Sync + sealed::Sealed {}
 
-// SAFETY: it is one.
+// SAFETY: it is an `f32`.
 unsafe impl Slot for f32 {}
-// SAFETY: laid out as what it may hold, which may be any.
+// SAFETY: it has the layout of the `f32` that it may contain, and any is valid.
 unsafe impl Slot for MaybeUninit<f32> {}
 
 mod sealed {
@@ -22,17 +22,17 @@ mod sealed {
     impl Sealed for std::mem::MaybeUninit<f32> {}
 }
 
-/// The slots as room that nothing is known of; only values are written to it.
+/// The slots as uninitialised memory; only values may be written to it.
 pub(crate) fn room<T: Slot>(out: &mut [T]) -> &mut [MaybeUninit<f32>] {
-    // SAFETY: both are laid out as an `f32` (the promise of `Slot`). The kernels write values and nothing else, so that
-    // what were floats before are floats after.
+    // SAFETY: both have the layout of an `f32` (the contract of `Slot`). The kernels only write values, so what was a float before is still
+    // one.
     unsafe { std::slice::from_raw_parts_mut(out.as_mut_ptr().cast(), out.len()) }
 }
 
-/// Writes as many values as there is room for, and gives them back as floats.
+/// Writes the values, as many as there are places, and returns them as floats.
 ///
 /// # Panics
-/// When there are not as many.
+/// If the numbers of values and places differ.
 pub(crate) fn filled(
     room: &mut [MaybeUninit<f32>],
     values: impl ExactSizeIterator<Item = f32>,
@@ -41,6 +41,6 @@ pub(crate) fn filled(
     for (to, value) in room.iter_mut().zip(values) {
         to.write(value);
     }
-    // SAFETY: all were written: this crate's iterators over slices are as long as they say.
+    // SAFETY: all were written: this crate's iterators over slices yield exactly `len()` items.
     unsafe { room.assume_init_mut() }
 }

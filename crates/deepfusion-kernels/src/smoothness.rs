@@ -1,20 +1,20 @@
 //! Edge-aware smoothness of a disparity (the paper's Eq. 8).
 //!
-//! L = mean|∂ₓd*|·e^(−|∂ₓI|) + mean|∂ᵧd*|·e^(−|∂ᵧI|), d* = d over its mean in the image, |∂I| averaged over
-//! channels. d* is never formed: the mean divides the sum.
+//! L = mean|∂ₓd*|·e^(−|∂ₓI|) + mean|∂ᵧd*|·e^(−|∂ᵧI|), where d* is d divided by its mean in the image, and |∂I| is averaged over channels.
+//! d* is never computed: the sum is divided by the mean.
 
 use crate::{activation::exp_negative, lanes::sum};
 use rayon::prelude::*;
 
-/// Keeps the division finite where a disparity is zero everywhere.
+/// Keeps the quotient finite if the disparity is zero everywhere.
 const EPSILON: f32 = 1e-7;
 
 /// The sizes of a smoothness term.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SmoothnessShape {
-    /// Images, N.
+    /// Number of images, N.
     pub batch: usize,
-    /// Channels of the image, C.
+    /// Number of channels of the image, C.
     pub channels: usize,
     /// Height, H.
     pub height: usize,
@@ -27,7 +27,7 @@ impl SmoothnessShape {
         self.height * self.width
     }
 
-    /// Differences along x and along y, over all images.
+    /// Number of differences along x and along y, over all images.
     fn counts(&self) -> (f32, f32) {
         let count = |n: usize| (self.batch * n).max(1) as f32;
         (
@@ -38,7 +38,11 @@ impl SmoothnessShape {
 
     fn check(&self, disparity: usize, image: usize) {
         assert!(self.area() > 0 && self.channels > 0, "images have pixels");
-        assert_eq!(disparity, self.batch * self.area(), "one disparity a pixel");
+        assert_eq!(
+            disparity,
+            self.batch * self.area(),
+            "one disparity per pixel"
+        );
         assert_eq!(image, disparity * self.channels, "channels of every pixel");
     }
 
@@ -103,7 +107,7 @@ impl SmoothnessShape {
 /// `disparity` N×1×H×W, `image` N×C×H×W.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 #[must_use]
 pub fn smoothness(shape: &SmoothnessShape, disparity: &[f32], image: &[f32]) -> f32 {
     shape.check(disparity.len(), image.len());
@@ -120,10 +124,10 @@ pub fn smoothness(shape: &SmoothnessShape, disparity: &[f32], image: &[f32]) -> 
 /// Gradient of [`smoothness`] with respect to the disparity, times `grad`.
 ///
 /// # Shapes
-/// As [`smoothness`]; `grad_disparity` N×1×H×W, overwritten.
+/// As for [`smoothness`]; `grad_disparity` N×1×H×W, overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn smoothness_backward(
     shape: &SmoothnessShape,
     disparity: &[f32],
@@ -140,7 +144,7 @@ pub fn smoothness_backward(
         .zip(image.par_chunks(shape.channels * area))
         .for_each(|((to, d), image)| {
             let mean = shape.mean(d);
-            // Through the mean, which every pixel moves alike.
+            // Through the mean, to which every pixel contributes equally.
             let through_mean = -grad * shape.image_sum(d, image) / (mean * mean * area as f32);
             to.fill(through_mean);
             let mut terms = vec![0.0; shape.width];
@@ -216,8 +220,8 @@ mod tests {
         assert!((ours - exact).abs() < 1e-5 * exact, "{ours} {exact}");
     }
 
-    /// Central differences with step 1e-3, away from the kinks. The factor 30 makes gradients of up to 4 and a
-    /// loss of 24, of which f32 knows 1e-6: over twice the step that is 1e-3, and 2.4e-3 was measured.
+    /// Central differences with step 1e-3, away from the kinks. The factor 30 gives gradients of up to 4 and a loss of 24, which f32
+    /// resolves to 1e-6: divided by twice the step, that is an error of 1e-3, and 2.4e-3 was measured.
     #[test]
     fn gradient_equals_finite_differences() {
         let (disparity, image) = inputs();

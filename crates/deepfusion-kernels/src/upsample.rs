@@ -1,4 +1,4 @@
-//! Nearest ×2 enlargement joined with a skip feature: the decoder's step between scales.
+//! Nearest ×2 enlargement concatenated with a skip feature, as between the decoder's scales.
 
 use crate::sizes::product;
 use crate::slot::{Slot, filled, room};
@@ -11,7 +11,7 @@ use std::mem::MaybeUninit;
 /// `x` N×C×H×W, `skip` N×S×2H×2W (S may be 0), `out` N×(C + S)×2H×2W; `width` is W.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn upsample_concat(
     x: &[f32],
     skip: &[f32],
@@ -57,7 +57,7 @@ pub fn upsample_concat(
 /// `grad_out` N×(C + S)×2H×2W, `grad_x` N×C×H×W and `grad_skip` N×S×2H×2W, overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn upsample_concat_backward(
     grad_out: &[f32],
     batch: usize,

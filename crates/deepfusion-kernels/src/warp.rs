@@ -1,7 +1,7 @@
-//! The bilinear warp: reads an image at given pixel coordinates.
+//! The bilinear warp, which samples an image at given pixel coordinates.
 //!
-//! Coordinates address pixel centres at integers; outside the image the border pixel counts. Where a
-//! coordinate was moved to the border, the output does not depend on it and its gradient is zero.
+//! Integer coordinates are pixel centres. Outside the image, the nearest border pixel is sampled: the output does not depend on a
+//! coordinate that was moved to the border, and its gradient is zero.
 
 use crate::sizes::product;
 use num_traits::Float;
@@ -13,35 +13,34 @@ use rayon::prelude::*;
 pub struct WarpShape {
     /// Channels of the image, C.
     pub channels: usize,
-    /// Height of the image that is read.
+    /// Height of the image that is sampled.
     pub in_height: usize,
-    /// Width of the image that is read.
+    /// Width of the image that is sampled.
     pub in_width: usize,
-    /// Pixels of the output, H'·W'.
+    /// Number of pixels of the output, H'·W'.
     pub out_area: usize,
 }
 
-/// Pixels whose coordinates are worked out together: fixed loops, which the compiler turns into vector code.
+/// Pixels whose coordinates are computed together, in loops of fixed length, which the compiler vectorises.
 const LANES: usize = 16;
 
 /// The number type of coordinates and pixels.
 ///
 /// # Safety
-/// [`Self::whole`] must give the whole part: pixels are then read without a check.
+/// [`Self::whole`] must return the integer part: pixels are then read without a check.
 pub unsafe trait WarpFloat: Float + Send + Sync {
-    /// The whole part.
+    /// The integer part.
     ///
     /// # Safety
-    /// The number must be finite and within what an `i32` holds. (The checked conversion is not turned into vector
-    /// code.)
+    /// The number must be finite and within the range of an `i32`. (The checked conversion is not vectorised.)
     unsafe fn whole(self) -> i32;
 }
 
-// SAFETY: the conversion cuts off what follows the point.
+// SAFETY: the conversion truncates the fraction.
 unsafe impl WarpFloat for f32 {
     #[inline(always)]
     unsafe fn whole(self) -> i32 {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { self.to_int_unchecked() }
     }
 }
@@ -50,17 +49,17 @@ unsafe impl WarpFloat for f32 {
 unsafe impl WarpFloat for f64 {
     #[inline(always)]
     unsafe fn whole(self) -> i32 {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { self.to_int_unchecked() }
     }
 }
 
-/// For each of some coordinates the upper left of its four neighbours, and how far it lies between them.
+/// For each of some coordinates: the upper left of its four neighbours, and its position between them, 0 to 1.
 struct Samples<T> {
     top_left: [usize; LANES],
     x: [T; LANES],
     y: [T; LANES],
-    /// 1 where moving the coordinate along x (y) moves the sample, else 0.
+    /// 1 where moving the coordinate along x (or y) moves the sample, else 0.
     free_x: [T; LANES],
     free_y: [T; LANES],
 }
@@ -70,13 +69,13 @@ impl WarpShape {
         product([self.in_height, self.in_width])
     }
 
-    /// From a neighbour to the one to its right, and to the one below.
+    /// Distance from a neighbour to the one to its right, and to the one below.
     fn steps(&self) -> (usize, usize) {
         let down = if self.in_height > 1 { self.in_width } else { 0 };
         (usize::from(self.in_width > 1), down)
     }
 
-    /// At most [`LANES`] coordinates; the rest are filled up with zeros.
+    /// Samples of at most [`LANES`] coordinates, padded with zeros.
     #[inline(always)]
     fn samples<T: WarpFloat>(&self, us: &[T], vs: &[T]) -> Samples<T> {
         let (x0, x, free_x) = axis(&padded(us), self.in_width);
@@ -100,7 +99,7 @@ impl WarpShape {
             "images have pixels"
         );
         assert!(i32::try_from(self.in_area()).is_ok(), "pixels of a plane");
-        // Beyond, an f32 does not tell the last pixel from the one after it.
+        // Beyond this, an f32 cannot distinguish the last pixel from the next.
         assert!(
             self.in_width.max(self.in_height) <= 1 << 24,
             "pixels of a side"
@@ -109,22 +108,22 @@ impl WarpShape {
         assert_eq!(image % size, 0, "whole images");
         let batch = image / size;
         let coordinates = product([batch, 2, self.out_area]);
-        assert_eq!(coords, coordinates, "two coordinates a pixel");
+        assert_eq!(coords, coordinates, "two coordinates per pixel");
         let values = product([batch, self.channels, self.out_area]);
         assert_eq!(out, values, "output length");
     }
 }
 
-/// Along one axis: the lower neighbour, how far the coordinate lies from it, and whether it may move.
+/// Along one axis: the lower neighbour, the distance of the coordinate from it, and whether the coordinate moves the sample.
 #[inline(always)]
 fn axis<T: WarpFloat>(p: &[T; LANES], size: usize) -> ([i32; LANES], [T; LANES], [T; LANES]) {
     let last = T::from(size - 1).unwrap_or_else(T::zero);
     let most = (last - T::one()).max(T::zero());
     let mut low = [T::zero(); LANES];
     let (mut index, mut part, mut free) = ([0; LANES], low, low);
-    // One short loop for each step: longer ones are not turned into vector code.
+    // One short loop for each step: longer ones are not vectorised.
     for l in 0..LANES {
-        // A NaN coordinate reads pixel 0: `max` returns the number.
+        // A NaN coordinate reads pixel 0, as `max` returns the number.
         part[l] = p[l].max(T::zero()).min(last);
     }
     for l in 0..LANES {
@@ -144,7 +143,7 @@ fn axis<T: WarpFloat>(p: &[T; LANES], size: usize) -> ([i32; LANES], [T; LANES],
     (index, part, free)
 }
 
-/// Pixels handled by one task.
+/// Number of pixels per task.
 const CHUNK: usize = 4096;
 
 /// The four neighbours of each sample in a plane, row by row: upper left and right, lower left and right.
@@ -161,15 +160,14 @@ unsafe fn neighbours<T: WarpFloat>(
     let mut corners = [[T::zero(); LANES]; 4];
     for (corner, step) in corners.iter_mut().zip([0, right, down, down + right]) {
         for l in 0..LANES {
-            // SAFETY: `samples` keeps the upper left one in the image, and one from its last row and column
-            // where there are more than one.
+            // SAFETY: `samples` keeps the upper left one in the image, and not in the last row or column unless there is only one.
             corner[l] = unsafe { *plane.get_unchecked(samples.top_left[l] + step) };
         }
     }
     corners
 }
 
-/// At most [`LANES`] numbers, filled up with zeros. Whole ones are copied without a loop of unknown length.
+/// At most [`LANES`] numbers, padded with zeros. A full set is copied without a loop of variable length.
 #[inline(always)]
 fn padded<T: WarpFloat>(from: &[T]) -> [T; LANES] {
     match from.first_chunk::<LANES>() {
@@ -193,7 +191,7 @@ fn write<T: WarpFloat>(values: &[T; LANES], to: &mut [T]) {
 /// `image` N×C×H×W, `coords` N×2×H'×W' (u, then v, in pixels), `out` N×C×H'×W'.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn warp<T: WarpFloat>(shape: &WarpShape, image: &[T], coords: &[T], out: &mut [T]) {
     shape.check(image.len(), coords.len(), out.len());
     let (area, channels) = (shape.out_area, shape.channels);
@@ -224,7 +222,7 @@ pub fn warp<T: WarpFloat>(shape: &WarpShape, image: &[T], coords: &[T], out: &mu
     );
 }
 
-/// Runs `work(image index, first pixel, pixels, their samples)` over all pixels, at most [`LANES`] at once.
+/// Calls `work(image index, first pixel, pixels, their samples)` for all pixels, at most [`LANES`] at once.
 fn for_lanes<T: WarpFloat>(
     shape: &WarpShape,
     coords: &[T],
@@ -247,7 +245,7 @@ fn for_lanes<T: WarpFloat>(
     });
 }
 
-/// The same for a range of pixels of image `n`, in the widest instructions there are.
+/// Like [`for_lanes`], for a range of pixels of image `n`, with the widest instructions available.
 fn each_lanes<T: WarpFloat>(
     shape: &WarpShape,
     coords: &[T],
@@ -272,10 +270,10 @@ fn each_lanes<T: WarpFloat>(
 /// Gradient of [`warp`] with respect to the coordinates.
 ///
 /// # Shapes
-/// As [`warp`]; `grad_out` N×C×H'×W', `grad_coords` N×2×H'×W', overwritten.
+/// As for [`warp`]; `grad_out` N×C×H'×W', `grad_coords` N×2×H'×W', overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn warp_backward_coords<T: WarpFloat>(
     shape: &WarpShape,
     image: &[T],
@@ -311,7 +309,7 @@ pub fn warp_backward_coords<T: WarpFloat>(
                 }
             }
             for l in 0..LANES {
-                // Not multiplied: a NaN gradient must not spread to where nothing moves.
+                // Not multiplied: a NaN gradient must not spread to coordinates that do not move the sample.
                 let keep = |free: T, g: T| if free > T::zero() { g } else { T::zero() };
                 gu[l] = keep(samples.free_x[l], gu[l]);
                 gv[l] = keep(samples.free_y[l], gv[l]);
@@ -328,10 +326,10 @@ pub fn warp_backward_coords<T: WarpFloat>(
 /// Gradient of [`warp`] with respect to the image.
 ///
 /// # Shapes
-/// As [`warp`]; `grad_out` N×C×H'×W', `grad_image` N×C×H×W, overwritten.
+/// As for [`warp`]; `grad_out` N×C×H'×W', `grad_image` N×C×H×W, overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn warp_backward_image<T: WarpFloat>(
     shape: &WarpShape,
     coords: &[T],
@@ -341,8 +339,8 @@ pub fn warp_backward_image<T: WarpFloat>(
     shape.check(grad_image.len(), coords.len(), grad_out.len());
     let (area, channels, in_area) = (shape.out_area, shape.channels, shape.in_area());
     let batch = coords.len() / (2 * area);
-    // Pixels may scatter anywhere, so that a task owns whole planes: all of an image, whose samples it then works
-    // out once, or where there are few images each plane by itself.
+    // Gradients may be added to any pixel, so a task has whole planes: all of an image, whose samples are then computed once, or, if there
+    // are few images, each plane separately.
     let together = if batch >= 2 * rayon::current_num_threads() {
         channels
     } else {
@@ -381,13 +379,13 @@ pub fn warp_backward_image<T: WarpFloat>(
         });
 }
 
-/// Adds to each sample's four neighbours their parts (upper left and right, lower left and right).
+/// Adds to each sample's four neighbours their shares (upper left and right, lower left and right).
 ///
-/// Neighbouring samples mostly lie one pixel apart and share two of the four: those sums are kept until the next
-/// sample has added to them, instead of being read back from memory just after they were written.
+/// Neighbouring samples are mostly one pixel apart and share two of the four neighbours. Those sums are kept until the next sample has
+/// added to them, instead of being read back from memory just after they were written.
 ///
 /// # Safety
-/// All neighbours must lie in the plane.
+/// All neighbours must be in the plane.
 #[inline(always)]
 unsafe fn scatter<T: WarpFloat>(
     plane: &mut [T],
@@ -396,7 +394,7 @@ unsafe fn scatter<T: WarpFloat>(
     (right, down): (usize, usize),
 ) {
     let mut add = |at: usize, value: T| {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let pixel = unsafe { plane.get_unchecked_mut(at) };
         *pixel = *pixel + value;
     };
@@ -436,8 +434,7 @@ mod tests {
         out_area: 12,
     };
 
-    /// Coordinates inside and outside the image, none within 1e-4 of a pixel centre, where the
-    /// bilinear surface has its kinks.
+    /// Coordinates inside and outside the image, none within 1e-4 of a pixel centre, where the bilinear surface has its kinks.
     fn coords() -> Vec<f64> {
         noise(2 * 2 * 12, 9)
             .iter()

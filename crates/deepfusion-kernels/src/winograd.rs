@@ -1,6 +1,6 @@
-//! What Winograd's F(4×4, 3×3) is made of, for training's convolutions here and for those of an inference engine:
-//! Y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs Y, at the points 0, 1, −1, 2, −2, ∞ (Lavin and Gray, "Fast
-//! Algorithms for Convolutional Neural Networks", 2016).
+//! The transforms of Winograd's F(4×4, 3×3), for training's convolutions here and for an inference engine: Y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A
+//! for a tile of 6×6 inputs d, kernel g and 4×4 outputs Y, at the points 0, 1, −1, 2, −2, ∞ (Lavin and Gray, "Fast Algorithms for
+//! Convolutional Neural Networks", 2016).
 
 use pulp::Simd;
 

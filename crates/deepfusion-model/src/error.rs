@@ -9,132 +9,129 @@ mod expected;
 
 pub use self::expected::{AskedBy, ExpectedDataSet, ExpectedSetting, FoundSetting};
 
-/// The version of the checkpoint's layout; files of another version are refused.
+/// The version of the checkpoint's layout; files of another version are rejected.
 pub const CHECKPOINT_VERSION: u32 = 1;
 
 /// What can go wrong with a configuration, or with a run on disk.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A setting that means nothing.
+    /// An invalid setting.
     #[error("setting `{field}`: expected {expected}, found {found}")]
     Config {
         /// The setting's name, as in the file.
         field: &'static str,
-        /// What would do.
+        /// What would be valid.
         expected: ExpectedSetting,
         /// What was found.
         found: FoundSetting,
     },
-    /// A run of several data sets, and none of them named, or none of that name.
+    /// A run that learned from several data sets, of which none or an unknown one was named.
     #[error("data set: expected {expected}, found {found}")]
     DataSet {
-        /// The names there are.
+        /// The names to choose from.
         expected: ExpectedDataSet,
         /// The name asked for, or "none".
         found: String,
     },
-    /// A preset set as if it were one of its keys: its name alone would change.
-    #[error("{assignment}: a preset is chosen as a whole, or in the file")]
+    /// A preset set as if it were one of the keys: only the preset's name would change.
+    #[error("{assignment}: a preset cannot be set as a key")]
     PresetAsKey {
-        /// What was asked for: preset=NAME.
+        /// The assignment as given: preset=NAME.
         assignment: String,
     },
-    /// A key that cannot be set so.
+    /// An assignment that cannot be made.
     #[error("{assignment}: {reason}")]
     Setting {
-        /// What was asked for: KEY=VALUE.
+        /// The assignment as given: KEY=VALUE.
         assignment: String,
-        /// What is wrong with it.
+        /// What is wrong with the assignment.
         reason: SettingProblem,
     },
-    /// A configuration file that cannot be read as one.
+    /// A file that is no training configuration.
     #[error("{path}: not a training configuration: {reason}")]
     ConfigFile {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser says, with the line.
+        /// The parser's message, with the line.
         #[source]
         reason: TomlProblem,
     },
     /// A file that cannot be read or written.
     #[error("{path}: cannot {action}: {source}")]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// "read" or "write".
         action: &'static str,
-        /// What the system says.
+        /// The operating system's reason.
         source: std::io::Error,
     },
-    /// What TOML cannot hold.
+    /// A value that TOML has no form for.
     #[error("{path}: cannot be written as TOML: {source}")]
     NotToml {
-        /// The file that was to be written.
+        /// Path of the file to be written.
         path: PathBuf,
-        /// Why not.
+        /// The serialiser's message.
         source: toml::ser::Error,
     },
     /// A checkpoint of another version than [`CHECKPOINT_VERSION`].
-    #[error(
-        "{path}: checkpoint format {found}, this program reads {}",
-        CHECKPOINT_VERSION
-    )]
+    #[error("{path}: checkpoint format {found}, expected {}", CHECKPOINT_VERSION)]
     Checkpoint {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its version.
+        /// The file's version.
         found: usize,
     },
-    /// No run where one should be.
+    /// A path where no run is.
     #[error("{path}: {reason}")]
     NotARun {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// What it lacks.
+        /// What is wrong with the folder.
         reason: NoRun,
     },
     /// Weights that this program did not write.
-    #[error("{path}: no checkpoint of this program: `{key}` is missing from its metadata")]
+    #[error("{path}: not a checkpoint of this program: metadata lacks `{key}`")]
     Foreign {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it lacks.
+        /// The missing key.
         key: String,
     },
-    /// A run that ended before its first checkpoint.
-    #[error("{path}: this run has no checkpoint yet: it ended before it saved its first")]
+    /// A run without a checkpoint.
+    #[error("{path}: this run has no checkpoint yet: it ended before writing its first")]
     NoCheckpoint {
-        /// The run's folder.
+        /// Path of the run's folder.
         path: PathBuf,
     },
-    /// A checkpoint that training cannot go on from; its weights are whole.
+    /// A checkpoint that training cannot continue from; its weights are complete.
     #[error("{path}: {reason}")]
     NotResumable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it lacks.
+        /// What the checkpoint lacks.
         reason: CheckpointLacks,
     },
-    /// A network that cannot be run: its encoder was imported, and the rest has learned nothing.
-    #[error("{path}: only its encoder has weights: the rest was never trained")]
+    /// A network that cannot predict: its encoder was imported, and the rest was never trained.
+    #[error("{path}: only the encoder is trained (imported weights)")]
     EncodersOnly {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A folder that already holds a run.
-    #[error("{path}: there is a run here already")]
+    /// A folder that already contains a run.
+    #[error("{path}: this folder already contains a run")]
     RunExists {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// The networks or their weights.
+    /// An error of the networks or their weights.
     #[error(transparent)]
     Network(#[from] NetworkError),
 }
 
 impl Error {
-    /// A setting that means nothing, by its name in the file.
+    /// An invalid setting, by its name in the file.
     #[must_use]
     pub fn config(
         field: &'static str,
@@ -162,17 +159,17 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::DataSet { .. } => Some("give the name of the data set whose metres are meant".into()),
+            Self::DataSet { .. } => Some("name the data set whose metres the predictions should have".into()),
             Self::Config { field: "data" | "data.paths", .. } => Some(
-                "give recordings as data.paths or as [[data.sets]], one of the two".into(),
+                "give recordings either as data.paths or as [[data.sets]]".into(),
             ),
             Self::Config { field: "view_motion", .. } => Some(
-                "without the speed loss nothing measured may enter: take view_motion = \"posenet\", or keep the speed loss".into(),
+                "set view_motion = \"posenet\", or keep the speed loss: without it, a run uses no measured motion".into(),
             ),
-            Self::Config { field, .. } => Some(format!("set `{field}` so in the configuration")),
+            Self::Config { field, .. } => Some(format!("change `{field}` in the configuration")),
             Self::Setting { .. } | Self::PresetAsKey { .. } => Some(
                 concat!(
-                    "every key and what it means is in ",
+                    "see all keys in ",
                     env!("CARGO_PKG_REPOSITORY"),
                     "/blob/main/docs/reference/configuration.md"
                 )
@@ -180,7 +177,7 @@ impl Hint for Error {
             ),
             Self::ConfigFile { .. } => Some(
                 concat!(
-                    "name a preset and the keys in which it differs; all are in ",
+                    "name a preset and the keys that differ from it; see ",
                     env!("CARGO_PKG_REPOSITORY"),
                     "/blob/main/docs/reference/configuration.md"
                 )
@@ -188,31 +185,31 @@ impl Hint for Error {
             ),
             Self::Io { source, action, .. } => match source.kind() {
                 std::io::ErrorKind::StorageFull => {
-                    Some("the disk is full; what was there before is untouched".into())
+                    Some("free some disk space; an existing file is unchanged".into())
                 }
                 std::io::ErrorKind::PermissionDenied => {
-                    Some(format!("no permission to {action} there"))
+                    Some(format!("check that you have permission to {action} there"))
                 }
                 kind => Some(system_hint(kind).into()),
             },
             Self::NotToml { .. } => None,
-            Self::Checkpoint { .. } => Some("use the version of the program that wrote it".into()),
+            Self::Checkpoint { .. } => Some("use the version of the program that wrote the file".into()),
             Self::NotARun { .. } => Some("give the folder of a run".into()),
             Self::Foreign { .. } => {
-                Some("weights of other programs are imported: deepfusion-nn".into())
+                Some("import weights of other programs with deepfusion-nn".into())
             }
-            Self::EncodersOnly { .. } => Some("train from it first".into()),
+            Self::EncodersOnly { .. } => Some("train a network from it first".into()),
             Self::NoCheckpoint { .. } => {
-                Some("begin it anew in another folder, or empty this one first".into())
+                Some("train again in another folder, or empty this one first".into())
             }
             Self::NotResumable { .. } => Some("start a new run from these weights".into()),
-            Self::RunExists { .. } => Some("resume it, or choose another folder".into()),
+            Self::RunExists { .. } => Some("resume that run, or choose another folder".into()),
             Self::Network(error) => error.hint(),
         }
     }
 }
 
-/// What the parser of TOML says of a text or a table, without the line break that ends it.
+/// The TOML parser's message about a text or a table, without its final line break.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 #[error("{}", .0.to_string().trim_end())]
@@ -224,73 +221,73 @@ impl From<toml::de::Error> for TomlProblem {
     }
 }
 
-/// Why a key cannot be set so.
+/// Why an assignment KEY=VALUE cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingProblem {
-    /// There is no `=`.
+    /// The `=` is missing.
     #[error("expected KEY=VALUE")]
     NoValue,
-    /// A key under one that is no table.
-    #[error("`{key}` is a value and no table")]
+    /// A key below one that is not a table.
+    #[error("`{key}` is a value, not a table")]
     NoTable {
-        /// What is no table.
+        /// The key that is not a table.
         key: String,
     },
-    /// A place in what is no list.
-    #[error("`{key}` is no list")]
+    /// An index into something that is not a list.
+    #[error("`{key}` is not a list")]
     NoList {
-        /// What is no list.
+        /// The key that is not a list.
         key: String,
     },
-    /// A place that a list does not have.
-    #[error("there is no `{key}[{place}]`: the list has {}, counted from 0", count_of(*length, "element"))]
+    /// An index beyond the end of a list.
+    #[error("there is no `{key}[{place}]`: the list has {}, numbered from 0", count_of(*length, "element"))]
     BeyondList {
-        /// The list.
+        /// The list's key.
         key: String,
-        /// The place.
+        /// The index, from 0.
         place: usize,
         /// How many elements the list has.
         length: usize,
     },
-    /// A name in a list, whose elements have places.
-    #[error("`{key}` is a list of {}: say which, such as {key}[0]", count_of(*length, "element"))]
+    /// A key below a list, without the index of an element.
+    #[error("`{key}` is a list of {}: name one, such as {key}[0]", count_of(*length, "element"))]
     NameInList {
-        /// The list.
+        /// The list's key.
         key: String,
         /// How many elements it has.
         length: usize,
     },
-    /// A name in a list that has no elements.
-    #[error("`{key}` is a list without elements: it is set as a whole first")]
+    /// A key below a list that is empty.
+    #[error("`{key}` is an empty list: set the whole list first")]
     NameInEmptyList {
-        /// The list.
+        /// The list's key.
         key: String,
     },
-    /// A text that cannot be a place in a list.
-    #[error("`{part}`: a place in a list is a number in brackets, such as [0]")]
+    /// An index that cannot be parsed.
+    #[error("`{part}`: an element of a list is named by a number in brackets, such as [0]")]
     NoPlace {
         /// The part of the key between two dots.
         part: String,
     },
-    /// An element of a list that is to be taken away.
-    #[error("`{key}` is an element of a list, which can only be set anew without it")]
+    /// An element to be removed from a list.
+    #[error("`{key}` is one element of a list: set the whole list instead")]
     ElementOfList {
-        /// The element.
+        /// The element's key.
         key: String,
     },
-    /// Nothing has this name.
+    /// A key that does not exist.
     #[error("there is no key `{key}`{}", did_you_mean(nearest))]
     NoSuchKey {
-        /// The name.
+        /// The key.
         key: String,
-        /// Those that may have been meant.
+        /// Keys that may have been meant.
         nearest: Vec<String>,
     },
-    /// The key cannot have this value: what the parser says.
+    /// A value that the key cannot have: the parser's message.
     #[error("{}", .0.to_string().trim().replace('\n', " "))]
     Value(Box<toml::de::Error>),
-    /// Something else decides it; what, in its caller's words.
+    /// A key that the caller sets itself; its reason.
     #[error("{0}")]
     DecidedElsewhere(&'static str),
 }
@@ -304,29 +301,29 @@ fn did_you_mean(keys: &[String]) -> String {
     }
 }
 
-/// Why a folder is no run's.
+/// Why a folder is not a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoRun {
-    /// There is no such folder.
+    /// The folder does not exist.
     #[error("no such run")]
     Missing,
-    /// It has no configuration.
-    #[error("this is no run: it has no config.toml")]
+    /// The folder lacks a configuration.
+    #[error("not a run: config.toml is missing")]
     NoConfig,
 }
 
-/// What a checkpoint lacks that training needs to go on.
+/// What a checkpoint lacks that training needs to continue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointLacks {
-    /// The optimiser's averages.
-    #[error("it has no optimiser state to go on with")]
+    /// The optimiser's moving averages.
+    #[error("the checkpoint has no optimiser state")]
     OptimiserState,
-    /// The decoder of the flow.
-    #[error("it has no flow decoder, and this configuration trains one")]
+    /// The flow decoder.
+    #[error("the checkpoint has no flow decoder, but the configuration trains one")]
     FlowDecoder,
     /// PoseNet.
-    #[error("it has no PoseNet, and this configuration has one")]
+    #[error("the checkpoint has no PoseNet, but the configuration has one")]
     PoseNet,
 }

@@ -1,4 +1,4 @@
-//! What a network was calibrated to for int8: the ranges of what its convolutions read.
+//! Calibration of a network for int8: the ranges of its convolutions' inputs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,20 +9,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, TomlProblem};
 
-/// The file in a run's folder.
+/// Name of the file in a run's folder.
 const FILE: &str = "int8.toml";
 
-/// The ranges that int8 divides into 255 steps, for one checkpoint of a network.
+/// The input ranges that int8 divides into 255 steps, for one checkpoint of a network.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Int8Calibration {
-    /// The checkpoint's step: what was trained since has other ranges.
+    /// The step of the calibrated checkpoint; after further training the ranges differ.
     pub step: usize,
-    /// Number of images that were looked at.
+    /// Number of images used for calibration.
     pub images: usize,
-    /// Mean |ln(d / d₀)| of the depth d in int8 and d₀ in f32, on some of these images.
+    /// Mean |ln(d / d₀)| of the depth d in int8 and d₀ in f32, over some of these images.
     pub deviation: f64,
-    /// For each convolution that is computed in int8, by its name, the range of its input whose 255 steps lose least ([`deepfusion_infer::SeenInputs::ranges`]).
+    /// For each convolution that is computed in int8, by its name: the input range whose 255 steps lose least
+    /// ([`deepfusion_infer::SeenInputs::ranges`]).
     pub ranges: InputRanges,
 }
 
@@ -30,10 +31,10 @@ pub struct Int8Calibration {
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationProblem {
-    /// The system does not give it, or it is no text.
+    /// The file cannot be read, or is not text.
     #[error("{0}")]
     Unread(#[source] Arc<std::io::Error>),
-    /// A text or a table that cannot be one.
+    /// Not a valid calibration in TOML.
     #[error("{0}")]
     NotOne(#[source] TomlProblem),
 }
@@ -44,14 +45,14 @@ impl From<toml::de::Error> for CalibrationProblem {
     }
 }
 
-/// A calibration that cannot be read: of no account until int8 is asked for.
+/// A calibration that cannot be read. It only matters if int8 is requested.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{origin}: {reason}")]
 #[non_exhaustive]
 pub struct UnreadableCalibration {
-    /// The file, or the network's name.
+    /// Path of the file, or name of the network.
     pub origin: String,
-    /// Why not.
+    /// Why it cannot be read.
     #[source]
     pub reason: CalibrationProblem,
 }
@@ -63,10 +64,10 @@ impl Hint for UnreadableCalibration {
 }
 
 impl Int8Calibration {
-    /// That of a card's table; `name` is what an error calls it.
+    /// Reads the calibration from a card's table; `name` is used in error messages.
     ///
     /// # Errors
-    /// A table that holds none.
+    /// A table that is not a calibration.
     pub fn from_table(name: &str, table: toml::Table) -> Result<Self, UnreadableCalibration> {
         table
             .try_into()
@@ -76,10 +77,10 @@ impl Int8Calibration {
             })
     }
 
-    /// That of a run at this step; `None` where it was not calibrated, or at another step.
+    /// The calibration of a run at this step; `None` if the run was not calibrated, or at another step.
     ///
     /// # Errors
-    /// A file that holds none, or cannot be read.
+    /// A file that is not a calibration, or cannot be read.
     pub fn of_run(folder: &Path, step: usize) -> Result<Option<Self>, UnreadableCalibration> {
         let path = folder.join(FILE);
         let unreadable = |reason: CalibrationProblem| UnreadableCalibration {
@@ -95,10 +96,10 @@ impl Int8Calibration {
         Ok(Some(found).filter(|found| found.step == step))
     }
 
-    /// Writes it into a run's folder; returns the file.
+    /// Writes the calibration into a run's folder; returns the file's path.
     ///
     /// # Errors
-    /// [`Error::NotToml`] where TOML cannot hold it, [`Error::Io`].
+    /// [`Error::NotToml`] if a value has no TOML form, [`Error::Io`].
     pub fn write(&self, folder: &Path) -> Result<std::path::PathBuf, Error> {
         let path = folder.join(FILE);
         let table = toml::to_string(self).map_err(|source| Error::NotToml {

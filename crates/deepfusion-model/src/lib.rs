@@ -1,7 +1,7 @@
-//! What a network is and what it weighs, without a framework to train it.
+//! The networks' configurations and weights, without a framework to train them.
 //!
-//! - [`DepthNetConfig`], [`PoseNetConfig`] and their parts say what a network is built from; [`ModuleCost`] what it costs.
-//! - [`TrainConfig`] is everything that decides a training run, and what a run's `config.toml` holds.
+//! - [`DepthNetConfig`], [`PoseNetConfig`] and their parts describe a network; [`ModuleCost`] is what a part costs.
+//! - [`TrainConfig`] is everything that decides a training run, as stored in a run's `config.toml`.
 //! - [`weights`] are tensors by name, in memory and in safetensors files.
 //! - [`RunFolder`] is a run on disk; [`StoredNetwork`] the trained depth network of one, or of a packed file.
 //! - [`depth_graph`] turns configuration and weights into the graph that `deepfusion-infer` runs and `deepfusion-onnx` writes.

@@ -6,26 +6,26 @@ use deepfusion_geometry::Intrinsics;
 use crate::weights::{Weights, read_safetensors_under};
 use crate::{CHECKPOINT_VERSION, Error, ExpectedSetting, NoRun, TrainConfig, TrainFindings};
 
-/// Metadata: the lowest value that `best` was chosen by. Files of before are without it: what was chosen by then held
-/// terms that depth cannot change, and is not to be compared with.
+/// Metadata key: the lowest validation loss so far, by which `best` is chosen. Older files lack it: they chose by a loss with terms that
+/// depth cannot change, which is not comparable.
 const BEST: &str = "best_selection";
-/// Metadata: what of the networks was ever trained, where that is not all.
+/// Metadata key: which parts of the networks were ever trained, if not all.
 const TRAINED: &str = "trained";
 const ENCODERS: &str = "encoders";
-/// Metadata: the learned camera.
+/// Metadata key: the learned camera.
 const FOCAL: &str = "focal_ratio";
 
 /// Which checkpoint of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckpointKind {
-    /// Everything needed to go on.
+    /// Everything needed to continue training.
     Last,
-    /// The networks at the lowest held-out loss that depth can change.
+    /// The networks with the lowest held-out loss, counting only terms that depth can change.
     Best,
 }
 
 impl CheckpointKind {
-    /// Its name: the file's without the ending.
+    /// The file's name without its extension.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -42,18 +42,18 @@ impl CheckpointKind {
     }
 }
 
-/// Where training stands.
+/// The state of training at a checkpoint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checkpoint {
-    /// Steps done, skipped ones included.
+    /// Number of steps done, including skipped ones.
     pub step: usize,
-    /// The lowest value so far that `best` is chosen by.
+    /// The lowest validation loss so far, by which `best` is chosen.
     pub best_validation: Option<f64>,
-    /// Steps skipped for a gradient that was not finite.
+    /// Number of steps skipped because a gradient was not finite.
     pub skipped: usize,
     /// Whether only the encoders were ever trained: imported ImageNet weights.
     pub encoders_only: bool,
-    /// f/f₀, by which a learned camera differs from the assumed one ([`TrainConfig::camera_learned`]).
+    /// f/f₀: the learned focal length divided by the assumed one ([`TrainConfig::camera_learned`]).
     pub focal_ratio: Option<f64>,
 }
 
@@ -64,10 +64,10 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// An empty folder for a new run.
+    /// Creates the folder of a new run.
     ///
     /// # Errors
-    /// [`Error::RunExists`] where a run already is; [`Error::Io`].
+    /// [`Error::RunExists`] if the folder already contains a run; [`Error::Io`].
     pub fn create(path: &Path) -> Result<Self, Error> {
         if path.join("config.toml").exists() {
             return Err(Error::RunExists {
@@ -80,7 +80,7 @@ impl RunFolder {
         })
     }
 
-    /// The folder of a run that another process makes, neither looked at nor written to.
+    /// The folder of a run that another process creates; neither checked nor written to.
     #[must_use]
     pub fn of_another(path: &Path) -> Self {
         Self {
@@ -88,7 +88,7 @@ impl RunFolder {
         }
     }
 
-    /// A folder that holds a run, or a checkpoint file in one; the latter also says which checkpoint.
+    /// The folder of an existing run. `path` is that folder or a checkpoint file in it, which also decides the checkpoint.
     ///
     /// # Errors
     /// [`Error::NotARun`].
@@ -116,25 +116,25 @@ impl RunFolder {
         Ok((folder, kind))
     }
 
-    /// The folder.
+    /// Path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The configuration file.
+    /// Path of the configuration file.
     #[must_use]
     pub fn config_path(&self) -> PathBuf {
         self.path.join("config.toml")
     }
 
-    /// A checkpoint's file.
+    /// Path of a checkpoint's file.
     #[must_use]
     pub fn checkpoint_path(&self, kind: CheckpointKind) -> PathBuf {
         self.path.join(kind.file())
     }
 
-    /// The checkpoint that the folder as a whole means: the best where there is one, else the last.
+    /// The checkpoint to use if none is named: `best` if it exists, else `last`.
     #[must_use]
     pub fn preferred(&self) -> CheckpointKind {
         if self.checkpoint_path(CheckpointKind::Best).exists() {
@@ -144,7 +144,7 @@ impl RunFolder {
         }
     }
 
-    /// That a checkpoint is there.
+    /// Checks that a checkpoint exists.
     ///
     /// # Errors
     /// [`Error::NoCheckpoint`].
@@ -157,7 +157,7 @@ impl RunFolder {
         })
     }
 
-    /// Writes the configuration, and what the run found out from its data.
+    /// Writes the configuration, and the run's findings from its data.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -173,23 +173,23 @@ impl RunFolder {
         deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))
     }
 
-    /// The configuration as the networks need it: what it leaves open is as the run found it.
+    /// The configuration as the networks need it: settings left open are filled in from the run's findings.
     ///
     /// # Errors
-    /// As [`TrainConfig::read`].
+    /// As for [`TrainConfig::read`].
     pub fn read_config(&self) -> Result<TrainConfig, Error> {
         Ok(self.read_findings()?.complete(self.read_settings()?))
     }
 
-    /// The configuration as it was set.
+    /// The configuration as set by the user.
     ///
     /// # Errors
-    /// As [`TrainConfig::read`].
+    /// As for [`TrainConfig::read`].
     pub fn read_settings(&self) -> Result<TrainConfig, Error> {
         TrainConfig::read(&self.config_path())
     }
 
-    /// What the run found out from its data.
+    /// The run's findings from its data.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::ConfigFile`].
@@ -204,7 +204,7 @@ impl RunFolder {
         Ok(findings)
     }
 
-    /// Where training stood at a checkpoint; its tensors are not read.
+    /// The state of training at a checkpoint, read without its tensors.
     ///
     /// # Errors
     /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one that cannot be read.
@@ -213,7 +213,7 @@ impl RunFolder {
         Checkpoint::of(&path, &read_safetensors_under(&path, "no tensor's name")?)
     }
 
-    /// Whether a checkpoint holds a PoseNet: not that of a run which left it out, nor of an imported depth network.
+    /// Whether a checkpoint contains a PoseNet. Runs without PoseNet and imported depth networks have none.
     ///
     /// # Errors
     /// [`Error::Network`] for a file that cannot be read.
@@ -222,11 +222,11 @@ impl RunFolder {
         Ok(!read_safetensors_under(&path, "pose.")?.tensors.is_empty())
     }
 
-    /// The camera that a checkpoint's network learned with, at the size of its images; `set` as for [`TrainConfig::for_set`]. Of a run
-    /// that learns its camera, the one of that step.
+    /// The camera that a checkpoint's network was trained with, at the size of its images; `set` as for [`TrainConfig::for_set`]. If the
+    /// run learns its camera, the camera at that step.
     ///
     /// # Errors
-    /// As [`Self::read_config`].
+    /// As for [`Self::read_config`].
     pub fn camera_of(
         &self,
         state: &Checkpoint,
@@ -241,7 +241,7 @@ impl RunFolder {
         Ok(learned.or(found))
     }
 
-    /// The depth network's weights alone, and where training stood: nothing else of the file is read.
+    /// The depth network's weights alone, and the state of training; nothing else of the file is read.
     ///
     /// # Errors
     /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one without a network.
@@ -254,7 +254,7 @@ impl RunFolder {
 }
 
 impl Checkpoint {
-    /// That its networks can be run; `path` is its file.
+    /// Checks that the networks can predict; `path` is the checkpoint's file.
     ///
     /// # Errors
     /// [`Error::EncodersOnly`].
@@ -266,7 +266,7 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// What its file's metadata say of it.
+    /// The checkpoint's state as metadata of its file.
     #[must_use]
     pub fn metadata(&self) -> BTreeMap<String, String> {
         let mut all = BTreeMap::new();
@@ -276,7 +276,7 @@ impl Checkpoint {
         note("step", self.step.to_string());
         note("skipped", self.skipped.to_string());
         if let Some(best) = self.best_validation {
-            // All digits: the comparison must go on exactly.
+            // All bits, so that the comparison continues exactly after a resume.
             note(BEST, format!("{:016x}", best.to_bits()));
         }
         if self.encoders_only {
@@ -288,7 +288,7 @@ impl Checkpoint {
         all
     }
 
-    /// What the metadata of a file say.
+    /// The checkpoint's state from the metadata of its file.
     ///
     /// # Errors
     /// [`Error::Checkpoint`] for a file of another version, [`Error::Foreign`] for one of another program.
@@ -313,10 +313,10 @@ impl Checkpoint {
         })
     }
 
-    /// A number among a file's metadata.
+    /// A number in a file's metadata.
     ///
     /// # Errors
-    /// [`Error::Foreign`] where it is missing.
+    /// [`Error::Foreign`] if it is missing.
     pub fn number(path: &Path, file: &Weights, key: &str) -> Result<usize, Error> {
         let text = file.metadata.get(key);
         text.and_then(|t| t.parse().ok())
@@ -332,7 +332,7 @@ mod tests {
     use super::*;
     use crate::Preset;
 
-    /// A run from before there was the table `[findings]`: read as it is, and written anew without a loss.
+    /// A run without the table `[findings]`, from an older version: it is read as is, and rewritten without loss.
     #[test]
     fn a_run_of_before_keeps_its_camera() {
         let at = tempfile::tempdir().unwrap();
@@ -347,7 +347,7 @@ mod tests {
         assert_eq!(found.camera.map(|k| k.fx), Some(230.4));
         assert_eq!(folder.read_config().unwrap(), config);
 
-        // As a run does that goes on.
+        // As a resumed run does.
         folder
             .write_config(&folder.read_settings().unwrap(), &found)
             .unwrap();

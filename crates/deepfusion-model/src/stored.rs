@@ -7,36 +7,36 @@ use crate::{
     CheckpointKind, Error, Int8Calibration, RunFolder, TrainConfig, UnreadableCalibration,
 };
 
-/// A trained depth network as it is stored, in a run's folder or packed without one: everything that is needed to build it.
+/// A trained depth network as stored in a run's folder or packed without one: everything needed to build it.
 #[derive(Debug, Clone)]
 pub struct StoredNetwork {
     /// The configuration of its run, as one of its data sets sees it.
     pub config: TrainConfig,
-    /// The camera it learned with, at the size of its images; `None` for imported weights.
+    /// The camera it was trained with, at the size of its images; `None` for imported weights.
     pub camera: Option<Intrinsics>,
     /// The depth network's weights.
     pub weights: Weights,
-    /// Steps it was trained for.
+    /// Number of steps it was trained for.
     pub step: usize,
-    /// What it was calibrated to for int8, where it was.
+    /// Its calibration for int8, if it has one.
     pub int8: Result<Option<Int8Calibration>, UnreadableCalibration>,
 }
 
 impl StoredNetwork {
-    /// That of a run's folder or a checkpoint in it; the folder means `best` where there is one. `set` names one of the data
-    /// sets it learned from, where it learned several.
+    /// Reads the network of a run. `path` is the run's folder, which means `best` if it exists, or a checkpoint in it. `set` names one of
+    /// the data sets it was trained on, if there are several.
     ///
     /// # Errors
-    /// As [`RunFolder::open`], [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
+    /// As for [`RunFolder::open`], [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
     pub fn of_run(path: &Path, set: Option<&str>) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
         Self::of_checkpoint(&folder, kind.unwrap_or_else(|| folder.preferred()), set)
     }
 
-    /// That of a checkpoint; `set` as in [`Self::of_run`].
+    /// Reads the network of a checkpoint; `set` as in [`Self::of_run`].
     ///
     /// # Errors
-    /// [`Error::EncodersOnly`]; as [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
+    /// [`Error::EncodersOnly`], and those of [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
     pub fn of_checkpoint(
         folder: &RunFolder,
         kind: CheckpointKind,
@@ -54,11 +54,11 @@ impl StoredNetwork {
         })
     }
 
-    /// One without a run: its configuration as the table of a run's `config.toml`, and its tensors as the bytes of a safetensors
-    /// file. `origin` is what error messages call it; `set` as in [`Self::of_run`].
+    /// Reads a network stored without a run: its configuration as the table of a run's `config.toml`, and its tensors as the bytes of a
+    /// safetensors file. Error messages call it `origin`; `set` as in [`Self::of_run`].
     ///
     /// # Errors
-    /// [`Error::ConfigFile`], [`Error::Network`] for what is neither, [`TrainConfig::for_set`]'s.
+    /// [`Error::ConfigFile`] or [`Error::Network`] for invalid content, and those of [`TrainConfig::for_set`].
     pub fn packed(
         origin: &str,
         config: toml::Table,
@@ -66,7 +66,7 @@ impl StoredNetwork {
         step: usize,
         set: Option<&str>,
     ) -> Result<Self, Error> {
-        // Not validated: it has no recordings, and trains nothing.
+        // Not validated, as it has no recordings and is not for training.
         let read = TrainConfig::from_run_table(config);
         let (config, findings) = read.map_err(|e| Error::ConfigFile {
             path: origin.into(),
@@ -83,7 +83,7 @@ impl StoredNetwork {
 }
 
 impl TrainConfig {
-    /// The configuration without the places of its recordings and of what it started from, which mean nothing elsewhere.
+    /// The configuration without the paths of recordings and initial weights, which are meaningless elsewhere.
     #[must_use]
     pub fn without_places(&self) -> Self {
         let mut config = self.clone();
@@ -105,7 +105,7 @@ impl TrainConfig {
 mod tests {
     use crate::Preset;
 
-    /// Each data set keeps its name and its metres, and says no more where it lay.
+    /// Each data set keeps its name and its depth range, but not its paths.
     #[test]
     fn data_sets_keep_their_metres() {
         let mut config = Preset::Tiny.config();

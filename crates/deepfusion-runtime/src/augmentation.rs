@@ -1,12 +1,12 @@
 /// Test-time augmentation: several predictions of one image, at several input sizes, mirrored or not. The mean of their disparities usually
-/// errs less on images unlike those learned from, and takes the time of all (what it is worth, and where it is worse:
-/// docs/benchmarks/test-time-augmentation.md).
+/// has a smaller error on images unlike the training images, but takes the time of all predictions. Gains and losses are in
+/// docs/benchmarks/test-time-augmentation.md.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmentation {
-    /// Input sizes, as multiples of the one that fits the image; each is rounded to one that the network takes.
+    /// Input sizes, as multiples of the size that fits the image; each is rounded to a size that the network accepts.
     pub scales: &'static [f64],
-    /// Whether the mirrored image is predicted, too, at each size. The two are blended as Godard et al. do (CVPR 2017, section 3.4;
-    /// Monodepth2's evaluation as well).
+    /// Whether to predict the mirrored image, too, at each size. The two predictions are blended as by Godard et al. (CVPR 2017, section
+    /// 3.4), like Monodepth2's evaluation.
     pub flip: bool,
 }
 
@@ -21,19 +21,19 @@ impl Augmentation {
         flip: true,
         ..Self::NONE
     };
-    /// A smaller input, which shows the network more of the scene at once, and a larger one, which shows it more of what is far: with
-    /// 640×192 to fit, 512×160 and 736×224.
+    /// A smaller input, in which the network sees more of the scene at once, and a larger one, in which it sees more of what is far. For
+    /// 640×192: 512×160 and 736×224.
     pub const MULTI_SCALE: Self = Self {
         scales: &[0.8, 1.2],
         flip: false,
     };
-    /// [`Self::MULTI_SCALE`], each mirrored as well.
+    /// [`Self::MULTI_SCALE`], with each size mirrored as well.
     pub const MULTI_SCALE_FLIP: Self = Self {
         flip: true,
         ..Self::MULTI_SCALE
     };
 
-    /// Whether it takes input sizes other than the one that fits.
+    /// Whether it needs input sizes other than the one that fits the image.
     #[must_use]
     pub fn resizes(&self) -> bool {
         self.scales.iter().any(|scale| *scale != 1.0)
@@ -46,12 +46,13 @@ impl Default for Augmentation {
     }
 }
 
-/// Where the blending with the mirrored image's disparity begins and ends, from an edge, as shares of the width.
+/// Where the blending with the mirrored image's disparity begins and ends: distances from an edge, as shares of the width.
 const EDGE: (f64, f64) = (0.05, 0.10);
 
-/// Values of an image and of its mirror image as one, in `own`: the mean of both; in the leftmost twentieth the mirrored image's alone, in the
-/// rightmost the image's, with a ramp as wide between. At its left edge a network trained on views to the right has not seen what it
-/// should predict; at the mirrored image's it has.
+/// Blends the values of an image with those of its mirror image, in place in `own`. The result is the mean of both, but the mirrored
+/// image's values alone in the leftmost twentieth and the image's own in the rightmost, with a ramp of the same width in between. A network
+/// that learned from views to the right predicts poorly at an image's left edge, which they do not show; mirrored, this edge is on the
+/// right.
 ///
 /// # Shapes
 /// - `own`: H×`width`
@@ -63,7 +64,7 @@ pub(crate) fn blend_flipped(own: &mut [f32], mirrored: &[f32], width: usize) {
         let x = column as f64 / last;
         1.0 - ((x - from) / (to - from)).clamp(0.0, 1.0)
     };
-    // What counts of the image's own value; the rest is the mirrored one's.
+    // Weight of the image's own value; the rest is the mirrored one's.
     let weights: Vec<f32> = (0..width)
         .map(|column| {
             let (left, right) = (near_left(column), near_left(width - 1 - column));
@@ -78,7 +79,7 @@ pub(crate) fn blend_flipped(own: &mut [f32], mirrored: &[f32], width: usize) {
     }
 }
 
-/// Mirrors an image of rows of `width` values from left to right.
+/// Mirrors an image with rows of `width` values from left to right.
 pub(crate) fn mirror(values: &mut [f32], width: usize) {
     for row in values.chunks_exact_mut(width.max(1)) {
         row.reverse();
@@ -95,7 +96,7 @@ mod tests {
         blend_flipped(&mut blended, &[3.0; 202], 101);
         let at = |column: usize| blended[column];
         assert_eq!([0, 5, 50, 95, 100].map(at), [3.0, 3.0, 2.0, 1.0, 1.0]);
-        // Halfway down the ramp, between the seventh column and the eighth: three quarters and one.
+        // Halfway down the ramp, between the seventh column and the eighth: weights of three quarters and one.
         assert!((f32::midpoint(at(7), at(8)) - 2.5).abs() < 1e-6);
         assert!((f32::midpoint(at(92), at(93)) - 1.5).abs() < 1e-6);
         assert_eq!(blended[..101], blended[101..]);

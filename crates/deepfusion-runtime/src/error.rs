@@ -5,16 +5,16 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EngineProblem {
-    /// The fused engine refuses it.
+    /// The fused engine's error.
     #[error("{0}")]
     Fused(#[from] deepfusion_infer::Error),
-    /// ONNX Runtime refuses it.
+    /// ONNX Runtime's error.
     #[error("{0}")]
     Onnx(#[from] deepfusion_onnx::Error),
-    /// It cannot be made ready for another input size.
+    /// The network cannot be prepared for another input size.
     #[error("{0}")]
     Network(Box<Error>),
-    /// The caller's own runner refuses it.
+    /// The error of a runner of the caller's own.
     #[error("{0}")]
     Runner(Box<dyn Hint + Send + Sync>),
 }
@@ -36,59 +36,59 @@ impl Hint for EngineProblem {
     }
 }
 
-/// What can go wrong on the way from a network's name to metres.
+/// What can go wrong between a network's name and its metric depth.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Neither a path nor an embedded network's name.
+    /// A model that is neither a path nor an embedded network's name.
     #[error("{}: no such file or folder, and no embedded network has this name", model.display())]
     NoSuchModel {
-        /// What was given.
+        /// The model as given.
         model: PathBuf,
-        /// The names there are.
+        /// Names of the embedded networks.
         known: Vec<&'static str>,
     },
-    /// Something that runs networks and cannot run this one.
+    /// An engine that cannot run the network.
     #[error("engine `{engine}`: {reason}")]
     Engine {
-        /// Its name.
+        /// The engine's name.
         engine: &'static str,
-        /// What it says.
+        /// Why it cannot.
         #[source]
         reason: Box<EngineProblem>,
     },
-    /// Int8 of a network whose convolutions' ranges nobody looked at.
-    #[error("int8: the network was not calibrated, or not since it was last trained")]
+    /// Int8 was requested for a network without a valid calibration.
+    #[error("int8: the network is not calibrated, or was trained after its calibration")]
     NotCalibrated,
     /// A calibration for int8 that cannot be read.
     #[error(transparent)]
     Calibration(#[from] deepfusion_model::UnreadableCalibration),
-    /// An image's values are not as many as the network takes.
-    #[error("an image of {}, where the network takes {expected}", count_of(*found, "value"))]
+    /// An image whose number of values does not match the network's input.
+    #[error("input image has {}, expected {expected}", count_of(*found, "value"))]
     ImageSize {
-        /// As many as the network takes.
+        /// Number of values of the network's input.
         expected: usize,
-        /// As many as there were.
+        /// Number of values of the image.
         found: usize,
     },
-    /// Several input sizes of a network that learned one camera at one size.
+    /// Several input sizes were requested of a network that was trained for one camera at one size.
     #[error(
-        "several input sizes: the network learned one camera at one size, without a canonical focal length"
+        "several input sizes: the network was trained at one size, without a canonical focal length"
     )]
     OneSize,
-    /// A packed network.
+    /// An error of a packed network.
     #[error(transparent)]
     Weights(#[from] deepfusion_weights::Error),
-    /// The configuration, the run's folder, or the networks' weights.
+    /// An error of the configuration, the run's folder, or the networks' weights.
     #[error(transparent)]
     Model(#[from] deepfusion_model::Error),
-    /// ONNX Runtime, or the model made for it.
+    /// An error of ONNX Runtime, or of exporting the model to it.
     #[error(transparent)]
     Onnx(#[from] deepfusion_onnx::Error),
 }
 
 impl Error {
-    /// What an engine said.
+    /// Why an engine cannot run a network.
     #[must_use]
     pub fn engine(engine: &'static str, reason: impl Into<EngineProblem>) -> Self {
         Self::Engine {
@@ -102,22 +102,22 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoSuchModel { known, .. } => Some(match known.as_slice() {
-                [] => "give the folder of a run; this build has no embedded network".into(),
+                [] => "give the folder of a run: this build has no embedded network".into(),
                 known => format!(
                     "give the folder of a run, or an embedded network: {}",
                     known.join(", ")
                 ),
             }),
             Self::Engine { reason, .. } => Some(reason.hint().unwrap_or(
-                "f32 in the fused engine runs on every processor; with the training framework, Burn runs \
+                "use the fused engine in f32, which runs on every processor; with the training framework, Burn runs \
                  every network on every device"
                     .into(),
             )),
-            Self::NotCalibrated => Some("bf16 needs no calibration".into()),
-            Self::Calibration(_) => Some("calibrate the network again; bf16 needs no calibration".into()),
-            Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
+            Self::NotCalibrated => Some("calibrate the network, or use bf16, which needs no calibration".into()),
+            Self::Calibration(_) => Some("calibrate the network again, or use bf16, which needs no calibration".into()),
+            Self::ImageSize { .. } => Some("give 3 × height × width values, at the network's input size".into()),
             Self::OneSize => Some(
-                "the mirrored image (flip) needs no other size; the embedded networks, and what was trained from them, run at any".into(),
+                "use flip, which needs one size only, or an embedded network or one trained from it, which run at any size".into(),
             ),
             Self::Weights(error) => error.hint(),
             Self::Model(error) => error.hint(),

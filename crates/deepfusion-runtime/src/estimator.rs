@@ -19,22 +19,22 @@ use crate::{
 #[derive(Debug)]
 pub struct DepthEstimator {
     config: Arc<TrainConfig>,
-    /// The camera it learned with.
+    /// The camera it was trained with.
     camera: Option<Intrinsics>,
     runner: Box<dyn DepthRunner>,
     /// Runners for other input sizes; `None` for a network that runs at one size only.
     others: Option<OtherSizes>,
-    /// Steps it was trained for.
+    /// Number of steps it was trained for.
     pub step: usize,
 }
 
 impl DepthEstimator {
-    /// A network by its path (a run's folder, a checkpoint in it, a packed file) or by the name of an embedded one, in the
-    /// fused engine and f32. For a run that learned several data sets, use [`ModelSource::load`] with the name of one, and
-    /// [`Self::fused`]: each has its own metric scale.
+    /// Loads a network, for the fused engine in f32, by its path (a run's folder, a checkpoint in it, a packed file) or by the name of an
+    /// embedded network. If a run was trained on several data sets, use [`ModelSource::load`] with the name of one, then [`Self::fused`]:
+    /// each data set has its own metric scale.
     ///
     /// # Errors
-    /// As [`ModelSource::named`] and [`ModelSource::load`].
+    /// As for [`ModelSource::named`] and [`ModelSource::load`].
     pub fn load(model: impl AsRef<Path>) -> Result<Self, Error> {
         let network = ModelSource::named(model.as_ref())?.load(None)?;
         Self::fused(network, Precision::F32)
@@ -43,7 +43,7 @@ impl DepthEstimator {
     /// An estimator for a stored network in the fused engine.
     ///
     /// # Errors
-    /// As [`FusedRunner::with_calibration`].
+    /// As for [`FusedRunner::with_calibration`].
     pub fn fused(network: StoredNetwork, precision: Precision) -> Result<Self, Error> {
         let int8 = match precision {
             Precision::Int8 => network.int8.clone()?,
@@ -57,11 +57,11 @@ impl DepthEstimator {
 
     /// An estimator for a stored network; `runner` makes its [`DepthRunner`] from configuration and weights.
     ///
-    /// A network with a canonical focal length runs at the input size that fits an image ([`crate::fitting`]): its weights
-    /// are kept, and `runner` is asked again for each other size.
+    /// A network with a canonical focal length runs at the input size that fits an image ([`crate::fitting`]): its weights are kept, and
+    /// `runner` is called again for each other size.
     ///
     /// # Errors
-    /// The runner's own.
+    /// The runner's error.
     pub fn of<E: Into<EngineProblem>>(
         network: StoredNetwork,
         runner: impl Fn(&TrainConfig, Weights) -> Result<Box<dyn DepthRunner>, E>
@@ -98,11 +98,11 @@ impl DepthEstimator {
         })
     }
 
-    /// An estimator for another thread: it shares the weights, those of input sizes yet to come as well, and has its own buffers. The fused engine's
-    /// weights are shared as they are packed, for the first 24 further input sizes; each session of ONNX Runtime packs its own.
+    /// An estimator for another thread, which shares the weights, including those for input sizes added later, and has its own buffers.
+    /// With the fused engine, the packed weights are shared for the first 24 other input sizes; each session of ONNX Runtime packs its own.
     ///
     /// # Errors
-    /// As [`DepthRunner::another`].
+    /// As for [`DepthRunner::another`].
     pub fn another(&self) -> Result<Self, Error> {
         let others = self.others.as_ref().map(OtherSizes::another);
         Ok(Self {
@@ -114,12 +114,12 @@ impl DepthEstimator {
         })
     }
 
-    /// The runner at the size trained with.
+    /// The runner at the training size.
     pub fn runner(&mut self) -> &mut dyn DepthRunner {
         &mut *self.runner
     }
 
-    /// Consumes the estimator and returns the runner at the size trained with.
+    /// Consumes the estimator and returns the runner at the training size.
     #[must_use]
     pub fn into_runner(self) -> Box<dyn DepthRunner> {
         self.runner
@@ -174,11 +174,11 @@ impl DepthEstimator {
         })
     }
 
-    /// The metric depth of an image. `camera` is the image's own; without it the training camera is assumed, and the
-    /// metric scale is only as good as that guess.
+    /// The metric depth of an image. `camera` is the image's own; without it the training camera is assumed, and the metric scale is only
+    /// as good as that assumption.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn estimate(
         &mut self,
         image: &RgbImage,
@@ -187,10 +187,10 @@ impl DepthEstimator {
         self.predict(image, camera, true, true)
     }
 
-    /// As [`Self::estimate`], with metres at the image's own size written into `depth`.
+    /// Like [`Self::estimate`], but writes the depth in metres, at the image's own size, into `depth`.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn estimate_into(
         &mut self,
         image: &RgbImage,
@@ -201,11 +201,11 @@ impl DepthEstimator {
         Ok(())
     }
 
-    /// As [`Self::estimate`], with the caller's choice of focal correction and of cropping to the aspect ratio trained
-    /// with: [`Preparer::prepare`], then [`Self::infer`].
+    /// Like [`Self::estimate`], but the caller decides about focal correction and about cropping to the training aspect ratio:
+    /// [`Preparer::prepare`], then [`Self::infer`].
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn predict(
         &mut self,
         image: &RgbImage,
@@ -217,20 +217,21 @@ impl DepthEstimator {
         self.infer(&preparer.prepare(image, camera, focal_correction, crop))
     }
 
-    /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Of several views the mean of
-    /// the disparities is taken, at the size of the largest; of ln b as well, where it predicts that, so that it says how sure a single
-    /// prediction is, not how sure their mean.
+    /// Runs the network on an image that [`Self::preparer`] or [`Self::augmented`] prepared, on any thread. Several views yield the mean of
+    /// their disparities, at the size of the largest. The mean of ln b, if the network predicts it, is the uncertainty of a single
+    /// prediction, not of the mean disparity.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn infer(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
         self.mean_over_views(image, |of, view| of.infer_view(view, image.flip))
     }
 
-    /// As [`Self::infer`] of the mirror image alone, mirrored back: beside the image's own prediction pixel by pixel.
+    /// Like [`Self::infer`], but of the mirror image alone, mirrored back, so that it can be compared with the image's own prediction pixel
+    /// by pixel.
     ///
     /// # Errors
-    /// As [`DepthRunner::run`].
+    /// As for [`DepthRunner::run`].
     pub fn infer_mirrored(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
         self.mean_over_views(image, Self::run_mirrored)
     }
@@ -268,7 +269,7 @@ impl DepthEstimator {
         })
     }
 
-    /// What the network predicts of one view, with metres corrected; blended with its mirror image's where `flip` says so.
+    /// The network's prediction of one view, with the focal correction applied; blended with its mirror image's if `flip` is set.
     fn infer_view(&mut self, view: &View, flip: bool) -> Result<NetworkOutput, Error> {
         let mut own = self.run(&view.input, view.size, view.focal_factor)?;
         if flip {
@@ -281,7 +282,7 @@ impl DepthEstimator {
         Ok(own)
     }
 
-    /// What the network predicts of the mirror image of one view, mirrored back, with metres corrected.
+    /// The network's prediction of the mirror image of one view, mirrored back, with the focal correction applied.
     fn run_mirrored(&mut self, view: &View) -> Result<NetworkOutput, Error> {
         let width = view.size.width;
         let mut input = view.input.clone();
@@ -305,7 +306,7 @@ impl DepthEstimator {
         for d in &mut output.disparity {
             *d = (f64::from(*d) / factor) as f32;
         }
-        // As the loss saw it: what lies beyond has never been learned.
+        // Limited as in the loss: training never used values beyond.
         let (low, high) = LOG_SCALE_BOUNDS;
         for log_scale in output.log_scale.iter_mut().flatten() {
             *log_scale = log_scale.clamp(low as f32, high as f32);
@@ -314,7 +315,7 @@ impl DepthEstimator {
     }
 }
 
-/// The mean of a network's predictions at several sizes, at one of them.
+/// The mean of a network's predictions at several sizes, at one of these sizes.
 fn mean_of(mut predictions: Vec<(InputSize, NetworkOutput)>, size: InputSize) -> NetworkOutput {
     if predictions.len() == 1
         && let Some((_, only)) = predictions.pop()

@@ -9,10 +9,10 @@ use deepfusion_model::{Int8Calibration, TrainConfig, depth_graph_with_uncertaint
 use crate::runner::check_image;
 use crate::{DepthRunner, Error, NetworkOutput, RunnerPlan, metric_disparity};
 
-/// The network laid out and packed once for this processor.
+/// A network that was laid out and packed once for this processor.
 ///
-/// In f32 its sigmoid differs from the training framework's by rounding alone (below 1e-4 in the tests); in bf16 by the
-/// rounding of eight bits of mantissa; in int8 by 255 steps of each convolution's input and of each channel's weights.
+/// Its sigmoid differs from the training framework's in f32 only by rounding (below 1e-4 in the tests), in bf16 by the rounding to eight
+/// bits of mantissa, and in int8 by quantisation to 255 steps of each convolution's input and of each channel's weights.
 #[derive(Debug)]
 pub struct FusedRunner {
     engine: Engine,
@@ -22,10 +22,10 @@ pub struct FusedRunner {
 }
 
 impl FusedRunner {
-    /// The network of a configuration with these weights, in f32 or bf16.
+    /// The network with this configuration and these weights, in f32 or bf16.
     ///
     /// # Errors
-    /// As [`Self::with_calibration`].
+    /// As for [`Self::with_calibration`].
     pub fn new(
         config: &TrainConfig,
         weights: Weights,
@@ -34,11 +34,11 @@ impl FusedRunner {
         Self::with_calibration(config, weights, precision, None)
     }
 
-    /// The same in any precision: int8 needs what the network was calibrated to.
+    /// Like [`Self::new`], in any precision: int8 needs a calibration of the network.
     ///
     /// # Errors
-    /// [`Error::Model`] for weights of another network, [`Error::Engine`] where the processor has no bf16 or int8,
-    /// [`Error::NotCalibrated`] for int8 without a calibration.
+    /// [`Error::Model`] for weights of another network, [`Error::Engine`] if the processor lacks bf16 or int8, [`Error::NotCalibrated`] for
+    /// int8 without a calibration.
     pub fn with_calibration(
         config: &TrainConfig,
         weights: Weights,
@@ -47,7 +47,7 @@ impl FusedRunner {
     ) -> Result<Self, Error> {
         let mut graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
         if precision == Precision::Int8 {
-            // Calibration would help nobody whose processor cannot.
+            // Checked first: a calibration does not help if the processor lacks int8.
             Self::check_int8()?;
             let set = graph.set_input_ranges(&int8.ok_or(Error::NotCalibrated)?.ranges);
             set.map_err(|e| Error::engine("fused-int8", e))?;
@@ -61,10 +61,10 @@ impl FusedRunner {
         })
     }
 
-    /// That this processor computes in int8.
+    /// Checks that this processor can compute in int8.
     ///
     /// # Errors
-    /// [`Error::Engine`] where it does not.
+    /// [`Error::Engine`] if it cannot.
     pub fn check_int8() -> Result<(), Error> {
         if Engine::has_int8() {
             return Ok(());
@@ -72,7 +72,7 @@ impl FusedRunner {
         Err(Error::engine("fused-int8", deepfusion_infer::Error::NoInt8))
     }
 
-    /// The names of the network's convolutions that int8 computes.
+    /// Names of the network's convolutions that are computed in int8.
     ///
     /// # Errors
     /// [`Error::Model`] for weights of another network.
@@ -81,13 +81,13 @@ impl FusedRunner {
         Ok(graph.computed_in_int8().map(str::to_owned).collect())
     }
 
-    /// Runs the network on an image and counts the values that its convolutions read, for int8.
+    /// Runs the network on an image and collects the distribution of its convolutions' input values, for int8.
     ///
     /// # Errors
     /// [`Error::ImageSize`].
     ///
     /// # Shapes
-    /// - `image`: as of [`DepthRunner::run`]
+    /// - `image`: as in [`DepthRunner::run`]
     pub fn observe(&mut self, image: &[f32], seen: &mut SeenInputs) -> Result<(), Error> {
         check_image(image, self.values())?;
         self.engine.observe(image, seen);

@@ -13,20 +13,19 @@ use crate::{DepthRunner, Error, NetworkOutput, RunnerPlan};
 #[derive(Debug)]
 pub struct OrtRunner {
     engine: OrtEngine,
-    /// The serialised model, for further sessions.
+    /// The serialised model, for more sessions.
     model: Arc<[u8]>,
     library: Option<PathBuf>,
     pixels: usize,
-    /// The image as model input: H×W×3 bytes.
+    /// The image as the model's input: H×W×3 bytes.
     rgb: Vec<u8>,
 }
 
 impl OrtRunner {
-    /// The network of a configuration with these weights, in an ONNX Runtime library: the given one, or the one found on this
-    /// system.
+    /// The network with this configuration and these weights, in an ONNX Runtime library: the given one, or the one found on this system.
     ///
     /// # Errors
-    /// [`Error::Model`] for weights of another network; [`Error::Onnx`] if there is no library, or it refuses the model.
+    /// [`Error::Model`] for weights of another network; [`Error::Onnx`] if there is no library, or it rejects the model.
     pub fn new(
         library: Option<&Path>,
         config: &TrainConfig,
@@ -60,7 +59,7 @@ impl DepthRunner for OrtRunner {
         "ort"
     }
 
-    /// An exported model outputs depth alone.
+    /// An exported model outputs only the depth.
     fn predicts_uncertainty(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! Runners for input sizes other than the one that a network was trained at.
+//! Runners for input sizes other than the training size.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -7,11 +7,11 @@ use deepfusion_model::InputSize;
 
 use crate::{DepthRunner, Error, RunnerPlan};
 
-/// Number of other input sizes for which an estimator keeps runners; each camera needs one, or as many as [`crate::Augmentation::scales`].
+/// Number of other input sizes for which an estimator keeps runners. Each camera needs one, or as many as [`crate::Augmentation::scales`].
 const SIZES_KEPT: usize = 6;
 
-/// Number of other input sizes for which what is packed is shared. More than an estimator keeps, as these places are never emptied: four times
-/// [`SIZES_KEPT`] is four cameras at six scales.
+/// Number of other input sizes for which packed weights are shared. It is larger than what an estimator keeps, because these entries are
+/// never removed: four times [`SIZES_KEPT`] is enough for four cameras at six scales.
 const SIZES_SHARED: usize = 24;
 
 /// Runners for other input sizes, made on demand.
@@ -21,14 +21,14 @@ pub(crate) struct OtherSizes {
     made: Vec<(InputSize, Box<dyn DepthRunner>)>,
 }
 
-/// What an estimator and its like on other threads share.
+/// What estimators of one network share among threads.
 struct SharedSizes {
     make: Box<MakeRunner>,
-    /// The first sizes that were asked for. Places are taken in their order and never emptied, so that nobody waits to read them.
+    /// The first sizes that were requested. Entries are added in order and never removed, so that reading needs no lock.
     packed: [OnceLock<PackedSize>; SIZES_SHARED],
 }
 
-/// What is packed for a size. (Of ONNX Runtime's that is the model's bytes alone.)
+/// Packed weights for one size. (ONNX Runtime shares only the model's bytes.)
 type PackedSize = (InputSize, Arc<dyn RunnerPlan>);
 
 type MakeRunner = dyn Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync;
@@ -40,7 +40,7 @@ impl fmt::Debug for OtherSizes {
 }
 
 impl OtherSizes {
-    /// None yet; `make` makes one of a size that nobody has packed.
+    /// No runners yet; `make` creates one for a size for which nothing is packed.
     pub(crate) fn new(
         make: impl Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync + 'static,
     ) -> Self {
@@ -53,10 +53,10 @@ impl OtherSizes {
         }
     }
 
-    /// The same for another thread.
+    /// The same sizes for another thread.
     ///
     /// # Errors
-    /// As [`DepthRunner::another`].
+    /// As for [`DepthRunner::another`].
     pub(crate) fn another(&self) -> Result<Self, Error> {
         let made = self.made.iter();
         let made = made.map(|(size, runner)| Ok((*size, runner.another()?)));
@@ -69,7 +69,7 @@ impl OtherSizes {
     /// The runner for a size.
     ///
     /// # Errors
-    /// Those of making it.
+    /// The error of creating the runner.
     pub(crate) fn runner(&mut self, size: InputSize) -> Result<&mut dyn DepthRunner, Error> {
         let found = match self.made.iter().position(|(of, _)| *of == size) {
             Some(place) => self.made.remove(place),
@@ -90,8 +90,8 @@ impl SharedSizes {
         if let Some((_, plan)) = packed.find(|(of, _)| *of == size) {
             return plan.runner();
         }
-        // Nobody waits while a size is packed: that is parallel work, and a thread that waits for its own may take up another
-        // estimator's task, which would wait for this one. Two threads may so pack a size at once: the first one's is kept by both.
+        // No thread waits while a size is packed. Packing is parallel work: a thread that waits for its own part may take up a task of
+        // another estimator, which would wait for this one. So two threads may pack the same size at once; both then keep the first result.
         let runner = (self.make)(size)?;
         match self.publish(size, runner.plan()) {
             Some(first) => {
@@ -102,7 +102,7 @@ impl SharedSizes {
         }
     }
 
-    /// Shares what was packed for a size, if there is a place left. Returns what another thread has packed for it meanwhile.
+    /// Shares what was packed for a size if there is a free entry. Returns what another thread has packed in the meantime, if so.
     fn publish(&self, size: InputSize, plan: Arc<dyn RunnerPlan>) -> Option<&dyn RunnerPlan> {
         let mut ours = (size, plan);
         for place in &self.packed {
@@ -126,7 +126,7 @@ mod tests {
     use crate::NetworkOutput;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// A runner without a network, and its own plan.
+    /// A runner without a network, with itself as its packed form.
     #[derive(Debug, Clone, Copy)]
     struct Idle;
 
@@ -171,12 +171,12 @@ mod tests {
             first.runner(size(number)).unwrap();
         }
         assert_eq!(packed.load(Ordering::Relaxed), sizes);
-        // Beyond, each thread packs for itself, and keeps what it used last.
+        // Beyond that number, each thread packs its own and keeps the most recently used.
         for number in (0..sizes).chain(SIZES_SHARED..sizes) {
             second.runner(size(number)).unwrap();
         }
         assert_eq!(packed.load(Ordering::Relaxed), sizes + 2);
-        // The first went from the list of the first thread, not from what is shared.
+        // The first size was dropped from the first thread's own list, but not from the shared entries.
         first.runner(size(0)).unwrap();
         assert_eq!(packed.load(Ordering::Relaxed), sizes + 2);
     }

@@ -5,9 +5,9 @@ use crate::resample::Resample;
 /// The metric depth of an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Metric disparity, 1/m, at network size (the largest of several), row by row; focal correction applied.
+    /// Metric disparity in 1/m at the network's size (the largest of several), row by row; focal correction applied.
     pub disparity: Vec<f32>,
-    /// ln b at network size, b the Laplace scale of the error of ln depth; `None` if the network does not predict it.
+    /// ln b at the network's size, with b the Laplace scale of the error of ln depth; `None` if the network does not predict it.
     pub log_scale: Option<Vec<f32>>,
     /// Width of `disparity`.
     pub width: usize,
@@ -17,7 +17,7 @@ pub struct Prediction {
     pub window: [u32; 4],
     /// Size of the whole image.
     pub image_size: [u32; 2],
-    /// Factor applied to depth because the focal length differs from the one trained with; of several predictions that of the largest.
+    /// Factor applied to depth because the focal length differs from that in training; of several predictions, the factor of the largest.
     pub focal_factor: f64,
 }
 
@@ -30,7 +30,7 @@ impl Prediction {
         }
     }
 
-    /// Depth at the network's size, and the camera at that size; `camera` is the whole image's.
+    /// Depth at the network's size, and the camera at that size; `camera` is that of the whole image.
     #[must_use]
     pub fn network_depth(&self, camera: &Intrinsics) -> (DepthMap, Intrinsics) {
         let [x, y, w, h] = self.window;
@@ -52,7 +52,7 @@ impl Prediction {
         depth
     }
 
-    /// As [`Self::depth`], written into `depth`, which is resized.
+    /// Like [`Self::depth`], but written into `depth`, which is resized.
     pub fn depth_into(&self, depth: &mut DepthMap) {
         self.enlarge(&self.disparity, |disparity| 1.0 / disparity, depth);
     }
@@ -64,7 +64,7 @@ impl Prediction {
         self.sigma_of(&self.depth())
     }
 
-    /// As [`Self::sigma`], from the result of [`Self::depth`].
+    /// Like [`Self::sigma`], but from the result of [`Self::depth`].
     #[must_use]
     pub fn sigma_of(&self, depth: &DepthMap) -> Option<DepthMap> {
         let relative = |log_scale: f32| std::f32::consts::SQRT_2 * log_scale.exp();
@@ -85,9 +85,9 @@ impl Prediction {
         Some(Self::confidence_of(&depth, &sigma))
     }
 
-    /// How far each pixel of a depth can be trusted, 0 to 1, by its standard deviation `sigma`: exp(−b), where b = sigma/(√2·depth) is
-    /// the error of ln depth that is to be expected (the Laplace scale). 0.9 stands for a depth that is expected to be 10 % off; 0 where
-    /// there is none.
+    /// How far each pixel of a depth can be trusted, 0 to 1, from its standard deviation `sigma`: exp(−b), where b = sigma/(√2·depth) is
+    /// the expected error of ln depth (the Laplace scale). 0.9 means that the depth is expected to be 10 % off; 0 means that there is no
+    /// depth.
     #[must_use]
     pub fn confidence_of(depth: &DepthMap, sigma: &DepthMap) -> DepthMap {
         let of = |(sigma, depth): (&f32, &f32)| {

@@ -4,15 +4,15 @@ use deepfusion_model::InputSize;
 
 use crate::Augmentation;
 
-/// The shortest side of an input, but for networks trained with a shorter one: 64 pixels are two cells of the deepest features, and `tiny`,
-/// shrunk to them, saw everything four times too far.
+/// The shortest side of an input, unless the network was trained with a shorter one. 64 pixels are two cells of the deepest features;
+/// shrunk to that, `tiny` predicted depths four times too large.
 const SHORTEST_SIDE: usize = 96;
 
 /// Relative difference up to which two aspect ratios count as equal.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// Turns images into a network's input. It knows the network's size and camera but not the network, so that
-/// any thread can prepare images while another one computes.
+/// Turns images into a network's input. It knows the network's size and camera but not the network, so any thread can prepare images while
+/// another one computes.
 #[derive(Debug, Clone, Copy)]
 pub struct Preparer {
     /// Size of the network's input in training.
@@ -21,16 +21,16 @@ pub struct Preparer {
     pub training_camera: Option<Intrinsics>,
     /// The canonical focal length in pixels, for a network trained with many cameras.
     pub canonical_focal_px: Option<f64>,
-    /// Of which predictions of an image its depth is the mean.
+    /// The predictions of an image whose mean is its depth.
     pub augmentation: Augmentation,
 }
 
 /// An image as network input.
 #[derive(Debug, Clone)]
 pub struct PreparedImage {
-    /// One for each input size; at least one.
+    /// One view for each input size; at least one.
     pub views: Vec<View>,
-    /// Whether the mirror image of each is predicted, too.
+    /// Whether each view's mirror image is predicted, too.
     pub flip: bool,
     /// The part of the image that the network sees: x, y, width, height.
     pub window: [u32; 4],
@@ -39,7 +39,7 @@ pub struct PreparedImage {
 }
 
 impl PreparedImage {
-    /// The view at the largest input size; `None` where there is no view at all.
+    /// The view at the largest input size; `None` if there are no views.
     #[must_use]
     pub fn largest(&self) -> Option<&View> {
         let pixels = |view: &&View| view.size.width * view.size.height;
@@ -54,13 +54,13 @@ pub struct View {
     pub input: Vec<f32>,
     /// The network's input size.
     pub size: InputSize,
-    /// Factor to be applied to depth because the focal length differs from the one trained with.
+    /// Factor to be applied to depth because the focal length differs from that in training.
     pub focal_factor: f64,
 }
 
 impl Preparer {
-    /// Resizes an image. With its camera, depth will be corrected for a focal length other than the one trained with,
-    /// unless `focal_correction` is off.
+    /// Resizes an image. With its camera, depth will be corrected for a focal length other than that in training, unless `focal_correction`
+    /// is off.
     ///
     /// A network with a canonical focal length was trained with many cameras: it sees the whole image, at the input size that
     /// fits the image's aspect ratio ([`fitting`]). For other networks, an image of a different aspect ratio is cropped about
@@ -85,7 +85,7 @@ impl Preparer {
                 Some(_) => fitting_scaled(self.size, width, height, *scale),
                 None => self.size,
             };
-            // Of a narrow image two scales may fit the same size: nothing new to see.
+            // Two scales of a narrow image may fit the same size, which would repeat the prediction.
             if !sizes.contains(&size) {
                 sizes.push(size);
             }
@@ -117,13 +117,13 @@ impl Preparer {
                 _ => 1.0,
             };
         };
-        // The one trained with, of as many degrees from left to right.
+        // The training camera, for an image with the same horizontal field of view.
         let assumed = train.map(|fy| fy * size.width as f64 / self.size.width as f64);
         test.or(assumed).map_or(1.0, |test| test / canonical)
     }
 
-    /// The part of the image with the aspect ratio trained with: the whole image if they agree, else
-    /// cropped about the principal point.
+    /// The part of the image with the training aspect ratio: the whole image if its ratio is the same, else cropped about the principal
+    /// point.
     fn window(&self, image: &RgbImage, camera: Option<&Intrinsics>, crop: bool) -> [u32; 4] {
         let (width, height) = image.dimensions();
         let whole = [0, 0, width, height];
@@ -141,7 +141,7 @@ impl Preparer {
             (start.clamp(0.0, f64::from(size - keep)) as u32, keep)
         };
         if aspect < wanted {
-            // Too tall: the principal row keeps its place in the image.
+            // Too tall: the principal row keeps its relative position in the image.
             let centre = camera.map_or(f64::from(height) / 2.0, |k| k.cy);
             let share = train.cy / f64::from(train.height);
             let (y, h) = cut(height, f64::from(width) / wanted, centre, share);
@@ -155,14 +155,14 @@ impl Preparer {
     }
 }
 
-/// The input size for an image, of a network trained with many cameras: of all sizes that the encoder accepts, the one
-/// that stretches the image least and has about as many pixels as `trained`; `trained` itself if it fits.
+/// The input size for an image, for a network trained with many cameras. It has about as many pixels as `trained` and stretches the image
+/// least, of all sizes that the encoder accepts; it is `trained` itself if that fits.
 #[must_use]
 pub fn fitting(trained: InputSize, width: u32, height: u32) -> InputSize {
     fitting_scaled(trained, width, height, 1.0)
 }
 
-/// As [`fitting`], of images `scale` times as wide and high.
+/// Like [`fitting`], for images `scale` times as wide and high.
 fn fitting_scaled(trained: InputSize, width: u32, height: u32, scale: f64) -> InputSize {
     let aspect = f64::from(width) / f64::from(height);
     let pixels = |size: InputSize| (size.width * size.height) as f64;
@@ -203,7 +203,7 @@ mod tests {
         ] {
             assert_eq!(fitting(trained, image.0, image.1), expected, "{image:?}");
         }
-        // As docs/guides/export-to-onnx.md lists them.
+        // The sizes listed in docs/guides/export-to-onnx.md.
         for (image, larger, smaller) in [
             ((1242, 375), (640, 192), (320, 96)),
             ((1000, 500), (512, 256), (256, 128)),
@@ -224,11 +224,11 @@ mod tests {
             [size(512, 160), size(640, 192), size(736, 224)]
         );
         let of_a_small = |scale| fitting_scaled(size(320, 96), 1242, 375, scale);
-        // No side is shorter than 96: there is no smaller input than its own.
+        // No side is shorter than 96, so there is no input smaller than the training size.
         assert_eq!([0.8, 1.2].map(of_a_small), [size(320, 96), size(416, 128)]);
     }
 
-    /// A narrow image fits one size alone at every scale: one prediction is as good as several.
+    /// Only one size fits a narrow image at every scale, so there is one prediction.
     #[test]
     fn equal_sizes_are_looked_at_once() {
         let preparer = Preparer {
@@ -242,7 +242,7 @@ mod tests {
         assert_eq!(sizes, [size(96, 384)]);
     }
 
-    /// At every size the factor is that size's own.
+    /// Each size has its own factor.
     #[test]
     fn an_image_is_prepared_at_each_scale() {
         let preparer = Preparer {
@@ -263,7 +263,7 @@ mod tests {
         }
     }
 
-    /// A wall 10 m away is 10 m away, whatever the lens and the picture's shape: the factor is the focal length at the
+    /// A wall 10 m away is predicted 10 m away, whatever the lens and the picture's shape: the factor is the ratio of focal lengths at the
     /// size that the network sees.
     #[test]
     fn the_factor_is_that_of_the_fitted_size() {
@@ -304,7 +304,7 @@ mod tests {
         assert!((factor(&unknown) - 230.4 * 0.6 / 185.0).abs() < 1e-9);
         let uncorrected = preparer.prepare(&image, Some(&camera), false, true);
         assert_eq!(factor(&uncorrected), factor(&unknown));
-        // A network of one camera cuts.
+        // A network of one camera crops.
         let own = Preparer {
             canonical_focal_px: None,
             ..preparer

@@ -1,6 +1,6 @@
-//! A map at another size: bilinear, half-pixel centres.
+//! A map resampled to another size: bilinear, half-pixel centres.
 
-/// From one size to another.
+/// Resamples from one size to another.
 pub(crate) struct Resample {
     columns: Vec<Taps>,
     width: usize,
@@ -8,11 +8,11 @@ pub(crate) struct Resample {
     to_height: usize,
 }
 
-/// Two neighbours, and how far from the first to the second.
+/// Indices of two neighbours, and the position between them, 0 to 1.
 type Taps = (usize, usize, f32);
 
 impl Resample {
-    /// From `width` by `height` to another width and height.
+    /// From `width` × `height` to another width and height.
     pub(crate) fn new((width, height): (usize, usize), to: (usize, usize)) -> Self {
         Self {
             columns: (0..to.0).map(|x| taps(x, to.0, width)).collect(),
@@ -22,7 +22,7 @@ impl Resample {
         }
     }
 
-    /// Row `y` of the resampled map, with `of` applied to each value, into `row`.
+    /// Writes row `y` of the resampled map into `row`, with `of` applied to each value.
     pub(crate) fn row(&self, values: &[f32], y: usize, of: impl Fn(f32) -> f32, row: &mut [f32]) {
         let (top, bottom, fy) = taps(y, self.to_height, self.height);
         let (top, bottom) = (top * self.width, bottom * self.width);
@@ -34,7 +34,7 @@ impl Resample {
         }
     }
 
-    /// The whole map.
+    /// The whole resampled map.
     pub(crate) fn map(&self, values: &[f32]) -> Vec<f32> {
         let width = self.columns.len();
         let mut map = vec![0.0; width * self.to_height];

@@ -1,4 +1,4 @@
-//! The interface to what runs a trained depth network: the fused engine, ONNX Runtime, Burn.
+//! The interface of the engines that run a trained depth network: the fused engine, ONNX Runtime, Burn.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ pub trait DepthRunner: Debug + Send + Sync {
     /// [`Error::ImageSize`] for an image of another size; [`Error::Engine`] or [`Error::Onnx`] if the network fails to run.
     fn run(&mut self, image: &[f32], output: &mut NetworkOutput) -> Result<(), Error>;
 
-    /// What it shares with its like: the weights, which the fused engine has packed, without its buffers.
+    /// What it shares with runners on other threads: the weights as packed by the fused engine, without its buffers.
     fn plan(&self) -> Arc<dyn RunnerPlan>;
 
     /// A second runner on the same weights, with its own buffers.
@@ -33,22 +33,22 @@ pub trait DepthRunner: Debug + Send + Sync {
         self.plan().runner()
     }
 
-    /// Metric disparity alone, as [`Self::run`] gives it.
+    /// Like [`Self::run`], but returns only the metric disparity.
     ///
     /// # Errors
-    /// As [`Self::run`].
+    /// As for [`Self::run`].
     fn disparity(&mut self, image: &[f32]) -> Result<Vec<f32>, Error> {
         let mut output = NetworkOutput::default();
         self.run(image, &mut output)?;
         Ok(output.disparity)
     }
 
-    /// Whether [`NetworkOutput::log_scale`] is set for a network with an uncertainty head.
+    /// Whether it sets [`NetworkOutput::log_scale`] for a network with an uncertainty head.
     fn predicts_uncertainty(&self) -> bool {
         true
     }
 
-    /// The most memory that it has held on a GPU, in bytes; `None` on a processor, or where the GPU's allocator does not say.
+    /// Peak of the GPU memory it has used, in bytes; `None` on a processor, or if the GPU's allocator does not report it.
     fn peak_device_bytes(&self) -> Option<u64> {
         None
     }
@@ -60,7 +60,7 @@ pub trait DepthRunner: Debug + Send + Sync {
     }
 }
 
-/// A network packed for one input size, from which any thread makes runners of its own.
+/// A network packed for one input size, from which any thread can create its own runner.
 pub trait RunnerPlan: Debug + Send + Sync {
     /// A runner with its own buffers.
     ///
@@ -74,16 +74,16 @@ pub trait RunnerPlan: Debug + Send + Sync {
 pub struct NetworkOutput {
     /// Metric disparity, 1/m, H×W.
     pub disparity: Vec<f32>,
-    /// ln b, H×W, b the Laplace scale of the error of ln depth; `None` if the network or its runner does not predict it.
+    /// ln b, H×W, with b the Laplace scale of the error of ln depth; `None` if the network or its runner does not predict it.
     pub log_scale: Option<Vec<f32>>,
 }
 
-/// A map over the image, as coarse as the layer it comes from.
+/// A map over the image, at the resolution of the layer it comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeatureMap {
-    /// Width, in pixels.
+    /// Width in pixels of the map.
     pub width: usize,
-    /// Height, in pixels.
+    /// Height in pixels of the map.
     pub height: usize,
     /// H×W, row by row.
     pub values: Vec<f32>,
@@ -94,9 +94,9 @@ pub struct FeatureMap {
 pub struct LayerMaps {
     /// Mean magnitude of the encoder's feature over its channels.
     pub feature: FeatureMap,
-    /// The same for what the decoder reads, if context or attention change it.
+    /// The same for the feature that the decoder reads, if context or attention change it.
     pub refined: Option<FeatureMap>,
-    /// The spatial mask and the least and greatest value of the channel mask, where there is attention.
+    /// The spatial mask, and the smallest and largest value of the channel mask, if there is attention.
     pub attention: Option<(FeatureMap, [f32; 2])>,
 }
 

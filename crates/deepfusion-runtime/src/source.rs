@@ -9,21 +9,21 @@ use deepfusion_weights::{Card, DEFAULT, Shipped};
 
 use crate::Error;
 
-/// Where a trained depth network comes from.
+/// The origin of a trained depth network.
 #[derive(Debug)]
 pub enum ModelSource {
     /// A run's folder, or a checkpoint in it.
     Run {
-        /// As it was given.
+        /// The path as given.
         given: PathBuf,
-        /// The folder.
+        /// The run's folder.
         folder: RunFolder,
         /// The checkpoint: the given one, or the folder's default.
         kind: CheckpointKind,
     },
     /// A network without a run: an embedded one by its name, or a packed file with its card beside it.
     Packed {
-        /// As it was given.
+        /// The path or name as given.
         given: PathBuf,
         /// The network.
         network: Box<Shipped>,
@@ -34,7 +34,7 @@ impl ModelSource {
     /// The default embedded network; `None` if this build has none.
     ///
     /// # Errors
-    /// As [`deepfusion_weights::find`], for a network that exists.
+    /// As for [`deepfusion_weights::find`], for a network that exists.
     pub fn embedded_default() -> Result<Option<Self>, Error> {
         let network = embedded(Path::new(DEFAULT))?;
         Ok(network.map(|network| Self::Packed {
@@ -43,11 +43,11 @@ impl ModelSource {
         }))
     }
 
-    /// Resolves a path or a name: a run or file that is there comes first, then an embedded network's name ([`hidden_by_run`] says where
-    /// both could be meant). A folder of images that has an embedded network's name does not stand in its way.
+    /// Resolves a path or a name. An existing run or file takes precedence over an embedded network of that name ([`hidden_by_run`] reports
+    /// if both exist). A folder of images that has an embedded network's name is ignored.
     ///
     /// # Errors
-    /// [`Error::NoSuchModel`] for neither; [`RunFolder::open`]'s and [`Shipped::read`]'s for a path that holds no network.
+    /// [`Error::NoSuchModel`] for neither; the errors of [`RunFolder::open`] and [`Shipped::read`] for a path without a network.
     pub fn named(model: &Path) -> Result<Self, Error> {
         let given = model.to_owned();
         if Shipped::is_at(model) {
@@ -57,7 +57,7 @@ impl ModelSource {
         if let Some(network) = embedded_unless_run(model)? {
             return Ok(Self::Packed { given, network });
         }
-        // A checkpoint that is named and not there is reported as one: its folder may be a run.
+        // A missing checkpoint is reported as such: its folder may be a run.
         if !model.exists() && !names_a_checkpoint(model) {
             return Err(Error::NoSuchModel {
                 model: given,
@@ -90,10 +90,10 @@ impl ModelSource {
         }
     }
 
-    /// Loads configuration and weights; `set` names one of the data sets it learned from, if there are several.
+    /// Loads configuration and weights; `set` names one of the data sets it was trained on, if there are several.
     ///
     /// # Errors
-    /// As [`StoredNetwork::of_checkpoint`] and [`StoredNetwork::packed`].
+    /// As for [`StoredNetwork::of_checkpoint`] and [`StoredNetwork::packed`].
     pub fn load(&self, set: Option<&str>) -> Result<StoredNetwork, deepfusion_model::Error> {
         match self {
             Self::Run { folder, kind, .. } => StoredNetwork::of_checkpoint(folder, *kind, set),
@@ -101,7 +101,7 @@ impl ModelSource {
         }
     }
 
-    /// What it was calibrated to for int8; `None` where it was not, or where that cannot be read.
+    /// Its calibration for int8; `None` if it is not calibrated, or the calibration cannot be read.
     #[must_use]
     pub fn int8(&self) -> Option<Int8Calibration> {
         match self {
@@ -116,11 +116,11 @@ impl ModelSource {
         }
     }
 
-    /// The camera that recordings without one are taken to have: the one a run assumed or learned for such recordings. `None` where all that
-    /// it learned from said theirs. `set` as in [`Self::load`].
+    /// The camera to assume for recordings without one: the camera that the run assumed or learned for such recordings. `None` if all its
+    /// recordings stated theirs. `set` as in [`Self::load`].
     ///
     /// # Errors
-    /// As [`RunFolder::read_config`] and [`RunFolder::read_state`], [`deepfusion_model::Error::ConfigFile`].
+    /// As for [`RunFolder::read_config`] and [`RunFolder::read_state`], [`deepfusion_model::Error::ConfigFile`].
     pub fn assumed_camera(
         &self,
         set: Option<&str>,
@@ -130,7 +130,7 @@ impl ModelSource {
                 let config = folder.read_config()?;
                 match (config.assumed_camera, config.learned_camera()) {
                     (None, _) => Ok(None),
-                    // Held, whatever other recordings' cameras were.
+                    // Fixed to this one, whatever the cameras of other recordings were.
                     (Some(held), None) => Ok(Some(held.intrinsics())),
                     (Some(_), Some(_)) => folder.camera_of(&folder.read_state(*kind)?, set),
                 }
@@ -160,20 +160,20 @@ impl ModelSource {
     }
 }
 
-/// The embedded network whose name `model` is; `None` if there is none.
+/// The embedded network named `model`; `None` if there is none.
 ///
 /// # Errors
-/// As [`deepfusion_weights::find`], for a network that exists.
+/// As for [`deepfusion_weights::find`], for a network that exists.
 pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
     let name = deepfusion_weights::names().find(|name| Path::new(name) == model);
     let network = name.map(deepfusion_weights::find).transpose()?;
     Ok(network.map(Box::new))
 }
 
-/// As [`embedded`], unless a run of that name is there, or what is left of one.
+/// Like [`embedded`], but `None` if a folder of that name contains a run or the remains of one.
 ///
 /// # Errors
-/// As [`embedded`].
+/// As for [`embedded`].
 pub fn embedded_unless_run(
     model: &Path,
 ) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
@@ -183,17 +183,17 @@ pub fn embedded_unless_run(
     embedded(model)
 }
 
-/// Whether a folder holds a run, or what is left of one.
+/// Whether a folder contains a run, or the remains of one.
 fn holds_a_run(folder: &Path) -> bool {
     let of_a_run = |path: &Path| path.ends_with("config.toml") || names_a_checkpoint(path);
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     entries.flatten().any(|entry| of_a_run(&entry.path()))
 }
 
-/// An embedded network whose name means a run's folder here.
+/// An embedded network whose name is also that of a run's folder here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HiddenByRun {
-    /// The name of both.
+    /// The name that both have.
     pub name: &'static str,
 }
 
@@ -202,16 +202,16 @@ impl fmt::Display for HiddenByRun {
         let name = self.name;
         write!(
             f,
-            "`{name}` is taken for the run in the folder of that name, not for the embedded network: ./{name} means the run in any case; \
-             for the embedded one work in another folder, or rename the run's"
+            "`{name}` is used as the run in that folder, not as the embedded network: write ./{name} to make that clear, \
+             or rename the folder to use the embedded network"
         )
     }
 }
 
-/// The embedded network that could be meant where [`ModelSource::named`] takes a run; `None` where a path says which.
+/// The embedded network of the same name, if [`ModelSource::named`] takes a run instead; `None` if `model` is clearly a path.
 #[must_use]
 pub fn hidden_by_run(model: &Path) -> Option<HiddenByRun> {
-    // Not as paths, of which `street/` is equal to `street`: no name ends so.
+    // Compared as text, not as paths, in which `street/` equals `street`.
     let name = deepfusion_weights::names().find(|name| model.as_os_str() == *name)?;
     holds_a_run(model).then_some(HiddenByRun { name })
 }
@@ -225,7 +225,7 @@ pub fn embedded_names() -> Vec<&'static str> {
 /// A packed network's configuration and weights; `set` as in [`ModelSource::load`].
 ///
 /// # Errors
-/// As [`StoredNetwork::packed`].
+/// As for [`StoredNetwork::packed`].
 pub fn unpacked(
     network: &Shipped,
     set: Option<&str>,

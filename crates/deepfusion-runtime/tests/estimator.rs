@@ -1,4 +1,4 @@
-//! Estimators of one network, on one thread and on many.
+//! Tests estimators of one network, on one thread and on several.
 
 use std::error::Error;
 use std::path::Path;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
 
-/// A picture with something in it.
+/// A picture with some texture.
 fn picture(width: u32, height: u32, seed: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| {
         let wave = |k: u32| ((x * k + y * 3 + seed * 17) % 251) as u8;
@@ -35,19 +35,19 @@ fn tiny() -> Result<DepthEstimator> {
 #[test]
 fn another_estimator_gives_the_same_bits() -> Result {
     let mut first = tiny()?;
-    // Its own size, and one that is made when it is asked for.
+    // Its own size, and one for which a runner is made on demand.
     for (width, height) in [(640, 192), (320, 240)] {
         let (image, k) = (picture(width, height, 1), camera(width, height));
         let expected = first.estimate(&image, Some(&k))?;
         let mut second = first.another()?;
-        // What it saw before leaves no trace.
+        // The images it saw before have no effect.
         second.estimate(&picture(width, height, 9), Some(&k))?;
         assert_eq!(second.estimate(&image, Some(&k))?, expected);
     }
     Ok(())
 }
 
-/// A size that only the second estimator has seen is there for the first, too: packing is what takes time and memory.
+/// A size that only the second estimator has used is available to the first, too: packing takes time and memory.
 #[test]
 fn estimators_share_what_is_packed_for_each_size() -> Result {
     let packed = Arc::new(AtomicUsize::new(0));
@@ -63,12 +63,12 @@ fn estimators_share_what_is_packed_for_each_size() -> Result {
     let expected = second.estimate(&image, Some(&k))?;
     assert_eq!(first.estimate(&image, Some(&k))?, expected);
     assert_eq!(first.another()?.estimate(&image, Some(&k))?, expected);
-    // Its own size, and that of the image.
+    // The training size, and the size that fits the image.
     assert_eq!(packed.load(Ordering::Relaxed), 2);
     Ok(())
 }
 
-/// Both pack it, neither waits for the other, and both go on with what was there first.
+/// Both threads pack the size, neither waits for the other, and both then use the first result.
 #[test]
 fn a_size_may_come_to_two_threads_at_once() -> Result {
     let network = ModelSource::named("tiny".as_ref())?.load(None)?;
@@ -88,13 +88,13 @@ fn a_size_may_come_to_two_threads_at_once() -> Result {
     });
     let other = other.map_err(|_| "the other thread panicked")?;
     assert_eq!(one?, other?);
-    // A third one packs nothing more: alone at the barrier it would wait for ever.
+    // A third estimator packs nothing: alone at the barrier it would wait forever.
     first.another()?.estimate(&image, Some(&k))?;
     Ok(())
 }
 
-/// Each task of a pool has an estimator of its own, whose work goes to the same pool. With one estimator behind a lock, a
-/// thread that waits for its own parallel work takes another task, which waits for the lock: for ever.
+/// Each task of a pool has its own estimator, whose work goes to the same pool. With one estimator behind a lock, a thread that waits for
+/// its own parallel work could take another task, which would wait for the lock forever.
 #[test]
 fn tasks_of_a_pool_may_all_predict() -> Result {
     let first = tiny()?;
@@ -199,14 +199,14 @@ fn several_looks_give_their_mean() -> Result {
         [(160, 128), (256, 192), (256, 192)]
     );
     assert_eq!(both.focal_factor, large.focal_factor);
-    // Metric disparity at the image's size: enlarging is linear, so that the order of means does not matter inside.
+    // Metric disparity at the image's size: enlarging is linear, so inside the image the order of means does not matter.
     let inverse = |of: &Prediction| of.depth().data.iter().map(|d| 1.0 / d).collect::<Vec<_>>();
     let [small, large, both] = [&small, &large, &both].map(inverse);
     let mut farthest = 0.0_f32;
     for ((a, b), mean) in small.iter().zip(&large).zip(&both) {
         farthest = farthest.max(((a + b) / 2.0 / mean - 1.0).abs());
     }
-    // What resampling twice takes from edges.
+    // The effect of resampling edges twice.
     assert!(farthest < 0.2, "{farthest}");
     let mean = |of: &[f32]| of.iter().sum::<f32>() / of.len() as f32;
     let ratio = (mean(&small) + mean(&large)) / 2.0 / mean(&both);
@@ -215,7 +215,7 @@ fn several_looks_give_their_mean() -> Result {
     Ok(())
 }
 
-/// With the mirrored image among the predictions, a mirrored image gives the mirrored depth.
+/// With the mirrored image among the predictions, the depth of a mirrored image is the mirrored depth.
 #[test]
 fn a_mirrored_image_is_seen_mirrored() -> Result {
     let mut estimator = DepthEstimator::load("street")?;
@@ -247,7 +247,7 @@ fn a_mirrored_image_is_seen_mirrored() -> Result {
     Ok(())
 }
 
-/// As of the mirrored picture, but for what resizing rounds.
+/// Equal to the prediction of the mirrored picture, up to rounding when resizing.
 #[test]
 fn a_mirrored_prediction_lies_beside_the_images_own() -> Result {
     let mut estimator = DepthEstimator::load("street")?;

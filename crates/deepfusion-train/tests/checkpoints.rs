@@ -142,7 +142,7 @@ fn imported_encoders_start_a_network_with_other_parts() {
     let error = StoredNetwork::of_run(folder.path(), None).unwrap_err();
     assert!(matches!(error, ModelError::EncodersOnly { .. }), "{error}");
     let error = PosePredictor::load(folder.path(), None, &device).unwrap_err();
-    assert!(error.to_string().contains("only its encoder"), "{error}");
+    assert!(error.to_string().contains("only the encoder"), "{error}");
 
     let paper = narrow(Preset::Paper.config());
     assert!(paper.depth_net.encoder.is_dilated() && paper.depth_net.hce.is_some());

@@ -2,41 +2,41 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CardProblem, Error};
 
-/// The version of the file pair; others are refused.
+/// Version of the format of a card and its weights; other versions are rejected.
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The description of a packed network and its origin: the content of `NAME.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Card {
-    /// [`FORMAT_VERSION`].
+    /// Version of the format: [`FORMAT_VERSION`].
     pub format_version: u32,
-    /// Its name, by which it is asked for.
+    /// Name of the network.
     pub name: String,
     /// SHA-256 of `NAME.safetensors`, in hexadecimal.
     pub sha256: String,
-    /// That file's length.
+    /// Length of that file in bytes.
     pub bytes: u64,
     /// Number of learned parameters of the depth network.
     pub parameters: u64,
-    /// Steps of its last run; what it began from is in the note.
+    /// Number of steps of its last run; the note says what that run started from.
     pub steps: usize,
-    /// The checkpoint of its run: `best` or `last`.
+    /// The checkpoint of its run that was packed: `best` or `last`.
     pub checkpoint: String,
-    /// The day that checkpoint was written, `2026-01-31`, UTC.
+    /// The date on which that checkpoint was written, `2026-01-31`, UTC.
     pub date: String,
-    /// The recordings it learned from, by name.
+    /// Names of the recordings it was trained on.
     pub data: Vec<String>,
-    /// Whether no real image was among them.
+    /// Whether none of them has real images.
     pub simulated_only: bool,
     /// How to reproduce it: a file of `recipes/`, or a command.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recipe: Option<String>,
     /// Its licence.
     pub licence: String,
-    /// The number formats of the tensors.
+    /// Number formats of the tensors.
     pub numbers: String,
-    /// Largest |packed − original| / original of the depths of a picture: the cost of the shorter numbers.
+    /// Largest |packed − original| / original of the depths of a picture: the cost of rounding the numbers.
     pub depth_difference: f64,
     /// Anything else worth knowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,10 +44,10 @@ pub struct Card {
     /// Evaluations of the checkpoint before it was packed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    /// The calibration of the network's uncertainty, as an evaluation found it.
+    /// Calibration of the network's uncertainty, from an evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<toml::Table>,
-    /// The ranges for int8, as found by `weights calibrate`.
+    /// Calibration for int8, by `weights calibrate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub int8: Option<toml::Table>,
     /// The run's configuration, without the paths of its recordings.
@@ -58,7 +58,7 @@ pub struct Card {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
-    /// The recordings measured on, by name.
+    /// Names of the evaluated recordings.
     pub data: String,
     /// Number of images.
     pub images: usize,
@@ -67,11 +67,11 @@ pub struct Figure {
     pub held_out: Option<bool>,
     /// Mean |prediction − truth| / truth, unscaled.
     pub abs_rel: f64,
-    /// The same after each image was scaled to the truth's median.
+    /// Mean |prediction − truth| / truth, median-scaled.
     pub abs_rel_scaled: f64,
-    /// Median over images of median(truth) / median(prediction): 1 is metric.
+    /// Median over the images of median(truth) / median(prediction); 1 if the scale is metric.
     pub scale: f64,
-    /// Share of pixels within 25 %.
+    /// Share of pixels whose depth is within 25 % of the truth (δ < 1.25).
     pub a1: f64,
 }
 
@@ -83,7 +83,7 @@ impl Card {
         preset.unwrap_or("unknown")
     }
 
-    /// Width and height of the images it takes, in pixels, as its configuration says.
+    /// Width and height of its input images in pixels, according to its configuration.
     #[must_use]
     pub fn size(&self) -> Option<[i64; 2]> {
         let size = self.config.get("size")?;
@@ -91,10 +91,10 @@ impl Card {
         Some([side("width")?, side("height")?])
     }
 
-    /// The card as TOML. Equal cards give equal texts.
+    /// The card as TOML. Equal cards have equal texts.
     ///
     /// # Errors
-    /// [`Error::Card`] for a value that TOML cannot hold.
+    /// [`Error::Card`] for a value that has no TOML form.
     pub fn to_toml(&self) -> Result<String, Error> {
         let text = toml::to_string_pretty(self).map_err(|e| Error::Card {
             origin: self.name.clone(),
@@ -106,7 +106,7 @@ impl Card {
         ))
     }
 
-    /// Reads a card; `origin` is what an error calls it.
+    /// Reads a card; error messages call it `origin`.
     ///
     /// # Errors
     /// [`Error::Version`] for a card of another version, [`Error::Card`] for a text that is not a card.
@@ -115,7 +115,7 @@ impl Card {
             origin: origin.to_owned(),
             reason: CardProblem::NotOne(Box::new(e)),
         };
-        // The version first: what else is in another version's card is not known.
+        // The version first: the content of other versions is unknown.
         let table: toml::Table = text.parse().map_err(failed)?;
         let version = table
             .get("format_version")

@@ -7,99 +7,96 @@ use std::path::PathBuf;
 pub enum Error {
     /// A name that no embedded network has.
     #[error(
-        "no network `{name}` is embedded in this build, which has {}",
+        "no embedded network is named `{name}`: this build has {}",
         listed(known)
     )]
     NotEmbedded {
-        /// What was asked for.
+        /// The name asked for.
         name: String,
-        /// What there is.
+        /// The names of the embedded networks.
         known: Vec<String>,
     },
-    /// A text that is no card.
+    /// A text that is not a card.
     #[error("{origin}: not a card of a packed network: {reason}")]
     Card {
-        /// The file, or the network's name.
+        /// Path of the file, or name of the network.
         origin: String,
-        /// Why.
+        /// Why it is not a card.
         #[source]
         reason: CardProblem,
     },
     /// A card of another version.
-    #[error(
-        "{origin}: format version {found}, this program reads {}",
-        crate::FORMAT_VERSION
-    )]
+    #[error("{origin}: format version {found}, expected {}", crate::FORMAT_VERSION)]
     Version {
-        /// The file, or the network's name.
+        /// Path of the file, or name of the network.
         origin: String,
-        /// Its version.
+        /// The card's version.
         found: i64,
     },
-    /// Weights that are not those of the card beside them.
-    #[error("{}: its SHA-256 is {found}, the card beside it says {expected}", path.display())]
+    /// Weights that do not belong to the card beside them.
+    #[error("{}: SHA-256 is {found}, expected {expected} according to the card", path.display())]
     OtherWeights {
-        /// The weights' file.
+        /// Path of the weights' file.
         path: PathBuf,
-        /// As it is.
+        /// SHA-256 of the file.
         found: String,
-        /// As the card has it.
+        /// SHA-256 according to the card.
         expected: String,
     },
-    /// A name that none can have.
+    /// An invalid name.
     #[error(
-        "`{name}`: a network's name is letters a to z, digits and dashes, a letter first, and not `none`"
+        "`{name}`: expected a name of letters a to z, digits and dashes that starts with a letter and is not `none`"
     )]
     Name {
         /// The name.
         name: String,
     },
-    /// A value that cannot be kept.
-    #[error("tensor `{tensor}`: {value} is not a number, or too large for bf16")]
+    /// A value that cannot be packed.
+    #[error("tensor `{tensor}`: {value} is not finite, or too large for bf16")]
     Value {
         /// The tensor's name.
         tensor: String,
         /// The value.
         value: f32,
     },
-    /// Tensors that do not make a file.
-    #[error("the tensors cannot be written: {source}")]
+    /// Tensors that cannot be written as a file.
+    #[error("cannot write the tensors: {source}")]
     Tensors {
-        /// What the format's library says.
+        /// The safetensors library's message.
         source: safetensors::SafeTensorError,
     },
-    /// A file that is in the way.
+    /// A file that already exists.
     #[error("{}: already exists", path.display())]
     Exists {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// A file that cannot be read or written.
     #[error("{}: cannot {action}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// "read" or "write".
         action: &'static str,
-        /// What the system says.
+        /// The operating system's reason.
         source: std::io::Error,
     },
 }
 
-/// Why a text is no card, or a card has no text.
+/// Why a text is not a card, or a card cannot be written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CardProblem {
-    /// Its text cannot be read as one. What the parser says, without the line break that ends it.
+    /// The text cannot be parsed: the parser's message, without the line break that ends it.
     #[error("{}", .0.to_string().trim_end())]
     NotOne(Box<toml::de::Error>),
-    /// It has a value that TOML cannot hold.
+    /// A value has no TOML form: the serialiser's message.
     #[error("{0}")]
     Unwritten(#[source] Box<toml::ser::Error>),
-    /// It describes another network than the one it lies beside.
+    /// The card describes another network than the one beside it.
     #[error("it is the card of `{name}`")]
     OfAnother {
-        /// That network's name.
+        /// Name of the network that it describes.
         name: String,
     },
 }
@@ -121,32 +118,32 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let hint = match self {
-            Self::NotEmbedded { known, .. } if known.is_empty() => "train one and give its folder",
+            Self::NotEmbedded { known, .. } if known.is_empty() => {
+                "train a network and give its folder"
+            }
             Self::NotEmbedded { known, .. } => {
                 return Some(format!(
                     "give {}, or the folder of a run",
                     known.join(" or ")
                 ));
             }
-            Self::Card { .. } => {
-                "packing a network writes a card beside the weights; take both from there"
-            }
+            Self::Card { .. } => "pack the network again: this writes its card beside the weights",
             Self::Version { .. } => {
-                "use the version of the program that packed it, or pack its run again"
+                "use the version of the program that packed the network, or pack its run again"
             }
             Self::OtherWeights { .. } => {
-                "one of the two files was changed, or belongs to another network: copy both again, or pack the run again"
+                "copy weights and card again from one place, or pack the run again"
             }
             Self::Name { .. } => "choose a name such as street or street-2",
             Self::Value { .. } => {
-                "the training that made it had diverged; take an earlier checkpoint"
+                "take an earlier checkpoint: the training diverged before this one was written"
             }
             Self::Tensors { .. } => return None,
-            Self::Exists { .. } => "choose another folder or name, or allow it to be replaced",
+            Self::Exists { .. } => "choose another folder or name, or allow replacing the files",
             Self::Io {
                 action: "write", ..
             } => "check the folder, its permissions and the free space",
-            Self::Io { .. } => "check the path; NAME.safetensors and NAME.toml belong together",
+            Self::Io { .. } => "check the path: NAME.safetensors needs NAME.toml beside it",
         };
         Some(hint.to_owned())
     }

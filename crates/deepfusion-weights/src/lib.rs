@@ -1,8 +1,8 @@
 //! Trained depth networks inside the program.
 //!
-//! A packed network is two files: `NAME.safetensors`, the tensors of a depth network under their paths ([`pack`]), and
-//! `NAME.toml`, its [`Card`]: the configuration that builds it, and what it was made from. Every such pair in this crate's folder
-//! `weights/` is embedded ([`all`], [`find`]); there may be none. [`Shipped::read`] reads a pair from disk.
+//! A packed network is two files: `NAME.safetensors`, the tensors of a depth network by name ([`pack`]), and `NAME.toml`, its [`Card`] with
+//! the configuration and the origin. All such pairs in this crate's folder `weights/` are embedded ([`all`], [`find`]); there may be none.
+//! [`Shipped::read`] reads a pair from disk.
 
 mod card;
 mod error;

@@ -1,5 +1,5 @@
-//! Finds the networks in a folder and generates the Rust code that embeds them. The build script and the crate's tests share this
-//! file: it uses the standard library alone.
+//! Finds the networks in a folder and generates the Rust code that embeds them. The build script and the crate share this file, so it uses
+//! the standard library alone.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 /// The two files of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pair {
-    /// Its name, by which it is asked for: the files' name without the ending.
+    /// Name of the network: that of the files, without extension.
     pub name: String,
-    /// `NAME.toml`.
+    /// Path of `NAME.toml`.
     pub card: PathBuf,
-    /// `NAME.safetensors`.
+    /// Path of `NAME.safetensors`.
     pub weights: PathBuf,
 }
 
@@ -25,13 +25,13 @@ pub(crate) enum ScanError {
     },
     /// A file whose name cannot be a network's.
     Name { path: PathBuf },
-    /// One of a network's files without the other.
+    /// One of a network's two files is missing.
     Alone {
         folder: PathBuf,
         name: String,
         lacks: NetworkFile,
     },
-    /// A file that `include_bytes!` could not name.
+    /// A path that `include_bytes!` cannot have.
     Path { path: PathBuf },
 }
 
@@ -48,7 +48,7 @@ impl std::fmt::Display for ScanError {
             Self::Io { path, source } => write!(f, "{}: {source}", path.display()),
             Self::Name { path } => write!(
                 f,
-                "{}: a network's name is letters a to z, digits and dashes, a letter first, and not `none`",
+                "{}: expected a name of letters a to z, digits and dashes that starts with a letter and is not `none`",
                 path.display()
             ),
             Self::Alone {
@@ -71,13 +71,14 @@ impl std::fmt::Display for ScanError {
     }
 }
 
-/// Whether this is a valid network name: letters a to z, digits and dashes, a letter first. `none` is reserved: it asks for no network.
+/// Whether this is a valid network name: letters a to z, digits and dashes, starting with a letter. `none` is reserved, as it means no
+/// network.
 pub(crate) fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(plain) && name != "none"
 }
 
-/// The networks in a folder, by name; none where there is no such folder. Hidden files and those with other endings are ignored.
+/// The networks in a folder, by name; none if the folder does not exist. Hidden files and those with other extensions are ignored.
 ///
 /// # Errors
 /// A file without its counterpart or with an invalid name, or a folder that cannot be read.
@@ -89,7 +90,7 @@ pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, ScanError> {
         path: folder.to_owned(),
         source,
     };
-    // By name: the card, the weights.
+    // For each name: the card, the weights.
     let mut found: BTreeMap<String, [Option<PathBuf>; 2]> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
@@ -133,7 +134,7 @@ pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, ScanError> {
 /// A Rust expression: `&[Embedded { … }, …]` with the content of every file.
 ///
 /// # Errors
-/// If a path is not absolute, or not Unicode: `include_bytes!` could not name it.
+/// If a path is not absolute, or not Unicode, so that `include_bytes!` cannot have it.
 pub(crate) fn list(pairs: &[Pair]) -> Result<String, ScanError> {
     let quoted = |path: &Path| match path.to_str() {
         Some(text) if path.is_absolute() => Ok(format!("{text:?}")),

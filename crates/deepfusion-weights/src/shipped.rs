@@ -16,13 +16,13 @@ pub const MAX_BYTES: u64 = 32_000_000;
 /// A packed network: its card and its weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shipped {
-    /// Its description.
+    /// The description of the network.
     pub card: Card,
-    /// A safetensors file.
+    /// The content of a safetensors file.
     pub bytes: Cow<'static, [u8]>,
 }
 
-/// An embedded network, as found by the build.
+/// An embedded network, as found by the build script.
 struct Embedded {
     name: &'static str,
     card: &'static str,
@@ -31,7 +31,7 @@ struct Embedded {
 
 static EMBEDDED: &[Embedded] = include!(concat!(env!("OUT_DIR"), "/embedded.rs"));
 
-/// The names of the embedded networks, in order.
+/// Names of the embedded networks, in order.
 pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|network| network.name)
 }
@@ -44,10 +44,10 @@ pub fn all() -> Result<Vec<Shipped>, Error> {
     EMBEDDED.iter().map(Shipped::embedded).collect()
 }
 
-/// The embedded network of a name.
+/// The embedded network with the given name.
 ///
 /// # Errors
-/// [`Error::NotEmbedded`] with the available names; otherwise as [`all`].
+/// [`Error::NotEmbedded`] with the available names; otherwise those of [`all`].
 pub fn find(name: &str) -> Result<Shipped, Error> {
     match EMBEDDED.iter().find(|network| network.name == name) {
         Some(network) => Shipped::embedded(network),
@@ -64,7 +64,7 @@ impl Shipped {
         Self::named(network.name, card, Cow::Borrowed(network.weights))
     }
 
-    /// The card's name must be its file's name: a network is found by one and shown by the other.
+    /// The card must have the name of its file: a network is found by the one and shown by the other.
     fn named(origin: &str, card: Card, bytes: Cow<'static, [u8]>) -> Result<Self, Error> {
         if card.name != origin {
             return Err(Error::Card {
@@ -103,7 +103,7 @@ impl Shipped {
         Self::named(&name, card, Cow::Owned(bytes))
     }
 
-    /// A network of this card and these weights; the card's length and digest are set from the bytes.
+    /// A network with this card and these weights; the card's length and digest are computed from the bytes.
     ///
     /// # Errors
     /// [`Error::Name`] for an invalid name.
@@ -116,17 +116,17 @@ impl Shipped {
         Ok(Self { card, bytes })
     }
 
-    /// The paths of a network's two files in a folder: the card, the weights.
+    /// Paths of a network's two files in a folder: the card, the weights.
     #[must_use]
     pub fn paths(folder: &Path, name: &str) -> [PathBuf; 2] {
         [".toml", ".safetensors"].map(|ending| folder.join(format!("{name}{ending}")))
     }
 
-    /// Writes both files into a folder, which is created; they get their final names when both are on the disk. Returns their
+    /// Writes both files into a folder, which is created if necessary. They get their final names when both are on disk. Returns their
     /// paths, the card's first.
     ///
     /// # Errors
-    /// [`Error::Exists`] if one exists already, unless `replace` is set; [`Error::Io`].
+    /// [`Error::Exists`] if one of them already exists, unless `replace` is set; [`Error::Io`].
     pub fn write(&self, folder: &Path, replace: bool) -> Result<[PathBuf; 2], Error> {
         use std::io::Write;
         let text = self.card.to_toml()?;
@@ -146,7 +146,7 @@ impl Shipped {
     }
 }
 
-/// SHA-256 in hexadecimal.
+/// SHA-256 in hexadecimal digits.
 fn sha256(bytes: &[u8]) -> String {
     format!("{:x}", Sha256::digest(bytes))
 }
@@ -176,12 +176,12 @@ mod tests {
         let [card, weights] = network.write(&out, false).unwrap();
         assert!(Shipped::is_at(&weights) && !Shipped::is_at(&card));
         assert_eq!(Shipped::read(&weights).unwrap(), network);
-        // SHA-256 of no bytes at all, as everybody has it.
+        // The well-known SHA-256 of no bytes.
         assert_eq!(
             sha256(b""),
             "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
         );
-        // The same again gives the same bytes, and only where it may.
+        // Writing again gives the same bytes, and only if replacing is allowed.
         let before = [&card, &weights].map(|path| std::fs::read(path).unwrap());
         assert!(matches!(
             network.write(&out, false),
@@ -191,7 +191,7 @@ mod tests {
         let after = [&card, &weights].map(|path| std::fs::read(path).unwrap());
         assert_eq!(before, after);
         let left = std::fs::read_dir(&out).unwrap().count();
-        assert_eq!(left, 2, "nothing else is left");
+        assert_eq!(left, 2, "no temporary file is left");
     }
 
     #[test]
@@ -203,7 +203,7 @@ mod tests {
         std::fs::write(&weights, bytes).unwrap();
         let error = Shipped::read(&weights).unwrap_err();
         assert!(matches!(error, Error::OtherWeights { .. }), "{error}");
-        // Renamed alone, the card tells another name than the files.
+        // If only the files are renamed, the card's name differs from theirs.
         let renamed = folder.path().join("other.safetensors");
         street().write(folder.path(), true).unwrap();
         std::fs::rename(&weights, &renamed).unwrap();
@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    /// The build script's work, on a folder of this test.
+    /// Does the build script's work on a temporary folder.
     #[test]
     fn a_folder_of_pairs_becomes_a_list_in_the_order_of_names() {
         let folder = tempfile::tempdir().unwrap();
@@ -253,7 +253,7 @@ mod tests {
             "Embedded {{ name: \"street\", card: include_str!({card:?}), weights: include_bytes!({weights:?}) }},"
         );
         assert!(text.contains(&line), "{text}");
-        // A card alone, weights alone, a name that is none.
+        // A card alone, weights alone, an invalid name.
         for (gone, kept) in [(&weights, "street.toml"), (&card, "street.safetensors")] {
             let content = std::fs::read(gone).unwrap();
             std::fs::remove_file(gone).unwrap();
@@ -267,7 +267,7 @@ mod tests {
         assert!(error.contains("Street 2.toml"), "{error}");
     }
 
-    /// The files in `weights/`, whatever they are: nothing is embedded that its card does not describe.
+    /// Checks the files in `weights/`: every embedded network matches its card.
     #[test]
     fn what_is_embedded_is_what_its_card_says() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");

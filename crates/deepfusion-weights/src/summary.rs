@@ -1,4 +1,4 @@
-//! A card for readers: in rows for people, without its configuration for scripts.
+//! A summary of a card: as rows for people, and as JSON without the configuration for scripts.
 
 use std::fmt;
 
@@ -7,14 +7,14 @@ use serde::Serialize;
 
 use crate::{Card, DEFAULT, Figure};
 
-/// Recordings that are named.
+/// Maximum number of recordings listed by name.
 const NAMED: usize = 6;
 
-/// A card without the configuration, and what of that one asks for first; for scripts.
+/// A card without its configuration, but with the most important settings; for scripts.
 #[derive(Debug, Serialize)]
 pub struct CardSummary<'a> {
     name: &'a str,
-    /// Whether it is meant where no network is named.
+    /// Whether it is the default network.
     default: bool,
     preset: &'a str,
     size: Option<[i64; 2]>,
@@ -36,13 +36,13 @@ pub struct CardSummary<'a> {
 }
 
 impl Card {
-    /// Whether it is the network's that is meant where none is named: [`DEFAULT`].
+    /// Whether this is the default network, [`DEFAULT`].
     #[must_use]
     pub fn is_default(&self) -> bool {
         self.name == DEFAULT
     }
 
-    /// What a script may ask of it.
+    /// The summary for scripts.
     #[must_use]
     pub fn summary(&self) -> CardSummary<'_> {
         CardSummary {
@@ -68,7 +68,7 @@ impl Card {
         }
     }
 
-    /// What a person may ask of it, but for its name: a name and a value each.
+    /// The summary for people: rows of a name and a value each, without the network's name.
     #[must_use]
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         let size = self

@@ -10,17 +10,16 @@ pub const NUMBERS: &str = "bf16, tensors of one dimension f32";
 /// A tensor to be packed.
 #[derive(Debug, Clone, Copy)]
 pub struct Tensor<'a> {
-    /// Its path in the network, such as `encoder.layer1.0.conv1.weight`.
+    /// Its name in the network, such as `encoder.layer1.0.conv1.weight`.
     pub name: &'a str,
-    /// Extents, outermost first.
+    /// Shape, outermost dimension first.
     pub shape: &'a [usize],
-    /// As many values as the extents' product, row-major.
+    /// The values, row-major; their number is the product of `shape`.
     pub values: &'a [f32],
 }
 
-/// A safetensors file of the tensors. One-dimensional ones (biases and batch-norm parameters) stay f32: they act on whole
-/// channels and are few. All others are rounded to bf16, to nearest, ties to even. Equal tensors give equal bytes, whatever their
-/// order.
+/// The tensors as a safetensors file. One-dimensional tensors (biases and batch-norm parameters) stay f32: they act on whole channels and
+/// are small. All others are rounded to the nearest bf16, ties to even. Equal tensors give equal bytes, in whatever order they are.
 ///
 /// # Errors
 /// [`Error::Value`] naming a tensor with a value that is not finite or too large for bf16; [`Error::Tensors`] for a shape that
@@ -40,7 +39,7 @@ pub fn pack(tensors: &[Tensor]) -> Result<Vec<u8>, Error> {
         let view = TensorView::new(*dtype, tensor.shape.to_vec(), bytes).map_err(failed)?;
         views.push((tensor.name, view));
     }
-    // Without metadata: its entries have no order, and the card says everything.
+    // No metadata: its entries have no fixed order, and the card has all information.
     safetensors::serialize(views, None).map_err(failed)
 }
 
@@ -73,8 +72,8 @@ fn refused(tensor: &Tensor, value: f32) -> Error {
 
 /// The bits of the nearest bf16, ties to even; `None` if it is not finite.
 fn bf16(value: f32) -> Option<u16> {
-    // bf16 is f32's upper half. Adding just less than half of its last place, and one more where that place is odd, carries into it
-    // exactly where rounding goes up; a carry out of the mantissa raises the exponent, as it should.
+    // bf16 is f32's upper half. Adding just less than half of its last place, and one more if that place is odd, carries into it exactly if
+    // the value is rounded up. A carry out of the mantissa correctly raises the exponent.
     let bits = value.to_bits();
     let odd = (bits >> 16) & 1;
     let rounded = (bits.checked_add(0x7fff + odd)? >> 16) as u16;
@@ -92,7 +91,7 @@ mod tests {
         f32::from_bits(u32::from(bits) << 16)
     }
 
-    /// Between 1 and the next bf16, 1 + 2⁻⁷, lie the f32 that are rounded to either.
+    /// f32 values between 1 and the next bf16, 1 + 2⁻⁷, are rounded to one of the two.
     #[test]
     fn halves_go_to_the_even_neighbour() {
         let step = 2.0_f32.powi(-7);
@@ -122,7 +121,7 @@ mod tests {
         ] {
             assert_eq!(bf16(bad), None, "{bad}");
         }
-        // The largest, and the first f32 that would be rounded to more than that.
+        // The largest f32 that fits, and the smallest that would be rounded to more than the largest bf16.
         assert_eq!(bf16(f32::from_bits(0x7f7f_7fff)), Some(0x7f7f));
         assert_eq!(bf16(f32::from_bits(0x7f7f_8000)), None);
     }

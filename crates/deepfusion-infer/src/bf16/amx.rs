@@ -1,8 +1,7 @@
 //! Convolutions in bf16 on AMX, the matrix unit of Xeon processors since Sapphire Rapids.
 //!
-//! A tile register holds 16 rows of 64 bytes. Sixteen pixels whose inputs lie at equal distances are the rows of
-//! one operand just as they lie in memory; the weights are packed as the other. The instructions have no
-//! stable intrinsics, so they are written as assembly.
+//! A tile register has 16 rows of 64 bytes. Sixteen pixels whose inputs are equally spaced in memory are the rows of one operand without
+//! any copying; the weights are packed as the other operand. The instructions have no stable intrinsics, so they are written in assembly.
 
 use std::arch::asm;
 
@@ -21,17 +20,17 @@ use crate::view::Shared;
 const PIXELS: usize = 16;
 /// Inputs in a row of a tile.
 const INPUTS: usize = 32;
-/// Output channels whose sums are kept at once: two tiles of 16.
+/// Output channels whose sums are computed at once: two tiles of 16.
 const GROUP: usize = 32;
 /// Elements of a tile.
 const TILE: usize = PIXELS * INPUTS;
 /// Sums of a tile: pixels × channels.
 const TILE_SUMS: usize = PIXELS * LANES;
-/// Sums of two strips by two tiles of channels; tile `2·strip + channels`.
+/// Sums of two strips by two tiles of channels; the index of a tile is `2·strip + channels`.
 const SUMS: usize = 4 * TILE_SUMS;
-/// Inputs summed before the sums go back to memory: the weights of a group stay in the first cache.
+/// Inputs summed before the sums are written to memory, so that the weights of a group stay in the L1 cache.
 const INPUTS_AT_ONCE: usize = 512;
-/// Strips of a task: their inputs and outputs stay in the second cache.
+/// Strips of a task, so that their inputs and outputs stay in the L2 cache.
 const STRIPS_AT_ONCE: usize = 32;
 
 /// A convolution ready to run.
@@ -46,18 +45,18 @@ pub(crate) struct Amx {
     strips: Vec<Strip>,
 }
 
-/// Sixteen pixels at equal distances in the input, not all of them of the image.
+/// Sixteen pixels equally spaced in the input, some of which may be outside the image.
 #[derive(Debug)]
 struct Strip {
-    /// Where the first pixel's first tap lies.
+    /// Offset of the first pixel's first tap.
     input: usize,
-    /// None where it is no pixel of the output.
+    /// `None` if it is not a pixel of the output.
     places: [Option<OutputPixel>; PIXELS],
 }
 
 impl ConvForm<Bf16> for Amx {
     fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
-        // Of few channels, several taps fill one row of a tile.
+        // With few channels, several taps fill one row of a tile.
         let runs = if channel_of.len() < INPUTS {
             Runs::new(&geometry, channel_of, usize::MAX, INPUTS)
         } else {
@@ -85,7 +84,7 @@ impl ConvForm<Bf16> for Amx {
         }
     }
 
-    /// Fifteen pixels that fill up a strip, at stride 2, and a row of inputs.
+    /// Fifteen pixels that complete a strip, at stride 2, and a row of inputs.
     fn overread(pitch: usize) -> usize {
         2 * PIXELS * pitch + INPUTS
     }
@@ -104,15 +103,15 @@ impl ConvForm<Bf16> for Amx {
     }
 
     /// # Safety
-    /// As the trait says; the processor must have the matrix unit.
+    /// As for the trait; the processor must have the matrix unit.
     unsafe fn run(&self, arena: Shared<Bf16>) {
         let groups = self.bias.len().div_ceil(GROUP);
         Tasks::new(self.strips.len(), STRIPS_AT_ONCE, 2, groups).run(|strips, groups| {
             let strips = &self.strips[strips];
             with_scratch(|scratch| {
                 let sums = scratch.first.take(strips.len().div_ceil(2) * SUMS);
-                // SAFETY: the processor has the unit and nobody else uses the output (the caller's promise), whose
-                // strips belong to one task each; the tiles are configured first.
+                // SAFETY: the processor has the unit and nobody else uses the output (guaranteed by the caller), of which each strip
+                // belongs to one task; the tiles are configured first.
                 unsafe {
                     configured(TileSizes::WHOLE, || {
                         for group in groups {
@@ -126,10 +125,10 @@ impl ConvForm<Bf16> for Amx {
 }
 
 impl Amx {
-    /// All of a task's strips, for one group of output channels.
+    /// Computes all of a task's strips, for one group of output channels.
     ///
     /// # Safety
-    /// As [`ConvForm::run`]; the strips must be this thread's alone, and the tiles configured.
+    /// As for [`ConvForm::run`]; the strips must be used by this thread only, and the tiles configured.
     unsafe fn group(
         &self,
         arena: Shared<Bf16>,
@@ -156,8 +155,8 @@ impl Amx {
                     panel: &panel[i * at_once * self.runs.len * width..],
                     add: i > 0,
                 };
-                // SAFETY: sixteen pixels of the runs lie in the arena, as `at` has checked; the tiles are configured
-                // (the caller's promise).
+                // SAFETY: sixteen pixels of the runs are in the arena, as `at` has checked; the tiles are configured (guaranteed by the
+                // caller).
                 unsafe {
                     if width == GROUP {
                         product.two_by_two(sums);
@@ -166,7 +165,7 @@ impl Amx {
                     }
                 }
                 if i == last {
-                    // SAFETY: what has the unit has the instructions; the output is this thread's alone.
+                    // SAFETY: a processor with the unit has the instructions; the output is used by this thread only.
                     unsafe { self.finish(arena, pair, sums, first, width) };
                 }
             }
@@ -174,7 +173,7 @@ impl Amx {
     }
 
     /// # Safety
-    /// The output must be this thread's alone; the processor must have the instructions.
+    /// The output must be used by this thread only; the processor must have the instructions.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn finish(
         &self,
@@ -188,7 +187,7 @@ impl Amx {
         for (i, strip) in strips.iter().enumerate() {
             let tiles = &sums[2 * i * TILE_SUMS..];
             if self.geometry.out.result {
-                // SAFETY: the strip's pixels are this thread's alone (the caller's promise).
+                // SAFETY: the strip's pixels are used by this thread only (guaranteed by the caller).
                 unsafe { finish.results(&strip.places, |p| tiles[p * LANES]) };
                 continue;
             }
@@ -214,8 +213,8 @@ fn strips(g: &Geometry) -> Vec<Strip> {
         let inside = x < g.out.width && y < g.out.height;
         inside.then(|| OutputPixel::new(g, x, y))
     };
-    // From a row's last pixel to the next row's first it is as far as over the border between them, so
-    // strips can run on over it; over a wide border that is more strips than a row at a time.
+    // The step from a row's last pixel to the next row's first spans the border between them, so strips can continue across it. With a wide
+    // border that makes more strips than handling each row separately.
     let across = g.input.row / g.input.pitch;
     let last = (g.out.height - 1) * across + g.out.width;
     let by_rows = g.out.height * g.out.width.div_ceil(PIXELS);
@@ -244,13 +243,13 @@ struct Product<'a> {
     len: usize,
     /// One or two tiles for each [`INPUTS`] of each run.
     panel: &'a [Bf16],
-    /// Whether the sums go on from what they are.
+    /// Whether to add to the existing sums.
     add: bool,
 }
 
 impl Product<'_> {
-    /// That the panel reaches as far as the runs, with so many tiles of channels, and that there are sums for all of
-    /// them. Returns the tiles of inputs in a run.
+    /// Checks that the panel is as long as the runs, with this number of tiles of channels, and that there is room for all sums. Returns
+    /// the number of tiles of inputs in a run.
     fn checked(&self, tiles: usize, sums: &[f32]) -> usize {
         let rows = self.len / INPUTS;
         assert!(rows > 0 && rows * INPUTS == self.len && !self.runs.is_empty());
@@ -259,16 +258,16 @@ impl Product<'_> {
         rows
     }
 
-    /// Two tiles of channels. One block from the first load to the last store: the sums are in no register that the
-    /// compiler does not know of in between.
+    /// Two tiles of channels. A single assembly block from the first load to the last store, as the compiler does not know that the
+    /// registers contain the sums.
     ///
     /// # Safety
     /// The runs of sixteen pixels must be readable, the tiles configured.
     #[inline(always)]
     unsafe fn two_by_two(&self, sums: &mut [f32]) {
         let rows = self.checked(2, sums);
-        // SAFETY: sums and panel are long enough, as was just checked; what the runs read is the caller's promise. The
-        // registers that are written are declared.
+        // SAFETY: sums and panel are long enough, as was just checked; the runs are readable (guaranteed by the caller). The written
+        // registers are declared.
         unsafe {
             asm!(
                 "test {left}, {left}",
@@ -283,14 +282,14 @@ impl Product<'_> {
                 "tilezero tmm1",
                 "tilezero tmm2",
                 "tilezero tmm3",
-                // A run.
+                // For each run:
                 "3:",
                 "mov {p0}, [{run}]",
                 "lea {p1}, [{a1} + {p0}*2]",
                 "lea {p0}, [{a0} + {p0}*2]",
                 "add {run}, 8",
                 "mov {left}, {rows}",
-                // Thirty-two inputs of it.
+                // For each thirty-two inputs of it:
                 "4:",
                 "tileloadd tmm6, [{b} + {s}*1]",
                 "tileloadd tmm4, [{p0} + {sa}*1]",
@@ -333,7 +332,7 @@ impl Product<'_> {
     /// One tile of channels.
     ///
     /// # Safety
-    /// As [`Self::two_by_two`].
+    /// As for [`Self::two_by_two`].
     #[inline(always)]
     unsafe fn two_by_one(&self, sums: &mut [f32]) {
         let rows = self.checked(1, sums);

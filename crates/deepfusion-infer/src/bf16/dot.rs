@@ -15,13 +15,13 @@ use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES};
 use crate::view::Shared;
 
-/// Inputs summed before the sums go back to memory: their weights stay in the first cache.
+/// Inputs summed before the sums are written to memory, so that their weights stay in the L1 cache.
 pub(super) const INPUTS_AT_ONCE: usize = 320;
 /// Output pixels of a task.
 const PIXELS_AT_ONCE: usize = 480;
-/// Pixels whose sums are kept in registers, at two vectors each.
+/// Pixels whose sums are kept in registers, with two vectors each.
 pub(super) const ROWS: usize = 6;
-/// The same of a single vector: fewer sums than an addition takes cycles would wait for each other.
+/// The same with a single vector each: with fewer sums, additions would wait for each other's latency.
 const NARROW_ROWS: usize = 2 * ROWS;
 
 /// A convolution ready to run.
@@ -54,7 +54,7 @@ impl ConvForm<Bf16> for Dot {
         }
     }
 
-    /// The second of a pair of which there is one.
+    /// The missing second of a pair.
     fn overread(_: usize) -> usize {
         1
     }
@@ -73,7 +73,7 @@ impl ConvForm<Bf16> for Dot {
     }
 
     /// # Safety
-    /// As the trait says; the processor must have the instructions.
+    /// As for the trait; the processor must have the instructions.
     unsafe fn run(&self, arena: Shared<Bf16>) {
         let groups = self.bias.len().div_ceil(GROUP);
         Tasks::new(
@@ -88,7 +88,7 @@ impl ConvForm<Bf16> for Dot {
                     .first
                     .take(pixels.len().next_multiple_of(NARROW_ROWS) * GROUP);
                 for group in groups {
-                    // SAFETY: the caller's promise; each pixel and group belongs to one task.
+                    // SAFETY: guaranteed by the caller; each pixel and group belongs to one task.
                     unsafe {
                         self.sum(arena, group, pixels.clone(), sums);
                         self.finish(arena, group, pixels.clone(), sums);
@@ -107,7 +107,7 @@ impl Dot {
     /// The sums of all pixels, [`GROUP`] values each.
     ///
     /// # Safety
-    /// As [`ConvForm::run`]; the processor must have the instructions.
+    /// As for [`ConvForm::run`]; the processor must have the instructions.
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn sum(
         &self,
@@ -116,7 +116,7 @@ impl Dot {
         pixels: std::ops::Range<usize>,
         sums: &mut [f32],
     ) {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             if self.width(group) > LANES {
                 self.sum_by::<ROWS>(arena, group, pixels, sums);
@@ -126,10 +126,10 @@ impl Dot {
         }
     }
 
-    /// The same, `R` pixels at a time.
+    /// Like [`Self::sum`], `R` pixels at a time.
     ///
     /// # Safety
-    /// As [`Self::sum`].
+    /// As for [`Self::sum`].
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn sum_by<const R: usize>(
         &self,
@@ -149,7 +149,7 @@ impl Dot {
             let Some(first) = inputs.peek() else { return };
             let mut rows = [first.cast_const(); R];
             for sums in sums.chunks_mut(R * GROUP).take(pixels.len().div_ceil(R)) {
-                // Too few pixels are filled up with those before them; nobody reads those sums.
+                // If too few pixels are left, some before them are repeated; those sums are ignored.
                 for (row, input) in rows.iter_mut().zip(&mut inputs) {
                     *row = input.cast_const();
                 }
@@ -164,9 +164,9 @@ impl Dot {
                         sums: sums[column..].as_mut_ptr(),
                         pitch: GROUP,
                     };
-                    // SAFETY: the runs lie within their extent, which is in the arena and which nobody writes (the
-                    // promise of `run`), but where the runs read on; the panel has a row for every pair of inputs, the
-                    // sums room for every pixel. The processor has the instructions.
+                    // SAFETY: the runs are within their extent, which is in the arena and which nobody writes (the contract of `run`),
+                    // except for the elements read beyond the inputs. The panel has a row for every pair of inputs, and the sums have room
+                    // for every pixel. The processor has the instructions.
                     unsafe {
                         if width - column >= 2 * LANES {
                             tile.run::<2>();
@@ -180,7 +180,7 @@ impl Dot {
     }
 
     /// # Safety
-    /// As [`Self::sum`], and the pixels of the output must be this thread's alone.
+    /// As for [`Self::sum`], and the pixels of the output must be used by this thread only.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn finish(
         &self,
@@ -199,7 +199,7 @@ impl Dot {
                     Some(first + i).filter(inside).map(place)
                 });
                 let sum = |i: usize| sums.get((first + i - pixels.start) * GROUP).copied();
-                // SAFETY: the pixels are this thread's alone (the caller's promise).
+                // SAFETY: the pixels are used by this thread only (guaranteed by the caller).
                 unsafe { finish.results(&places, |i| sum(i).unwrap_or(0.0)) };
             }
             return;
@@ -224,10 +224,10 @@ pub(super) struct Tile<'a, const R: usize> {
     pub(super) panel: *const Bf16,
     /// Elements of a row of the panel.
     pub(super) stride: usize,
-    /// Whether the sums go on from what they are.
+    /// Whether to add to the existing sums.
     pub(super) add: bool,
     pub(super) sums: *mut f32,
-    /// Sums from a pixel to the next.
+    /// Distance from one pixel's sums to the next pixel's.
     pub(super) pitch: usize,
 }
 
@@ -239,8 +239,8 @@ impl<const R: usize> Tile<'_, R> {
     #[target_feature(enable = "avx512f,avx512bf16")]
     pub(super) unsafe fn run<const V: usize>(self) {
         let mut sums = [[_mm512_setzero_ps(); V]; R];
-        // SAFETY: what is read and written is the caller's promise. A pair of bf16 is 32 bits; a vector of pairs and one
-        // of integers are the same bits.
+        // SAFETY: reads and writes are valid (guaranteed by the caller). A pair of bf16 has 32 bits; a vector of pairs has the same bits as
+        // one of integers.
         unsafe {
             if self.add {
                 for r in 0..R {

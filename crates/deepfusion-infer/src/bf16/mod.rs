@@ -30,7 +30,7 @@ pub(crate) fn has_dot() -> bool {
     V4::try_new().is_some() && is_x86_feature_detected!("avx512bf16")
 }
 
-/// Whether the processor has the matrix unit and the system lets this process use it.
+/// Whether the processor has the matrix unit and the system allows this process to use it.
 pub(crate) fn has_amx() -> bool {
     has_dot() && deepfusion_kernels::matrix_unit::available()
 }
@@ -51,7 +51,7 @@ impl OutputPixel {
     }
 }
 
-/// The end of a pixel's sums: bias, residual and activation, rounded to bf16.
+/// The last steps for a pixel's sums: bias, residual and activation, rounded to bf16.
 pub(crate) struct Epilogue<'a> {
     simd: V4,
     geometry: &'a Geometry,
@@ -61,40 +61,43 @@ pub(crate) struct Epilogue<'a> {
 
 impl<'a> Epilogue<'a> {
     /// # Panics
-    /// Without AVX-512; [`has_dot`] must hold.
-    #[expect(clippy::expect_used, reason = "asked before an engine of bf16 is made")]
+    /// Without AVX-512; [`has_dot`] must be true.
+    #[expect(
+        clippy::expect_used,
+        reason = "checked before a bf16 engine is created"
+    )]
     pub(crate) fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<'a, Bf16>) -> Self {
         let simd = V4::try_new();
         Self {
-            simd: simd.expect("AVX512-BF16 comes with AVX-512; the engine asked for it"),
+            simd: simd.expect("AVX512-BF16 implies AVX-512, and the engine checked it"),
             geometry,
             bias,
             arena,
         }
     }
 
-    /// Sixteen channels from `c` on.
+    /// Finishes sixteen channels from `c` on.
     ///
     /// # Safety
-    /// The place's pixel must be this thread's alone, and nobody write its residual; `sums` holds 16 values;
-    /// [`has_dot`] must hold.
+    /// The place's pixel must be used by this thread only, and nobody may write its residual; `sums` must have 16 values; [`has_dot`] must
+    /// be true.
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     pub(crate) unsafe fn channels(&self, place: OutputPixel, c: usize, sums: *const f32) {
-        // SAFETY: sixteen values; the rest is the caller's promise.
+        // SAFETY: sixteen values; the rest is guaranteed by the caller.
         unsafe { self.vector(place, c, _mm512_loadu_ps(sums)) };
     }
 
-    /// The same of sums in a register.
+    /// Like [`Self::channels`], with the sums in a register.
     ///
     /// # Safety
-    /// As [`Self::channels`].
+    /// As for [`Self::channels`].
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     pub(crate) unsafe fn vector(&self, place: OutputPixel, c: usize, sums: __m512) {
         let bias = &self.bias[c..][..LANES];
-        // SAFETY: sixteen values of the bias and, as `at` checks, of the arena; the rest is the caller's promise.
-        // Vectors of one size are arrays of the same numbers, whoever names them.
+        // SAFETY: sixteen values of the bias and, as `at` checks, of the arena; the rest is guaranteed by the caller. Vectors of the same
+        // size are arrays of the same numbers, whichever crate defines them.
         unsafe {
             let bias = _mm512_loadu_ps(bias.as_ptr());
             let mut sum = _mm512_add_ps(sums, bias);
@@ -114,7 +117,7 @@ impl<'a> Epilogue<'a> {
     /// The single channel of up to sixteen pixels, kept in f32.
     ///
     /// # Safety
-    /// As [`Self::channels`].
+    /// As for [`Self::channels`].
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn results(&self, places: &[Option<OutputPixel>], sums: impl Fn(usize) -> f32) {
@@ -130,7 +133,7 @@ impl<'a> Epilogue<'a> {
                 let slots = self
                     .arena
                     .at(place.out, size_of::<f32>() / size_of::<Bf16>());
-                // SAFETY: the layout gave the pixel the room of an f32, which is this thread's alone.
+                // SAFETY: the layout has reserved the size of an f32 for the pixel, and it is used by this thread only.
                 unsafe { slots.cast::<f32>().write_unaligned(value) };
             }
         }

@@ -1,9 +1,9 @@
-//! 3×3 convolutions at stride 1 in bf16 by Winograd's F(2×2, 3×3): 16 products for 4 pixels instead of 36, each a matrix product by AVX-512's
-//! dot products of pairs.
+//! 3×3 convolutions at stride 1 in bf16 by Winograd's F(2×2, 3×3): 16 products for 4 pixels instead of 36. Each of the 16 is a matrix
+//! product, computed with AVX-512's dot products of pairs.
 //!
-//! y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 4×4 inputs d, kernel g and 2×2 outputs y (Lavin and Gray, "Fast Algorithms for Convolutional
-//! Neural Networks", 2016). Kernels and inputs are transformed in f32 and rounded once more; larger tiles would magnify that rounding by more
-//! than they save. On the matrix unit the plain sums are faster.
+//! y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 4×4 inputs d, kernel g and 2×2 outputs y (Lavin and Gray, "Fast Algorithms for
+//! Convolutional Neural Networks", 2016). Kernels and inputs are transformed in f32 and rounded once more; larger tiles would amplify that
+//! rounding too much. On the matrix unit, plain sums are faster.
 
 use std::arch::x86_64::{
     __m256bh, __m256i, __m512, _mm256_loadu_si256, _mm256_storeu_si256, _mm512_add_ps,
@@ -32,12 +32,12 @@ const OUT: usize = 2;
 const IN: usize = 4;
 /// Products of a tile.
 const AREA: usize = IN * IN;
-/// Channels, in and out, from which on products saved outweigh the transforms.
+/// Minimum number of input and output channels: with fewer, the transforms cost more than the saved products.
 const LEAST_CHANNELS: usize = 32;
-/// Pixels from which on the transformed weights, nearly twice as many, are shared by enough.
+/// Minimum number of pixels: they share the transformed weights, which are nearly twice as large.
 const LEAST_PIXELS: usize = 400;
-/// Bytes of transformed inputs and products that a task holds, at most: they stay in the second cache. Beside large weights, which do not, it
-/// may hold half as many as those: each task reads all weights.
+/// Maximum number of bytes of transformed inputs and products of a task, so that they stay in the L2 cache. If the weights are too large
+/// for that cache, they may take half as many bytes as the weights, since each task reads all weights.
 const BYTES_AT_ONCE: usize = 600_000;
 
 /// A convolution ready to run.
@@ -49,7 +49,7 @@ pub(crate) struct WinogradDot {
     /// For each of the 16 products, each group of [`GROUP`] output channels and each pair of inputs: the pair's weights, channel by channel.
     panels: Aligned<Bf16>,
     bias: Vec<f32>,
-    /// Tiles of a task.
+    /// Number of tiles in a task.
     tiles: usize,
 }
 
@@ -70,13 +70,14 @@ fn transformed_kernel(g: &[f32; 9]) -> [f32; AREA] {
 }
 
 impl WinogradDot {
-    /// Whether this form pays for a convolution: 3×3 at stride 1, of enough channels and pixels. Input channels must be whole vectors.
+    /// Whether this form is faster for a convolution: 3×3 at stride 1, with enough channels and pixels. Input channels must be whole
+    /// vectors.
     pub(crate) fn fits(conv: &Conv, geometry: &Geometry, channel_of: &[Option<usize>]) -> bool {
         if conv.kernel != 3 || conv.stride != 1 || geometry.out.result {
             return false;
         }
         let pixels = geometry.out.pixels();
-        // Products with the pixels that only fill up tiles, of which a phase of few pixels has many.
+        // Including the products of pixels that only complete tiles, which are many if a phase has few pixels.
         let products = AREA * Tiles::new(geometry, OUT).count();
         channel_of.len().is_multiple_of(LANES)
             && channel_of.len() >= LEAST_CHANNELS
@@ -118,10 +119,10 @@ impl WinogradDot {
     }
 
     /// # Safety
-    /// As [`crate::conv::ConvForm::run`]; the processor must have the instructions.
+    /// As for [`crate::conv::ConvForm::run`]; the processor must have the instructions.
     pub(crate) unsafe fn run(&self, arena: Shared<Bf16>) {
         let all = Tiles::new(&self.geometry, OUT).count();
-        // Whole rounds for all threads, where there are few tasks.
+        // The number of tasks is a multiple of the number of threads, which matters if there are few.
         let rounds = all
             .div_ceil(self.tiles)
             .next_multiple_of(rayon::current_num_threads());
@@ -132,14 +133,14 @@ impl WinogradDot {
                 let inputs = scratch.halves.take(AREA * tiles.len() * self.channels);
                 let whole = tiles.len().next_multiple_of(ROWS);
                 let products = scratch.first.take(AREA * whole * self.bias.len());
-                // SAFETY: the caller's promise; each tile belongs to one task.
+                // SAFETY: guaranteed by the caller; each tile belongs to one task.
                 unsafe { self.task(arena, tiles, inputs, products) };
             });
         });
     }
 
     /// # Safety
-    /// As [`Self::run`], and the tiles of the output must be this thread's alone.
+    /// As for [`Self::run`], and the tiles of the output must be used by this thread only.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn task(
         &self,
@@ -151,15 +152,15 @@ impl WinogradDot {
         let places = Tiles::new(&self.geometry, OUT);
         let size = AREA * self.channels;
         for (tile, to) in tiles.clone().zip(inputs.chunks_exact_mut(size)) {
-            // SAFETY: nobody writes the input (the caller's promise).
+            // SAFETY: nobody writes the input (guaranteed by the caller).
             unsafe { self.transform_input(arena, places.of(tile), to) };
         }
-        // SAFETY: inputs and products are as long as so many tiles ask for.
+        // SAFETY: inputs and products are long enough for this number of tiles.
         unsafe { self.multiply(inputs, products) };
         let columns = self.bias.len();
         let finish = Epilogue::new(&self.geometry, &self.bias, arena);
         for (tile, from) in tiles.zip(products.chunks_exact(AREA * columns)) {
-            // SAFETY: the tile's pixels are this thread's alone (the caller's promise).
+            // SAFETY: the tile's pixels are used by this thread only (guaranteed by the caller).
             unsafe { self.transform_output(&finish, from, places.of(tile)) };
         }
     }
@@ -167,7 +168,7 @@ impl WinogradDot {
     /// Bᵀ d B for all channels of a tile; product (i, j) of channel c goes to `to[(i·4 + j)·channels + c]`.
     ///
     /// # Safety
-    /// Nobody may write the input meanwhile; the processor must have the instructions.
+    /// Nobody may write the input during the call; the processor must have the instructions.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn transform_input(
         &self,
@@ -178,19 +179,19 @@ impl WinogradDot {
         let (view, channels) = (&self.geometry.input, self.channels);
         assert_eq!(to.len(), AREA * channels, "a tile's products");
         let to = to.as_mut_ptr();
-        // What lies beyond the border only reaches outputs beyond the image.
+        // Inputs beyond the border only affect outputs outside the image.
         let column = |i: usize| (x + i * step).min(view.width - 1 + 2 * step) * view.pitch;
         let row = |i: usize| (y + i * step).min(view.height - 1 + 2 * step) * view.row;
         let corner = view.offset - step * (view.row + view.pitch);
         let columns: [usize; IN] = std::array::from_fn(column);
         let rows: [usize; IN] = std::array::from_fn(row);
-        // The last pixel's last channel included: rows and columns only grow.
+        // Includes the last pixel's last channel, as rows and columns only increase.
         let from = arena.at(corner, rows[IN - 1] + columns[IN - 1] + channels);
         let from = from.cast_const();
         for c in (0..channels).step_by(LANES) {
             let mut half = [[_mm512_setzero_ps(); IN]; IN];
-            // SAFETY: what is read lies in the arena, as was just checked, and nobody writes it (the caller's promise); `to` has a value for
-            // every product of every channel.
+            // SAFETY: the inputs read are in the arena, as was just checked, and nobody writes them (guaranteed by the caller); `to` has
+            // room for every product of every channel.
             unsafe {
                 for j in 0..IN {
                     let mut d = [_mm512_setzero_ps(); IN];
@@ -219,7 +220,7 @@ impl WinogradDot {
     /// The processor must have the instructions.
     ///
     /// # Panics
-    /// Where `products` has no room for the inputs' tiles and those that fill up the last few.
+    /// If `products` has no room for the tiles of the inputs and those that complete the last group.
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn multiply(&self, inputs: &[Bf16], products: &mut [f32]) {
         let (columns, channels) = (self.bias.len(), self.channels);
@@ -235,7 +236,7 @@ impl WinogradDot {
                 let panel = &self.panels[(product * columns + first) * channels..];
                 for from in (0..channels).step_by(part) {
                     for tile in (0..count).step_by(ROWS) {
-                        // Too few tiles are filled up with the last; nobody reads those sums.
+                        // If too few tiles are left, the last one is repeated; those sums are ignored.
                         let rows: [*const Bf16; ROWS] = std::array::from_fn(|r| {
                             let tile = (tile + r).min(count - 1);
                             inputs[(tile * AREA + product) * channels..].as_ptr()
@@ -252,8 +253,8 @@ impl WinogradDot {
                                 sums: products[sums..].as_mut_ptr(),
                                 pitch: AREA * columns,
                             };
-                            // SAFETY: each row has `channels` inputs, the panel a row of weights for every pair of them, and the sums of
-                            // the last tile end where the room does. The processor has the instructions (the caller's promise).
+                            // SAFETY: each row has `channels` inputs, the panel has a row of weights for every pair of them, and the sums
+                            // of the last tile end within `products`. The processor has the instructions (guaranteed by the caller).
                             unsafe {
                                 if width - column >= 2 * LANES {
                                     tile.run::<2>();
@@ -295,7 +296,7 @@ impl WinogradDot {
             for (i, half) in half.into_iter().enumerate().take(down) {
                 for (j, value) in output_axis(half).into_iter().enumerate().take(across) {
                     let place = OutputPixel::new(g, x + j * step, y + i * step);
-                    // SAFETY: the caller's promise.
+                    // SAFETY: guaranteed by the caller.
                     unsafe { finish.vector(place, c, value) };
                 }
             }
@@ -310,7 +311,7 @@ impl WinogradDot {
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 unsafe fn load(from: *const Bf16) -> __m512 {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let bits = unsafe { _mm256_loadu_si256(from.cast()) };
     _mm512_castsi512_ps(_mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits)))
 }

@@ -7,163 +7,163 @@ use deepfusion_hint::count_of;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphProblem {
-    /// It reads a value that no node before it gives.
+    /// The operation reads a value that no previous node computes.
     #[error("value {value} does not exist yet")]
     NoSuchValue {
         /// The value: 0 is the image, `i + 1` the output of node `i`.
         value: usize,
     },
-    /// It would enlarge beyond the image's own size.
-    #[error("larger than the image")]
+    /// The operation enlarges beyond the image's size.
+    #[error("output is larger than the image")]
     LargerThanImage,
-    /// No image is so large that it could be halved as often.
-    #[error("the {halvings}th halving of the image")]
+    /// The operation halves the image more often than any image can be halved.
+    #[error("the image is halved {halvings} times, expected at most 20")]
     Halvings {
-        /// How often.
+        /// Number of halvings.
         halvings: u32,
     },
-    /// A mean over the image where the image's pixels are needed.
-    #[error("a single pixel where an image is expected")]
+    /// The operation needs an image, but its input is a mean over the image.
+    #[error("input is a single pixel, expected an image")]
     SinglePixel,
-    /// A mean over the image has no neighbours for a larger kernel.
-    #[error("a single pixel takes a 1×1 kernel at stride 1")]
+    /// A convolution of a single pixel (a mean over the image) has a larger kernel or stride.
+    #[error("input is a single pixel, expected a 1×1 kernel at stride 1")]
     WindowOnPixel,
-    /// A concatenation of no values.
+    /// A concatenation without values.
     #[error("nothing to concatenate")]
     NoInput,
-    /// A kernel of an even side, or no output channel.
-    #[error("kernels are odd, and there is at least one output")]
+    /// A kernel with an even side, or no output channels.
+    #[error("expected a kernel with odd sides and at least one output channel")]
     EvenKernelOrNoOutput,
-    /// Another stride than the engine has.
+    /// A stride that the engine does not support.
     #[error("stride {stride}, expected 1 or 2")]
     Stride {
         /// The stride.
         stride: usize,
     },
-    /// Taps no distance apart, or farther than any network's.
+    /// A dilation of 0, or a very large one.
     #[error("dilation {dilation}, expected 1 to 256")]
     Dilation {
         /// The dilation.
         dilation: usize,
     },
-    /// Another number of channels than its weights are for.
-    #[error("{} expected, its input has {found}", count_of(*expected, "channel"))]
+    /// A number of input channels that the weights are not for.
+    #[error("expected {} of input, found {found}", count_of(*expected, "channel"))]
     Channels {
-        /// Those the weights are for.
+        /// Number of channels of the weights.
         expected: usize,
-        /// Those of the input.
+        /// Number of channels of the input.
         found: usize,
     },
-    /// More weights than can be counted.
-    #[error("more weights than any memory holds")]
+    /// More weights than can be counted in a `usize`.
+    #[error("too many weights for any memory")]
     TooManyWeights,
-    /// Weights or biases that are not as many as its channels and its kernel take.
+    /// A number of weights or biases that does not match channels and kernel.
     #[error(
-        "{} and {} expected, {} and {} given",
+        "expected {} and {}, found {} and {}",
         count_of(expected[0], "weight"), count_of(expected[1], "bias"), found[0], found[1]
     )]
     Weights {
-        /// Weights and biases that it takes.
+        /// Expected number of weights, and of biases.
         expected: [usize; 2],
-        /// Weights and biases that there are.
+        /// Number of weights, and of biases.
         found: [usize; 2],
     },
-    /// A normalisation's summand that is not above 0.
-    #[error("an epsilon of {epsilon}, expected above 0")]
+    /// A normalisation whose epsilon is not above 0.
+    #[error("epsilon {epsilon}, expected above 0")]
     Epsilon {
-        /// The summand.
+        /// The epsilon.
         epsilon: f32,
     },
-    /// Channels that are not queries, keys and values of as many heads.
+    /// A number of channels that is not divisible into queries, keys and values of the heads.
     #[error("{} for 3 times {}", count_of(*channels, "channel"), count_of(*heads, "head"))]
     Heads {
-        /// Channels of the input.
+        /// Number of channels of the input.
         channels: usize,
-        /// Heads.
+        /// Number of heads.
         heads: usize,
     },
-    /// A code of positions in no channel, or in more than any network's.
-    #[error("{} an axis, expected 1 to 1024", count_of(*per_axis, "channel"))]
+    /// A positional encoding of no channels, or of too many.
+    #[error("{} per axis, expected 1 to 1024", count_of(*per_axis, "channel"))]
     PositionChannels {
-        /// Channels for each axis.
+        /// Number of channels for each axis.
         per_axis: usize,
     },
-    /// Channels that are not four for each pixel.
+    /// A number of channels that is not divisible by the four pixels of a block.
     #[error("{} for 2×2 pixels", count_of(*channels, "channel"))]
     ChannelsForPixels {
-        /// Channels of the input.
+        /// Number of channels of the input.
         channels: usize,
     },
-    /// A convex enlargement by nothing, or by too much.
-    #[error("an enlargement by 2 to the {halvings}, expected 1 to 3")]
+    /// A convex upsampling by a factor of 1, or by too much.
+    #[error("convex upsampling by 2 to the power of {halvings}, expected 1 to 3")]
     Enlargement {
-        /// The power of two.
+        /// The exponent.
         halvings: u32,
     },
-    /// A convex enlargement of more than a map.
-    #[error("{} enlarged, expected one", count_of(*channels, "channel"))]
+    /// A convex upsampling of more than one channel.
+    #[error("convex upsampling of {}, expected one", count_of(*channels, "channel"))]
     EnlargedChannels {
-        /// Channels of the input.
+        /// Number of channels of the input.
         channels: usize,
     },
-    /// What is added or multiplied does not lie in memory as its partner does.
-    #[error("its residual or operand is a concatenation, an extent or the image")]
+    /// An operand whose layout in memory differs from that of the other operand.
+    #[error("residual or operand is a concatenation, an extent or the image")]
     Operand,
-    /// Two values that do not fit each other.
+    /// Two values whose shapes do not match.
     #[error(transparent)]
     Misfit(#[from] Misfit),
 }
 
-/// Two values of an operation whose shapes do not fit each other.
+/// Two operands whose shapes do not match.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Misfit {
-    /// A spatial mask that is not one channel of its input's size.
-    #[error("a spatial mask of {mask:?} on {input:?}")]
+    /// A spatial mask that does not have one channel of its input's size.
+    #[error("spatial mask of {mask:?} on {input:?}")]
     SpatialMask {
-        /// The mask.
+        /// Shape of the mask.
         mask: ValueShape,
-        /// What it acts on.
+        /// Shape of its input.
         input: ValueShape,
     },
-    /// What acts on every pixel is no single pixel, or has other channels.
-    #[error("{pixel:?} at every pixel of {input:?}")]
+    /// The operand for every pixel is not a single pixel, or has other channels.
+    #[error("{pixel:?} at every pixel of {input:?}, expected a single pixel of as many channels")]
     Pixel {
-        /// What acts on every pixel.
+        /// Shape of the operand for every pixel.
         pixel: ValueShape,
-        /// What it acts on.
+        /// Shape of the other operand.
         input: ValueShape,
     },
-    /// Values that are multiplied or blended, of different shapes.
+    /// Values of different shapes that are multiplied or blended.
     #[error("{other:?} combined with {first:?}")]
     Combined {
-        /// A later one.
+        /// Shape of the other value.
         other: ValueShape,
-        /// The first.
+        /// Shape of the first value.
         first: ValueShape,
     },
-    /// Values that are concatenated, of different sizes.
+    /// Values of different sizes that are concatenated.
     #[error("{second:?} appended to {first:?}")]
     Appended {
-        /// What is appended.
+        /// Shape of the appended value.
         second: ValueShape,
-        /// What is there already.
+        /// Shape of the value before it.
         first: ValueShape,
     },
-    /// A residual of another shape than the output that it is added to.
-    #[error("a residual of {residual:?} on {output:?}")]
+    /// A residual whose shape differs from that of the output.
+    #[error("residual of {residual:?} on {output:?}")]
     Residual {
-        /// The residual.
+        /// Shape of the residual.
         residual: ValueShape,
-        /// The output.
+        /// Shape of the output.
         output: ValueShape,
     },
-    /// Weights of a convex enlargement that are not nine for each new pixel.
+    /// Weights of a convex upsampling that are not nine for each output pixel.
     #[error("weights of {found:?}, expected {expected:?}")]
     ConvexWeights {
-        /// As they should be.
+        /// The expected shape.
         expected: ValueShape,
-        /// As they are.
+        /// The shape of the weights.
         found: ValueShape,
     },
 }

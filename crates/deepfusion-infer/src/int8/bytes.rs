@@ -17,7 +17,7 @@ use crate::view::{Shared, View};
 /// The largest byte.
 const STEPS: f32 = 255.0;
 
-/// How values become bytes: q = x / `step` + `zero`, rounded and held within a byte.
+/// Conversion of values to bytes: q = x / `step` + `zero`, rounded and limited to a byte.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub(super) step: f32,
@@ -25,10 +25,10 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// That of a range, which is stretched to hold 0, so that 0 is a byte exactly: a border of zeros is one of `zero`.
+    /// The scale of a range. It is extended to include 0, which then has an exact byte: a border of zeros consists of `zero`.
     pub(super) fn of([low, high]: [f32; 2]) -> Self {
         let (low, high) = (low.min(0.0), high.max(0.0));
-        // A value that never differs from 0.
+        // For values that are all 0.
         let step = if high > low {
             (high - low) / STEPS
         } else {
@@ -41,12 +41,12 @@ impl Scale {
     }
 }
 
-/// Where a convolution's input lies as bytes: without gaps between pixels, as far beyond the image as the kernel reaches.
+/// The input of a convolution as bytes: without gaps between pixels, with as wide a border as the kernel needs.
 #[derive(Debug, Clone)]
 pub(super) struct ByteImage {
     /// The same convolution on the bytes.
     pub(super) geometry: Geometry,
-    /// Every how many pixels of the input one is read.
+    /// Distance in pixels between those that are read.
     every: usize,
     pub(super) len: usize,
 }
@@ -55,7 +55,7 @@ impl ByteImage {
     pub(super) fn new(geometry: &Geometry) -> Self {
         let input = &geometry.input;
         let reach = geometry.kernel / 2 * geometry.dilation;
-        // A single tap passes over the pixels between.
+        // A single tap skips the pixels in between.
         let every = if geometry.kernel == 1 {
             geometry.stride
         } else {
@@ -86,7 +86,7 @@ impl ByteImage {
     /// Writes the input of a convolution as bytes.
     ///
     /// # Safety
-    /// `input` must lie in the arena with its border, which nobody may write; the processor must have AVX-512.
+    /// `input` and its border must be in the arena, and nobody may write them; the processor must have AVX-512.
     pub(super) unsafe fn fill(
         &self,
         arena: Shared<Bf16>,
@@ -102,7 +102,7 @@ impl ByteImage {
         } = self.geometry.input;
         let pixels = width + 2 * reach;
         let first = input.offset - reach * (input.row + input.pitch);
-        // Without gaps a row is one piece.
+        // Without gaps a row is contiguous.
         let joined = input.pitch == input.channels && self.every == 1;
         let rows = bytes[..self.len].par_chunks_mut(row_len).enumerate();
         rows.for_each(|(y, row)| {
@@ -114,7 +114,7 @@ impl ByteImage {
             };
             for (x, to) in row.chunks_exact_mut(piece).enumerate() {
                 let from = arena.at(start + x * self.every * input.pitch, piece);
-                // SAFETY: as many values as bytes, which nobody writes (the caller's promise).
+                // SAFETY: as many values as bytes, which nobody writes (guaranteed by the caller).
                 unsafe { to_bytes(from, scale, to) };
             }
         });
@@ -122,7 +122,7 @@ impl ByteImage {
 }
 
 /// # Safety
-/// `from` must hold as many values as `to`, a multiple of [`LANES`]; the processor must have AVX-512.
+/// `from` must have as many values as `to`, a multiple of [`LANES`]; the processor must have AVX-512.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl")]
 unsafe fn to_bytes(from: *const Bf16, scale: Scale, to: &mut [u8]) {
     let inverse = _mm512_set1_ps(scale.step.recip());
@@ -134,7 +134,7 @@ unsafe fn to_bytes(from: *const Bf16, scale: Scale, to: &mut [u8]) {
             let bits = _mm256_loadu_si256(from.add(i * LANES).cast());
             let value = _mm512_castsi512_ps(_mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits)));
             let steps = _mm512_fmadd_ps(value, inverse, zero);
-            // NaN becomes the least value: bytes have none.
+            // NaN, for which bytes have no value, becomes the smallest one.
             let steps = _mm512_min_ps(_mm512_max_ps(steps, _mm512_setzero_ps()), most);
             let bytes = _mm512_cvtusepi32_epi8(_mm512_cvtps_epi32(steps));
             _mm_storeu_si128(to.as_mut_ptr().cast(), bytes);
@@ -142,8 +142,8 @@ unsafe fn to_bytes(from: *const Bf16, scale: Scale, to: &mut [u8]) {
     }
 }
 
-/// Lends `len` bytes that the thread keeps from image to image. They are taken out of their place meanwhile: a thread that
-/// waits for its tasks may run another engine's.
+/// Lends `len` bytes that the thread keeps from image to image. During the call they are moved out of the thread's storage, because a
+/// thread that waits for its tasks may run another engine's.
 pub(super) fn with_bytes<R>(len: usize, work: impl FnOnce(&mut [u8]) -> R) -> R {
     thread_local! {
         static BYTES: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
@@ -167,7 +167,7 @@ mod tests {
         for range in [[-1.0, 3.0], [0.5, 2.0], [-4.0, -1.0], [0.0, 0.0]] {
             let scale = Scale::of(range);
             assert!(scale.step > 0.0, "{range:?}");
-            // One step is a 255th of what holds both the range and 0.
+            // One step is a 255th of the range extended to 0.
             let all = range[1].max(0.0) - range[0].min(0.0);
             assert!((scale.step * 255.0 - all).abs() < 1e-6 || all == 0.0);
         }
@@ -188,7 +188,7 @@ mod tests {
             *place = Bf16::of(value);
         }
         let mut to = [0_u8; LANES];
-        // SAFETY: sixteen of each, and the processor was asked.
+        // SAFETY: sixteen of each, and the processor was checked.
         unsafe { to_bytes(from.as_ptr(), scale, &mut to) };
         // In steps of 0.01 from 100 on; 1.55 is 1.546875 in bf16.
         assert_eq!(to[..9], [0, 0, 99, 100, 100, 102, 255, 255, 0]);

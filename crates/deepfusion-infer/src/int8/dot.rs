@@ -1,4 +1,4 @@
-//! The sums of products of bytes: each lane adds four inputs times four weights.
+//! Sums of products of bytes: each lane adds four inputs times four weights.
 
 use std::arch::x86_64::{
     _mm512_cvtepi32_ps, _mm512_dpbusd_epi32, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_mul_ps,
@@ -16,17 +16,17 @@ use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES};
 use crate::view::Shared;
 
-/// Inputs summed before the sums go back to memory: their weights stay in the first cache.
+/// Inputs summed before the sums are written to memory, so that their weights stay in the L1 cache.
 const INPUTS_AT_ONCE: usize = 384;
 /// Output pixels of a task.
 const PIXELS_AT_ONCE: usize = 480;
-/// Pixels whose sums are kept in registers, at four vectors each.
+/// Pixels whose sums are kept in registers, with four vectors each.
 const ROWS: usize = 6;
 /// Inputs that one lane multiplies at once.
 const FOUR: usize = 4;
 /// The largest weight.
 const MOST: f32 = 127.0;
-/// More products of 255 and 127 than this may not fit in 32 bits.
+/// A sum of up to this many products of 255 and 127 fits in 32 bits.
 const MOST_INPUTS: usize = 65_000;
 
 /// A convolution ready to run.
@@ -38,13 +38,13 @@ pub(crate) struct ByteDot {
     runs: Runs,
     /// For each group of [`GROUP`] output channels and four inputs: their weights, channel by channel.
     panels: Aligned<i8>,
-    /// What a sum of each output channel is multiplied by.
+    /// Factor of each output channel's sums.
     factors: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl ByteDot {
-    /// Whether channels come in whole vectors, and sums fit in 32 bits.
+    /// Whether channels are whole vectors, and sums fit in 32 bits.
     pub(super) fn fits(conv: &Conv, geometry: &Geometry) -> bool {
         let inputs = conv.channels_in * conv.kernel * conv.kernel;
         let whole = geometry.input.channels.is_multiple_of(LANES);
@@ -94,10 +94,10 @@ impl ByteDot {
     }
 
     /// # Safety
-    /// As [`crate::conv::ConvForm::run`]; [`super::has_int8`] must hold.
+    /// As for [`crate::conv::ConvForm::run`]; [`super::has_int8`] must be true.
     pub(super) unsafe fn run(&self, arena: Shared<Bf16>) {
         with_bytes(self.image.len, |bytes| {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             unsafe {
                 self.image
                     .fill(arena, &self.geometry.input, self.scale, bytes);
@@ -110,7 +110,7 @@ impl ByteDot {
                         let room = pixels.len().next_multiple_of(ROWS) * GROUP;
                         let sums = scratch.first.take(room);
                         for group in groups {
-                            // SAFETY: the caller's promise; each pixel and group belongs to one task.
+                            // SAFETY: guaranteed by the caller; each pixel and group belongs to one task.
                             unsafe {
                                 self.sum(bytes, group, pixels.clone(), sums);
                                 self.finish(arena, group, pixels.clone(), sums);
@@ -126,7 +126,7 @@ impl ByteDot {
         GROUP.min(self.bias.len() - group * GROUP)
     }
 
-    /// The sums of all pixels, [`GROUP`] integers each, in the room of as many floats.
+    /// The sums of all pixels, [`GROUP`] integers each, stored in the memory of as many floats.
     ///
     /// # Safety
     /// The processor must have the instructions.
@@ -138,7 +138,7 @@ impl ByteDot {
         for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
             let starts = pixels.clone().step_by(ROWS);
             for (start, sums) in starts.zip(sums.chunks_exact_mut(ROWS * GROUP)) {
-                // Too few pixels are filled up with the last; nobody reads those sums.
+                // If too few pixels are left, the last one is repeated; those sums are ignored.
                 let rows: [*const u8; ROWS] = std::array::from_fn(|r| {
                     let pixel = (start + r).min(pixels.end - 1);
                     let first = self.image.geometry.first_tap(pixel % out, pixel / out);
@@ -161,8 +161,8 @@ impl ByteDot {
                         2.. => 2,
                         _ => 1,
                     };
-                    // SAFETY: the runs lie within their extent; the panel has a row for every four inputs, the sums room
-                    // for every pixel. The processor has the instructions.
+                    // SAFETY: the runs are within their extent; the panel has a row for every four inputs, and the sums have room for every
+                    // pixel. The processor has the instructions.
                     unsafe {
                         match vectors {
                             4 => tile.run::<4>(),
@@ -177,7 +177,7 @@ impl ByteDot {
     }
 
     /// # Safety
-    /// As [`Self::sum`], and the pixels of the output must be this thread's alone, its residual nobody's to write.
+    /// As for [`Self::sum`]; the pixels of the output must be used by this thread only, and nobody may write the residual.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn finish(&self, arena: Shared<Bf16>, group: usize, pixels: Range<usize>, sums: &[f32]) {
         let g = &self.geometry;
@@ -201,7 +201,7 @@ impl ByteDot {
     }
 }
 
-/// What one step of an output channel's weights is worth.
+/// Size of one step of an output channel's weights.
 fn weight_step(conv: &Conv, out: usize) -> f32 {
     let inputs = conv.channels_in * conv.kernel * conv.kernel;
     let own = conv.weight.get(out * inputs..(out + 1) * inputs);
@@ -218,9 +218,9 @@ struct Tile<'a> {
     panel: *const i8,
     /// Weights of a row of the panel.
     stride: usize,
-    /// Whether the sums go on from what they are.
+    /// Whether to add to the existing sums.
     add: bool,
-    /// [`GROUP`] values from a pixel to the next.
+    /// Distance from one pixel's sums to the next pixel's: [`GROUP`].
     sums: *mut i32,
 }
 
@@ -232,7 +232,7 @@ impl Tile<'_> {
     #[target_feature(enable = "avx512f,avx512vnni")]
     unsafe fn run<const V: usize>(self) {
         let mut sums = [[_mm512_setzero_si512(); V]; ROWS];
-        // SAFETY: what is read and written is the caller's promise.
+        // SAFETY: reads and writes are valid (guaranteed by the caller).
         unsafe {
             if self.add {
                 for r in 0..ROWS {

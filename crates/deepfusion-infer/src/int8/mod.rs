@@ -1,9 +1,9 @@
-//! Convolutions in int8 with AVX-512's dot products of four bytes (VNNI): inputs as steps of 8 bits of the range
-//! found in calibration, weights as steps of ±127 of each output channel, sums exact in 32 bits.
+//! Convolutions in int8 with AVX-512's dot products of four bytes (VNNI): inputs as 255 steps of the calibrated range, weights as steps of
+//! ±127 for each output channel, sums exact in 32 bits.
 //!
-//! Between the operations values stay in bf16, so that all others are as they are there. A convolution first writes its
-//! input as bytes: x ≈ s·(q − z), s = (high − low) / 255, z = −low / s rounded. Then with weights w ≈ s_o·p of each output
-//! channel o, Σ w·x = s·s_o·(Σ p·q − z·Σ p), of which the last part goes into the bias.
+//! Between operations, values are in bf16, so all other operations are as in bf16. A convolution first converts its input to bytes: x ≈
+//! s·(q − z), s = (high − low) / 255, z = −low / s rounded. Then, with weights w ≈ s_o·p of each output channel o, Σ w·x = s·s_o·(Σ p·q −
+//! z·Σ p). The last part is added to the bias.
 
 mod bytes;
 mod dot;
@@ -19,15 +19,15 @@ use crate::view::Shared;
 
 pub(crate) use dot::ByteDot;
 
-/// Whether the processor multiplies fours of bytes (AVX512-VNNI), and knows bf16 for all that is not computed in bytes.
+/// Whether the processor multiplies bytes in groups of four (AVX512-VNNI), and has bf16 for everything else.
 pub(crate) fn has_int8() -> bool {
     has_dot() && V4::try_new().is_some() && is_x86_feature_detected!("avx512vnni")
 }
 
-/// In bytes where that was calibrated, in bf16 elsewhere.
+/// A convolution in int8 if it was calibrated, else in bf16.
 #[expect(
     clippy::large_enum_variant,
-    reason = "a few dozen of them a network, most of them bytes"
+    reason = "there are a few dozen per network, most of them in int8"
 )]
 #[derive(Debug)]
 pub(crate) enum Int8Conv {
@@ -69,7 +69,7 @@ impl ConvForm<Bf16> for Int8Conv {
         }
     }
 
-    /// Bytes are made of the input alone.
+    /// Int8 reads its inputs only.
     fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
         match self {
             Self::Bytes(_) => None,
@@ -78,7 +78,7 @@ impl ConvForm<Bf16> for Int8Conv {
     }
 
     unsafe fn run(&self, arena: Shared<Bf16>) {
-        // SAFETY: the caller's promise; `new` is only called where `available` holds.
+        // SAFETY: guaranteed by the caller; `new` is only called if `available` is true.
         unsafe {
             match self {
                 Self::Bytes(conv) => conv.run(arena),

@@ -7,18 +7,18 @@ use super::oracle::run;
 use crate::dispatch::tests::{Level, with_level};
 use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 
-/// What a skip path of a small network has.
+/// Parameters of a small network's skip path.
 #[derive(Debug, Clone)]
 struct SkipPath {
     widths: [usize; 3],
     rates: Vec<usize>,
     global: bool,
     residual: bool,
-    /// Of the convolution at full depth, whose border is reflected where it is odd.
+    /// Dilation of the convolution at full depth, whose border is reflected if it is odd.
     dilation: usize,
 }
 
-/// A 1×1 of an image's mean.
+/// A 1×1 convolution of an image's mean.
 fn on_mean(
     b: &mut Builder<impl FnMut() -> f32>,
     input: ValueId,
@@ -104,7 +104,7 @@ fn network(seed: u64, p: &SkipPath) -> Graph {
     b.graph
 }
 
-/// Of all of them, small.
+/// Small parameters of all kinds.
 pub(super) fn small_network() -> Graph {
     let parts = SkipPath {
         widths: [8, 16, 16],
@@ -124,7 +124,7 @@ fn check(graph: &Graph, width: usize, height: usize, seed: u64) -> Result<(), Te
     let f32_off = |level| {
         with_level(level, || {
             let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
-            // Twice: nothing of an image may remain for the next.
+            // Twice, as one image must not affect the next.
             engine.run(&noise_image(seed ^ 7, width, height));
             engine.run(&image);
             let off = deviation(&engine.output(0), exact);
@@ -138,7 +138,7 @@ fn check(graph: &Graph, width: usize, height: usize, seed: u64) -> Result<(), Te
         Level::Avx2,
     ] {
         let off = f32_off(level);
-        // As the plain networks' tolerance: f32 through some fifteen layers, the Winograd form included.
+        // Tolerance as for the plain networks: f32 through some fifteen layers, including the Winograd form.
         prop_assert!(off < 3e-5, "{level:?} off by {off}");
     }
     if Engine::has_bf16() {
@@ -157,7 +157,7 @@ proptest! {
     fn skip_paths_compute_what_the_operations_mean(
         seed in any::<u64>(),
         widths in [1_usize..40, 1_usize..70, 1_usize..80],
-        // Some beyond the image: those taps see nothing.
+        // Some dilations exceed the image: those taps read only padding.
         rates in prop::collection::vec(1_usize..14, 0..4),
         (global, residual) in any::<(bool, bool)>(),
         dilation in 1_usize..5,
@@ -168,7 +168,7 @@ proptest! {
     }
 }
 
-/// At least 1,024 pixels at a quarter of the size: dilated kernels take Winograd's form, phase by phase.
+/// At least 1,024 pixels at a quarter of the size, so that dilated kernels use Winograd's form, phase by phase.
 #[test]
 fn large_dilated_convolutions_take_the_winograd_form_and_agree_too() {
     let parts = SkipPath {
@@ -234,7 +234,7 @@ fn operations_that_do_not_fit_are_refused() {
     refused(add(half), "every pixel");
     refused(add(wide), "every pixel");
 
-    // What is multiplied or added must lie as a convolution's channels do.
+    // Operands of products and sums must have the layout of a convolution's output.
     let joined = b.push(Op::Concat {
         inputs: vec![full, full],
     });

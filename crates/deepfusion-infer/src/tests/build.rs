@@ -1,9 +1,9 @@
-//! Random graphs and images, and the deviation of results.
+//! Random graphs and images, and the difference of results.
 
 use super::oracle::Image;
 use crate::{Activation, Border, Conv, Graph, Op, ValueId};
 
-/// Numbers without a pattern in [−1, 1).
+/// Pseudo-random numbers in [−1, 1).
 pub(super) fn noise(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     move || {
@@ -14,14 +14,14 @@ pub(super) fn noise(seed: u64) -> impl FnMut() -> f32 {
     }
 }
 
-/// A graph under construction, its weights random.
+/// A graph under construction, with random weights.
 pub(super) struct Builder<F> {
     pub(super) graph: Graph,
     pub(super) noise: F,
 }
 
 impl<F: FnMut() -> f32> Builder<F> {
-    /// A 3×3 with ReLU, or what `change` makes of it.
+    /// A 3×3 convolution with ReLU, modified by `change`.
     pub(super) fn conv(
         &mut self,
         input: ValueId,
@@ -57,7 +57,7 @@ impl<F: FnMut() -> f32> Builder<F> {
     }
 }
 
-/// The largest difference.
+/// The largest absolute difference.
 pub(super) fn deviation(engine: &[f32], exact: &Image) -> f64 {
     let off = engine.iter().zip(&exact.data);
     off.map(|(a, b)| (f64::from(*a) - b).abs())

@@ -1,4 +1,4 @@
-//! Int8 against integer arithmetic written out, and against the network in f64.
+//! Compares int8 with integer arithmetic written out, and with the network in f64.
 
 use super::build::{Builder, deviation, noise, noise_image};
 use super::network;
@@ -16,7 +16,7 @@ fn pair(second: impl Fn(&mut Conv)) -> Graph {
         graph: Graph::new([0.4; 3], [0.3; 3]),
         noise: noise(5),
     };
-    // To a size that does not halve.
+    // The output has an odd size.
     let first = b.conv(ValueId::IMAGE, 32, |c| {
         (c.activation, c.stride) = (Activation::Elu, 2);
     });
@@ -26,7 +26,7 @@ fn pair(second: impl Fn(&mut Conv)) -> Graph {
     b.graph
 }
 
-/// The ranges that an image shows.
+/// The ranges determined from an image.
 fn observed(graph: &Graph, images: &[Vec<f32>], (width, height): (usize, usize)) -> InputRanges {
     let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
     let mut seen = SeenInputs::default();
@@ -39,7 +39,7 @@ fn observed(graph: &Graph, images: &[Vec<f32>], (width, height): (usize, usize))
     ranges
 }
 
-/// The second convolution of [`pair`], from the first one's values as they were stored: bytes, products, sums.
+/// The second convolution of [`pair`], computed from the stored output of the first: bytes, products, sums.
 fn by_integers(graph: &Graph, input: &[f32], [low, high]: [f32; 2]) -> Vec<f32> {
     let Op::Conv(conv) = &graph.nodes()[1].op else {
         panic!("a convolution");
@@ -47,7 +47,7 @@ fn by_integers(graph: &Graph, input: &[f32], [low, high]: [f32; 2]) -> Vec<f32> 
     let (low, high) = (low.min(0.0), high.max(0.0));
     let step = (high - low) / 255.0;
     let zero = (-low / step).round();
-    // In the engine's order: next to halfway, another would round the other way.
+    // In the engine's order: close to a tie, another order would round the other way.
     let byte = |x: f32| x.mul_add(step.recip(), zero).round_ties_even();
     let byte = |x: f32| byte(x).clamp(0.0, 255.0) as i64;
     let (width, height) = (SIZE.0 / 2, SIZE.1 / 2);
@@ -121,7 +121,7 @@ fn sums_are_those_of_the_integers() {
         let found = engine.output(1);
         assert_eq!(found.len(), expected.len());
         for (found, expected) in found.iter().zip(&expected) {
-            // Rounded to bf16 in the end. Where the sum ends halfway between two of its numbers, f32 may go the other way.
+            // Rounded to bf16 at the end. If the sum is close to a tie, f32 may round the other way.
             let rounded = Bf16::of(*expected).value();
             let step = expected.abs() / 128.0 + 1e-6;
             assert!(
@@ -163,9 +163,9 @@ fn a_network_in_int8_is_near_its_definition_and_takes_the_form() {
             .count();
         assert!(in_int8 >= 9, "{in_int8} of {steps:?}");
         let off = deviation(&engine.output(0), &exact);
-        // A sigmoid's output, after a dozen layers of which each rounds to 255 steps.
+        // A sigmoid's output after a dozen layers, each rounded to 255 steps.
         assert!(off < 0.1, "off by {off}");
-        // Nothing remains for the next image, and another engine gives the same.
+        // One image must not affect the next, and another engine gives the same result.
         let first = engine.output(0);
         engine.run(&noise_image(4, width, height));
         engine.run(&image);

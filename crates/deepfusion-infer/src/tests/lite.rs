@@ -1,4 +1,4 @@
-//! Depthwise convolutions, attention between channels, positions, smooth enlargement: Lite-Mono's operations.
+//! Lite-Mono's operations: depthwise convolutions, attention between channels, positional encoding, bilinear enlargement.
 
 use proptest::prelude::*;
 
@@ -7,7 +7,7 @@ use super::oracle::run;
 use crate::dispatch::tests::{Level, with_level};
 use crate::{Activation, Border, Depthwise, Engine, Graph, Op, Precision, ValueId};
 
-/// What a small network has.
+/// Parameters of a small network.
 #[derive(Debug, Clone)]
 struct LiteSettings {
     heads: usize,
@@ -37,7 +37,7 @@ fn depthwise(
     b.push(Op::Depthwise(Box::new(op)))
 }
 
-/// A block's 1×1 layers, its input added.
+/// The 1×1 convolutions of a block, with its input added.
 fn bottleneck(
     b: &mut Builder<impl FnMut() -> f32>,
     input: ValueId,
@@ -109,7 +109,7 @@ fn network(seed: u64, p: &LiteSettings) -> Graph {
     let smaller = depthwise(&mut b, small, 3, [2, 1]);
     let inputs = vec![start, fine, smaller];
     let joined = b.push(Op::Concat { inputs });
-    // Of channels with gaps between them.
+    // Channels with gaps between them.
     let normed = b.push(Op::ChannelNorm {
         input: joined,
         epsilon: 1e-6,
@@ -136,7 +136,7 @@ fn network(seed: u64, p: &LiteSettings) -> Graph {
     b.graph
 }
 
-/// Of all of them, small.
+/// Small parameters of all kinds.
 pub(super) fn small_network() -> Graph {
     let settings = LiteSettings {
         heads: 2,
@@ -156,7 +156,7 @@ proptest! {
         seed in any::<u64>(),
         (heads, each, expansion) in (1_usize..5, 1_usize..40, 1_usize..4),
         kernel in prop::sample::select(vec![1_usize, 3, 5]),
-        // Some beyond the image: those taps see nothing.
+        // Some dilations exceed the image: those taps read only padding.
         rates in prop::collection::vec(1_usize..9, 0..3),
         (across, down) in (2_usize..7, 2_usize..7),
     ) {
@@ -170,7 +170,7 @@ proptest! {
             let off = with_level(level, || {
                 let mut engine =
                     Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
-                // Twice: nothing of an image may remain for the next.
+                // Twice, as one image must not affect the next.
                 engine.run(&noise_image(seed ^ 7, width, height));
                 engine.run(&image);
                 [0, 1].map(|i: usize| deviation(&engine.output(i), exact[i]))
@@ -230,8 +230,8 @@ fn operations_that_do_not_fit_are_refused() {
     refused(attention(3), "12 channels for 3 times 3 heads");
     refused(attention(0), "heads");
     let position = |per_axis, halvings| Op::Position { per_axis, halvings };
-    refused(position(0, 1), "channels an axis");
-    refused(position(4, 60), "halving");
+    refused(position(0, 1), "channels per axis");
+    refused(position(4, 60), "halved");
 
     let joined = b.push(Op::Concat {
         inputs: vec![full, full, full],

@@ -1,4 +1,4 @@
-//! The engine against the operations' definitions in f64, on small random networks.
+//! Compares the engine with the operations' definitions in f64, on small random networks.
 
 mod attention;
 mod build;
@@ -27,8 +27,7 @@ use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 use build::{Builder, deviation, noise, noise_image};
 use oracle::run;
 
-/// The depth network's shapes in small: stem, pooling, blocks with and without a shortcut convolution, an
-/// enlarging decoder with skips, a head.
+/// A small version of the depth network: stem, pooling, blocks with and without a shortcut convolution, a decoder with skips, a head.
 fn network(seed: u64, widths: [usize; 4], bottleneck: bool, stem: usize) -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.485, 0.456, 0.406], [0.229, 0.224, 0.225]),
@@ -69,7 +68,7 @@ fn network(seed: u64, widths: [usize; 4], bottleneck: bool, stem: usize) -> Grap
     b.graph
 }
 
-/// The first output of an engine whose convolutions all take one form.
+/// The first output of an engine in which all convolutions use one form.
 fn output_of<E: Element, C: ConvForm<E>>(graph: Graph, image: &[f32], width: usize) -> Vec<f32> {
     let mut engine = Typed::<E, C>::new(graph, width, image.len() / 3 / width).unwrap();
     engine.run(image, |_, _| {});
@@ -93,11 +92,11 @@ proptest! {
         let values = run(&graph, &image, height, width);
         let exact = &values[graph.outputs()[0].0];
         let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
-        // Twice: nothing of an image may remain for the next.
+        // Twice, as one image must not affect the next.
         for _ in 0..2 {
             engine.run(&image);
             let off = deviation(&engine.output(0), exact);
-            // A sigmoid's output; f32 through 13 layers, the Winograd form's 1e-5 included.
+            // A sigmoid's output; f32 through 13 layers, including 1e-5 of the Winograd form.
             prop_assert!(off < 3e-5, "off by {off}");
         }
         for level in [Level::Scalar, #[cfg(target_arch = "x86_64")] Level::Avx2] {
@@ -153,7 +152,7 @@ fn large_images_take_the_winograd_form_and_agree_too() {
     }
 }
 
-/// The matrix unit and the dot products sum the same products in another order.
+/// The matrix unit and the dot products sum the same products in a different order.
 #[cfg(target_arch = "x86_64")]
 #[test]
 fn both_bf16_forms_round_alike() {
@@ -172,7 +171,7 @@ fn both_bf16_forms_round_alike() {
     assert!(mean < 1e-3 && most < 2e-2, "mean {mean}, most {most}");
 }
 
-/// What a processor without a matrix unit takes in bf16, also where there is one.
+/// What a processor without a matrix unit uses in bf16, tested on others, too.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug)]
 struct WithoutMatrixUnit(Bf16Conv);
@@ -200,13 +199,13 @@ impl ConvForm<crate::element::Bf16> for WithoutMatrixUnit {
     }
 
     unsafe fn run(&self, arena: Shared<crate::element::Bf16>) {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { self.0.run(arena) };
     }
 }
 
-/// Every kind of convolution that takes Winograd's form in bf16: dilated or not, both borders, a residual, channels that fill up a vector, images
-/// whose tiles reach over the edge.
+/// Every kind of convolution that uses Winograd's form in bf16: dilated or not, both kinds of border, a residual, padded channels, images
+/// whose tiles extend over the edge.
 #[cfg(target_arch = "x86_64")]
 #[test]
 fn winograd_in_bf16_is_as_near_the_truth_as_plain_sums() {
@@ -232,7 +231,7 @@ fn winograd_in_bf16_is_as_near_the_truth_as_plain_sums() {
     let exact = &values[b.graph.outputs()[0].0];
     let mut engine = Typed::<Bf16, WithoutMatrixUnit>::new(b.graph.clone(), width, height).unwrap();
     let mut forms = Vec::new();
-    // An image may leave anything behind, and nothing of it may reach the next.
+    // The previous image may leave anything in the arena, which must not affect the next one.
     engine.poison();
     engine.run(&image, |_, form| forms.push(form.to_owned()));
     assert_eq!(forms.iter().filter(|form| *form == "winograd").count(), 3);
@@ -245,7 +244,7 @@ fn winograd_in_bf16_is_as_near_the_truth_as_plain_sums() {
     // Its inputs are rounded once more than those of plain sums.
     assert!(
         winograd < 2.5 * dot,
-        "{winograd} where plain sums are off by {dot}"
+        "off by {winograd}, plain sums by {dot}"
     );
 }
 
@@ -270,8 +269,8 @@ fn results_do_not_depend_on_the_number_of_threads() {
     }
 }
 
-/// What no depth network has: the image convolved at full size and appended, a value appended twice, a
-/// concatenation enlarged and pooled, wide reflection, several outputs.
+/// Combinations that no depth network has: the image convolved at full size and appended, a value appended twice, a concatenation enlarged
+/// and pooled, wide reflection, several outputs.
 fn odd_network() -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.4; 3], [0.3; 3]),
@@ -368,7 +367,7 @@ fn what_cannot_be_laid_out_is_refused() {
     graph.push("c", Op::Conv(Box::new(plain))).unwrap();
     assert!(
         graph.check_size(3, 8).is_err(),
-        "seven pixels see four to mirror"
+        "a kernel of seven pixels needs four to mirror"
     );
     assert!(graph.check_size(4, 8).is_ok());
     let huge = Conv {

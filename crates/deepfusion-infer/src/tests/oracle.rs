@@ -36,7 +36,7 @@ impl Image {
         self.data[(c * self.height + y) * self.width + x]
     }
 
-    /// The same; of a single pixel wherever one looks.
+    /// A pixel's value; a single pixel is the same everywhere.
     fn near(&self, c: usize, y: usize, x: usize) -> f64 {
         self.at(c, y.min(self.height - 1), x.min(self.width - 1))
     }
@@ -45,7 +45,7 @@ impl Image {
 fn conv(conv: &Conv, values: &[Image]) -> Image {
     let input = &values[conv.input.0];
     let half = conv.reach() as isize;
-    // Where a tap reads; `None` for zeros.
+    // The index that a tap reads; `None` for zeros.
     let place = |i: isize, n: usize| {
         let n = n as isize;
         match conv.border {
@@ -109,7 +109,7 @@ fn depthwise(op: &Depthwise, input: &Image) -> Image {
     })
 }
 
-/// Half-pixel centres: output pixel i lies at (i + ½)/2 − ½ of the input.
+/// Half-pixel centres: output pixel i is at (i + ½)/2 − ½ of the input.
 fn enlarged(v: &Image) -> Image {
     let around = |i: usize, n: usize| {
         let place = ((i as f64 + 0.5) / 2.0 - 0.5).clamp(0.0, (n - 1) as f64);
@@ -124,7 +124,7 @@ fn enlarged(v: &Image) -> Image {
     })
 }
 
-/// Each pixel by the softmax of its nine weights.
+/// Each pixel, by the softmax of its nine weights.
 fn convex(v: &Image, weights: &Image, side: usize) -> Image {
     Image::from_fn(1, v.height * side, v.width * side, |_, y, x| {
         let (row, column) = (y / side, x / side);

@@ -1,5 +1,5 @@
-//! A convolution in bf16 that reads just what the fast forms read, in plain code, for processors and tools that lack
-//! their instructions.
+//! A convolution in bf16 that reads exactly the elements that the fast forms read, in plain code, for processors and tools without their
+//! instructions.
 
 use rayon::prelude::*;
 
@@ -9,18 +9,18 @@ use crate::tile::LANES;
 use crate::view::Shared;
 use crate::{Activation, Conv};
 
-/// Reads as the dot products do where `MULTIPLE` is 2, as the matrix unit where it is 32.
+/// Reads like the dot products if `MULTIPLE` is 2, and like the matrix unit if it is 32.
 #[derive(Debug)]
 pub(super) struct Plain<const MULTIPLE: usize> {
     geometry: Geometry,
     runs: Runs,
-    /// For each output channel one for every input of every run.
+    /// For each output channel: one weight for every input of every run.
     weights: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl<const MULTIPLE: usize> Plain<MULTIPLE> {
-    /// Pixels that are read behind one.
+    /// Number of pixels that are read beyond one.
     const BEHIND: usize = if MULTIPLE == 32 { 15 } else { 0 };
 }
 
@@ -63,8 +63,8 @@ impl<const MULTIPLE: usize> ConvForm<Bf16> for Plain<MULTIPLE> {
             for x in 0..g.out.width {
                 let behind = Self::BEHIND * g.stride * g.input.pitch;
                 arena.at(g.first_tap(x, y), behind + runs.extent);
-                // SAFETY: a pixel's inputs, of which nobody writes any, not even those that are multiplied by zero: the
-                // layout keeps them apart from the output.
+                // SAFETY: a pixel's inputs, which nobody writes, not even those that are multiplied by zero: the layout keeps them apart
+                // from the output.
                 let runs: Vec<&[Bf16]> = runs
                     .offsets
                     .iter()
@@ -77,7 +77,7 @@ impl<const MULTIPLE: usize> ConvForm<Bf16> for Plain<MULTIPLE> {
                     sum + self.bias[o]
                 };
                 if g.out.result {
-                    // SAFETY: a pixel of the output, whose row is this task's alone.
+                    // SAFETY: a pixel of the output, whose row is used by this task only.
                     let slots = unsafe { arena.write(g.out.at(x, y), 2) };
                     let bits = activated(g.activation, sum(0)).to_bits();
                     slots.copy_from_slice(&[Bf16(bits as u16), Bf16((bits >> 16) as u16)]);
@@ -89,7 +89,7 @@ impl<const MULTIPLE: usize> ConvForm<Bf16> for Plain<MULTIPLE> {
                         // SAFETY: a pixel of the residual, which nobody writes.
                         value += unsafe { arena.read(view.at(x, y) + o, 1) }[0].value();
                     }
-                    // SAFETY: a pixel of the output, whose row is this task's alone.
+                    // SAFETY: a pixel of the output, whose row is used by this task only.
                     let out = unsafe { arena.write(g.out.at(x, y) + o, 1) };
                     out[0] = Bf16::of(activated(g.activation, value));
                 }

@@ -1,4 +1,4 @@
-//! Gated recurrent units, refined values and convex enlargement: R-MSFM's operations.
+//! R-MSFM's operations: gated recurrent units, refined values and convex upsampling.
 
 use proptest::prelude::*;
 
@@ -7,7 +7,7 @@ use super::oracle::run;
 use crate::dispatch::tests::{Level, with_level};
 use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 
-/// Two steps of a gated unit that refine a value of one channel, which is then enlarged.
+/// Two steps of a gated unit that refine a single channel, which is then enlarged.
 fn network(seed: u64, channels: usize, halvings: u32) -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.45; 3], [0.225; 3]),
@@ -45,7 +45,7 @@ fn network(seed: u64, channels: usize, halvings: u32) -> Graph {
             candidate,
             share,
         });
-        // As a whole vector and one channel more.
+        // Joined below: a padded vector of channels, and a single channel without padding.
         let seen = b.conv(refined, 5, |c| {
             (c.kernel, c.border, c.activation) = (7, Border::Reflect, Activation::LeakyRelu);
         });
@@ -72,7 +72,7 @@ fn network(seed: u64, channels: usize, halvings: u32) -> Graph {
     b.graph
 }
 
-/// Of all of them, small.
+/// Small parameters of all kinds.
 pub(super) fn small_network() -> Graph {
     network(5, 19, 2)
 }
@@ -95,7 +95,7 @@ proptest! {
         for level in [Level::Widest, Level::Scalar, #[cfg(target_arch = "x86_64")] Level::Avx2] {
             let off = with_level(level, || {
                 let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
-                // Twice: nothing of an image may remain for the next.
+                // Twice, as one image must not affect the next.
                 engine.run(&noise_image(seed ^ 7, width, height));
                 engine.run(&image);
                 deviation(&engine.output(0), exact)
@@ -145,7 +145,7 @@ fn values_that_do_not_fit_are_refused() {
         weights,
         halvings,
     };
-    refused(convex(half, weights, 1), "12 channels enlarged");
+    refused(convex(half, weights, 1), "upsampling of 12 channels");
     refused(convex(one, half, 1), "weights of");
     refused(convex(one, weights, 0), "expected 1 to 3");
     refused(convex(one, weights, 9), "expected 1 to 3");
@@ -154,7 +154,7 @@ fn values_that_do_not_fit_are_refused() {
     refused_beyond(&b.graph, convex(quarter, for_it, 1));
 }
 
-/// What would be larger than the image.
+/// Checks that an operation is rejected because its output would be larger than the image.
 fn refused_beyond(graph: &Graph, op: Op) {
     let error = graph.clone().push("op", op).unwrap_err().to_string();
     assert!(error.contains("larger than the image"), "{error}");

@@ -1,4 +1,4 @@
-//! No image affects the next one, whatever its content.
+//! No image affects the next one, whatever it contains.
 
 use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;
@@ -10,8 +10,8 @@ use crate::engine::Typed;
 use crate::forms::F32Conv;
 use crate::{Activation, Engine, Graph, Op, Precision, ValueId};
 
-/// Inputs of a count that no run divides, and a concatenation of a value and its own convolution; the second output is
-/// a sum without an activation.
+/// A number of inputs that no run length divides, and a concatenation of a value and its own convolution; the second output is a sum
+/// without an activation.
 fn dense_network(width: usize) -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.4; 3], [0.3; 3]),
@@ -34,7 +34,7 @@ fn dense_network(width: usize) -> Graph {
     b.graph
 }
 
-/// Many inputs at the start, and at the end a value so large that it lies where those were, and behind them.
+/// Many inputs at the start, and at the end a value large enough to be stored over and beyond them.
 fn widening_network() -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.4; 3], [0.3; 3]),
@@ -55,7 +55,7 @@ fn widening_network() -> Graph {
 
 fn graphs() -> Vec<(Graph, usize, usize)> {
     if cfg!(miri) {
-        // Some thousand times slower.
+        // Miri is some thousand times slower.
         return vec![
             (dense_network(20), 8, 8),
             (network(3, [4, 6, 5, 4], true, 3), 16, 16),
@@ -77,7 +77,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-/// The first output's bits with an arena of zeros, and with one that was full of NaN.
+/// The first output's bits, from an arena of zeros and from one full of NaN.
 fn fresh_and_nan_filled<E: Element, C: ConvForm<E>>(
     graph: &Graph,
     (width, height): (usize, usize),
@@ -122,7 +122,7 @@ fn nothing_stale_is_read_in_bf16() {
     }
 }
 
-/// What the bf16 forms read, in plain code: the network's values, rounded.
+/// The bf16 forms in plain code give the network's values, up to rounding.
 #[test]
 fn what_bf16_reads_is_what_the_operations_mean() {
     for (i, (graph, width, height)) in graphs().into_iter().enumerate() {
@@ -163,7 +163,7 @@ fn a_finite_image_that_overflows_is_not_seen_in_the_next() {
     }
 }
 
-/// Engines on one plan know nothing of each other, even while both run.
+/// Engines that share a plan do not affect each other, even if they run at the same time.
 #[test]
 fn another_engine_gives_the_same_bits() {
     for precision in [Precision::F32, Precision::Bf16] {

@@ -1,4 +1,4 @@
-//! Transposed convolutions as convolutions whose channels become pixels, and sizes that do not halve without a rest.
+//! Transposed convolutions as convolutions followed by depth to space, and sizes that are not divisible by 2.
 
 use proptest::prelude::*;
 
@@ -7,7 +7,7 @@ use super::oracle::run;
 use crate::dispatch::tests::{Level, with_level};
 use crate::{Activation, Engine, Graph, Op, Precision, ValueId};
 
-/// DispNet in small: halved four times, rounding up, and enlarged again with skips; disparities go on to the next scale.
+/// A small DispNet: halved four times, rounding up, and enlarged again with skips; each scale's disparity is read by the next.
 fn network(seed: u64, widths: [usize; 4], kernel: usize) -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.5; 3], [0.5; 3]),
@@ -26,7 +26,7 @@ fn network(seed: u64, widths: [usize; 4], kernel: usize) -> Graph {
         let large = b.push(Op::DepthToSpace { input: wide });
         let mut inputs = vec![large];
         inputs.extend(skips.pop());
-        // Up to half of the image's size sizes are exact here.
+        // Sizes are exact up to half of the image's size.
         if index == 3 {
             inputs.push(b.push(Op::Enlarge { input: head }));
         }
@@ -62,7 +62,7 @@ proptest! {
         for level in [Level::Widest, Level::Scalar, #[cfg(target_arch = "x86_64")] Level::Avx2] {
             let off = with_level(level, || {
                 let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
-                // Twice: nothing of an image may remain for the next.
+                // Twice, as one image must not affect the next.
                 engine.run(&noise_image(seed ^ 7, width, height));
                 engine.run(&image);
                 deviation(&engine.output(0), exact)
@@ -79,7 +79,7 @@ proptest! {
     }
 }
 
-/// What is doubled whole asks for halves without a rest; the rest of the network does not.
+/// Enlargements that double the size exactly need exact halvings; the rest of the network does not.
 #[test]
 fn sizes_may_round_up_where_they_are_cut() {
     let graph = small_network();

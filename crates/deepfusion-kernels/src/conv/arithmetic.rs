@@ -1,5 +1,5 @@
-//! The arithmetic of a product over taps: f32, or pairs of bf16. It determines the layout of channels in a tile's
-//! planes, the layout of weights, and the multiples in which rows and columns come.
+//! The arithmetic of a product over taps: f32, or pairs of bf16. It determines the layout of channels in a tile's planes, the layout of
+//! weights, and the multiples of rows and columns.
 
 use super::ConvShape;
 use super::bf16::{self, TapPairs, Unit};
@@ -8,36 +8,36 @@ use super::product::{self, TapProduct};
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 
-/// Buffers are counted in words of 32 bits: a float, or a pair.
+/// Buffers are measured in words of 32 bits: a float, or a pair of bf16.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arithmetic {
     Single,
     Pairs(Unit),
 }
 
-/// The weights of a product, as they lie in a convolution's.
+/// The weights of a product, in the layout of a convolution's weights.
 #[derive(Clone, Copy)]
 pub(super) struct Weights<'a> {
     pub(super) values: &'a [f32],
-    /// From a row's to the next row's, and from a channel's to the next channel's.
+    /// Distance from one row to the next, and from one channel to the next.
     pub(super) strides: (usize, usize),
-    /// Channels that are summed over.
+    /// Number of channels that are summed over.
     pub(super) channels: usize,
-    /// Where the taps lie in a channel's.
+    /// Indices of the taps within a channel's weights.
     pub(super) taps: &'a [usize],
 }
 
 /// A product over all taps of all channels of a tile.
 pub(super) struct Product<'a> {
-    /// As [`Arithmetic::prepare`] wrote them.
+    /// Written by [`Arithmetic::prepare`].
     pub(super) weights: &'a [f32],
     pub(super) rows: usize,
-    /// Channels that are summed over.
+    /// Number of channels that are summed over.
     pub(super) channels: usize,
-    /// As [`Arithmetic::offsets`] says.
+    /// From [`Arithmetic::offsets`].
     pub(super) offsets: &'a [usize],
     pub(super) plane_len: usize,
-    /// As [`Arithmetic::gather`] wrote it.
+    /// Written by [`Arithmetic::gather`].
     pub(super) source: &'a [f32],
     pub(super) columns: usize,
     /// `rows` × `columns`.
@@ -49,7 +49,7 @@ impl Arithmetic {
         Unit::of(shape).map_or(Self::Single, Self::Pairs)
     }
 
-    /// Rows that a task should take a multiple of.
+    /// The number of rows of a task should be a multiple of this.
     pub(super) fn rows(self) -> usize {
         match self {
             Self::Single => 8,
@@ -57,7 +57,7 @@ impl Arithmetic {
         }
     }
 
-    /// Columns of a product over a whole tile.
+    /// Number of columns of a product over a whole tile.
     pub(super) fn columns(self, lattice: &Lattice) -> usize {
         match self {
             Self::Single => product::padded(lattice.columns()),
@@ -65,7 +65,7 @@ impl Arithmetic {
         }
     }
 
-    /// Words of a tile's planes.
+    /// Number of words of a tile's planes.
     pub(super) fn source_len(self, channels: usize, plane_len: usize) -> usize {
         match self {
             Self::Single => channels * plane_len,
@@ -73,7 +73,7 @@ impl Arithmetic {
         }
     }
 
-    /// Words of a row's weights.
+    /// Number of words of a row's weights.
     pub(super) fn row_len(self, channels: usize, taps: usize) -> usize {
         match self {
             Self::Single => channels * taps,
@@ -96,7 +96,7 @@ impl Arithmetic {
         }
     }
 
-    /// Where a product reads, with the channels' planes one after the other and each tap's place in the first.
+    /// Offsets that a product reads at, given the channels' planes one after the other and each tap's offset in the first.
     pub(super) fn offsets(self, channels: usize, plane_len: usize, taps: &[usize]) -> Vec<usize> {
         let (steps, step_len) = match self {
             Self::Single => (channels, plane_len),
@@ -110,7 +110,7 @@ impl Arithmetic {
             .collect()
     }
 
-    /// Lays weights out for products: [`Self::row_len`] words for each row, all of which are written.
+    /// Rearranges weights for products: [`Self::row_len`] words for each row, all of which are written.
     pub(super) fn prepare(self, weights: Weights, to: &mut [f32]) {
         match self {
             Self::Single => copy(weights, to),
@@ -160,7 +160,7 @@ impl Arithmetic {
 
 /// Rows × (channels · taps).
 fn copy(weights: Weights, to: &mut [f32]) {
-    /// Rows of a task: a channel's of them lie near each other.
+    /// Rows of a task: a channel's weights of these rows are near each other in memory.
     const GROUP: usize = 8;
     let Weights {
         values,
@@ -182,7 +182,7 @@ fn copy(weights: Weights, to: &mut [f32]) {
                         (to.as_mut_array::<9>(), from.first_chunk::<9>())
                         && taps.last() == Some(&8)
                     {
-                        // The usual 3×3: a copy of known length needs no call.
+                        // The usual 3×3: a copy of fixed length compiles without a call.
                         *to = *from;
                     } else {
                         for (to, tap) in to.iter_mut().zip(taps) {

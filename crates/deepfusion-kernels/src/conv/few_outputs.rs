@@ -1,8 +1,7 @@
 //! The weight gradient of a convolution with few outputs, such as a head's.
 //!
-//! [`super::product::PixelProduct`] has the outputs in its vectors' lanes; a single output would use one of sixteen.
-//! Here the lanes are neighbouring pixels: each weight's gradient is a dot product of two images, one shifted by its
-//! tap.
+//! The vectors of [`super::product::PixelProduct`] run along the outputs; a single output would use one of sixteen lanes. Here they run
+//! along neighbouring pixels: each weight's gradient is a dot product of two images, one of them shifted by its tap.
 
 use super::{
     ConvShape,
@@ -12,7 +11,7 @@ use super::{
 use crate::scratch::with_scratch;
 use pulp::{Arch, Simd, WithSimd};
 
-/// Outputs below which this is faster.
+/// Number of outputs below which this is faster.
 pub(super) const FEW: usize = 8;
 
 /// Adds the weight gradient over a tile to `sum`, outputs × taps.
@@ -24,7 +23,7 @@ pub(super) fn add(shape: &ConvShape, tile: Tile, x: &[f32], grad_out: &[f32], su
     with_scratch(source_len + columns, |buffer| {
         let (source, grad) = buffer.split_at_mut(source_len);
         gather_channels(&lattice, x, shape.in_channels, 0..shape.in_channels, source);
-        // Zero wherever a column is no pixel.
+        // Zero in columns that are not pixels.
         grad.fill(0.0);
         for (output, sum) in sum.chunks_exact_mut(offsets.len()).enumerate() {
             copy_pixels(shape, &lattice, tile, output, grad_out, grad);
@@ -39,7 +38,7 @@ pub(super) fn add(shape: &ConvShape, tile: Tile, x: &[f32], grad_out: &[f32], su
     });
 }
 
-/// Copies a tile's pixels of one output to their columns.
+/// Copies a tile's pixels of one output into their columns.
 fn copy_pixels(
     shape: &ConvShape,
     lattice: &Lattice,
@@ -62,7 +61,7 @@ fn copy_pixels(
 struct DotProducts<'a> {
     offsets: &'a [usize],
     source: &'a [f32],
-    /// Whole vectors.
+    /// Its length is a multiple of whole vectors.
     grad: &'a [f32],
     out: &'a mut [f32],
 }
@@ -100,7 +99,7 @@ impl WithSimd for DotProducts<'_> {
 /// `TAPS` dot products at once: the gradient is read once for all of them.
 ///
 /// # Safety
-/// `source` must reach the length of `grad` beyond every offset, and `grad` be whole vectors.
+/// `source` must be as long as `grad` beyond every offset, and `grad` must be whole vectors.
 #[inline(always)]
 unsafe fn dot<S: Simd, const TAPS: usize>(
     simd: S,
@@ -111,7 +110,7 @@ unsafe fn dot<S: Simd, const TAPS: usize>(
 ) {
     let mut sums = [simd.splat_f32s(0.0); TAPS];
     for q in (0..grad.len()).step_by(S::F32_LANES) {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             let factor = grad.as_ptr().add(q).cast::<S::f32s>().read_unaligned();
             for (sum, offset) in sums.iter_mut().zip(offsets) {

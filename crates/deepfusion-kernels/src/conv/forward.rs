@@ -13,11 +13,11 @@ use rayon::prelude::*;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
-/// Tasks below which the output channels of a tile are shared out too, so that no core waits.
+/// If there are fewer tasks, the output channels of a tile are also divided among tasks, so that no core is idle.
 const TASKS: usize = 4;
 
-/// Every tile with every group of `channels`, a multiple of `step`; several groups only where the tiles are few,
-/// of which the last may be smaller.
+/// Pairs every tile with every group of channels. The size of a group is a multiple of `step`, except for the last. There are several
+/// groups only if there are few tiles.
 pub(super) fn tasks(tiles: &[Tile], channels: usize, step: usize) -> Vec<(Tile, Range<usize>)> {
     let groups = TASKS.div_ceil(tiles.len().max(1));
     let most = channels.div_ceil(groups).next_multiple_of(step);
@@ -36,7 +36,7 @@ pub(super) fn tasks(tiles: &[Tile], channels: usize, step: usize) -> Vec<(Tile, 
 /// `x` N×C×H×W, `weight` O×C×kh×kw, `bias` O, `out` N×O×H_out×W_out.
 ///
 /// # Panics
-/// When a length does not fit `shape`, or reflection padding is as large as the image.
+/// If a length does not match `shape`, or reflection padding is as large as the image.
 pub fn conv2d(
     shape: &ConvShape,
     x: &[f32],
@@ -73,7 +73,7 @@ pub fn conv2d(
             });
     };
     if arithmetic == Arithmetic::Single {
-        // They lie as they should.
+        // They already have the right layout.
         return run(weight);
     }
     let taps: Vec<usize> = (0..shape.kernel_area()).collect();
@@ -90,7 +90,7 @@ pub fn conv2d(
     });
 }
 
-/// A convolution of 3×3 with a margin of one pixel, as Winograd's form takes it.
+/// A 3×3 convolution with a margin of one pixel, in Winograd's form.
 pub(super) fn winograd_sum<'a>(
     shape: &ConvShape,
     x: &'a [f32],
@@ -119,7 +119,7 @@ pub(super) fn by_winograd(
     let out = SharedMut::new(out);
     sum.run(|image, channel, (y, x), values| {
         let at = ((image * shape.out_channels + channel) * height + y) * width + x;
-        // SAFETY: `run` gives each line once, and no two overlap.
+        // SAFETY: `run` passes each line once, and no two overlap.
         let to = unsafe { out.slice(at, values.len()) };
         filled(to, values.iter().copied());
     });

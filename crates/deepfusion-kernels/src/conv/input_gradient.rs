@@ -14,24 +14,24 @@ use rayon::prelude::*;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
-/// The padded input rows and columns of one residue by the stride: a convolution of ∂Y at stride 1 with
-/// those taps alone that reach them.
+/// Padded input rows and columns with the same remainder modulo the stride. Their gradient is a convolution of ∂Y at stride 1 with the taps
+/// that reach them.
 struct Phase<'a> {
     down: usize,
     right: usize,
-    /// Taps (index in the kernel, distance from the first tap).
+    /// Taps: index in the kernel, and distance from the first tap.
     taps: Vec<(usize, (usize, usize))>,
-    /// Transposed weights, C rows of O·taps as the arithmetic wants them.
+    /// Transposed weights: C rows of O·taps in the arithmetic's layout.
     weights: &'a [f32],
 }
 
-/// ∂L/∂X: every input pixel gathers from the outputs it went into.
+/// ∂L/∂X: every input pixel sums the gradients of the outputs that it contributed to.
 ///
 /// # Shapes
 /// `weight` O×C×kh×kw, `grad_out` N×O×H_out×W_out, `grad_x` N×C×H×W, overwritten.
 ///
 /// # Panics
-/// When a length does not fit `shape`.
+/// If a length does not match `shape`.
 pub fn conv2d_backward_input(
     shape: &ConvShape,
     weight: &[f32],
@@ -50,7 +50,7 @@ pub fn conv2d_backward_input(
     if shape.is_plain_3x3() && sum.pays() {
         return by_winograd(shape, &sum, grad_x);
     }
-    // Elsewhere every value is written exactly once.
+    // Without reflection, every value is written exactly once.
     if shape.stride > 1 || shape.reflect || grad_out.is_empty() {
         let zero = MaybeUninit::new(0.0);
         grad_x.par_chunks_mut(1 << 16).for_each(|c| c.fill(zero));
@@ -67,14 +67,14 @@ pub fn conv2d_backward_input(
     });
 }
 
-/// The gradient of a convolution of 3×3 with a margin of one pixel, as Winograd's form takes it: every pixel gathers from
-/// the outputs that it went into.
+/// The gradient of a 3×3 convolution with a margin of one pixel, in Winograd's form: every pixel sums the gradients of the outputs that it
+/// contributed to.
 pub(super) fn winograd_sum<'a>(
     shape: &ConvShape,
     weight: &'a [f32],
     grad_out: &'a [f32],
 ) -> winograd::Sum<'a> {
-    // Mirrored, the margin's gradient belongs to pixels of the image; in a padding of zeros nobody needs it.
+    // If mirrored, the margin's gradient belongs to pixels of the image; in a padding of zeros it is not needed.
     let margin = if shape.reflect { shape.padding } else { 0 };
     winograd::Sum {
         source: Image {
@@ -105,7 +105,7 @@ pub(super) fn by_winograd(
     let plane = |image: usize, channel: usize| image * shape.in_channels + channel;
     let to = SharedMut::new(grad_x);
     let write = |plane: usize, (y, x): (usize, usize), values: &[f32]| {
-        // SAFETY: `run` gives each line once, and no two overlap.
+        // SAFETY: `run` passes each line once, and no two overlap.
         let to = unsafe { to.slice((plane * height + y) * width + x, values.len()) };
         filled(to, values.iter().copied());
     };
@@ -122,7 +122,7 @@ pub(super) fn by_winograd(
                 values,
                 |y, x, values| write(plane, (y, x), values),
                 |at, values| {
-                    // SAFETY: as above; a line's pieces have places of their own.
+                    // SAFETY: as above; the pieces of a line have separate places.
                     let to = unsafe { kept.slice(plane * margins.len() + at, values.len()) };
                     to.copy_from_slice(values);
                 },
@@ -131,7 +131,7 @@ pub(super) fn by_winograd(
         (0..shape.batch * shape.in_channels)
             .into_par_iter()
             .for_each(|plane| {
-                // SAFETY: a plane each, all of which were written.
+                // SAFETY: one plane each, all of which were written.
                 let (kept, to) = unsafe {
                     (
                         kept.slice(plane * margins.len(), margins.len()),
@@ -144,7 +144,7 @@ pub(super) fn by_winograd(
     });
 }
 
-/// With reflection, what it adds to must have been cleared.
+/// With reflection, `grad_x` must have been cleared, as gradients are added to it.
 fn backward_input(
     shape: &ConvShape,
     arithmetic: Arithmetic,
@@ -154,7 +154,7 @@ fn backward_input(
 ) {
     let (s, margin) = (shape.stride, margin(shape));
     let window = gradient_window(shape, margin);
-    // Rows of a phase; without reflection those that lie wholly in the padding are left out.
+    // Rows of a phase; without reflection, those that are completely in the padding are left out.
     let all = shape.out_height() + shape.reach().0 / s;
     let rows = if shape.reflect {
         0..all
@@ -166,7 +166,7 @@ fn backward_input(
     let tiles = tiles(shape.batch, rows.start, rows.len(), row_floats);
     let to = SharedMut::new(grad_x);
     if shape.reflect {
-        // Mirrored rows may fall into the neighbouring tile: the tiles of an image take turns.
+        // Mirrored rows may be in the neighbouring tile, so the tiles of an image are processed one after the other.
         tiles
             .chunk_by(|a, b| a.first_image == b.first_image)
             .collect::<Vec<_>>()
@@ -188,10 +188,10 @@ fn backward_input(
     }
 }
 
-/// Rows and columns around the image whose gradient is worked out too.
+/// Width of the margin around the image whose gradient is also computed.
 ///
-/// What lands in a padding of zeros is needed by nobody: at stride 1 it is left out, which for 10×3 pixels is a
-/// third of the work. Elsewhere it costs less than to tell it apart, or, mirrored, belongs to pixels of the image.
+/// The gradient of a padding of zeros is not needed. At stride 1 it is left out, which for 10×3 pixels is a third of the work. At other
+/// strides, computing it costs less than leaving it out. If mirrored, it belongs to pixels of the image.
 fn margin(shape: &ConvShape) -> usize {
     let (down, right) = shape.reach();
     let needless = shape.stride == 1 && !shape.reflect && shape.padding <= down.min(right);
@@ -214,7 +214,7 @@ fn gradient_window(shape: &ConvShape, margin: usize) -> Window {
     }
 }
 
-/// All phases that have taps; their weights are written to `transposed`, one after the other.
+/// All phases that have taps; their weights are written to `transposed` one after the other.
 fn phases<'a>(
     shape: &ConvShape,
     arithmetic: Arithmetic,
@@ -293,7 +293,7 @@ fn gradient_tile(
     });
 }
 
-/// Writes one channel of a phase to the pixels it belongs to; mirrored margins are added to theirs.
+/// Writes one channel of a phase to its pixels; mirrored margins are added to theirs.
 fn scatter(
     shape: &ConvShape,
     lattice: &Lattice,
@@ -306,7 +306,7 @@ fn scatter(
     let (s, p) = (shape.stride, margin(shape));
     let (height, width) = (shape.in_height, shape.in_width);
     let count = gradient_window(shape, p).out_width;
-    // Columns whose pixel lies inside: 0 <= s·x + right − p < width.
+    // Columns whose pixel is in the image: 0 <= s·x + right − p < width.
     let first = p.saturating_sub(phase.right).div_ceil(s).min(count);
     let last = (width + p)
         .saturating_sub(phase.right)
@@ -319,14 +319,14 @@ fn scatter(
             let Some(y) = inside(y, p, height, shape.reflect) else {
                 continue;
             };
-            // SAFETY: rows of this task's images and channels; tasks with the same image have other rows,
-            // or, with reflection, run one after the other.
+            // SAFETY: rows of this task's images and channels. Tasks with the same image have other rows or, with reflection, run one after
+            // the other.
             let to = unsafe { to.slice(plane + y * width, width) };
             let from = &result[lattice.column(image, row)..][..count];
             let start = first * s + phase.right;
             let body = &from[first..last];
             if shape.reflect {
-                // SAFETY: with reflection everything was cleared at first.
+                // SAFETY: with reflection, everything was cleared before.
                 let to = unsafe { to.assume_init_mut() };
                 for x in (0..first).chain(last..count) {
                     if let Some(at) = inside(x * s + phase.right, p, width, true) {

@@ -3,7 +3,7 @@
 use super::bf16::{self, planar, zipped};
 use std::ops::Range;
 
-/// Floats a tile's padded input and its output may take: they should stay in the second cache.
+/// Number of floats of a tile's padded input and its output, so that they stay in the L2 cache.
 const TILE_FLOATS: usize = 1 << 17;
 
 /// Rows of one image, or all rows of several.
@@ -15,14 +15,13 @@ pub(super) struct Tile {
     pub(super) rows: usize,
 }
 
-/// Cuts `images` images of `rows` rows, `first_row` on, into tiles of about [`TILE_FLOATS`], where a row
-/// takes `row_floats`.
+/// Divides the rows of each image, `rows` from `first_row` on, into tiles of about [`TILE_FLOATS`], where a row takes `row_floats`.
 pub(super) fn tiles(images: usize, first_row: usize, rows: usize, row_floats: usize) -> Vec<Tile> {
     let wanted = (TILE_FLOATS / row_floats.max(1)).max(1);
     let whole = wanted / rows.max(1);
     let mut tiles = Vec::new();
     if whole >= 2 {
-        // Equal tiles: a last one of a single image would waste most of a product.
+        // Equal tiles: if the last one had a single image, most of its product would be wasted.
         let groups = images.div_ceil(whole);
         for g in 0..groups {
             let first_image = g * images / groups;
@@ -55,22 +54,22 @@ pub(super) fn tiles(images: usize, first_row: usize, rows: usize, row_floats: us
 pub(super) struct Window {
     pub(super) height: usize,
     pub(super) width: usize,
-    /// Rows above and below, columns left and right.
+    /// Rows of padding above and below, columns left and right.
     pub(super) padding: (usize, usize),
-    /// The padding mirrors the image instead of being zero.
+    /// Whether the padding mirrors the image instead of being zero.
     pub(super) reflect: bool,
     pub(super) stride: usize,
     /// Distance between the first and the last tap, down and right.
     pub(super) reach: (usize, usize),
-    /// Pixels of an output row.
+    /// Number of pixels in an output row.
     pub(super) out_width: usize,
 }
 
 /// A tile's padded input: tap (down, right) of the output pixel in column q reads
 /// `q + offset(down, right)` of its channel's plane.
 ///
-/// With stride s a plane is s×s phases, each every s-th row and column, which the taps read at stride 1.
-/// Zero padding is shared: a row's right margin is the next one's left, an image's foot the next one's head.
+/// With stride s, a plane consists of s×s phases, each with every s-th row and column, which the taps read at stride 1. Zero padding is
+/// shared: a row's right margin is the next row's left margin, and an image's bottom margin is the next image's top margin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lattice {
     window: Window,
@@ -101,7 +100,7 @@ impl Lattice {
         } else {
             tile.rows + down
         };
-        // The last pixels' taps reach past the last row; the last block of columns a little further.
+        // The last pixels' taps read beyond the last row, and the last block of columns reads a little further.
         let slack = (down + 1) * pitch + right + bf16::COLUMNS;
         let phase_len = tile.images * image_rows * pitch + slack;
         Self {
@@ -114,12 +113,12 @@ impl Lattice {
         }
     }
 
-    /// Pixels of an image's channel.
+    /// Number of pixels in a channel of an image.
     pub(super) fn image_area(&self) -> usize {
         self.window.height * self.window.width
     }
 
-    /// Columns of a product over the whole tile, margins between its rows included.
+    /// Number of columns of a product over the whole tile, including the margins between its rows.
     pub(super) fn columns(&self) -> usize {
         self.column(self.tile.images - 1, self.tile.rows - 1) + self.window.out_width
     }
@@ -141,21 +140,20 @@ impl Lattice {
         pixels
     }
 
-    /// Where a tap that lies `down` and `right` of the first one reads, in a channel's plane.
+    /// Offset, in a channel's plane, of a tap that is `down` and `right` of the first one.
     pub(super) fn offset(&self, (down, right): (usize, usize)) -> usize {
         let s = self.window.stride;
         ((down % s) * s + right % s) * self.phase_len + (down / s) * self.pitch + right / s
     }
 
-    /// Copies a channel of the tile's images, `image(n)` that of the n-th image of the batch, into its
-    /// padded plane.
+    /// Copies a channel of the tile's images into its padded plane; `image(n)` is that channel of the n-th image of the batch.
     pub(super) fn gather<'a>(&self, image: impl Fn(usize) -> &'a [f32], plane: &mut [f32]) {
         self.rows(plane, 0.0, |n, row, shift, to| {
             self.gather_row(image(n), row, shift, to);
         });
     }
 
-    /// The same of two channels at once, rounded to bf16: each word of the plane holds both.
+    /// Copies two channels at once, rounded to bf16: each word of the plane contains both.
     pub(super) fn gather_pairs<'a>(
         &self,
         first: impl Fn(usize) -> &'a [f32],
@@ -170,7 +168,7 @@ impl Lattice {
         });
     }
 
-    /// The same of one channel, rounded to bf16.
+    /// Copies one channel, rounded to bf16.
     pub(super) fn gather_halves<'a>(&self, image: impl Fn(usize) -> &'a [f32], plane: &mut [u16]) {
         let mut values = vec![0.0; self.pitch];
         self.rows(plane, 0, |n, row, shift, to| {
@@ -179,8 +177,8 @@ impl Lattice {
         });
     }
 
-    /// Calls `write` with every row of a plane: its image in the batch, its number in the tile, its phase's shift, and the
-    /// row itself; what lies behind the last is cleared.
+    /// Calls `write` with every row of a plane: its image in the batch, its number in the tile, its phase's shift, and the row itself. The
+    /// memory beyond the last row is cleared.
     fn rows<T: Copy>(
         &self,
         plane: &mut [T],
@@ -216,7 +214,7 @@ impl Lattice {
             return;
         };
         let from = &image[y * width..][..width];
-        // Columns whose source lies inside: 0 <= stride·x + right − padding < width.
+        // Columns whose source is in the image: 0 <= stride·x + right − padding < width.
         let first = padding
             .1
             .saturating_sub(right)
@@ -259,7 +257,7 @@ pub(super) fn gather_channels(
     }
 }
 
-/// The index that position `i` of an axis of `n` values with `padding` before it reads; `None` is zero.
+/// The index that position `i` reads on an axis of `n` values with `padding` before them; `None` for zero padding.
 pub(super) fn inside(i: usize, padding: usize, n: usize, reflect: bool) -> Option<usize> {
     if i >= padding && i - padding < n {
         return Some(i - padding);
@@ -270,7 +268,7 @@ pub(super) fn inside(i: usize, padding: usize, n: usize, reflect: bool) -> Optio
     if i < padding {
         return (padding - i < n).then(|| padding - i);
     }
-    // Past the mirrored margin there is only slack. No pixel's sum has it, but the rounding of Winograd's tiles has: it must be
-    // finite.
+    // Beyond the mirrored margin there is only unused space. It does not contribute to any pixel's sum, but to the rounding in Winograd's
+    // tiles, so it must be finite.
     (2 * (n - 1)).checked_sub(i - padding)
 }

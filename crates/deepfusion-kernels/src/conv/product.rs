@@ -1,21 +1,20 @@
 //! The inner loop of convolutions in f32: a small block of outputs kept in registers.
 //!
-//! A convolution's forward pass and both its gradients are sums over products of one number (a row's)
-//! with a vector of neighbouring numbers (the columns'). They differ only in where the two are read:
+//! A convolution's forward pass and both its gradients are sums over products of a number (from a row) and a vector of neighbouring numbers
+//! (from the columns). They differ only in where the two are read:
 //!
 //! | | rows | columns | summed over |
 //! |---|---|---|---|
 //! | forward, input gradient | weights of an output channel | neighbouring pixels | taps (c, ky, kx) |
 //! | weight gradient | one tap's pixels | neighbouring output channels | pixels |
 //!
-//! Reading through tables of offsets makes unfolding (im2col) unnecessary: in a padded image, the pixels
-//! that a tap sees are the same image, shifted.
+//! Reading through tables of offsets makes im2col unnecessary: in a padded image, the pixels that a tap reads are the same image, shifted.
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Columns come in multiples of this: the lanes of the widest vectors. Buffers are padded to it.
+/// Columns are a multiple of this, the lanes of the widest vectors. Buffers are padded to it.
 pub(super) const LANES: usize = 16;
-/// Taps summed before the partial sums go back to memory: their weights stay in the first cache.
+/// Taps summed before the partial sums are written to memory, so that their weights stay in the L1 cache.
 const TAPS_AT_ONCE: usize = 288;
 /// Pixels summed at once by the weight gradient, for the same reason.
 const PIXELS_AT_ONCE: usize = 128;
@@ -31,10 +30,10 @@ pub(super) struct TapProduct<'a> {
     pub(super) weights: &'a [f32],
     /// Distance between the rows of `weights`.
     pub(super) weight_stride: usize,
-    /// Where each tap reads.
+    /// Offset of each tap.
     pub(super) offsets: &'a [usize],
     pub(super) source: &'a [f32],
-    /// A multiple of [`LANES`].
+    /// Number of columns, a multiple of [`LANES`].
     pub(super) columns: usize,
     /// `rows` × `columns`, overwritten.
     pub(super) out: &'a mut [f32],
@@ -43,14 +42,14 @@ pub(super) struct TapProduct<'a> {
 
 /// `out[t][o] += Σ_i source[offsets[t] + pixels[i]] · grad[i][o]`
 pub(super) struct PixelProduct<'a> {
-    /// Where each tap reads.
+    /// Offset of each tap.
     pub(super) offsets: &'a [usize],
     pub(super) source: &'a [f32],
-    /// Where each pixel lies in the source.
+    /// Offset of each pixel in the source.
     pub(super) pixels: &'a [usize],
     /// `pixels.len()` × `columns`.
     pub(super) grad: &'a [f32],
-    /// A multiple of [`LANES`].
+    /// Number of columns, a multiple of [`LANES`].
     pub(super) columns: usize,
     /// `offsets.len()` × `columns`.
     pub(super) out: &'a mut [f32],
@@ -85,13 +84,13 @@ impl PixelProduct<'_> {
     }
 }
 
-/// Where a block reads and writes.
+/// Pointers and flags of a block.
 #[derive(Clone, Copy)]
 struct Block {
     columns: *const f32,
     out: *mut f32,
     out_stride: usize,
-    /// Adds to what `out` holds.
+    /// Whether to add to the content of `out`.
     add: bool,
 }
 
@@ -111,7 +110,7 @@ unsafe fn block<S: Simd, const ROWS: usize, const VECTORS: usize>(
 ) {
     let zero = simd.splat_f32s(0.0);
     let mut sums = [[zero; VECTORS]; ROWS];
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         for i in 0..n {
             let from = at.columns.add(column_at(i)).cast::<S::f32s>();
@@ -140,12 +139,12 @@ unsafe fn block<S: Simd, const ROWS: usize, const VECTORS: usize>(
     }
 }
 
-/// Rows of a block, where there are that many.
+/// Number of rows of a block, if that many are left.
 fn most_rows<S: Simd>() -> usize {
     if S::REGISTER_COUNT >= 32 { 8 } else { 4 }
 }
 
-/// Rows of the next block where `left` are left: blocks of `most`, then of 4, 2 and 1.
+/// Number of rows of the next block if `left` are left: blocks of `most`, then of 4, 2 and 1.
 fn rows_at_once(left: usize, most: usize) -> usize {
     match left {
         _ if left >= most => most,
@@ -155,7 +154,7 @@ fn rows_at_once(left: usize, most: usize) -> usize {
     }
 }
 
-/// Vectors of the next block where `left` are left: blocks of 3, ending with 2 + 2 rather than 3 + 1.
+/// Number of vectors of the next block if `left` are left: blocks of 3, ending with 2 + 2 rather than 3 + 1.
 fn vectors_at_once(left: usize) -> usize {
     match left {
         4 => 2,
@@ -297,13 +296,13 @@ mod tests {
     use super::*;
     use crate::noise::noise32 as noise;
 
-    /// Rows, columns, taps and pixels that make blocks of every size, and several rounds of sums.
+    /// Numbers of rows, columns, taps and pixels that need blocks of every size and several rounds of sums.
     const ROWS: usize = 15;
     const COLUMNS: usize = 7 * LANES;
     const TAPS: usize = TAPS_AT_ONCE + 11;
     const PIXELS: usize = PIXELS_AT_ONCE + 9;
 
-    /// Both products by `run`, one after the other.
+    /// The results of both products by `run`, one after the other.
     fn products(run: &dyn Fn(TapProduct, PixelProduct)) -> Vec<f32> {
         let source = noise(2 * TAPS + COLUMNS + 3 * PIXELS, 1);
         let weights = noise(ROWS * (TAPS + 3), 2);
@@ -340,8 +339,8 @@ mod tests {
         })
     }
 
-    /// The width of the vectors decides how many sums are made at once, not in which order: every
-    /// instruction set with fused multiply-add gives the same bits.
+    /// The width of the vectors determines how many sums are computed at once, but not their order, so every instruction set with fused
+    /// multiply-add gives the same bits.
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
         let dispatched = products(&|by_taps, by_pixels| {

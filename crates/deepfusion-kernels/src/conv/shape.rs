@@ -7,7 +7,7 @@ use std::ops::Range;
 /// The sizes of a convolution. Images are N×C×H×W, weights O×C×kh×kw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConvShape {
-    /// Images, N.
+    /// Number of images, N.
     pub batch: usize,
     /// Input channels, C.
     pub in_channels: usize,
@@ -23,13 +23,13 @@ pub struct ConvShape {
     pub kernel_width: usize,
     /// Step between output pixels, on both axes.
     pub stride: usize,
-    /// Rows and columns added on each side.
+    /// Rows and columns of padding on each side.
     pub padding: usize,
     /// Step between kernel taps, on both axes.
     pub dilation: usize,
-    /// Padding mirrors the image (without repeating its edge) instead of being zero.
+    /// Whether padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
-    /// The precision of its products.
+    /// Precision of the products.
     pub precision: Precision,
 }
 
@@ -58,7 +58,7 @@ impl ConvShape {
             .map_or(0, |span| span / self.stride + 1)
     }
 
-    /// Weights of one output channel: K = C·kh·kw.
+    /// Number of weights of one output channel: K = C·kh·kw.
     pub(crate) fn taps(&self) -> usize {
         product([self.in_channels, self.kernel_height, self.kernel_width])
     }
@@ -102,7 +102,7 @@ impl ConvShape {
         }
     }
 
-    /// Where the taps of channels `channels` read, with these channels' planes one after the other.
+    /// Offsets of the taps of channels `channels`, given these channels' planes one after the other.
     pub(super) fn tap_offsets(&self, lattice: &Lattice, channels: Range<usize>) -> Vec<usize> {
         let of_channel: Vec<usize> = self.kernel_taps().map(|t| lattice.offset(t)).collect();
         channels
@@ -113,7 +113,7 @@ impl ConvShape {
     /// Number of input values.
     ///
     /// # Panics
-    /// When it is more than can be counted.
+    /// If the number overflows.
     #[must_use]
     pub fn in_len(&self) -> usize {
         product([self.batch, self.in_channels, self.in_area()])
@@ -122,7 +122,7 @@ impl ConvShape {
     /// Number of output values.
     ///
     /// # Panics
-    /// As [`Self::in_len`].
+    /// As for [`Self::in_len`].
     #[must_use]
     pub fn out_len(&self) -> usize {
         product([self.batch, self.out_channels, self.out_area()])
@@ -131,7 +131,7 @@ impl ConvShape {
     /// Number of weights.
     ///
     /// # Panics
-    /// As [`Self::in_len`].
+    /// As for [`Self::in_len`].
     #[must_use]
     pub fn weight_len(&self) -> usize {
         product([self.out_channels, self.taps()])
@@ -140,13 +140,13 @@ impl ConvShape {
     /// Multiply-adds of the forward pass; each gradient costs as many.
     ///
     /// # Panics
-    /// As [`Self::in_len`].
+    /// As for [`Self::in_len`].
     #[must_use]
     pub fn multiply_adds(&self) -> usize {
         product([self.batch, self.out_area(), self.weight_len()])
     }
 
-    /// Whether it is of the kind that Winograd's form computes: 3×3 with a margin of one pixel, at stride 1, in f32.
+    /// Whether Winograd's form can compute it: 3×3 with a margin of one pixel, at stride 1, in f32.
     pub(super) fn is_plain_3x3(&self) -> bool {
         (self.kernel_height, self.kernel_width) == (3, 3)
             && (self.stride, self.dilation, self.padding) == (1, 1, 1)
@@ -154,7 +154,7 @@ impl ConvShape {
     }
 
     /// # Panics
-    /// Where reflection would need more rows or columns than the image has.
+    /// If reflection needs more rows or columns than the image has.
     pub(crate) fn check(&self) {
         assert!(
             self.stride > 0 && self.dilation > 0 && self.kernel_area() > 0,

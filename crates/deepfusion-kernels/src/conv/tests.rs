@@ -1,4 +1,4 @@
-//! Checked against the definition, summed in f64, over random shapes.
+//! Compares the convolution with its definition, summed in f64, for random shapes.
 
 use super::*;
 use crate::noise::noise32 as noise;
@@ -49,12 +49,12 @@ fn products(s: &ConvShape, mut visit: impl FnMut(usize, usize, usize)) {
     }
 }
 
-/// How exact a pass must be.
+/// How precise a pass must be.
 #[derive(Clone, Copy)]
 pub(super) enum Form {
-    /// Rounding grows with the number of summed products: about ε·√n·|term|, with room.
+    /// Rounding grows with the number of summed products: about ε·√n·|term|, with some margin.
     Plain,
-    /// Sums that are larger than the result are subtracted: exact to some hundred ε of a typical value.
+    /// Sums larger than the result are subtracted, so the error is some hundred ε of a typical value.
     Winograd,
 }
 
@@ -72,7 +72,7 @@ pub(super) fn assert_close(ours: &[f32], exact: &[f64], form: Form, what: &str) 
     }
 }
 
-/// What the passes should give, by the definition.
+/// The expected results of the passes, from the definition.
 pub(super) struct Exact {
     pub(super) output: Vec<f64>,
     pub(super) input_gradient: Vec<f64>,
@@ -104,7 +104,7 @@ impl Exact {
     }
 }
 
-/// Image, weights, bias and the output's gradient; in bf16 numbers that are such, so that only sums are rounded.
+/// Image, weights, bias and the output's gradient. For bf16, all values are exact in bf16, so that only sums are rounded.
 pub(super) fn inputs(s: &ConvShape) -> [Vec<f32>; 4] {
     let lengths = [s.in_len(), s.weight_len(), s.out_channels, s.out_len()];
     std::array::from_fn(|i| {
@@ -121,7 +121,7 @@ pub(super) fn inputs(s: &ConvShape) -> [Vec<f32>; 4] {
 /// The output, and the gradients of image, weights and bias.
 fn all_passes(s: &ConvShape) -> [Vec<f32>; 4] {
     let [x, w, b, g] = inputs(s);
-    // Filled with rubbish: every value must be overwritten.
+    // Filled with garbage: every value must be overwritten.
     let (mut y, mut gx) = (vec![7.0; s.out_len()], vec![7.0; s.in_len()]);
     let (mut gw, mut gb) = (vec![7.0; s.weight_len()], vec![7.0; s.out_channels]);
     conv2d(s, &x, &w, Some(&b), &mut y);
@@ -153,7 +153,7 @@ fn check(s: &ConvShape) {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
-    /// On a processor without bf16 this is the same in f32.
+    /// On a processor without bf16, this tests f32 again.
     #[test]
     fn pairs_equal_the_definition(
         batch in 1usize..6, in_channels in 1usize..5, out_channels in 1usize..4,
@@ -188,7 +188,7 @@ proptest! {
     }
 }
 
-/// Large enough for several tiles in an image, and for tiles of several images; with few outputs and more.
+/// Large enough for several tiles in an image, and for tiles of several images; with few outputs and many.
 #[test]
 fn equals_the_definition_across_tiles() {
     for out_channels in [4, 11] {
@@ -249,7 +249,7 @@ fn pairs_equal_the_definition_across_tiles() {
     }
 }
 
-/// Leaves buffers full of NaN for the next borrowers on this thread, as many as nest.
+/// Leaves buffers full of NaN for the next `nested` nested borrowers on this thread.
 fn fill_scratch_with_garbage(nested: usize) {
     with_scratch(1 << 22, |buffer| {
         if nested > 1 {
@@ -259,8 +259,8 @@ fn fill_scratch_with_garbage(nested: usize) {
     });
 }
 
-/// Sums are cut by the shape alone, never by the number of threads: one thread and three give the same
-/// bits, whether tasks share tiles, channels or weights, and whatever their buffers held before.
+/// Sums are divided by the shape alone, never by the number of threads. So one thread and three give the same bits, whether tasks share
+/// tiles, channels or weights, and whatever their buffers contained before.
 #[test]
 fn threads_do_not_change_a_bit() {
     let shape = ConvShape {
@@ -277,7 +277,7 @@ fn threads_do_not_change_a_bit() {
         reflect: false,
         precision: Precision::F32,
     };
-    // Above the limit where the weight gradient is shared out by channels.
+    // Above the limit from which the weight gradient is divided by channels.
     let many_weights = ConvShape {
         in_channels: 96,
         in_height: 6,

@@ -1,6 +1,6 @@
-//! Planar values to values side by side.
+//! Transposes planar values to interleaved ones.
 
-/// Side of the blocks of [`transpose`]: a block of rows and one of columns fit the first cache together.
+/// Side of the blocks of [`transpose`]: a block of rows and one of columns fit into the L1 cache together.
 const BLOCK: usize = 16;
 
 /// `to[q][r] = from[r][q]` for `rows` rows of `columns` values; the rest of each row of `to` is zeroed.

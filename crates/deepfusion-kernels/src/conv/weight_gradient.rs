@@ -13,14 +13,13 @@ use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Into how many tasks work is cut: a few a thread, so that the last one does not wait alone. A fixed
-/// number, so that sums do not depend on the machine.
+/// Number of tasks: a few per thread, so that threads finish at about the same time. It is fixed, so that sums do not depend on the
+/// machine.
 const TASKS: usize = 8;
-/// Weights up to which every task sums all of them over its own tiles; above, every task sums a group
-/// of channels over all tiles.
+/// Up to this number of weights, every task sums all of them over its own tiles; above, every task sums a group of channels over all tiles.
 const FEW_WEIGHTS: usize = 1 << 16;
 
-/// `total` cut into at most `parts` ranges of nearly equal length.
+/// `total` divided into at most `parts` ranges of nearly equal length.
 fn split(total: usize, parts: usize) -> Vec<Range<usize>> {
     let parts = parts.clamp(1, total.max(1));
     (0..parts)
@@ -34,7 +33,7 @@ fn split(total: usize, parts: usize) -> Vec<Range<usize>> {
 /// `x` N×C×H×W, `grad_out` N×O×H_out×W_out, `grad_weight` O×C×kh×kw, overwritten.
 ///
 /// # Panics
-/// When a length does not fit `shape`.
+/// If a length does not match `shape`.
 pub fn conv2d_backward_weight(
     shape: &ConvShape,
     x: &[f32],
@@ -70,13 +69,13 @@ pub fn conv2d_backward_weight(
     let arithmetic = Arithmetic::of(shape);
     let to = SharedMut::new(grad_weight);
     let all = 0..shape.in_channels;
-    // Groups of pairs' products are whole tiles of channels.
+    // For products of pairs, groups must be whole tiles of channels.
     let step = match arithmetic {
         Arithmetic::Single => 1,
         Arithmetic::Pairs(_) => bf16::ROWS,
     };
     if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS * step {
-        // Every group of channels needs the transposed gradient of all tiles: it is made once.
+        // Every group of channels needs the transposed gradient of all tiles, so it is computed once.
         let len = |tile: &Tile| grad_len(shape, arithmetic, tile);
         with_scratch(tiles.iter().map(len).sum(), |grads| {
             let mut rest = grads;
@@ -118,7 +117,7 @@ pub fn conv2d_backward_weight(
     write(shape, all.clone(), &total, &to);
 }
 
-/// The gradient of kernels of 3×3 with a margin of one pixel, as Winograd's form takes it.
+/// The gradient of 3×3 kernels with a margin of one pixel, in Winograd's form.
 pub(super) fn winograd<'a>(
     shape: &ConvShape,
     x: &'a [f32],
@@ -132,7 +131,7 @@ pub(super) fn winograd<'a>(
     }
 }
 
-/// With `many` weights every task sums a group of channels over all tiles, else all weights over its own tiles.
+/// With `many` weights, every task sums a group of channels over all tiles, else all weights over its own tiles.
 pub(super) fn by_winograd(
     shape: &ConvShape,
     gradient: &WeightGradient<'_>,
@@ -156,7 +155,7 @@ pub(super) fn by_winograd(
     write(shape, 0..shape.in_channels, &total(sums), &to);
 }
 
-/// `len` sums over tiles, to which `add` adds a tile's; every task has a state of its own.
+/// The `len` sums over all tiles; `add` adds those of one tile. Every task has its own state.
 fn sum_over<S>(
     tiles: &[Tile],
     len: usize,
@@ -187,7 +186,7 @@ fn total(mut parts: Vec<Vec<f32>>) -> Vec<f32> {
     total
 }
 
-/// Pixels of a tile, as pairs' products sum them: its columns, those between its rows among them.
+/// Number of pixels of a tile, as products of pairs sum them: all columns, including those between rows.
 fn columns(shape: &ConvShape, tile: &Tile) -> usize {
     let lattice = Lattice::new(shape.window(), *tile);
     lattice.columns().next_multiple_of(bf16::COLUMNS)
@@ -203,7 +202,7 @@ fn grad_len(shape: &ConvShape, arithmetic: Arithmetic, tile: &Tile) -> usize {
     }
 }
 
-/// The output gradient of a tile with its outputs side by side.
+/// The output gradient of a tile with interleaved outputs.
 fn transposed_grad(
     shape: &ConvShape,
     arithmetic: Arithmetic,
@@ -224,7 +223,7 @@ fn transposed_grad(
     }
 }
 
-/// Words of two neighbouring columns × outputs; zero where a column is no pixel.
+/// Words of two neighbouring columns × outputs; zero in columns that are not pixels.
 fn transposed_pairs(shape: &ConvShape, tile: &Tile, grad_out: &[f32], to: &mut [u32]) {
     let lattice = Lattice::new(shape.window(), *tile);
     let (outputs, pairs) = (shape.out_channels, columns(shape, tile) / 2);
@@ -250,7 +249,7 @@ fn sum_len(shape: &ConvShape, channels: &Range<usize>) -> usize {
     channels.len() * shape.kernel_area() * padded(shape.out_channels)
 }
 
-/// Sums weight gradients over tiles; remembers the offsets, which tiles of one size share.
+/// Sums weight gradients over tiles, and keeps the offsets, which tiles of the same size share.
 struct Adder {
     arithmetic: Arithmetic,
     layout: Option<Layout>,
@@ -259,9 +258,9 @@ struct Adder {
 struct Layout {
     images: usize,
     rows: usize,
-    /// Of all channels, or of the first one for pairs.
+    /// Offsets of the taps, of all channels or, for pairs, of the first one.
     taps: Vec<usize>,
-    /// Not of pairs, which sum all columns.
+    /// Offsets of the pixels; unused for pairs, which sum all columns.
     pixels: Vec<usize>,
 }
 
@@ -361,9 +360,9 @@ fn write(shape: &ConvShape, channels: Range<usize>, sum: &[f32], to: &SharedMut<
     let stride = padded(shape.out_channels);
     for first in (0..shape.out_channels).step_by(LANES) {
         let count = LANES.min(shape.out_channels - first);
-        // A vector of the sum goes to as many rows: all of them stay in the cache.
+        // A vector of the sum goes to as many rows, all of which stay in the cache.
         let mut rows: Vec<&mut [f32]> = (first..first + count)
-            // SAFETY: the taps of these channels are written by this task alone, each row once.
+            // SAFETY: only this task writes the taps of these channels, each row once.
             .map(|output| unsafe { to.slice(output * shape.taps() + start, taps) })
             .collect();
         for (tap, sums) in sum.chunks_exact(stride).enumerate() {

@@ -1,7 +1,7 @@
-//! Local correlation: the similarity of each pixel's feature to those around the same pixel of another image.
+//! Local correlation: the similarity of each pixel's feature to those around the same pixel in another image.
 //!
-//! out(d, p) = (1/C) Σ_c a(c, p)·b(c, p + d) for every displacement d of at most r pixels along each axis; outside
-//! of its image b is zero. Displacements come row by row: channel (d_y + r)·(2r + 1) + (d_x + r).
+//! out(d, p) = (1/C) Σ_c a(c, p)·b(c, p + d) for every displacement d of at most r pixels along each axis; b is zero outside of its image.
+//! Displacements are ordered row by row: channel (d_y + r)·(2r + 1) + (d_x + r).
 
 mod product;
 #[cfg(test)]
@@ -17,26 +17,26 @@ use rayon::prelude::*;
 /// The sizes of a local correlation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CorrelationShape {
-    /// Channels of both images, C.
+    /// Number of channels of both images, C.
     pub channels: usize,
-    /// Height of both.
+    /// Height of both images.
     pub height: usize,
-    /// Width of both.
+    /// Width of both images.
     pub width: usize,
     /// The largest displacement along each axis, r, in pixels.
     pub radius: usize,
 }
 
-/// Rows copied by one task.
+/// Number of rows copied by one task.
 const ROWS_AT_ONCE: usize = 64;
 
 impl CorrelationShape {
-    /// Displacements along one axis, 2r + 1.
+    /// Number of displacements along one axis, 2r + 1.
     fn side(&self) -> usize {
         2 * self.radius + 1
     }
 
-    /// Channels of the output, (2r + 1)².
+    /// Number of output channels, (2r + 1)².
     #[must_use]
     pub fn displacements(&self) -> usize {
         product([self.side(), self.side()])
@@ -46,28 +46,28 @@ impl CorrelationShape {
         product([self.height, self.width])
     }
 
-    /// From one padded row to the next: whole vectors, and zeros on both sides.
+    /// Distance from one padded row to the next: whole vectors, with zeros on both sides.
     fn stride(&self) -> usize {
         self.width.next_multiple_of(LANES) + 2 * self.radius
     }
 
-    /// From one padded plane to the next.
+    /// Distance from one padded plane to the next.
     fn plane(&self) -> usize {
         product([self.height, self.stride()])
     }
 
-    /// The images of a batch.
+    /// Number of images in a batch.
     fn batch(&self, image: usize, out: usize) -> usize {
         let size = product([self.channels, self.area()]);
         assert!(size > 0, "images have pixels");
         assert_eq!(image % size, 0, "whole images");
         let batch = image / size;
         let expected = product([batch, self.displacements(), self.area()]);
-        assert_eq!(out, expected, "one output a displacement and pixel");
+        assert_eq!(out, expected, "one output per displacement and pixel");
         batch
     }
 
-    /// Lends `work` a copy of the planes with `radius` zeros before each row and at least as many behind it.
+    /// Lends `work` a copy of the planes with `radius` zeros before each row and at least as many after it.
     fn padded<R>(&self, planes: &[f32], work: impl FnOnce(&[f32]) -> R) -> R {
         let (stride, radius) = (self.stride(), self.radius);
         with_scratch(product([planes.len() / self.width, stride]), |to| {
@@ -95,20 +95,20 @@ impl CorrelationShape {
 /// `first`, `second` N×C×H×W, `out` N×(2r + 1)²×H×W.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn local_correlation(shape: &CorrelationShape, first: &[f32], second: &[f32], out: &mut [f32]) {
     let batch = shape.batch(first.len(), out.len());
     assert_eq!(first.len(), second.len(), "both images have the same size");
     let (height, radius, side) = (shape.height, shape.radius, shape.side());
     let to = SharedMut::new(out);
     let correlate = |first: &[f32], second: &[f32]| {
-        // A task has one row of the second image, which meets 2r + 1 rows of the first. Rows beyond the image are
-        // tasks too: theirs are the outputs that look out of it.
+        // A task takes one row of the second image, which is compared with 2r + 1 rows of the first. Rows outside the image are tasks, too:
+        // they write the outputs of displacements that leave the image.
         let rows = height + 2 * radius;
         (0..batch * rows).into_par_iter().for_each(|task| {
             let (n, beyond) = (task / rows, task % rows);
             let image = n * shape.channels * shape.plane();
-            // Row y of the first image lies d_y = y₂ − y above; with y₂ + r = `beyond`, d_y + r = `beyond` − y.
+            // Row y of the first image is d_y = y₂ − y above; with y₂ + r = `beyond`, d_y + r = `beyond` − y.
             let pairs = (0..side).filter_map(|down| {
                 let y = beyond.checked_sub(down).filter(|&y| y < height)?;
                 let outputs = (n * side + down) * side * height + y;
@@ -139,10 +139,10 @@ pub fn local_correlation(shape: &CorrelationShape, first: &[f32], second: &[f32]
 /// Gradient of [`local_correlation`] with respect to its first image.
 ///
 /// # Shapes
-/// As [`local_correlation`]; `grad_first` N×C×H×W, overwritten.
+/// As for [`local_correlation`]; `grad_first` N×C×H×W, overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn local_correlation_backward_first(
     shape: &CorrelationShape,
     second: &[f32],
@@ -162,10 +162,10 @@ pub fn local_correlation_backward_first(
 /// Gradient of [`local_correlation`] with respect to its second image.
 ///
 /// # Shapes
-/// As [`local_correlation`]; `grad_second` N×C×H×W, overwritten.
+/// As for [`local_correlation`]; `grad_second` N×C×H×W, overwritten.
 ///
 /// # Panics
-/// When a length does not fit.
+/// If a length does not match.
 pub fn local_correlation_backward_second(
     shape: &CorrelationShape,
     first: &[f32],
@@ -183,13 +183,13 @@ pub fn local_correlation_backward_second(
     });
 }
 
-/// Where one displacement's products are read for the first pixel of a row: row, and column of the padded copies.
+/// Offsets of one displacement's products for the first pixel of a row: its row, and its column in the padded copies.
 struct Tap {
     grad: (usize, usize),
     other: (usize, usize),
 }
 
-/// out(c, p) = (1/C) Σ_d grad(d, ·)·other(c, ·), read where `tap(row of p, d_y + r, d_x + r)` says.
+/// out(c, p) = (1/C) Σ_d grad(d, ·)·other(c, ·), read at the offsets that `tap(row of p, d_y + r, d_x + r)` returns.
 fn sum_displacements(
     shape: &CorrelationShape,
     other: &[f32],

@@ -7,17 +7,17 @@ use pulp::{Simd, WithSimd};
 /// The lanes of the widest vectors: padded rows are read in whole vectors.
 pub(super) const LANES: usize = 16;
 
-/// All products of one row of the second image: for each pair, with the row of the first that starts there.
+/// All products of one row of the second image with the row of the first that each pair names.
 ///
-/// A vector of the second image is used for several rows of the first before the next is loaded, and the other way
-/// round: three of each are nine sums, enough to hide the multiply-adds' latency, from six loads.
+/// A vector of the second image is used for several rows of the first before the next is loaded, and vice versa. Three of each give nine
+/// sums from six loads, enough to hide the latency of the multiply-adds.
 pub(super) struct RowCorrelation<'a> {
     pub(super) shape: &'a CorrelationShape,
-    /// Where a row of the first image starts in its padded copy, and where its outputs for the leftmost displacement.
+    /// Offset of a row of the first image in its padded copy, and of its outputs for the leftmost displacement.
     pub(super) pairs: &'a [(usize, usize)],
     /// The padded first images.
     pub(super) first: &'a [f32],
-    /// The padded second image from the row on.
+    /// The padded second image, from the row on.
     pub(super) second: &'a [f32],
     /// No other task writes the pairs' output rows.
     pub(super) out: SharedMut<'a, f32>,
@@ -26,7 +26,7 @@ pub(super) struct RowCorrelation<'a> {
 /// One row of a gradient, all channels: `out[c][x] = (1/C) Σ_taps grad[tap.0 + x] · other[c][tap.1 + x]`.
 pub(super) struct DisplacementSums<'a> {
     pub(super) shape: &'a CorrelationShape,
-    /// Where a displacement's products are read, for the row's first pixel.
+    /// Offsets of a displacement's products, for the row's first pixel.
     pub(super) taps: &'a [(usize, usize)],
     /// The padded output gradient of the image.
     pub(super) grad: &'a [f32],
@@ -34,7 +34,7 @@ pub(super) struct DisplacementSums<'a> {
     pub(super) other: &'a [f32],
     /// No other task writes this row.
     pub(super) out: SharedMut<'a, f32>,
-    /// Where the row starts in the first channel's plane.
+    /// Offset of the row in the first channel's plane.
     pub(super) start: usize,
 }
 
@@ -65,7 +65,7 @@ impl WithSimd for RowCorrelation<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let side = self.shape.side();
-        // What the blocks read, at the most: the last channel of the last vector.
+        // The furthest read of the blocks: the last channel of the last vector.
         let span = (self.shape.channels - 1) * self.shape.plane();
         let row = self.shape.width.next_multiple_of(LANES);
         assert!(self.second.len() >= span + row + side - 1, "second image");
@@ -91,7 +91,7 @@ impl WithSimd for RowCorrelation<'_> {
 }
 
 impl RowCorrelation<'_> {
-    /// `ROWS` pairs from `done` on with `COLUMNS` displacements from `right` on, for the vector of pixels at `x`.
+    /// Computes `ROWS` pairs from `done` on with `COLUMNS` displacements from `right` on, for the vector of pixels at `x`.
     ///
     /// # Safety
     /// The padded images must be as long as `with_simd` asserts.
@@ -113,7 +113,7 @@ impl RowCorrelation<'_> {
         for c in 0..shape.channels {
             let at = c * shape.plane();
             let mut vectors = [simd.splat_f32s(0.0); COLUMNS];
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             unsafe {
                 for (j, vector) in vectors.iter_mut().enumerate() {
                     *vector = second.add(at + j).cast::<S::f32s>().read_unaligned();
@@ -172,7 +172,7 @@ impl WithSimd for DisplacementSums<'_> {
 }
 
 impl DisplacementSums<'_> {
-    /// `ROWS` channels from `c` on, for the vector of pixels at `x`.
+    /// Computes `ROWS` channels from `c` on, for the vector of pixels at `x`.
     ///
     /// # Safety
     /// The padded images must be as long as `with_simd` asserts.
@@ -183,7 +183,7 @@ impl DisplacementSums<'_> {
         let grad = self.grad.as_ptr().wrapping_add(x);
         let other = self.other.as_ptr().wrapping_add(c * shape.plane() + x);
         for &(in_grad, in_other) in self.taps {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             unsafe {
                 let factor = grad.add(in_grad).cast::<S::f32s>().read_unaligned();
                 for (m, sum) in sums.iter_mut().enumerate() {

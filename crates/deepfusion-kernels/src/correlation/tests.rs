@@ -11,7 +11,7 @@ const fn shape(channels: usize, height: usize, width: usize, radius: usize) -> C
     }
 }
 
-/// Blocks of every size; images smaller than the radius, narrower and wider than a vector.
+/// Shapes for blocks of every size; images smaller than the radius, narrower and wider than a vector.
 const SHAPES: [CorrelationShape; 8] = [
     shape(1, 1, 1, 4),
     shape(3, 4, 4, 4),
@@ -67,7 +67,7 @@ fn assert_close(what: &str, shape: CorrelationShape, ours: &[f32], exact: &[f64]
     }
 }
 
-/// Outputs and gradients are written over rubbish and compared with loops in f64.
+/// Outputs and gradients overwrite garbage and are compared with loops in f64.
 #[test]
 fn values_and_gradients_equal_the_definition() {
     for shape in SHAPES {
@@ -93,8 +93,8 @@ fn values_and_gradients_equal_the_definition() {
     }
 }
 
-/// The correlation is linear in each image, so that differences over a long step are the gradient itself, there are
-/// no kinks, and single precision is enough.
+/// The correlation is linear in each image, so differences over a large step equal the gradient, there are no kinks, and f32 is precise
+/// enough.
 #[test]
 fn gradients_equal_finite_differences() {
     for shape in [shape(3, 4, 5, 2), shape(2, 3, 18, 4)] {
@@ -129,7 +129,7 @@ fn gradients_equal_finite_differences() {
     }
 }
 
-/// One image of shifted noise: the correlation is the square at the displacement that it was shifted by.
+/// An image of noise and a shifted copy: at the displacement of the shift, the correlation is the mean square.
 #[test]
 fn a_shift_is_found_where_it_was_made() {
     let shape = shape(4, 12, 20, 4);
@@ -152,11 +152,11 @@ fn a_shift_is_found_where_it_was_made() {
         let square: f32 = (0..4).map(|c| first[c * 240 + p].powi(2)).sum::<f32>() / 4.0;
         assert!((out[channel * 240 + p] - square).abs() < 1e-7);
     }
-    // A pixel of the first row; this displacement looks two rows above it.
+    // A pixel of the first row; this displacement reads two rows above it.
     assert_eq!(out[channel * 240 + 7], 0.0, "out of the image");
 }
 
-/// The width of the vectors decides how many sums are made at once, not in which order.
+/// The width of the vectors determines how many sums are computed at once, but not their order.
 #[test]
 fn every_instruction_set_gives_the_same_bits() {
     struct Both<'a>(RowCorrelation<'a>, DisplacementSums<'a>);

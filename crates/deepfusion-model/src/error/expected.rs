@@ -1,4 +1,4 @@
-//! What a setting must be, and what it is instead.
+//! What a setting must be, and what was found instead.
 
 use deepfusion_hint::count_of;
 
@@ -12,13 +12,13 @@ pub enum ExpectedSetting {
     /// A number above 0.
     #[error("above 0")]
     AboveZero,
-    /// A number above 0, at most this.
+    /// A number above 0, at most the given one.
     #[error("above 0, at most {0}")]
     AboveZeroUpTo(f64),
-    /// A number that is not negative.
+    /// A number that is 0 or more.
     #[error("0 or more")]
     NotNegative,
-    /// A number from one to the other, both included.
+    /// A number within two limits, both included.
     #[error("{from} to {to}")]
     Within {
         /// The smallest.
@@ -26,15 +26,15 @@ pub enum ExpectedSetting {
         /// The largest.
         to: f64,
     },
-    /// An angle between two others, both excluded.
+    /// An angle between two limits, both excluded.
     #[error("above {above} and below {below} degrees")]
     Degrees {
-        /// The smaller one, degrees.
+        /// Lower limit in degrees.
         above: f64,
-        /// The larger one, degrees.
+        /// Upper limit in degrees.
         below: f64,
     },
-    /// A time.
+    /// A time in seconds.
     #[error("a time in seconds")]
     Seconds,
     /// Two depths, the smaller one first.
@@ -46,143 +46,135 @@ pub enum ExpectedSetting {
     /// Cameras as configurations name them.
     #[error("2, 3 or both")]
     Cameras,
-    /// A name that nothing else has.
-    #[error("a name of its own")]
+    /// A unique name.
+    #[error("a unique name")]
     OwnName,
-    /// Recordings to learn from.
+    /// Recordings to train on.
     #[error("data.paths or [[data.sets]]")]
     Recordings,
-    /// A recording of a data set, or more.
+    /// At least one recording in a data set.
     #[error("at least one")]
     OneRecording,
-    /// What all data sets have, or none of them.
+    /// A setting that all data sets have, or none.
     #[error("given for all sets or for none")]
     AllSetsOrNone,
-    /// Neighbouring frames, by how far they are from the target's.
+    /// Offsets of the source frames.
     #[error("at least one offset")]
     OneOffset,
-    /// Other frames than the target's own.
+    /// Source frames other than the target.
     #[error("offsets other than 0")]
     OtherOffsets,
-    /// Weights of the networks.
-    #[error(
-        "weights by their names, or by the beginning of them, as depth.encoder or depth.encoder.layer1"
-    )]
+    /// Names of weights.
+    #[error("the beginning of a weight's name, such as depth.encoder or depth.encoder.layer1")]
     Weights,
-    /// Fewer weights that do not learn: none learns from video.
+    /// Fewer frozen weights: none are left to learn from video.
     #[error("weights left to learn from video")]
     LeftForVideo,
-    /// The same of known depth.
+    /// Fewer frozen weights: none are left to learn from known depth.
     #[error("weights left to learn from known depth")]
     LeftForDepth,
-    /// Something that a TOML file can say.
+    /// Values that TOML has a form for.
     #[error("values that TOML can hold")]
     TomlValues,
-    /// What another setting asks of it.
+    /// A condition of another setting.
     #[error(transparent)]
     AskedBy(#[from] AskedBy),
 }
 
-/// What another setting asks of a setting: alone, each could be as it is.
+/// What another setting demands of a setting. Each alone would be valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AskedBy {
-    /// There is no canonical focal length, by which metres are the same at every size.
+    /// There is no canonical focal length, with which a sigmoid disparity means the same metres at every size.
     #[error("none without canonical_focal_px")]
     NoCanonicalFocal,
     /// No data set has known depth.
-    #[error(
-        "false where nothing is learned from known depth: the head has nothing else to learn from"
-    )]
+    #[error("false if no data set has known depth: the head learns from nothing else")]
     NoKnownDepth,
-    /// A data set has nothing else to learn from.
-    #[error(
-        "above 0 where recordings are learned from by their depth alone, or depth_net.uncertainty = true"
-    )]
+    /// A data set teaches nothing but depth.
+    #[error("above 0 (or depth_net.uncertainty = true) if any recordings have learn = \"depth\"")]
     DepthAlone,
-    /// The depth network is another one.
-    #[error(
-        "0 where the depth network is no ResNet with its decoder: the flow decoder reads a ResNet's features"
-    )]
+    /// The depth network is not a ResNet.
+    #[error("0 unless the depth network is a ResNet, whose features the flow decoder reads")]
     NoResNet,
-    /// Nothing measured may enter.
-    #[error("posenet where loss.speed is 0")]
+    /// Without the speed loss, a run uses no measured motion.
+    #[error("posenet if loss.speed is 0")]
     NoSpeedLoss,
-    /// Both frames are warped onto each other.
+    /// Reprojection is bidirectional: the two frames are warped onto each other.
     #[error("[1] for bidirectional reprojection")]
     BothWays,
-    /// They are not.
-    #[error("0 where reprojection is not bidirectional: it compares both frames' depths")]
+    /// Reprojection is not bidirectional.
+    #[error("0 unless reprojection is bidirectional: the term compares the depths of both frames")]
     OneWay,
-    /// There are explainability masks, of which the term is.
-    #[error("above 0 where pose_net.explainability is true: nothing else keeps the masks up")]
+    /// There are explainability masks, which need this term.
+    #[error("above 0 if pose_net.explainability is true: otherwise the masks fall to 0")]
     MasksForTerm,
     /// There are explainability masks, one for each source.
-    #[error("mean where pose_net.explainability is true")]
+    #[error("mean if pose_net.explainability is true")]
     MasksForMean,
-    /// There are none.
-    #[error("0 where pose_net.explainability is false: there are no masks")]
+    /// There are no explainability masks.
+    #[error("0 if pose_net.explainability is false: there are no masks")]
     NoMasks,
-    /// The mean of the sources' errors is taken.
-    #[error("false where reprojection is mean")]
+    /// Reprojection takes the mean of the sources' errors.
+    #[error("false if reprojection is mean")]
     MeanOfSources,
     /// The other camera's image is a source.
-    #[error("{0} where stereo is on")]
+    #[error("{0} if stereo is on")]
     Stereo(&'static str),
-    /// There is no flow.
-    #[error("false where loss.flow.weight is 0: the flow shows what is dynamic")]
+    /// There is no flow decoder.
+    #[error("false if loss.flow.weight is 0: dynamic pixels are found by the flow")]
     NoFlow,
     /// There are data sets.
-    #[error("none beside data.sets: each set has its own")]
+    #[error("none if data.sets is given: each set has its own")]
     DataSets,
-    /// The set's views are simulated.
-    #[error("none beside simulated views")]
+    /// The set's views are simulated: it has no recordings.
+    #[error("none for simulated views")]
     SimulatedViews,
-    /// The same of what is learned from them.
+    /// The set's views are simulated: they have no neighbouring frames.
     #[error("\"depth\" for simulated views, which have no neighbours")]
     NoNeighbours,
 }
 
-/// What a setting is instead.
+/// What was found instead.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FoundSetting {
-    /// This.
+    /// A value.
     #[error("{0}")]
     Value(String),
-    /// It is not given.
+    /// The setting is missing.
     #[error("none")]
     Nothing,
-    /// It is given.
+    /// The setting is given.
     #[error("some")]
     Something,
-    /// So many of the data sets have it.
+    /// Only some of the data sets have the setting.
     #[error("{with} of {}", count_of(*of, "set"))]
     SomeSets {
-        /// How many.
+        /// Number of data sets that have it.
         with: usize,
-        /// Of how many.
+        /// Number of data sets.
         of: usize,
     },
-    /// A data set has none.
+    /// A data set lacks the setting.
     #[error("none in {set}")]
     NothingIn {
-        /// Its name.
+        /// The data set's name.
         set: String,
     },
-    /// A data set has some.
+    /// A data set has the setting.
     #[error("some in {set}")]
     SomethingIn {
-        /// Its name.
+        /// The data set's name.
         set: String,
     },
-    /// A data set has another one.
+    /// A data set has another value.
     #[error("another in {set}")]
     AnotherIn {
-        /// Its name.
+        /// The data set's name.
         set: String,
     },
-    /// TOML has no form for it: what the writer says.
+    /// The value has no form in TOML: the serialiser's message.
     #[error("{0}")]
     NoTomlForm(Box<toml::ser::Error>),
 }
@@ -203,15 +195,15 @@ impl From<toml::ser::Error> for FoundSetting {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedDataSet {
-    /// There are none to name.
-    #[error("none: this run learned from one data set")]
+    /// The run learned from one unnamed data set.
+    #[error("none, as this run learned from one unnamed data set")]
     NoSets,
-    /// This one.
-    #[error("{0}, the only one that this run learned from, or none")]
+    /// The run learned from this data set only.
+    #[error("{0} (the only one that this run learned from) or none")]
     Only(String),
-    /// One of these must be.
+    /// The run learned from several data sets.
     #[error(
-        "one of {}, as this run learned from several data sets and metres are each one's own",
+        "one of {}: this run learned from several data sets, and each has its own metres",
         .0.join(", ")
     )]
     OneOf(Vec<String>),

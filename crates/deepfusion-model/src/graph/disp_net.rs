@@ -1,4 +1,5 @@
-//! DispNet's part of the graph. A transposed convolution of stride 2 is a convolution to four times its channels, which become pixels.
+//! DispNet's part of the graph. A transposed convolution of stride 2 is a convolution to four times its channels, which are then rearranged
+//! to pixels (depth to space).
 
 use deepfusion_infer::{Activation, Border, Op, ValueId};
 
@@ -8,11 +9,11 @@ use crate::{
     NetworkError,
 };
 
-/// Side of the transposed kernels.
+/// Side of the transposed convolutions' kernels.
 const SIDE: usize = 3;
 
 impl Builder {
-    /// The disparity at the image's size, and ln b with the head for uncertainty.
+    /// The disparity at the image's size, and ln b if the network has an uncertainty head.
     pub(super) fn disp_net(
         &mut self,
         config: &DepthNetConfig,
@@ -66,7 +67,7 @@ impl Builder {
         Ok(outputs)
     }
 
-    /// A scale's disparity for the next one.
+    /// The disparity of one scale, enlarged for the next.
     fn coarse_disparity(&mut self, path: &str, sigmoid: ValueId) -> Result<ValueId, NetworkError> {
         let [factor, summand] = DISP_NET_DISPARITY.map(|number| number as f32);
         let scaled = Layer {
@@ -77,8 +78,8 @@ impl Builder {
         self.push(format!("{path}.disparity.enlarge"), Op::Enlarge { input })
     }
 
-    /// A transposed convolution of 3×3 and stride 2 with ReLU. Along each axis out(2i) = w₁·x(i) and out(2i + 1) = w₂·x(i) + w₀·x(i + 1),
-    /// zeros beyond the edge.
+    /// A transposed convolution, 3×3 and stride 2, with ReLU. Along each axis out(2i) = w₁·x(i) and out(2i + 1) = w₂·x(i) + w₀·x(i + 1),
+    /// with zeros beyond the edge.
     fn transposed(
         &mut self,
         name: &str,
@@ -88,7 +89,7 @@ impl Builder {
         let from = self.graph.shape(input).channels;
         let weight = self.take(&format!("{name}.weight"), &[from, width, SIDE, SIDE])?;
         let bias = self.take(&format!("{name}.bias"), &[width])?;
-        // For an even and an odd output pixel: the tap of the transposed kernel for each of a kernel's own.
+        // For an even and an odd output pixel: which tap of the transposed kernel each tap of the plain kernel is.
         let taps = [[None, Some(1), None], [None, Some(2), Some(0)]];
         let area = SIDE * SIDE;
         let mut spread = Vec::with_capacity(4 * weight.len() * area);
@@ -114,7 +115,7 @@ impl Builder {
     }
 }
 
-/// A 3×3 of stride 1 over a border of zeros.
+/// A 3×3 convolution of stride 1, padded with zeros.
 fn layer(name: String, input: ValueId, channels: [usize; 2]) -> Layer<'static> {
     Layer {
         name,

@@ -10,7 +10,7 @@ impl Builder {
         self.encoder_to("encoder", encoder, 4)
     }
 
-    /// The features up to those of so many layers; what is beyond them is the last one again. Names begin with `prefix`.
+    /// The features of the stem and the first `layers` layers. The other entries repeat the last of them. Names begin with `prefix`.
     pub(super) fn encoder_to(
         &mut self,
         prefix: &str,
@@ -48,7 +48,7 @@ impl Builder {
         Ok(features)
     }
 
-    /// relu(residual(x) + shortcut(x)): a basic block where the inner and the outer channels agree.
+    /// relu(residual(x) + shortcut(x)); a basic block if `inner` equals `outer`, else a bottleneck.
     fn block(
         &mut self,
         path: &str,

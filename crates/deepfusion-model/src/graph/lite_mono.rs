@@ -1,4 +1,4 @@
-//! Lite-Mono's part of the graph. Factors of channels (layer norms', layer scales) are folded into the 1×1 beside them.
+//! Lite-Mono's part of the graph. Per-channel factors (layer norms', layer scales) are folded into the adjacent 1×1 convolution.
 
 use deepfusion_infer::{Activation, Border, Conv, Depthwise, Op, ValueId};
 
@@ -27,7 +27,7 @@ fn layer(
     }
 }
 
-/// A 1×1.
+/// A 1×1 convolution.
 fn point(name: String, input: ValueId, channels: [usize; 2]) -> Layer<'static> {
     layer(name, Offset::Bias, input, channels, [1, 1])
 }
@@ -43,7 +43,7 @@ impl Builder {
         let finest = self.lite_mono_decoder(config, features)?;
         let head = "lite_mono.decoder.heads.0";
         let large = self.enlarged_head(head, finest)?;
-        // The sigmoid of a 1×1 that gives what it reads.
+        // A 1×1 convolution that is the identity, followed by the sigmoid.
         let sigmoid = Layer {
             activation: &Activation::Sigmoid,
             ..point(format!("{head}.sigmoid"), large, [1, 1])
@@ -55,7 +55,7 @@ impl Builder {
         Ok(outputs)
     }
 
-    /// A 3×3 to one channel at half of the image's size, enlarged.
+    /// A 3×3 convolution to one channel at half of the image's size, enlarged to the full size.
     fn enlarged_head(&mut self, name: &str, input: ValueId) -> Result<ValueId, NetworkError> {
         let channels = self.graph.shape(input).channels;
         let head = Layer {
@@ -184,7 +184,7 @@ impl Builder {
         self.scaled(&project, &format!("{path}.scale"), x)
     }
 
-    /// A 1×1 of the layer norm of its input: W·(γ ⊙ n + β) + b = (W·γ)·n + (W·β + b).
+    /// A 1×1 convolution of the layer norm of its input: W·(γ ⊙ n + β) + b = (W·γ)·n + (W·β + b).
     fn after_norm(&mut self, norm: &str, layer: Layer) -> Result<ValueId, NetworkError> {
         let [from, to] = layer.channels;
         let op = Op::ChannelNorm {

@@ -1,4 +1,4 @@
-//! A trained depth network as a graph, batch normalisation folded into the convolutions before it.
+//! A trained depth network as a graph, with each batch normalisation folded into the convolution before it.
 
 use std::collections::BTreeMap;
 
@@ -18,12 +18,12 @@ use crate::{DepthNetConfig, NetworkError};
 /// The graph of a depth network with these weights: from an RGB image to the sigmoid disparity at full
 /// size.
 ///
-/// The weights carry the network's own names (`encoder.layer1.0.conv1.weight`) and become the graph's, but for the
-/// heads of the coarser scales, which are dropped.
+/// The weights have the network's own names (`encoder.layer1.0.conv1.weight`) and become the graph's. The heads of the coarser scales are
+/// dropped.
 ///
 /// # Errors
-/// [`NetworkError::Config`] for a network that cannot be built, [`NetworkError::MissingTensor`] or
-/// [`NetworkError::TensorShape`] or [`NetworkError::UnexpectedTensor`] where the weights are another network's, [`NetworkError::NotFinite`].
+/// [`NetworkError::Config`] for a network that cannot be built; [`NetworkError::MissingTensor`], [`NetworkError::TensorShape`] or
+/// [`NetworkError::UnexpectedTensor`] if the weights belong to another network; [`NetworkError::NotFinite`] for NaN or infinite weights.
 pub fn depth_graph(config: &DepthNetConfig, mut weights: Weights) -> Result<Graph, NetworkError> {
     let alone = DepthNetConfig {
         uncertainty: false,
@@ -36,10 +36,10 @@ pub fn depth_graph(config: &DepthNetConfig, mut weights: Weights) -> Result<Grap
     depth_graph_with_uncertainty(&alone, weights)
 }
 
-/// The same; a network with the head for uncertainty has ln b at full size as a second output.
+/// Like [`depth_graph`], but a network with an uncertainty head has ln b at full size as a second output.
 ///
 /// # Errors
-/// As [`depth_graph`].
+/// As for [`depth_graph`].
 pub fn depth_graph_with_uncertainty(
     config: &DepthNetConfig,
     weights: Weights,
@@ -71,25 +71,25 @@ pub fn depth_graph_with_uncertainty(
 
 struct Builder {
     graph: Graph,
-    /// What was not taken yet.
+    /// Weights that no operation has taken yet.
     weights: Weights,
-    /// What was taken of layers that run several times.
+    /// Copies of weights of layers that run several times.
     repeated: BTreeMap<String, Vec<f32>>,
 }
 
 /// What is added to a convolution's sum.
 enum Offset {
-    /// Its own bias.
+    /// The convolution's own bias.
     Bias,
-    /// That of the batch normalisation with this name.
+    /// The offset of the batch normalisation with this name.
     Norm(String),
     /// Nothing.
     None,
 }
 
-/// What a convolution is beside its weights.
+/// A convolution without its weights.
 struct Layer<'a> {
-    /// Of the convolution's tensors.
+    /// Name that the convolution's tensors begin with.
     name: String,
     /// What is added to its sum.
     offset: Offset,
@@ -111,7 +111,7 @@ impl Builder {
         self.conv_with(layer, weight, bias)
     }
 
-    /// The layer's weights and bias, its batch normalisation folded in.
+    /// The layer's weights and bias, with its batch normalisation folded in.
     fn folded(
         &mut self,
         layer: &Layer,
@@ -127,7 +127,7 @@ impl Builder {
         Ok((weight, bias))
     }
 
-    /// The layer with these weights.
+    /// Adds the layer with the given weights.
     fn conv_with(
         &mut self,
         layer: &Layer,
@@ -151,8 +151,7 @@ impl Builder {
         self.push(layer.name.clone(), Op::Conv(Box::new(conv)))
     }
 
-    /// γ (w ⋆ x − μ) / √(σ² + ε) + β = (s·w) ⋆ x + (β − s·μ), s = γ / √(σ² + ε). Scales the weights by s and
-    /// gives the bias.
+    /// γ (w ⋆ x − μ) / √(σ² + ε) + β = (s·w) ⋆ x + (β − s·μ), s = γ / √(σ² + ε). Scales the weights by s and returns the bias.
     fn fold(
         &mut self,
         norm: &str,
@@ -175,7 +174,7 @@ impl Builder {
         Ok(bias)
     }
 
-    /// Moves a tensor's values out of the weights: a large network lies in memory once.
+    /// Moves a tensor's values out of the weights, so that a large network is in memory only once.
     fn take(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f32>, NetworkError> {
         let tensor = self.weights.tensors.remove(name);
         let tensor = tensor.ok_or_else(|| NetworkError::MissingTensor {
@@ -204,7 +203,7 @@ impl Builder {
         Ok(tensor.values)
     }
 
-    /// That every tensor found its place, but for the heads of the coarser scales, which only training needs.
+    /// Checks that every tensor was used, except for the heads of the coarser scales, which only training needs.
     fn nothing_left(&self) -> Result<(), NetworkError> {
         let head = |name: &str| {
             ["1", "2", "3"]

@@ -1,14 +1,14 @@
-//! R-MSFM's part of the graph: the refinements one after the other, the enlargement of the last alone.
+//! R-MSFM's part of the graph: all refinements in turn, and the enlargement of the last one only.
 
 use deepfusion_infer::{Activation, Border, Op, ValueId};
 
 use super::{Builder, Layer, Offset};
 use crate::{DepthNetConfig, NetworkError, R_MSFM_STATE, RMsfmConfig, RefinementInput};
 
-/// A mask is a quarter of what its layer gives (RAFT's balance of gradients).
+/// The factor of a mask layer's output, which balances gradients as in RAFT.
 const MASK_SCALE: f32 = 0.25;
 
-/// Side of the kernels that a strip of 1×3 or 3×1 becomes a part of.
+/// Side of the square kernels into which 1×3 and 3×1 kernels are embedded.
 const SQUARE: usize = 3;
 
 impl Builder {
@@ -74,7 +74,7 @@ impl Builder {
         self.feature("fine", small, R_MSFM_STATE, 2)
     }
 
-    /// How R-MSFM6 takes a feature up again: 1×3 and 3×1, tanh after each.
+    /// The convolutions 1×3 and 3×1, with tanh after each, through which R-MSFM6 reads a feature a second time.
     fn feature_again(&mut self, index: usize, input: ValueId) -> Result<ValueId, NetworkError> {
         let mut x = input;
         for strip in ["across", "down"] {
@@ -84,7 +84,7 @@ impl Builder {
         Ok(x)
     }
 
-    /// The gated unit, first along rows, then along columns.
+    /// The gated recurrent unit, first along rows, then along columns.
     fn gru(
         &mut self,
         index: usize,
@@ -133,7 +133,7 @@ impl Builder {
         Ok(state)
     }
 
-    /// The refined logit of the disparity, and what it was refined by.
+    /// The refined logit of the disparity, and the features that refined it.
     fn refined(
         &mut self,
         index: usize,
@@ -174,7 +174,7 @@ impl Builder {
         Ok((self.conv_with(&last, weight, bias)?, seen))
     }
 
-    /// Weights of each pixel's neighbours, as logarithms.
+    /// Logarithmic weights of each pixel's neighbours.
     fn weights(&mut self, seen: ValueId) -> Result<ValueId, NetworkError> {
         let path = "r_msfm.weights.reduce";
         let x = self.reflected(
@@ -207,7 +207,7 @@ impl Builder {
         self.push("r_msfm.enlarge".into(), op)
     }
 
-    /// A number at every pixel of a value's size.
+    /// A constant at every pixel of a value's size.
     fn everywhere(
         &mut self,
         name: &str,
@@ -219,7 +219,7 @@ impl Builder {
         self.conv_with(&layer, vec![0.0; channels], vec![number])
     }
 
-    /// A convolution over a reflected border with a copy of the weights at `path`.
+    /// A convolution with reflection padding and a copy of the weights at `path`.
     fn reflected(
         &mut self,
         name: String,
@@ -239,7 +239,7 @@ impl Builder {
         self.conv_with(&layer, weight, bias)
     }
 
-    /// A 1×3 or 3×1 over a border of zeros, as a 3×3 of which six taps are zero.
+    /// A 1×3 or 3×1 convolution with zero padding, as a 3×3 of which six taps are zero.
     fn strip(
         &mut self,
         name: String,
@@ -272,7 +272,7 @@ impl Builder {
         self.conv_with(&layer, weight, bias)
     }
 
-    /// A layer's weights and bias, which stay for the next refinement.
+    /// A layer's weights and bias, copied because later refinements use them too.
     fn copied(
         &mut self,
         path: &str,
@@ -292,7 +292,7 @@ impl Builder {
     }
 }
 
-/// A convolution of stride 1 over a border of zeros.
+/// A convolution of stride 1 with zero padding.
 fn plain(name: String, input: ValueId, channels: [usize; 2], kernel: usize) -> Layer<'static> {
     Layer {
         name,

@@ -1,11 +1,11 @@
-//! Context, attention and aggregation: what lies between the encoder's features and the decoder.
+//! Context, attention and aggregation: what is between the encoder's features and the decoder.
 
 use deepfusion_infer::{Activation, Border, Op, ValueId};
 
 use super::{Builder, Layer, Offset};
 use crate::{AttentionConfig, AttentionForm, DepthNetConfig, HceConfig, NetworkError};
 
-/// A 1×1 on a value.
+/// A 1×1 convolution of a value.
 fn point(name: String, offset: Offset, input: ValueId, channels: [usize; 2]) -> Layer<'static> {
     Layer {
         name,
@@ -21,7 +21,7 @@ fn point(name: String, offset: Offset, input: ValueId, channels: [usize; 2]) -> 
     }
 }
 
-/// A 1×1 with batch normalisation and ReLU, as [`crate::layers::ConvNorm`] names its tensors.
+/// A 1×1 convolution with batch normalisation and ReLU, with tensors named as by [`crate::layers::ConvNorm`].
 fn point_norm(path: &str, input: ValueId, channels: [usize; 2]) -> Layer<'static> {
     let norm = Offset::Norm(format!("{path}.bn"));
     point(format!("{path}.conv"), norm, input, channels)

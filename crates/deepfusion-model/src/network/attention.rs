@@ -47,7 +47,7 @@ impl AttentionConfig {
     }
 
     /// # Errors
-    /// [`NetworkError::Config`] for a reduction or a kernel that means no network.
+    /// [`NetworkError::Config`] for an invalid reduction or kernel.
     pub fn validate(&self) -> Result<(), NetworkError> {
         if !(1..=1024).contains(&self.reduction) {
             let found = self.reduction;

@@ -1,20 +1,20 @@
-//! What each part of the networks costs: parameters, multiply-adds, values.
+//! The cost of each part of the networks: parameters, multiply-adds, output values.
 
 use super::{
     DISP_NET_LEVELS, DepthNetConfig, EXPLAINABILITY_WIDTHS, InputSize, POSE_WIDTH, PoseNetConfig,
     ResNetConfig,
 };
 
-/// What a part of a network costs for one image, batch normalisation folded into the convolutions.
+/// Cost of a part of a network for one image, with batch normalisation folded into the convolutions.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct ModuleCost {
-    /// Where its tensors' names begin: `encoder.layer1`, `hce.0`, …
+    /// The beginning of its tensors' names: `encoder.layer1`, `hce.0`, …
     pub name: String,
-    /// Numbers that are learned: weights, biases, γ and β; not the running statistics.
+    /// Number of learned parameters: weights, biases, γ and β, but not the running statistics.
     pub parameters: u64,
-    /// Multiplications with addition in its convolutions, zeros of a border included.
+    /// Multiply-adds of its convolutions, including those with padding.
     pub multiply_adds: u64,
-    /// Values that its operations give.
+    /// Number of values that its operations output.
     pub values: u64,
 }
 
@@ -24,12 +24,12 @@ pub(super) enum ConvTail {
     Norm,
     Bias,
     Nothing,
-    /// Nothing, and its weights are not learned.
+    /// Nothing, and the weights are constants.
     Fixed,
 }
 
 impl ModuleCost {
-    /// Several parts as one.
+    /// The sum of several parts.
     #[must_use]
     pub fn sum(name: impl Into<String>, parts: &[Self]) -> Self {
         let sum = |of: fn(&Self) -> u64| parts.iter().map(of).sum::<u64>();
@@ -47,7 +47,7 @@ impl ModuleCost {
         megabytes(self.parameters)
     }
 
-    /// What its operations give for one image in f32, in MB of 2²⁰ bytes.
+    /// Size of its operations' outputs for one image in f32, in MB of 2²⁰ bytes.
     #[must_use]
     pub fn values_mb(&self) -> f64 {
         megabytes(self.values)
@@ -72,7 +72,7 @@ impl ModuleCost {
         self.products(from * to * kernel * kernel, to, pixels, after);
     }
 
-    /// A kernel of its own for each channel.
+    /// One kernel for each channel (depthwise).
     pub(super) fn depthwise(
         &mut self,
         channels: usize,
@@ -100,13 +100,13 @@ impl ModuleCost {
     }
 }
 
-/// MB of numbers in f32.
+/// Size of `count` f32 values in MB of 2²⁰ bytes.
 fn megabytes(numbers: u64) -> f64 {
     numbers as f64 * 4.0 / (1024.0 * 1024.0)
 }
 
 impl ResNetConfig {
-    /// The stem (`conv1`, `bn1`, the pooling) and `layer1`…`layer4`, their names behind `prefix`.
+    /// The stem (`conv1`, `bn1`, the pooling) and `layer1`…`layer4`; their names begin with `prefix`.
     pub(super) fn costs(&self, prefix: &str, size: InputSize) -> Vec<ModuleCost> {
         let channels = self.channels();
         let pixels = feature_pixels(self, size);
@@ -154,8 +154,8 @@ fn feature_pixels(encoder: &ResNetConfig, size: InputSize) -> [usize; 5] {
 }
 
 impl DepthNetConfig {
-    /// The network's parts in the order in which they run. Of the heads all have parameters, and the finest alone has
-    /// multiply-adds: the others only train. What runs several times has its parameters once.
+    /// The network's parts in the order in which they run. All heads count their parameters, but only the finest counts multiply-adds: the
+    /// others run in training only. The parameters of a part that runs several times count once.
     #[must_use]
     pub fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
         if let Some(r_msfm) = &self.r_msfm {
@@ -203,7 +203,7 @@ impl DepthNetConfig {
                 if hce.global_pool {
                     cost.give(channels, 1);
                     cost.conv([channels, width], 1, 1, ConvTail::Bias);
-                    // The projection's share of the branch that is the same everywhere.
+                    // The projection's share of the global branch, which is the same at every pixel.
                     cost.conv([width, width], 1, 1, ConvTail::Nothing);
                 }
                 costs.push(cost);
@@ -296,7 +296,7 @@ impl PoseNetConfig {
         all
     }
 
-    /// Five layers, the feature enlarged between them, and the masks of both frames.
+    /// Five layers with the feature enlarged between them, and the masks of both frames.
     fn explainability_cost(&self, size: InputSize, all: &mut ModuleCost) {
         let mut from = self.encoder.channels()[4];
         for (index, width) in EXPLAINABILITY_WIDTHS.into_iter().enumerate() {

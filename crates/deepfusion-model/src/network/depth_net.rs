@@ -10,10 +10,10 @@ use super::{
     ResNetDepth,
 };
 
-/// ln b is held within these, in learning and in a prediction: errors of ln depth between 0.25 % and a factor of 7.
+/// Limits of ln b, in training and in prediction. They correspond to errors of ln depth between 0.25 % and a factor of 7.
 pub const LOG_SCALE_BOUNDS: (f64, f64) = (-6.0, 2.0);
 
-/// The size of the images a network is given, in pixels.
+/// Size of a network's input images, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InputSize {
@@ -24,18 +24,18 @@ pub struct InputSize {
 }
 
 impl InputSize {
-    /// A size that the encoder can halve five times.
+    /// A valid input size.
     ///
     /// # Errors
-    /// As [`Self::validate`].
+    /// As for [`Self::validate`].
     pub fn new(width: usize, height: usize) -> Result<Self, NetworkError> {
         let size = Self { width, height };
         size.validate()?;
         Ok(size)
     }
 
-    /// The coarsest feature has 1/32 of the size; the decoder's reflection padding needs two of its
-    /// pixels in each direction.
+    /// Checks that the encoder can halve the size five times and the decoder can pad: the coarsest feature has 1/32 of the size, and
+    /// reflection padding needs two of its pixels in each direction.
     ///
     /// # Errors
     /// [`NetworkError::InputSize`] unless both sides are multiples of 32 and at least 64.
@@ -52,14 +52,14 @@ impl InputSize {
     }
 }
 
-/// One of the disparities that a depth network gives while it learns.
+/// One of the disparities that a depth network predicts in training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthScale {
-    /// Its width and height are the image's divided by 2 this many times.
+    /// How many times the image's width and height are halved.
     pub halvings: u32,
     /// Weight of its reprojection error in the loss.
     pub weight: f64,
-    /// Weight of its smoothness, which the loss's own multiplies.
+    /// Weight of its smoothness, which is multiplied by the loss's own weight.
     pub smoothness: f64,
 }
 
@@ -106,12 +106,12 @@ pub struct DepthNetConfig {
     pub uncertainty: bool,
 }
 
-/// What the tensor names of the head for uncertainty begin with, in a depth network's weights.
+/// The beginning of the uncertainty head's tensor names in a depth network's weights.
 pub const UNCERTAINTY_PREFIX: &str = "uncertainty.";
 
 impl DepthNetConfig {
-    /// Without what one network's weights may differ in from another's and mean the same depths: whether batch norms learn, the head for
-    /// uncertainty, and the depth that new weights start at, unless R-MSFM refines from it.
+    /// A copy without the settings that do not change what the weights predict: whether batch norms learn, the uncertainty head, and the
+    /// initial depth of new weights (unless R-MSFM refines from it).
     #[must_use]
     pub fn of_the_weights(&self) -> Self {
         let mut config = self.clone();
@@ -200,14 +200,14 @@ impl DepthNetConfig {
         }
     }
 
-    /// Whether the network is a ResNet with its decoder, whose features others may share.
+    /// Whether the network is a ResNet with its decoder, so that other parts can read its features.
     #[must_use]
     pub fn is_resnet(&self) -> bool {
         self.lite_mono.is_none() && self.r_msfm.is_none() && self.disp_net.is_none()
     }
 
-    /// The disparities that the network gives while it learns, in the order in which it gives them. A decoder's scales count alike, their
-    /// smoothness by their size; each refinement counts nine tenths of the next, the last one whole.
+    /// The disparities that the network predicts in training, in the order of its outputs. A decoder's scales count equally, and their
+    /// smoothness in proportion to their size. Each refinement counts nine tenths of the next; the last counts fully.
     #[must_use]
     pub fn scales(&self) -> Vec<DepthScale> {
         if let Some(r_msfm) = &self.r_msfm {
@@ -232,7 +232,7 @@ impl DepthNetConfig {
             .collect()
     }
 
-    /// Lite-Mono, R-MSFM and DispNet have an encoder and a decoder of their own; settings of others would say nothing.
+    /// Lite-Mono, R-MSFM and DispNet have their own encoder and decoder, so settings of other parts would have no effect.
     fn validate_own_body(&self) -> Result<(), NetworkError> {
         let read = ResNetConfig {
             normalisation: self.encoder.normalisation,
@@ -251,7 +251,7 @@ impl DepthNetConfig {
             Some((field, _)) => Err(NetworkError::config(
                 field,
                 Expected::NotRead,
-                "another value",
+                format_args!("changed"),
             )),
         }
     }
@@ -266,7 +266,7 @@ impl DepthNetConfig {
             return refused("lite_mono", "another network");
         }
         if self.uncertainty {
-            // Its finest feature has an eighth of the image's size.
+            // R-MSFM's finest feature has an eighth of the image's size.
             return refused("uncertainty", "true");
         }
         Ok(())
@@ -289,7 +289,7 @@ impl DepthNetConfig {
     }
 
     /// # Errors
-    /// [`NetworkError::Config`] for a network that cannot be built, or a depth range that cannot be one.
+    /// [`NetworkError::Config`] for a network that cannot be built, or an invalid depth range.
     pub fn validate(&self) -> Result<(), NetworkError> {
         self.encoder.validate()?;
         self.hce.as_ref().map_or(Ok(()), HceConfig::validate)?;

@@ -1,21 +1,21 @@
-//! The settings of DispNet as SfMLearner has it (Zhou et al., CVPR 2017): an image halved seven times and enlarged again, with a disparity at
-//! each of the four finest sizes that the next one reads.
+//! The settings of DispNet as in SfMLearner (Zhou et al., CVPR 2017). The image is halved seven times and enlarged again. Each of the four
+//! finest sizes has a disparity, which the next finer one reads.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ExpectedNetworkSetting as Expected, InputSize, NetworkError};
 
-/// How often the image is halved, and enlarged again.
+/// How many times the image is halved, and then enlarged.
 pub const DISP_NET_LEVELS: usize = 7;
 
-/// Sides of the kernels of each halving, in pixels.
+/// Sides of the kernels at each halving, in pixels.
 pub const DISP_NET_KERNELS: [usize; DISP_NET_LEVELS] = [7, 5, 3, 3, 3, 3, 3];
 
-/// Factor and summand of the disparity that the next scale reads: 10·σ + 0.01. The published networks' disparity, whatever the range of depths.
+/// Factor and summand of the disparity that the next scale reads: 10·σ + 0.01, as in the published networks, whatever the range of depths.
 pub const DISP_NET_DISPARITY: [f64; 2] = [10.0, 0.01];
 
-/// Disparities that the network gives.
+/// Number of disparities that the network predicts.
 const SCALES: usize = 4;
 
 /// What a `DispNet` is built from.
@@ -41,7 +41,7 @@ impl Default for DispNetConfig {
 
 impl DispNetConfig {
     /// # Errors
-    /// [`NetworkError::Config`] for a width that has no half, or is no network's.
+    /// [`NetworkError::Config`] for an invalid width.
     pub fn validate(&self) -> Result<(), NetworkError> {
         let width = self.base_width;
         if width.is_multiple_of(2) && (2..=256).contains(&width) {
@@ -66,7 +66,7 @@ impl DispNetConfig {
         [32, 32, 16, 8, 4, 2, 1].map(|factor| factor * self.base_width / 2)
     }
 
-    /// Channels that an enlargement reads.
+    /// Input channels of an enlargement.
     #[must_use]
     pub fn before(&self, stage: usize) -> usize {
         match stage {
@@ -75,14 +75,15 @@ impl DispNetConfig {
         }
     }
 
-    /// Channels that are appended to an enlargement's: those of the halving of its size, none at the image's own.
+    /// Channels appended to an enlargement's output: those of the halving with the same size, none at the image's own size.
     #[must_use]
     pub fn skip(&self, stage: usize) -> usize {
         let level = (DISP_NET_LEVELS - 2).checked_sub(stage);
         level.map_or(0, |level| self.widths()[level])
     }
 
-    /// The scale of the disparity that an enlargement's layer gives, 0 at the image's size; the coarse ones give none.
+    /// The scale of the disparity that an enlargement's layer outputs, 0 at the image's size; `None` for the coarse layers, which output
+    /// none.
     #[must_use]
     pub fn scale_of(stage: usize) -> Option<usize> {
         (DISP_NET_LEVELS - 1)
@@ -90,7 +91,7 @@ impl DispNetConfig {
             .filter(|scale| *scale < SCALES)
     }
 
-    /// Whether an enlargement's layer reads the disparity of the scale before.
+    /// Whether an enlargement's layer reads the disparity of the previous scale.
     #[must_use]
     pub fn reads_disparity(stage: usize) -> bool {
         Self::scale_of(stage).is_some_and(|scale| scale + 1 < SCALES)
@@ -106,7 +107,7 @@ impl DispNetConfig {
 mod tests {
     use super::*;
 
-    /// The paper's figure.
+    /// The number in the paper.
     #[test]
     fn stages_have_the_published_channels() {
         let config = DispNetConfig::default();

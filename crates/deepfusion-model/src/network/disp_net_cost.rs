@@ -1,10 +1,11 @@
-//! What DispNet costs: [`super::ModuleCost`]s of its parts.
+//! The cost of DispNet: [`super::ModuleCost`]s of its parts.
 
 use super::cost::ConvTail;
 use super::{DISP_NET_KERNELS, DISP_NET_LEVELS, DispNetConfig, InputSize, ModuleCost};
 
 impl DispNetConfig {
-    /// The network's parts in the order in which they run. All four heads predict: three of them for the next scale.
+    /// The network's parts in the order in which they run. All four heads run in prediction, as each scale reads the previous one's
+    /// disparity.
     pub(super) fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
         let mut costs = Vec::new();
         let mut from = 3;
@@ -22,7 +23,7 @@ impl DispNetConfig {
             let halvings = DISP_NET_LEVELS - 1 - stage;
             let pixels = Self::pixels(size, halvings);
             let mut cost = ModuleCost::new(format!("disp_net.decoder.{stage}"));
-            // Each pixel of the small image times all taps.
+            // All taps are applied at each pixel of the small image.
             cost.conv(
                 [self.before(stage), width],
                 3,

@@ -13,7 +13,7 @@ pub use self::expected::ExpectedNetworkSetting;
 #[non_exhaustive]
 pub enum NetworkError {
     /// A configuration value outside what the network can be built with.
-    #[error("network config: `{field}` is {found}, expected {expected}")]
+    #[error("network configuration: `{field}` is {found}, expected {expected}")]
     Config {
         /// The field's dotted name, such as `encoder.base_width`.
         field: &'static str,
@@ -37,7 +37,7 @@ pub enum NetworkError {
     /// A file that could not be opened, read, written or renamed.
     #[error("{}: cannot {action}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What was tried: `read`, `write`, …
         action: &'static str,
@@ -48,14 +48,14 @@ pub enum NetworkError {
     /// A file that is not a weights file, or is damaged.
     #[error("{}: not a readable weights file: {reason}", path.display())]
     Format {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the reader found.
+        /// Why it cannot be read.
         #[source]
         reason: FormatProblem,
     },
 
-    /// A tensor the network has and the weights lack.
+    /// A tensor that the network has and the weights lack.
     #[error("{origin}: tensor `{name}` {expected:?} is missing{}", and_others(*others))]
     MissingTensor {
         /// Where the weights come from, usually a file.
@@ -68,7 +68,7 @@ pub enum NetworkError {
         others: usize,
     },
 
-    /// A tensor the weights have and the network lacks.
+    /// A tensor that the weights have and the network lacks.
     #[error("{origin}: tensor `{name}` {found:?} is not part of this network{}", and_others(*others))]
     UnexpectedTensor {
         /// Where the weights come from, usually a file.
@@ -81,7 +81,7 @@ pub enum NetworkError {
         others: usize,
     },
 
-    /// A tensor of another shape than the network's.
+    /// A tensor whose shape is not the network's.
     #[error("{origin}: tensor `{name}` has shape {found:?}, expected {expected:?}{}", and_others(*others))]
     TensorShape {
         /// Where the weights come from, usually a file.
@@ -96,13 +96,13 @@ pub enum NetworkError {
         others: usize,
     },
 
-    /// A network that cannot be written as a graph; its config and weights were accepted before.
+    /// A network that cannot be written as a graph, although its configuration and weights were accepted before.
     #[error(transparent)]
     Graph(#[from] deepfusion_infer::Error),
 
-    /// A NaN or an infinity among the weights.
+    /// NaNs or infinities among the weights.
     #[error(
-        "{origin}: tensor `{name}` holds {} that {} not finite",
+        "{origin}: tensor `{name}` has {} that {} not finite",
         count_of(*count, "value"),
         if *count == 1 { "is" } else { "are" }
     )]
@@ -111,7 +111,7 @@ pub enum NetworkError {
         origin: String,
         /// The tensor's name.
         name: String,
-        /// How many NaNs and infinities it holds.
+        /// Number of NaNs and infinities.
         count: usize,
     },
 
@@ -125,63 +125,63 @@ pub enum NetworkError {
     },
 }
 
-/// Why weights are not those of a network that is known, or that is wanted.
+/// Why weights do not belong to a known network, or not to the expected one.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArchitectureProblem {
-    /// They lack a tensor that every network of a kind has.
-    #[error("not {network}: there is no `{lacks}`; its first tensor is `{first}`")]
+    /// A tensor is missing that every network of this kind has.
+    #[error("not {network}: `{lacks}` is missing; the first tensor is `{first}`")]
     NotOfKind {
-        /// The kind.
+        /// The kind of network.
         network: &'static str,
-        /// The tensor.
+        /// The missing tensor.
         lacks: &'static str,
-        /// The first tensor that there is; empty without any.
+        /// The first tensor of the weights; empty if there is none.
         first: String,
     },
-    /// The same of a ResNet.
-    #[error("no ResNet: there is no `{lacks}`; its first tensor is `{first}`")]
+    /// A tensor is missing that every ResNet has.
+    #[error("not a ResNet: `{lacks}` is missing; the first tensor is `{first}`")]
     NoResNet {
-        /// The tensor.
+        /// The missing tensor.
         lacks: &'static str,
-        /// The first tensor that there is; empty without any.
+        /// The first tensor of the weights; empty if there is none.
         first: String,
     },
-    /// A ResNet of another depth than the known ones.
-    #[error("a ResNet of {blocks:?} blocks, bottleneck: {bottleneck}, is not known")]
+    /// A ResNet of unknown depth.
+    #[error("unknown ResNet: {blocks:?} blocks, bottleneck: {bottleneck}")]
     ResNet {
-        /// Blocks of each layer.
+        /// Number of blocks of each layer.
         blocks: [usize; 4],
         /// Whether its blocks are bottlenecks.
         bottleneck: bool,
     },
-    /// A Lite-Mono of another size than the published ones.
-    #[error("a Lite-Mono of {widths:?} channels and {blocks:?} dilated blocks is not known")]
+    /// A Lite-Mono of unknown size.
+    #[error("unknown Lite-Mono: {widths:?} channels, {blocks:?} dilated blocks")]
     LiteMono {
         /// Channels of each stage.
         widths: [usize; 3],
-        /// Dilated blocks of each stage.
+        /// Number of dilated blocks of each stage.
         blocks: [usize; 3],
     },
-    /// An R-MSFM of another encoder than the first half of a ResNet-18.
+    /// An R-MSFM whose encoder is not the first half of a ResNet-18.
     #[error(
-        "R-MSFM of a ResNet-18 reads 64 channels by `convX21.1.weight`, this one {}: R-MSFMX is not known",
+        "`convX21.1.weight`: expected 64 input channels (R-MSFM with ResNet-18), found {}: R-MSFMX is not known",
         channels.map_or_else(|| "none".to_owned(), |channels| channels.to_string())
     )]
     RMsfm {
-        /// The channels that this one reads.
+        /// Input channels of `convX21.1.weight`.
         channels: Option<usize>,
     },
-    /// Weights of a ResNet for a network without one.
-    #[error("its weights are a ResNet's, and the network to start is {network}")]
+    /// Weights of a ResNet for a network that has none.
+    #[error("the weights are a ResNet's, but the network to be trained is {network}")]
     ResNetForOther {
-        /// What the network is.
+        /// The network to be trained.
         network: &'static str,
     },
-    /// A checkpoint of encoders alone, which are ResNets, for a depth network without one.
-    #[error("it holds ResNets, and this configuration's depth network is {network}")]
+    /// A checkpoint of encoders (ResNets) alone, for a depth network without a ResNet.
+    #[error("the checkpoint has ResNets, but the configuration's depth network is {network}")]
     EncodersForOther {
-        /// What the network is.
+        /// The configuration's depth network.
         network: &'static str,
     },
 }
@@ -207,7 +207,7 @@ impl Hint for NetworkError {
             Self::InputSize { width, height } => {
                 let nearest = |n: usize| (n.max(64) + 16) / 32 * 32;
                 return Some(format!(
-                    "the nearest is {}×{}",
+                    "the nearest valid size is {}×{}",
                     nearest(*width),
                     nearest(*height)
                 ));
@@ -217,18 +217,18 @@ impl Hint for NetworkError {
             }
             Self::Io { .. } => "check the path",
             Self::Format { .. } => {
-                "expected .safetensors, or a .pth / .pt state dictionary saved by torch.save; a partial download ends early"
+                "give a complete .safetensors file, or a state dictionary (.pth, .pt) saved by torch.save"
             }
             Self::MissingTensor { .. }
             | Self::UnexpectedTensor { .. }
             | Self::TensorShape { .. } => {
-                "the weights belong to another architecture: compare the encoder (`resnet18`…), the widths and the preset in both configs"
+                "use weights of the same architecture: compare the encoder (`resnet18`…), the widths and the preset of both configurations"
             }
             Self::NotFinite { .. } => {
-                "the training that wrote this file had diverged; take an earlier checkpoint"
+                "take an earlier checkpoint: the training diverged before this one was written"
             }
             Self::UnknownArchitecture { .. } => {
-                "known are torchvision's ResNet-18, 34, 50 and 101, and Monodepth2's encoder.pth, depth.pth, pose_encoder.pth, pose.pth"
+                "give torchvision's ResNet-18, 34, 50 or 101, or Monodepth2's encoder.pth, depth.pth, pose_encoder.pth or pose.pth"
             }
         };
         Some(hint.to_owned())

@@ -1,4 +1,4 @@
-//! The settings of hierarchical context encoding (Eq. 11–12): one feature seen at several scales at once.
+//! The settings of hierarchical context encoding (Eq. 11–12), which reads one feature at several scales.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,7 @@ impl HceConfig {
     }
 
     /// # Errors
-    /// [`NetworkError::Config`] for rates or widths that mean no network.
+    /// [`NetworkError::Config`] for invalid rates or widths.
     pub fn validate(&self) -> Result<(), NetworkError> {
         let in_range = |rate: &usize| (1..=64).contains(rate);
         if self.rates.len() > 8 || !self.rates.iter().all(in_range) {

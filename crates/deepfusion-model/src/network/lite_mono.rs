@@ -9,7 +9,7 @@ use super::{ExpectedNetworkSetting as Expected, NetworkError};
 /// ε of Lite-Mono's layer normalisations.
 pub const LAYER_NORM_EPSILON: f64 = 1e-6;
 
-/// Channels of the position's encoding for each axis.
+/// Channels of the positional encoding, for each axis.
 pub const POSITION_CHANNELS: usize = 32;
 
 /// Which of the published networks.
@@ -26,7 +26,7 @@ pub enum LiteMonoSize {
 }
 
 impl LiteMonoSize {
-    /// All of them.
+    /// All published networks.
     pub const ALL: [Self; 4] = [Self::Full, Self::Small, Self::Tiny, Self::EightM];
 }
 
@@ -79,7 +79,7 @@ impl LiteMonoConfig {
         }
     }
 
-    /// The same with the dilations published for 1024×320.
+    /// The published network for images of 1024×320, which differs in its dilations.
     #[must_use]
     pub fn for_large_images(mut self) -> Self {
         if self.widths == Self::new(LiteMonoSize::EightM).widths {
@@ -102,7 +102,7 @@ impl LiteMonoConfig {
     }
 
     /// # Errors
-    /// [`NetworkError::Config`] for widths, dilations or heads that mean no network.
+    /// [`NetworkError::Config`] for invalid widths, dilations or heads.
     pub fn validate(&self) -> Result<(), NetworkError> {
         if !(1..=64).contains(&self.heads) {
             return Err(NetworkError::config(

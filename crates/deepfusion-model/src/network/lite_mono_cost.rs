@@ -1,11 +1,11 @@
-//! What Lite-Mono's parts cost.
+//! The cost of Lite-Mono's parts.
 
 use super::cost::{ConvTail, ModuleCost};
 use super::{InputSize, LiteMonoConfig, POSITION_CHANNELS};
 
 impl LiteMonoConfig {
-    /// The network's parts in the order in which they run. Of the heads all three have parameters, and the finest alone
-    /// has multiply-adds: the others only train.
+    /// The network's parts in the order in which they run. All three heads count their parameters, but only the finest counts
+    /// multiply-adds: the others run in training only.
     pub(super) fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
         let pixels = |halvings: usize| (size.width >> halvings) * (size.height >> halvings);
         let mut costs = Vec::new();
@@ -17,7 +17,7 @@ impl LiteMonoConfig {
         costs.push(stem);
         let mut from = first + 3;
         for (stage, width) in self.widths.into_iter().enumerate() {
-            // The image as it was pooled for this stage.
+            // The image pooled for this stage.
             let mut small = ModuleCost::new(format!("lite_mono.encoder.pool.{stage}"));
             small.depthwise(3, 3, pixels(stage + 1), ConvTail::Fixed);
             costs.push(small);
@@ -50,7 +50,7 @@ impl LiteMonoConfig {
             cost.give(2 * POSITION_CHANNELS, area);
             cost.conv([2 * POSITION_CHANNELS, width], 1, area, ConvTail::Bias);
         }
-        // Normalisation and its factors, one temperature a head, the scales of attention.
+        // Normalisation and its factors, one temperature per head, the attention's scales.
         cost.give(width, area);
         cost.parameters += (3 * width + self.heads) as u64;
         cost.conv([width, 3 * width], 1, area, ConvTail::Bias);
@@ -63,7 +63,7 @@ impl LiteMonoConfig {
         cost
     }
 
-    /// Two 1×1 and the scale of what they give.
+    /// Two 1×1 convolutions and the scale of their output.
     fn bottleneck(&self, width: usize, area: usize, cost: &mut ModuleCost) {
         let inner = self.expansion * width;
         cost.conv([width, inner], 1, area, ConvTail::Bias);

@@ -1,4 +1,4 @@
-//! What the networks are built from: one config struct each, stored beside the weights.
+//! The networks' settings: one config struct each, stored beside the weights.
 
 mod attention;
 mod cost;

@@ -80,13 +80,13 @@ impl PoseNetConfig {
         Ok(())
     }
 
-    /// As [`Self::validate`], but without looking at `metres_per_unit`, which may still be measured.
+    /// Like [`Self::validate`], but without checking `metres_per_unit`, which may still have to be measured.
     ///
     /// # Errors
     /// [`NetworkError::Config`].
     pub fn validate_layers(&self) -> Result<(), NetworkError> {
         self.encoder.validate()?;
-        // What it sees is a pair, in training and in use.
+        // PoseNet always reads a pair of frames.
         if self.encoder.frames != 2 {
             return Err(NetworkError::config(
                 "pose_net.encoder.frames",

@@ -1,22 +1,22 @@
-//! The settings of R-MSFM (Zhou et al., ICCV 2021): the first half of a ResNet-18, and a disparity that one small network refines
-//! again and again, from the coarsest feature to the finest.
+//! The settings of R-MSFM (Zhou et al., ICCV 2021): the first half of a ResNet-18, and a small network that refines a disparity several
+//! times, from the coarsest feature to the finest.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ExpectedNetworkSetting as Expected, InputSize, NetworkError};
 
-/// Channels of what the features become before they refine the disparity, and of the gated unit's state.
+/// Channels of the features that refine the disparity, and of the recurrent unit's state.
 pub const R_MSFM_STATE: usize = 128;
 
-/// What a refinement of R-MSFM reads before it.
+/// What the state of R-MSFM is updated with before a refinement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RefinementInput {
-    /// The middle feature, `layer1`'s.
+    /// The middle feature, from `layer1`.
     Middle,
-    /// The finest, the stem's.
+    /// The finest feature, from the stem.
     Fine,
-    /// The state itself, by the second refinement of this level: 0 is the coarsest.
+    /// The state itself, before the second refinement at a level; 0 is the coarsest level.
     Again(usize),
 }
 
@@ -30,7 +30,7 @@ pub struct RMsfmConfig {
 
 impl RMsfmConfig {
     /// # Errors
-    /// [`NetworkError::Config`] for another number of refinements than the published ones.
+    /// [`NetworkError::Config`] for a number of refinements other than the published ones.
     pub fn validate(&self) -> Result<(), NetworkError> {
         if matches!(self.iterations, 3 | 6) {
             return Ok(());
@@ -42,14 +42,14 @@ impl RMsfmConfig {
         ))
     }
 
-    /// Whether each feature refines twice.
+    /// Whether each feature refines the disparity twice.
     #[must_use]
     pub fn twice(&self) -> bool {
         self.iterations == 6
     }
 
-    /// What is taken up into the state before refinement `index`, from 1 on: features from coarse to fine, each once or twice. The first
-    /// refinement has the coarsest feature as its state.
+    /// Input of the state's update before refinement `index`, counted from 1: features from coarse to fine, each once or twice. Refinement
+    /// 0 starts with the coarsest feature as its state.
     #[must_use]
     pub fn taken_up(&self, index: usize) -> RefinementInput {
         let times = if self.twice() { 2 } else { 1 };
@@ -60,7 +60,7 @@ impl RMsfmConfig {
         }
     }
 
-    /// Pixels of the refined disparity: an eighth of the image along each axis.
+    /// Number of pixels of the refined disparity, which has an eighth of the image's size along each axis.
     pub(super) fn pixels(size: InputSize) -> usize {
         (size.width >> 3) * (size.height >> 3)
     }

@@ -1,11 +1,11 @@
-//! What R-MSFM costs: [`super::ModuleCost`]s of its parts.
+//! The cost of R-MSFM: [`super::ModuleCost`]s of its parts.
 
 use super::cost::ConvTail;
 use super::{InputSize, ModuleCost, R_MSFM_STATE, RMsfmConfig, ResNetConfig};
 
 impl RMsfmConfig {
-    /// The network's parts in the order in which they first run. The refining network runs once an iteration, and has its parameters once; its
-    /// weights for the enlargement are only needed in the last.
+    /// The network's parts in the order in which they first run. The refining network runs once per iteration, but its parameters count
+    /// once. Its weights for the enlargement are needed in the last iteration only.
     pub(super) fn costs(&self, encoder: &ResNetConfig, size: InputSize) -> Vec<ModuleCost> {
         let mut costs = encoder.costs("r_msfm.encoder", size);
         costs.truncate(3);
@@ -54,12 +54,12 @@ impl RMsfmConfig {
 }
 
 impl ModuleCost {
-    /// A kernel of 1×3 or 3×1.
+    /// A 1×3 or 3×1 convolution.
     fn strip(&mut self, [from, to]: [usize; 2], pixels: usize) {
         self.products(3 * from * to, to, pixels, ConvTail::Bias);
     }
 
-    /// The same run several times.
+    /// The cost of a part that runs several times.
     fn repeated(&mut self, times: usize) {
         self.multiply_adds *= times as u64;
         self.values *= times as u64;

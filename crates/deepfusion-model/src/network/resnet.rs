@@ -23,7 +23,7 @@ pub enum ResNetDepth {
 }
 
 impl ResNetDepth {
-    /// All of them.
+    /// All published ResNets.
     pub const ALL: [Self; 4] = [
         Self::ResNet18,
         Self::ResNet34,
@@ -54,7 +54,7 @@ impl ResNetDepth {
     }
 }
 
-/// How images in [0, 1] are brought to what an encoder's first convolution expects.
+/// How images in [0, 1] are normalised for an encoder's first convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum InputNormalisation {
@@ -152,35 +152,35 @@ impl ResNetConfig {
         }
     }
 
-    /// The same on `frames` images stacked along the channels.
+    /// The same network on `frames` images stacked along the channels.
     #[must_use]
     pub fn with_frames(mut self, frames: usize) -> Self {
         self.frames = frames;
         self
     }
 
-    /// The same with another width.
+    /// The same network with another base width.
     #[must_use]
     pub fn with_base_width(mut self, base_width: usize) -> Self {
         self.base_width = base_width;
         self
     }
 
-    /// The same with another input normalisation.
+    /// The same network with another input normalisation.
     #[must_use]
     pub fn with_normalisation(mut self, normalisation: InputNormalisation) -> Self {
         self.normalisation = normalisation;
         self
     }
 
-    /// The same with another output stride.
+    /// The same network with another output stride.
     #[must_use]
     pub fn with_output_stride(mut self, output_stride: usize) -> Self {
         self.output_stride = output_stride;
         self
     }
 
-    /// Whether `layer4` dilates where the published network halves the image.
+    /// Whether `layer4` is dilated instead of halving the image.
     #[must_use]
     pub fn is_dilated(&self) -> bool {
         self.output_stride == 16
@@ -202,7 +202,7 @@ impl ResNetConfig {
     }
 
     /// # Errors
-    /// [`NetworkError::Config`] for a width or a number of frames that no network has.
+    /// [`NetworkError::Config`] for an invalid width, number of frames, output stride or dilation.
     pub fn validate(&self) -> Result<(), NetworkError> {
         if !(1..=1024).contains(&self.base_width) {
             return Err(NetworkError::config(

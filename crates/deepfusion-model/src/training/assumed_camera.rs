@@ -1,4 +1,4 @@
-//! The camera of recordings that do not say theirs.
+//! The camera assumed for recordings that do not state theirs.
 
 use deepfusion_geometry::{HFOV_DEG, Intrinsics};
 use schemars::JsonSchema;
@@ -21,7 +21,7 @@ pub struct AssumedCamera {
     pub learning_rate: f64,
 }
 
-/// The narrowest and the widest view that is learned, along the longer side: no lens without a calibration sees more or less.
+/// The narrowest and the widest field of view that is learned, along the longer side: no lens without a calibration is narrower or wider.
 const LEARNED_HFOV_DEG: [f64; 2] = [10.0, 160.0];
 
 impl Default for AssumedCamera {
@@ -36,7 +36,7 @@ impl Default for AssumedCamera {
 }
 
 impl AssumedCamera {
-    /// As wide as a camera that was learned, and held.
+    /// The fixed assumed camera that is as wide as a learned one.
     #[must_use]
     pub fn held(k: &Intrinsics) -> Self {
         let half = f64::from(k.width.max(k.height)) / 2.0 / k.fx;
@@ -48,7 +48,7 @@ impl AssumedCamera {
         }
     }
 
-    /// The camera, of images of some size: only its view along the longer side is meant.
+    /// The camera for images of the given size; only its field of view along the longer side is used.
     #[must_use]
     pub fn intrinsics(&self) -> Intrinsics {
         let square = Intrinsics::from_hfov(self.hfov_deg, (1024, 768));
@@ -58,7 +58,7 @@ impl AssumedCamera {
         }
     }
 
-    /// How many times its focal length the shortest and the longest that is learned are: views of 10 and 160 degrees.
+    /// Limits of a learned focal length, as multiples of the assumed one: fields of view of 10 and 160 degrees.
     #[must_use]
     pub fn ratios(&self) -> (f64, f64) {
         let half = |degrees: f64| (degrees / 2.0).to_radians().tan();
@@ -67,7 +67,7 @@ impl AssumedCamera {
     }
 
     /// # Errors
-    /// [`Error::Config`] naming the first value that means nothing.
+    /// [`Error::Config`] naming the first invalid value.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let fail = |field, expected: ExpectedSetting, found: f64| {
             Err(Error::config(field, expected, found.to_string()))
@@ -93,25 +93,25 @@ impl AssumedCamera {
     }
 }
 
-/// The focal length that a run learned, of the camera that it assumed.
+/// The focal length that a run learned for its assumed camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LearnedCamera {
     /// fx and fy in pixels of the run's images.
     pub focal_px: [f64; 2],
-    /// One standard deviation of each, in pixels: how far parts of the drives disagree, and how far the loss is off its minimum. Absent
-    /// where the drives do not determine the focal length.
+    /// One standard deviation of each, in pixels: how far parts of the drives disagree, and how far the loss is from its minimum. Absent if
+    /// the drives do not determine the focal length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_px: Option<[f64; 2]>,
-    /// After this step.
+    /// The step after which it had this value.
     pub step: usize,
 }
 
-/// A standard deviation, as a share of the focal length, above which a learned camera is not to be relied on.
+/// Relative standard deviation of the focal length above which a learned camera is not reliable.
 const MOST_SIGMA_SHARE: f64 = 0.1;
 
 impl LearnedCamera {
-    /// Whether the drives determined the focal length, to 10 %.
+    /// Whether the drives determined the focal length to within 10 %.
     #[must_use]
     pub fn is_reliable(&self) -> bool {
         let sure = |(sigma, focal): (&f64, &f64)| *sigma <= MOST_SIGMA_SHARE * focal;
@@ -121,8 +121,8 @@ impl LearnedCamera {
 }
 
 impl TrainConfig {
-    /// The camera that a run has learned of images of a size, by f/f₀ of a checkpoint ([`crate::Checkpoint::focal_ratio`]). `None` of a
-    /// run that learns none.
+    /// The camera that a run has learned, for images of the given size, from a checkpoint's f/f₀ ([`crate::Checkpoint::focal_ratio`]).
+    /// `None` if the run learns none.
     #[must_use]
     pub fn camera_learned(&self, ratio: f64, size: (u32, u32)) -> Option<Intrinsics> {
         let assumed = self.learned_camera()?.intrinsics().centred_at(size);
@@ -133,7 +133,7 @@ impl TrainConfig {
         })
     }
 
-    /// The assumed camera of a run that learns it.
+    /// The assumed camera, if the run learns it.
     #[must_use]
     pub fn learned_camera(&self) -> Option<&AssumedCamera> {
         self.assumed_camera.as_ref().filter(|camera| camera.learn)

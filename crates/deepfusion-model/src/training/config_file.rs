@@ -1,4 +1,4 @@
-//! Configurations as people write them: a whole file, some keys over a preset, or one key on the command line.
+//! Configurations written by people: a whole file, some keys over a preset, or one key on the command line.
 
 use crate::{Compute, Error, ExpectedSetting, Preset, SettingProblem, TrainConfig, TrainFindings};
 use std::path::Path;
@@ -6,17 +6,17 @@ use toml::{Table, Value};
 
 use super::setting_key;
 
-/// What stands for "without a value" in [`TrainConfig::set`].
+/// The word that removes an optional value in [`TrainConfig::set`].
 const NONE: &str = "none";
 
 impl TrainConfig {
-    /// Reads a TOML file that names every key, or a `preset` and the keys in which it differs from that. Tables are
-    /// taken together key by key, lists are replaced whole.
+    /// Reads a TOML file that names every key, or a `preset` and the keys that differ from it. Tables are merged key by key, lists are
+    /// replaced whole.
     ///
-    /// A whole file stands for itself: what it leaves out is left out, whatever its preset has.
+    /// A file that names every key ignores its preset: optional keys that it leaves out are absent.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::ConfigFile`] naming the line or the key, or what [`Self::validate`] says.
+    /// [`Error::Io`], [`Error::ConfigFile`] naming the line or the key, and those of [`Self::validate`].
     pub fn read_over_preset(path: &Path, compute: Compute) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let wrong = |e: toml::de::Error| Error::ConfigFile {
@@ -43,12 +43,12 @@ impl TrainConfig {
         Ok(config)
     }
 
-    /// Sets one key, as `loss.smoothness=0.01` says it: dots between tables, a TOML value or a bare word, and `none` to take
-    /// an optional one away. Elements of lists have their place, counted from 0, in brackets: `data.sets[0].learn=depth`; how many there are
-    /// changes only where a list is set as a whole. What comes out is not validated.
+    /// Sets one key, as in `loss.smoothness=0.01`: dots between tables, then a TOML value or a bare word; `none` removes an optional value.
+    /// An element of a list is named by its index in brackets, counted from 0: `data.sets[0].learn=depth`. The number of elements changes
+    /// only if the list is set as a whole. The result is not validated.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have; [`Error::PresetAsKey`].
+    /// [`Error::Setting`] for a key that does not exist or a value that it cannot have; [`Error::PresetAsKey`].
     pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
         let wrong = |reason| Error::Setting {
             assignment: assignment.to_owned(),
@@ -59,7 +59,7 @@ impl TrainConfig {
         };
         let (key, value) = (key.trim(), value.trim());
         if key == "preset" {
-            // Its name alone would change, and none of its settings.
+            // Only its name would change, none of its settings.
             return Err(Error::PresetAsKey {
                 assignment: assignment.to_owned(),
             });
@@ -73,7 +73,7 @@ impl TrainConfig {
     }
 }
 
-/// A TOML value, or the text itself where it is none: `light` needs no quotes.
+/// Parses a TOML value, or takes the text itself: `light` needs no quotes.
 fn parsed(text: &str) -> Value {
     let read: Result<Table, _> = toml::from_str(&format!("value = {text}"));
     let value = read.ok().and_then(|mut table| table.remove("value"));
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!(config, expected);
     }
 
-    /// The paper's preset has a context encoding; a whole file without it means a network without it.
+    /// The paper's preset has a context encoding; a whole file that leaves it out configures a network without it.
     #[test]
     fn a_whole_file_stands_for_itself() {
         let mut config = Preset::Paper.config();
@@ -172,7 +172,7 @@ mod tests {
         ] {
             assert_eq!(said(assignment), expected);
         }
-        // The key is right, and the value is not.
+        // The key exists, but the value is invalid.
         assert!(!said("batch=many").contains("there is no key"));
     }
 
@@ -217,7 +217,7 @@ mod tests {
             ("batch=many", "many"),
             ("batch=none", "batch"),
             ("batsch=none", "batsch"),
-            ("batch.size=3", "no table"),
+            ("batch.size=3", "not a table"),
         ] {
             let error = config.set(assignment).unwrap_err();
             assert!(matches!(error, Error::Setting { .. }));
@@ -228,11 +228,11 @@ mod tests {
         let of_lists = [
             ("augmentation.sizes[0].width=64", "0 elements"),
             ("frames[2]=1", "2 elements"),
-            ("frames[0]=none", "an element of a list"),
-            ("size[0]=64", "no list"),
+            ("frames[0]=none", "one element of a list"),
+            ("size[0]=64", "not a list"),
             ("frames.first=1", "such as frames[0]"),
             ("frames[*]=1", "number in brackets"),
-            ("data.sets.learn=depth", "a list without elements"),
+            ("data.sets.learn=depth", "an empty list"),
             ("frames[0]=far", "far"),
         ];
         for (assignment, reason) in of_lists {
@@ -242,7 +242,7 @@ mod tests {
         let error = config.set("preset=tiny").unwrap_err();
         assert!(matches!(error, Error::PresetAsKey { .. }), "{error}");
         assert!(error.to_string().contains("preset=tiny"), "{error}");
-        assert_eq!(config, expected, "what failed changed nothing");
+        assert_eq!(config, expected, "failed assignments change nothing");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What every key of a configuration means, as its field's own comment says it.
+//! All keys of a configuration, with their meaning from the comments of the struct fields.
 
 use crate::{Error, TrainConfig};
 use serde_json::Value;
@@ -8,15 +8,15 @@ use std::fmt::Write;
 /// A key of a configuration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigKey {
-    /// With dots between tables: `loss.depth.weight`. `data.sets[].name` is a key of each of a list of tables.
+    /// Path with dots between tables: `loss.depth.weight`. `data.sets[].name` is a key of each table in a list.
     pub key: String,
-    /// The field's comment, on one line.
+    /// The field's comment on one line.
     pub meaning: String,
-    /// The words that it may be, and what each means; empty where it is something else.
+    /// The words it accepts, and the meaning of each; empty if its value is not a word.
     pub words: Vec<(String, String)>,
-    /// What it is if it is no word: a number, a string, …
+    /// Its type if it is not one of these words: a number, a string, …
     pub kind: &'static str,
-    /// What it is where a file leaves it out, as TOML; `None` where it has to be there, or is then absent.
+    /// Its value in TOML if a file leaves it out; `None` if it is required, or absent when left out.
     pub default: Option<String>,
 }
 
@@ -30,13 +30,13 @@ pub fn config_keys() -> Vec<ConfigKey> {
 }
 
 impl ConfigKey {
-    /// The table that it stands in: `loss.depth`.
+    /// The table it belongs to: `loss.depth`.
     #[must_use]
     pub fn table(&self) -> &str {
         self.key.rsplit_once('.').map_or("", |(table, _)| table)
     }
 
-    /// Its own name: `weight`.
+    /// Its name within the table: `weight`.
     #[must_use]
     pub fn name(&self) -> &str {
         self.key
@@ -44,7 +44,7 @@ impl ConfigKey {
             .map_or(&*self.key, |(_, name)| name)
     }
 
-    /// The first sentence of its meaning, and the words that it may be.
+    /// The first sentence of its meaning, and the words it accepts.
     fn line(&self) -> String {
         let end = self.meaning.find(". ").unwrap_or(self.meaning.len());
         let sentence = self.meaning[..end].trim_end_matches('.');
@@ -57,7 +57,7 @@ impl ConfigKey {
     }
 }
 
-/// The schema that a reference stands for; of an optional one that of its value.
+/// The schema behind a reference; for an optional value, the schema of the value.
 fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
     if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
         let found = root.pointer(reference.trim_start_matches('#'));
@@ -131,14 +131,14 @@ fn kind(schema: &Value, items: Option<&Value>) -> &'static str {
     }
 }
 
-/// What a key that is left out is. A switch that the files of old runs lack is off.
+/// The value of a key that is left out. A switch that older runs' files lack is off.
 fn default(own: &Value, property: &Value) -> Option<String> {
     let off = || (kind(own, None) == "true or false").then(|| "false".to_owned());
     let own = property.get("default").and_then(as_toml);
     own.or_else(off)
 }
 
-/// A value of the schema as a configuration file has it.
+/// A value of the schema in TOML.
 fn as_toml(value: &Value) -> Option<String> {
     match value {
         Value::Null => None,
@@ -147,7 +147,7 @@ fn as_toml(value: &Value) -> Option<String> {
     }
 }
 
-/// The shortest decimal of a number that may have come from 32 bits.
+/// The shortest decimal form of a number that may have been an f32.
 fn shortest(number: f64) -> String {
     let single = number as f32;
     if f64::from(single) == number {
@@ -163,11 +163,10 @@ fn one_line(description: Option<&Value>) -> String {
 }
 
 impl TrainConfig {
-    /// The configuration as TOML with a line above each key that says what it means; keys that it does not set are there as
-    /// comments.
+    /// The configuration as TOML, with a comment above each key that explains it. Keys that are not set appear as comments.
     ///
     /// # Errors
-    /// As [`TrainConfig::to_toml`].
+    /// As for [`TrainConfig::to_toml`].
     pub fn to_commented_toml(&self) -> Result<String, Error> {
         let all = config_keys();
         let mut written = BTreeSet::new();
@@ -189,7 +188,7 @@ impl TrainConfig {
             text.push('\n');
         }
         unset(&mut text, &all, &mut written, &table);
-        // Tables that are not there at all.
+        // Tables that are missing altogether.
         let mut left: Vec<&str> = Vec::new();
         for key in all.iter().filter(|k| !written.contains(&k.key)) {
             if !left.contains(&key.table()) {
@@ -207,7 +206,7 @@ impl TrainConfig {
     }
 }
 
-/// The keys of a table that are not written yet, as comments, before the empty line that ends it.
+/// Inserts the unset keys of a table as comments before its final empty line.
 fn unset(text: &mut String, all: &[ConfigKey], written: &mut BTreeSet<String>, table: &str) {
     let ends_empty = text.ends_with("\n\n");
     if ends_empty {
@@ -228,7 +227,7 @@ mod tests {
     use super::*;
     use crate::Preset;
 
-    /// Every key that any preset writes is known, and nothing is without a meaning.
+    /// Every key that any preset writes is listed and has a meaning.
     #[test]
     fn every_key_has_a_meaning() {
         let keys = config_keys();
@@ -256,7 +255,7 @@ mod tests {
         assert_eq!(weight.unwrap().kind, "number");
     }
 
-    /// What is shown is a file that can be trained with, and says all that there is.
+    /// The output is a valid configuration and lists all keys.
     #[test]
     fn a_commented_file_is_the_configuration() {
         for preset in Preset::ALL {

@@ -1,4 +1,4 @@
-//! Several data sets in one run, each with its own cameras, range of depths and unit of displacement.
+//! Several data sets in one run, each with its own cameras, depth range and unit of translation.
 
 use crate::{AskedBy, Error, ExpectedDataSet, ExpectedSetting, FoundSetting, TrainConfig};
 use deepfusion_geometry::{DepthRange, Intrinsics};
@@ -31,13 +31,13 @@ impl Learn {
         }
     }
 
-    /// Whether pairs of frames are learned from.
+    /// Whether to learn from pairs of frames.
     #[must_use]
     pub fn from_motion(self) -> bool {
         self != Self::Depth
     }
 
-    /// Whether known depth is learned from.
+    /// Whether to learn from known depth.
     #[must_use]
     pub fn from_depth(self) -> bool {
         self != Self::OwnMotion
@@ -178,13 +178,13 @@ pub struct DataSetConfig {
 }
 
 impl DataSetConfig {
-    /// Whether it has frames of its own to validate on.
+    /// Whether it has separate frames for validation.
     #[must_use]
     pub fn validates(&self) -> bool {
         !self.validation.is_empty() || self.validation_split.is_some()
     }
 
-    /// What simulated views can be, and be beside.
+    /// Checks the settings of simulated views, and that no conflicting settings are given.
     fn validate_simulated(&self, simulated: &SimulatedConfig) -> Result<(), Error> {
         let set = || self.name.clone();
         if self.learn != Learn::Depth {
@@ -230,8 +230,8 @@ impl DataSetConfig {
 }
 
 impl TrainConfig {
-    /// The range of depths and the metres per unit of PoseNet's translation of a data set, by its place in
-    /// `data.sets`; those of the networks where the run has no sets.
+    /// The depth range, and the metres per unit of PoseNet's translation, of the data set at an index of `data.sets`; the networks' own if
+    /// the run has no sets.
     #[must_use]
     pub fn factors(&self, set: usize) -> (DepthRange, f64) {
         let own = (self.depth_net.range, self.pose_net.metres_per_unit);
@@ -241,8 +241,8 @@ impl TrainConfig {
             .map_or(own, |set| (set.range.unwrap_or(own.0), set.metres_per_unit))
     }
 
-    /// The data set that is meant by a name, or without one: the only set; or, where all sets share one range of depths, the only
-    /// one whose motion is learned, since a depth means the same metres in all of them.
+    /// The data set of the given name. Without a name: the only set; or, if all sets share one depth range, the only set whose motion is
+    /// learned, since a depth means the same metres in all of them.
     pub(crate) fn set_meant(&self, name: Option<&str>) -> Option<&DataSetConfig> {
         let sets = self.data.sets.as_slice();
         if let Some(name) = name {
@@ -260,12 +260,12 @@ impl TrainConfig {
         }
     }
 
-    /// The configuration of a run as one of its data sets sees it: depths and displacements mean metres of that set. A run
-    /// without sets is its own; without a name, the only set is meant, or the only one whose motion is learned where all share one
-    /// range of depths. The set's camera is [`crate::TrainFindings::camera_of`].
+    /// The configuration of a run as one of its data sets sees it, in which depths and translations mean metres of that set. A run without
+    /// sets is unchanged. Without a name, the set is the only one; or, if all share one depth range, the only one whose motion is learned.
+    /// The set's camera is [`crate::TrainFindings::camera_of`].
     ///
     /// # Errors
-    /// [`Error::DataSet`] where the run has several sets and none is named, or none of that name.
+    /// [`Error::DataSet`] if the run has several sets and none of this name, or no name is given.
     pub fn for_set(mut self, name: Option<&str>) -> Result<Self, Error> {
         if self.data.sets.is_empty() && name.is_none() {
             return Ok(self);
@@ -288,7 +288,7 @@ impl TrainConfig {
     }
 
     /// # Errors
-    /// [`Error::Config`] naming the first set that means nothing.
+    /// [`Error::Config`] naming the first invalid setting of a set.
     pub(crate) fn validate_sets(&self) -> Result<(), Error> {
         let sets = &self.data.sets;
         let fail = |field, expected: ExpectedSetting, found: FoundSetting| {
@@ -392,17 +392,17 @@ mod tests {
             let error = config.clone().for_set(name).unwrap_err().to_string();
             assert!(error.contains("road, garage"), "{error}");
         }
-        // It survives the run's folder.
+        // The sets survive writing and reading the run's folder.
         let text = config.to_toml().unwrap();
         assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
     }
 
-    /// Recorded drives beside simulated depth of the same range: nobody has to say which metres are meant.
+    /// Recorded drives beside simulated depth of the same range: no name is needed to decide which metres are meant.
     #[test]
     fn of_sets_with_one_range_the_one_that_moves_is_meant() {
         let mut config = config();
         config.data.sets[1].range = None;
-        assert!(config.clone().for_set(None).is_err(), "both move");
+        assert!(config.clone().for_set(None).is_err(), "both learn motion");
         config.data.sets[0].learn = Learn::Depth;
         let meant = config.clone().for_set(None).unwrap();
         assert_eq!(meant.pose_net.metres_per_unit, 0.1);
@@ -410,7 +410,7 @@ mod tests {
             min_m: 1.0,
             max_m: 50.0,
         });
-        assert!(config.for_set(None).is_err(), "other depths");
+        assert!(config.for_set(None).is_err(), "other depth range");
     }
 
     #[test]

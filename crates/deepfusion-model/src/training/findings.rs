@@ -1,4 +1,4 @@
-//! What a run found out from its data, apart from what its configuration says.
+//! What a run measured in its data, separate from its configuration.
 
 use std::path::{Path, PathBuf};
 
@@ -9,58 +9,56 @@ use toml::{Table, Value};
 use super::{LearnedCamera, TrainConfig};
 use crate::Error;
 
-/// The table of a run's `config.toml` that holds it.
+/// Name of the table in a run's `config.toml`.
 const TABLE: &str = "findings";
 
-/// What a run found out from its data when it began. Nobody sets it, and without it the networks' outputs mean no metres.
+/// What a run measured in its data when it began. Users do not set it, and without it the networks' outputs do not mean metres.
 ///
-/// It is the table `[findings]` of the run's `config.toml`; as a configuration for another run that file means its
-/// settings alone.
+/// It is the table `[findings]` of the run's `config.toml`. If that file serves as the configuration of another run, the table is ignored.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainFindings {
-    /// Metres of translation per unit of PoseNet's output, where `pose_net.metres_per_unit` is 0: the mean displacement of a
-    /// pair.
+    /// Metres of translation per unit of PoseNet's output, if `pose_net.metres_per_unit` is 0: the mean displacement of a pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metres_per_unit: Option<f64>,
-    /// The camera trained with, at the size of its images; `None` for imported weights. Several cameras: the first.
+    /// The training camera, at the size of its images; `None` for imported weights. If there were several cameras: the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
-    /// f_c of training, as `canonical_focal_px`, where that is absent and the training data has several focal lengths: the first camera's, as the
-    /// network sees it.
+    /// f_c of the training, like `canonical_focal_px`, if that is absent and the training data has several focal lengths: the first
+    /// camera's, in pixels of the network's input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_px: Option<f64>,
-    /// How well that camera is known, where the run learned it; written when it ends.
+    /// How precisely that camera is known, if the run learned it; written when the run ends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned_camera: Option<LearnedCamera>,
-    /// The same for each of `data.sets`.
+    /// The findings for each of `data.sets`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<SetFindings>,
-    /// The networks that its weights are the mean of; none where it was trained.
+    /// The networks of which its weights are the mean; empty if it was trained.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub averaged: Vec<AveragedNetwork>,
 }
 
-/// One of the networks that a run's weights are the mean of.
+/// One of the networks of which a run's weights are the mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AveragedNetwork {
-    /// A checkpoint or a packed file; or with `sha256` the name of a network that the program carries.
+    /// Path of a checkpoint or a packed file; with `sha256`, the name of an embedded network.
     pub path: PathBuf,
     /// SHA-256 of the embedded network's weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// Its part of the mean; all parts together are 1.
+    /// Its share of the mean; all shares sum to 1.
     pub share: f64,
 }
 
-/// What a run found out from one of its data sets.
+/// What a run measured in one of its data sets.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SetFindings {
     /// The set's name in `data.sets`.
     pub name: String,
-    /// Metres of translation per unit of PoseNet's output, where the set's own `metres_per_unit` is 0.
+    /// Metres of translation per unit of PoseNet's output, if the set's own `metres_per_unit` is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metres_per_unit: Option<f64>,
     /// The camera of its first sample, at the size of its images.
@@ -69,7 +67,7 @@ pub struct SetFindings {
 }
 
 impl TrainFindings {
-    /// What a configuration's file holds of them, whether or not it names every key; nothing where it is no run's.
+    /// The findings in a configuration file, whether or not it names every key; empty if the file is not a run's.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::ConfigFile`].
@@ -84,7 +82,7 @@ impl TrainFindings {
         Ok(found.unwrap_or_default())
     }
 
-    /// The configuration with the metres per unit that it leaves open.
+    /// The configuration, with the metres per unit filled in if it leaves them open.
     #[must_use]
     pub fn complete(&self, mut config: TrainConfig) -> TrainConfig {
         let fill = |open: &mut f64, found: Option<f64>| {
@@ -102,7 +100,8 @@ impl TrainFindings {
         config
     }
 
-    /// The same for who learns on: with the focal length to which its samples are brought. Predictions go by the first camera, whose it is, and need none.
+    /// Like [`Self::complete`], and also with the focal length to which samples are brought. For further training only: predictions use the
+    /// first camera, which has this focal length.
     #[must_use]
     pub fn complete_for_training(&self, config: TrainConfig) -> TrainConfig {
         let mut config = self.complete(config);
@@ -110,7 +109,7 @@ impl TrainFindings {
         config
     }
 
-    /// The camera that a data set was learned with; `set` as for [`TrainConfig::for_set`].
+    /// The camera that a data set was trained with; `set` as for [`TrainConfig::for_set`].
     #[must_use]
     pub fn camera_of(&self, config: &TrainConfig, set: Option<&str>) -> Option<Intrinsics> {
         let meant = config.set_meant(set);
@@ -118,7 +117,7 @@ impl TrainFindings {
         own.and_then(|own| own.camera).or(self.camera)
     }
 
-    /// Takes in a camera that was learned: that of every data set whose motion is learned from.
+    /// Stores a learned camera, also for every data set whose motion is learned.
     pub fn learn_camera(&mut self, config: &TrainConfig, camera: Intrinsics) {
         self.camera = Some(camera);
         for set in config
@@ -138,7 +137,7 @@ impl TrainFindings {
         self.sets.iter().find(|set| set.name == name)
     }
 
-    /// Its lines at the end of a configuration's; none where nothing was found.
+    /// The findings as lines to append to a configuration; empty if there are none.
     pub(crate) fn to_toml(&self) -> Result<String, toml::ser::Error> {
         let mut table = Table::new();
         self.put_into(&mut table)?;
@@ -156,8 +155,8 @@ impl TrainFindings {
         Ok(())
     }
 
-    /// Takes them out of a configuration's table: `[findings]`, or the keys that runs had before there was that table
-    /// (`camera`, and `trained_with` of each set). `None` where there are neither.
+    /// Takes the findings out of a configuration's table: `[findings]`, or the keys that older runs have instead (`camera`, and
+    /// `trained_with` of each set). `None` if there are neither.
     pub(super) fn take_from(config: &mut Table) -> Result<Option<Self>, toml::de::Error> {
         if let Some(findings) = config.remove(TABLE) {
             return findings.try_into().map(Some);
@@ -188,28 +187,28 @@ impl TrainFindings {
 }
 
 impl TrainConfig {
-    /// A configuration and what its run found out, of a table as a run's `config.toml` or an embedded network's card holds it.
+    /// A run's configuration and findings, from the table of its `config.toml` or of an embedded network's card.
     ///
     /// # Errors
-    /// The first key that is unknown, missing, or of another type.
+    /// An error about the first key that is unknown, missing, or of another type.
     pub fn from_run_table(mut table: Table) -> Result<(Self, TrainFindings), toml::de::Error> {
         let findings = TrainFindings::take_from(&mut table)?;
         Ok((table.try_into()?, findings.unwrap_or_default()))
     }
 
-    /// That table: [`Self::from_run_table`] reads it.
+    /// The table of a run's configuration and findings; [`Self::from_run_table`] reads it.
     ///
     /// # Errors
-    /// Values that TOML cannot hold.
+    /// An error about values that have no TOML form.
     pub fn to_run_table(&self, findings: &TrainFindings) -> Result<Table, toml::ser::Error> {
         let mut table = Table::try_from(self)?;
         findings.put_into(&mut table)?;
         Ok(table)
     }
 
-    /// What [`Self::from_run_table`] reads, of a file's text.
+    /// Like [`Self::from_run_table`], from the text of a file.
     pub(crate) fn from_run_text(text: &str) -> Result<(Self, TrainFindings), toml::de::Error> {
-        // Of a configuration alone, the error names the line.
+        // For a configuration alone, this error names the line.
         toml::from_str(text).map_or_else(
             |error| {
                 let mut table: Table = toml::from_str(text)?;
@@ -239,7 +238,7 @@ mod tests {
         }
     }
 
-    /// A run with two data sets, of which one has its unit set.
+    /// A run with two data sets; one of them sets its metres per unit.
     fn config() -> TrainConfig {
         let mut config = Preset::Tiny.config();
         config.data = toml::from_str(
@@ -281,7 +280,7 @@ mod tests {
         let read = TrainConfig::from_run_text(&text).unwrap();
         assert_eq!(read, (config.clone(), findings));
         assert_eq!(read.0.pose_net.metres_per_unit, 0.0, "what was set stays");
-        // Nothing found leaves no trace.
+        // Empty findings write nothing.
         let text = config.to_toml().unwrap() + &TrainFindings::default().to_toml().unwrap();
         assert!(!text.contains(TABLE));
         let wrong = text.replace("batch = 4", "batsch = 4");
@@ -326,7 +325,7 @@ mod tests {
         assert_eq!(TrainFindings::default().complete(config()), config());
     }
 
-    /// Runs, and the cards of embedded networks, from before there was the table.
+    /// Older runs, and cards of embedded networks, without the table.
     #[test]
     fn older_runs_are_read() {
         let mut expected = config();

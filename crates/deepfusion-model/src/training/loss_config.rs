@@ -88,7 +88,7 @@ pub struct FlowLossConfig {
 }
 
 impl Default for FlowLossConfig {
-    /// Off, with the other weights as [`LossConfig::with`] switches them on.
+    /// Off; the other weights are those that [`LossConfig::with`] sets.
     fn default() -> Self {
         Self {
             weight: 0.0,
@@ -150,13 +150,13 @@ impl LossConfig {
         "moving",
     ];
 
-    /// λ of the terms as [`Self::with`] switches them on: the paper's.
+    /// Weights λ that [`Self::with`] sets: the paper's.
     const SMOOTHNESS: f64 = 1e-3;
     const SPEED: f64 = 0.2;
     const AFFINE: f64 = 0.01;
     const FLOW: f64 = 0.1;
 
-    /// The same with every term on.
+    /// All terms switched on.
     #[must_use]
     #[expect(clippy::expect_used, reason = "a list of its own names")]
     pub fn with_every_term(mut self) -> Self {
@@ -166,11 +166,10 @@ impl LossConfig {
         self
     }
 
-    /// Switches a term on by its name, at the paper's weight unless it has one already. Moving pixels bring
-    /// the flow with them.
+    /// Switches a term on by its name, at the paper's weight unless it already has one. `moving` also switches the flow on.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    /// [`Error::Config`] for a name that is not in [`Self::TERMS`].
     pub fn with(&mut self, term: &str) -> Result<(), Error> {
         let switch_on = |weight: &mut f64, value: f64| {
             if *weight == 0.0 {
@@ -192,10 +191,10 @@ impl LossConfig {
         Ok(())
     }
 
-    /// Switches a term off by its name. Without the flow no pixel is known to move.
+    /// Switches a term off by its name. Without the flow, dynamic pixels cannot be found, so `moving` is switched off too.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    /// [`Error::Config`] for a name that is not in [`Self::TERMS`].
     pub fn without(&mut self, term: &str) -> Result<(), Error> {
         match term {
             "smoothness" => self.smoothness = 0.0,
@@ -213,7 +212,7 @@ impl LossConfig {
     }
 
     /// # Errors
-    /// [`Error::Config`] naming the first weight that means nothing.
+    /// [`Error::Config`] naming the first invalid weight.
     pub fn validate(&self) -> Result<(), Error> {
         let weights = [
             ("loss.smoothness", self.smoothness),
@@ -293,7 +292,7 @@ mod tests {
             loss.without(term).unwrap();
         }
         assert_eq!((loss.speed, loss.smoothness, loss.affine), (0.0, 0.0, 0.0));
-        // A weight that is there stays.
+        // A weight that is already set stays.
         let mut own = start;
         own.speed = 0.7;
         own.with("speed").unwrap();

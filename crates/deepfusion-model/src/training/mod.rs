@@ -1,5 +1,5 @@
-//! Everything that decides a training run, as one struct: the command line, a configuration file and a run's `config.toml` say the same.
-//! What a run finds out from its data is another: [`TrainFindings`].
+//! Everything that decides a training run, as one struct that the command line, a configuration file and a run's `config.toml` share. What
+//! a run measures in its data is a separate struct: [`TrainFindings`].
 
 mod assumed_camera;
 mod config_file;

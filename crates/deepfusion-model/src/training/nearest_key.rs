@@ -1,12 +1,13 @@
-//! Which keys may have been meant by one that no configuration has.
+//! Suggests existing keys for one that does not exist.
 
 use super::ConfigKey;
 use strsim::osa_distance;
 
-/// Most keys that are named.
+/// Maximum number of suggested keys.
 const MOST: usize = 3;
 
-/// Those with the fewest letters to change, in their order; none where that is more than a third of them. A name alone may be meant in any table.
+/// The keys with the fewest letters to change, in their order; none if that is more than a third of the letters. A key without a table is
+/// compared with the names in every table.
 pub(super) fn nearest_keys(key: &str, known: &[ConfigKey]) -> Vec<String> {
     let changes = |known: &ConfigKey| {
         let of_all = osa_distance(key, &known.key);

@@ -50,7 +50,7 @@ pub enum Preset {
     Sfmlearner,
 }
 
-/// What a run computes on, as far as a preset's sizes follow it.
+/// The device class that a preset's sizes depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Compute {
     /// A few cores.
@@ -60,9 +60,8 @@ pub enum Compute {
     Gpu,
 }
 
-/// Fewer steps than this teach a network from scratch hardly anything, however short the drive: on 154 frames, 1,200
-/// steps of `light` came to an abs_rel of 0.24 to 0.26 on another street, where 20 epochs would be 240 steps of twelve
-/// (docs/benchmarks/kitti.md).
+/// A network trained from scratch learns hardly anything in fewer steps, however short the drive. On 154 frames, 1,200 steps of `light`
+/// reached an abs_rel of 0.24 to 0.26 on another street; 20 epochs would be 240 steps of twelve images (docs/benchmarks/kitti.md).
 const MIN_STEPS: usize = 1200;
 
 impl Preset {
@@ -103,8 +102,8 @@ impl Preset {
         }
     }
 
-    /// The configuration to train with on such a device. On a processor every preset takes images of 320×96, four a step,
-    /// which it learns from in minutes: twelve of 640×192 are twelve times as many pixels.
+    /// The configuration for training on such a device. On a processor, every preset uses images of 320×96 and a batch of 4, which learn in
+    /// minutes: twelve of 640×192 are twelve times as many pixels.
     #[must_use]
     pub fn config_on(self, compute: Compute) -> TrainConfig {
         let mut config = self.config();
@@ -199,7 +198,7 @@ impl Preset {
             depth_net: DepthNetConfig::lite_mono(size),
             ..Self::Monodepth2.config()
         };
-        // Their trainer's AdamW and clipping; its one-cycle schedule is nearest to a cosine with warm-up.
+        // Lite-Mono's AdamW and gradient clipping. Its one-cycle schedule is closest to a cosine with warm-up.
         let r_msfm = |iterations: usize| TrainConfig {
             preset: self,
             epochs: 40,
@@ -214,7 +213,7 @@ impl Preset {
             config.frames = vec![-1, 1];
             config.reprojection = Reprojection::Minimum;
             config.depth_net = DepthNetConfig {
-                // A metric pose needs a first depth that keeps pixels in view.
+                // A metric pose needs an initial depth that keeps pixels in view.
                 initial_depth_m: Some(10.0),
                 ..DepthNetConfig::monodepth2(depth)
             };
@@ -234,10 +233,10 @@ impl Preset {
                     height: 128,
                 };
                 config.batch = 4;
-                // Theirs does not fall.
+                // SfMLearner's learning rate does not fall.
                 (config.learning_rate, config.learning_rate_drop) = (2e-4, 1.0);
                 config.depth_net = DepthNetConfig::disp_net();
-                // Every source counts, as far as its mask says.
+                // Every source counts, weighted by its mask.
                 config.reprojection = Reprojection::Mean;
                 config.pose_net.explainability = true;
                 config.loss.explainability = 0.2;
@@ -298,7 +297,7 @@ impl std::fmt::Display for Preset {
 mod tests {
     use super::*;
 
-    /// A processor's images are small; on a graphics card, and where nothing is trained, the sizes are the published ones.
+    /// A processor trains on small images. On a GPU, or without training, the sizes are the published ones.
     #[test]
     fn sizes_follow_the_device() {
         for preset in Preset::ALL {

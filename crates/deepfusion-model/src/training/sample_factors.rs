@@ -2,26 +2,26 @@ use deepfusion_geometry::{DepthRange, Intrinsics};
 
 use crate::{InputSize, TrainConfig};
 
-/// What the networks' raw outputs mean of one sample.
+/// How the networks' raw outputs for one sample become metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleFactors {
-    /// The depths that the sigmoid spans, before `focal`.
+    /// The depths that the sigmoid spans, before `focal` is applied.
     pub range: DepthRange,
     /// Metres of translation per unit of the pose network's output.
     pub metres_per_unit: f64,
-    /// What depth is multiplied by for the sample's camera, f_y/f_c; 1 without a canonical focal length.
+    /// Factor of the depth for the sample's camera, f_y/f_c; 1 without a canonical focal length.
     pub focal: f64,
 }
 
 impl TrainConfig {
-    /// Whether the networks' outputs mean something else from sample to sample.
+    /// Whether these factors differ between samples.
     #[must_use]
     pub fn has_factors(&self) -> bool {
         !self.data.sets.is_empty() || self.canonical_focal_px.is_some()
     }
 
-    /// What the outputs mean of a sample of a set, by its place in `data.sets`, seen by `camera` (at any size) and shown to
-    /// the networks at `size`.
+    /// The factors for a sample of the data set at an index of `data.sets`, recorded by `camera` (at any size) and input to the networks at
+    /// `size`.
     #[must_use]
     pub fn sample_factors(
         &self,

@@ -1,23 +1,23 @@
-//! The way to one value of a configuration: names with dots between tables, places in lists, as in `data.sets[0].learn`.
+//! The path to one value of a configuration: names with dots between tables, indices in lists, as in `data.sets[0].learn`.
 
 use super::nearest_key::nearest_keys;
 use crate::SettingProblem;
 use toml::{Table, Value};
 
-/// A step on the way from a configuration to one of its values.
+/// A step on the path from a configuration to one of its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step<'a> {
-    /// Into a table.
+    /// Into a table, by name.
     Name(&'a str),
-    /// Into a list, counted from 0.
+    /// Into a list, by index, counted from 0.
     Place(usize),
 }
 
-/// Puts a value where `key` says; without one, takes away what is there. Tables on the way to a value are made where they are missing, elements
-/// of lists are not. A name that no configuration has is left to whoever reads the whole.
+/// Sets the value at `key`; with `None`, removes it. Missing tables on the path are created, missing elements of lists are not. Unknown
+/// names are left for the caller to find when it parses the whole.
 ///
 /// # Errors
-/// Where there is no such place.
+/// If a list on the path lacks the element, or the path does not fit the configuration.
 pub(super) fn put(
     config: &mut Value,
     key: &str,
@@ -34,7 +34,7 @@ pub(super) fn put(
                 if !table.contains_key(name) {
                     let here = &steps[..=done];
                     match (known(here), *next) {
-                        // A list without elements may be left out.
+                        // A list may be left out if it is empty.
                         (Some(KeyKind::List), Step::Place(place)) => {
                             return Err(SettingProblem::BeyondList {
                                 key: written(here),
@@ -49,7 +49,7 @@ pub(super) fn put(
                         (None, Step::Place(_)) => return Err(no_such_key()),
                         _ => {}
                     }
-                    // Nothing is there to be taken away, and no table is made for it.
+                    // There is nothing to remove, and no table is created for it.
                     if value.is_none() {
                         return known(&steps).map(|_| ()).ok_or_else(no_such_key);
                     }
@@ -83,9 +83,9 @@ pub(super) fn put(
     Ok(())
 }
 
-/// What is wrong with a value that was put where `key` says, by the error of whoever read the whole: that there is no such key, or the value.
+/// What is wrong with a value set at `key`, from the error of parsing the whole: the key does not exist, or the value is invalid.
 pub(super) fn problem(key: &str, error: toml::de::Error) -> SettingProblem {
-    // serde's words.
+    // The words of serde's message.
     let is_unknown = error.message().starts_with("unknown field");
     match steps(key) {
         Ok(steps) if is_unknown && known(&steps).is_none() => no_such_key(&steps),
@@ -93,7 +93,7 @@ pub(super) fn problem(key: &str, error: toml::de::Error) -> SettingProblem {
     }
 }
 
-/// That nothing has this name, and what may have been meant.
+/// The key does not exist; with suggestions.
 fn no_such_key(way: &[Step<'_>]) -> SettingProblem {
     let any_place = text(way, |_| "[]".to_owned());
     let nearest = nearest_keys(&any_place, &crate::config_keys());
@@ -104,7 +104,7 @@ fn no_such_key(way: &[Step<'_>]) -> SettingProblem {
     }
 }
 
-/// A key with the places of a way in its lists.
+/// A key with the path's indices in its lists.
 fn with_places(key: String, way: &[Step<'_>]) -> String {
     way.iter().fold(key, |key, step| match step {
         Step::Place(place) => key.replacen("[]", &format!("[{place}]"), 1),
@@ -155,7 +155,7 @@ fn element<'a>(
         })
 }
 
-/// A name where a list has places.
+/// A name is used where a list needs an index.
 fn name_in_list(way: &[Step<'_>], length: usize) -> SettingProblem {
     let key = written(way);
     if length == 0 {
@@ -165,12 +165,12 @@ fn name_in_list(way: &[Step<'_>], length: usize) -> SettingProblem {
     }
 }
 
-/// A way as it is written, with its places.
+/// A path as text, with its indices.
 fn written(way: &[Step<'_>]) -> String {
     text(way, |place| format!("[{place}]"))
 }
 
-/// What a configuration may have in a place.
+/// What kind of value a key has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum KeyKind {
     Table,
@@ -178,7 +178,7 @@ enum KeyKind {
     Value,
 }
 
-/// What a configuration may have there, if anything.
+/// The kind of the key at this path, if it exists.
 fn known(way: &[Step<'_>]) -> Option<KeyKind> {
     let key = text(way, |_| "[]".to_owned());
     let keys = crate::config_keys();
@@ -190,7 +190,7 @@ fn known(way: &[Step<'_>]) -> Option<KeyKind> {
             KeyKind::Value
         });
     }
-    // Tables are no keys of their own.
+    // Tables are not listed as keys.
     let is_table = keys.iter().any(|known| known.table() == key);
     is_table.then_some(KeyKind::Table)
 }
@@ -261,16 +261,16 @@ mod tests {
         let value = || Some(Value::Integer(1));
         assert_eq!(
             said("data.sets[2].learn", value()),
-            "there is no `data.sets[2]`: the list has 2 elements, counted from 0"
+            "there is no `data.sets[2]`: the list has 2 elements, numbered from 0"
         );
         assert_eq!(
             said("frames[7]", None),
-            "there is no `frames[7]`: the list has 2 elements, counted from 0"
+            "there is no `frames[7]`: the list has 2 elements, numbered from 0"
         );
-        // It is left out where it is empty.
+        // An empty list is left out.
         assert_eq!(
             said("augmentation.sizes[0].width", value()),
-            "there is no `augmentation.sizes[0]`: the list has 0 elements, counted from 0"
+            "there is no `augmentation.sizes[0]`: the list has 0 elements, numbered from 0"
         );
         assert_eq!(
             said("augmentation.seizes[0].width", value()),
@@ -281,27 +281,27 @@ mod tests {
     #[test]
     fn places_belong_to_lists_and_names_to_tables() {
         let value = || Some(Value::Integer(1));
-        assert_eq!(said("data[0].camera", value()), "`data` is no list");
-        assert_eq!(said("batch[0]", value()), "`batch` is no list");
+        assert_eq!(said("data[0].camera", value()), "`data` is not a list");
+        assert_eq!(said("batch[0]", value()), "`batch` is not a list");
         assert_eq!(
             said("data.sets.name", value()),
-            "`data.sets` is a list of 2 elements: say which, such as data.sets[0]"
+            "`data.sets` is a list of 2 elements: name one, such as data.sets[0]"
         );
         assert_eq!(
             said("augmentation.sizes.width", value()),
-            "`augmentation.sizes` is a list without elements: it is set as a whole first"
+            "`augmentation.sizes` is an empty list: set the whole list first"
         );
         assert_eq!(
             said("assumed_camera[0]", value()),
-            "`assumed_camera` is no list"
+            "`assumed_camera` is not a list"
         );
         assert_eq!(
             said("data.camera.name", value()),
-            "`data.camera` is a value and no table"
+            "`data.camera` is a value, not a table"
         );
         assert_eq!(
             said("frames[0]", None),
-            "`frames[0]` is an element of a list, which can only be set anew without it"
+            "`frames[0]` is one element of a list: set the whole list instead"
         );
     }
 
@@ -318,7 +318,9 @@ mod tests {
             let problem = said(key, Some(Value::Integer(1)));
             assert_eq!(
                 problem,
-                format!("`{key}`: a place in a list is a number in brackets, such as [0]")
+                format!(
+                    "`{key}`: an element of a list is named by a number in brackets, such as [0]"
+                )
             );
         }
     }

@@ -256,16 +256,16 @@ fn no_zoom() -> f32 {
     1.0
 }
 
-/// What a kill or a power cut costs at most.
+/// At most this much work is lost if the process is killed or the power fails.
 fn checkpoint_minutes() -> f64 {
     10.0
 }
 
 impl DataConfig {
-    /// Most threads that load where nothing else is said.
+    /// Maximum number of loader threads if the configuration sets none.
     const LOADER_THREADS: usize = 4;
 
-    /// How many threads load on this machine.
+    /// Number of loader threads on this machine.
     #[must_use]
     pub fn loader_threads_here(&self) -> usize {
         self.loader_threads.unwrap_or_else(|| {
@@ -274,15 +274,15 @@ impl DataConfig {
         })
     }
 
-    /// Bytes of images that may be kept.
+    /// Maximum size of the image cache in bytes.
     #[must_use]
     pub fn cache_bytes(&self) -> usize {
         self.cache_mib.unwrap_or(2048).saturating_mul(1 << 20)
     }
 
-    /// Makes every path absolute, so that the run is gone on with and measured from any folder.
+    /// Makes every path absolute, so that the run can be resumed and evaluated from any folder.
     pub fn make_absolute(&mut self) {
-        // Every field by name: one that is added says whether it is a path.
+        // All fields are listed, so that whoever adds one decides whether it is a path.
         let Self {
             paths,
             validation,
@@ -312,7 +312,7 @@ impl DataConfig {
 }
 
 impl TrainConfig {
-    /// Makes every path absolute. The name of an embedded network is none.
+    /// Makes every path absolute, except for the name of an embedded network.
     pub fn make_absolute(&mut self) {
         self.data.make_absolute();
         if self.init_sha256.is_none() {
@@ -320,8 +320,7 @@ impl TrainConfig {
         }
     }
 
-    /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms
-    /// of the loss.
+    /// Names that [`Self::with`] and [`Self::without`] accept: parts of the depth network, then the terms of the loss.
     pub const TERMS: [&'static str; 9] = [
         "hce",
         "attention",
@@ -334,9 +333,8 @@ impl TrainConfig {
         "moving",
     ];
 
-    /// The metres that one unit of PoseNet's translation stands for where nothing else is said: the data's mean
-    /// displacement, so that the raw outputs stay near 1. Without the speed loss it is 1: nothing measured may
-    /// enter, not even by the start.
+    /// Metres per unit of PoseNet's translation unless the configuration sets it: the data's mean displacement, so that the raw outputs
+    /// stay near 1. Without the speed loss it is 1, as no measured motion may influence the training, not even initially.
     #[must_use]
     pub fn first_unit(&self, mean_displacement_m: f64) -> f64 {
         if self.loss.speed > 0.0 {
@@ -346,10 +344,10 @@ impl TrainConfig {
         }
     }
 
-    /// Reads a TOML file. Of a run's, what it was given, not what it found out ([`crate::RunFolder::read_findings`]).
+    /// Reads a TOML file. From a run's file it reads the settings, not the findings ([`crate::RunFolder::read_findings`]).
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::ConfigFile`] naming the line, or what [`Self::validate`] says.
+    /// [`Error::Io`], [`Error::ConfigFile`] naming the line, and those of [`Self::validate`].
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
         let (config, _) = Self::from_run_text(&text).map_err(|e| Error::ConfigFile {
@@ -369,11 +367,10 @@ impl TrainConfig {
             .map_err(|e| Error::config("config", ExpectedSetting::TomlValues, e))
     }
 
-    /// Switches a part of the depth network or a term of the loss on by its name, as the paper has it unless
-    /// it is on already.
+    /// Switches a part of the depth network or a term of the loss on by its name. Unless it is already on, it gets the paper's settings.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    /// [`Error::Config`] for a name that is not in [`Self::TERMS`].
     pub fn with(&mut self, term: &str) -> Result<(), Error> {
         let net = &mut self.depth_net;
         match known(term, "with")? {
@@ -381,8 +378,8 @@ impl TrainConfig {
                 net.hce.get_or_insert_with(HceConfig::default);
             }
             "attention" => {
-                // Not the paper's product, which starts at a quarter of the feature: from scratch it cost 7 to 9 % of
-                // abs_rel at 1,000 steps (docs/benchmarks/paper.md).
+                // Not the paper's product, which starts at a quarter of the feature: trained from scratch, it worsened abs_rel by 7 to 9 %
+                // at 1,000 steps (docs/benchmarks/paper.md).
                 net.attention.get_or_insert(AttentionConfig {
                     form: AttentionForm::Residual,
                     ..AttentionConfig::default()
@@ -394,11 +391,11 @@ impl TrainConfig {
         Ok(())
     }
 
-    /// Switches a part of the depth network or a term of the loss off by its name. Without the speed term
-    /// nothing measured fixes the scale: the views then follow PoseNet alone.
+    /// Switches a part of the depth network or a term of the loss off by its name. Without the speed loss no measurement fixes the scale,
+    /// so the pose used for warping is then PoseNet's.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    /// [`Error::Config`] for a name that is not in [`Self::TERMS`].
     pub fn without(&mut self, term: &str) -> Result<(), Error> {
         match known(term, "without")? {
             "hce" => self.depth_net.hce = None,
@@ -412,10 +409,10 @@ impl TrainConfig {
         Ok(())
     }
 
-    /// The name of the whole of PoseNet in [`Self::freeze`].
+    /// The name that freezes all of PoseNet in [`Self::freeze`].
     pub const POSE_NET: &'static str = "pose";
 
-    /// Whether there is no PoseNet: it would not learn, and neither are the views warped by its poses nor are there masks of its own.
+    /// Whether PoseNet is left out: it is frozen, its poses are not used for warping, and it predicts no masks.
     #[must_use]
     pub fn leaves_pose_net_out(&self) -> bool {
         self.view_motion == ViewMotion::Vehicle
@@ -423,14 +420,14 @@ impl TrainConfig {
             && self.freeze.iter().any(|name| name == Self::POSE_NET)
     }
 
-    /// Steps of the optimiser in a run whose epochs have so many.
+    /// Number of optimiser steps, for epochs of `steps_per_epoch` steps.
     #[must_use]
-    pub fn steps_of(&self, steps_an_epoch: usize) -> usize {
-        let of_epochs = self.epochs * steps_an_epoch;
+    pub fn steps_of(&self, steps_per_epoch: usize) -> usize {
+        let of_epochs = self.epochs * steps_per_epoch;
         self.steps.unwrap_or(of_epochs.max(self.min_steps))
     }
 
-    /// What is learned from a data set, by its place in `data.sets`.
+    /// What is learned from the data set at an index of `data.sets`.
     #[must_use]
     pub fn learn(&self, set: usize) -> Learn {
         let own = self.data.sets.get(set).map(|set| set.learn);
@@ -446,19 +443,19 @@ impl TrainConfig {
         }
     }
 
-    /// The size of the images of batch number `number` of those whose depth is known; the batches that several workers learn from in one step count as one.
+    /// Size of the images with known depth in batch number `number`. Batches that several workers learn from in one step count as one.
     #[must_use]
     pub fn size_of_depth_batch(&self, number: usize) -> InputSize {
         in_turns(self.size, &self.augmentation.sizes, number)
     }
 
-    /// The size of the images of batch number `number` of video; the batches that several workers learn from in one step count as one.
+    /// Size of the video images in batch number `number`. Batches that several workers learn from in one step count as one.
     #[must_use]
     pub fn size_of_video_batch(&self, number: usize) -> InputSize {
         in_turns(self.size, &self.augmentation.video_sizes, number)
     }
 
-    /// Whether anything in training needs to know how the vehicle turned, not only how far it went. `auto` reads it where it is known.
+    /// Whether training needs to know how the vehicle turned, not only how far it moved. With `auto`, turns are used if they are known.
     #[must_use]
     pub fn reads_rotation(&self) -> bool {
         match self.view_motion {
@@ -471,7 +468,7 @@ impl TrainConfig {
     }
 }
 
-/// A run's own size for every other batch, for those between in turns one of the others.
+/// The run's own size for every other batch, and one of the other sizes in turn for those between.
 fn in_turns(own: InputSize, others: &[InputSize], number: usize) -> InputSize {
     if others.is_empty() || number.is_multiple_of(2) {
         own
@@ -480,7 +477,7 @@ fn in_turns(own: InputSize, others: &[InputSize], number: usize) -> InputSize {
     }
 }
 
-/// The term of this name.
+/// Checks that there is a term of this name.
 fn known(term: &str, field: &'static str) -> Result<&'static str, Error> {
     let terms = TrainConfig::TERMS;
     let found = terms.iter().find(|t| **t == term).copied();
@@ -529,7 +526,7 @@ mod tests {
         assert_eq!(data.sets[0].split, Some(here.join("e.txt")));
     }
 
-    /// A run is moved with its paths; what the program carries has none.
+    /// The paths of a run become absolute. The name of an embedded network is not a path.
     #[test]
     fn the_name_of_an_embedded_network_stays() {
         let mut config = Preset::Tiny.config();
@@ -546,7 +543,7 @@ mod tests {
         assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
     }
 
-    /// A run from before the key was there is read as one that has it.
+    /// A run from before this key existed is read with its default.
     #[test]
     fn checkpoints_come_every_ten_minutes_unless_said_otherwise() {
         let config = Preset::Tiny.config();
@@ -604,7 +601,7 @@ mod tests {
         assert!(error.contains("hce, attention, aggregation"), "{error}");
     }
 
-    /// A short drive gets the least steps, a long one its epochs, and whoever names a number that number.
+    /// A short drive gets the minimum number of steps, a long one its epochs, and an explicit number of steps is kept.
     #[test]
     fn a_short_drive_has_enough_steps() {
         let mut config = Preset::Light.config();
@@ -617,15 +614,15 @@ mod tests {
         assert_eq!(config.steps_of(34), 5);
     }
 
-    /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise
-    /// afterwards gets an error.
+    /// Without the speed loss, PoseNet's poses are used for warping: `without` changes the setting, and setting another one afterwards is
+    /// an error.
     #[test]
     fn without_speed_the_views_follow_posenet() {
         let mut config = Preset::Tiny.config();
         assert_ne!(config.view_motion, ViewMotion::PoseNet);
         assert_eq!(config.first_unit(0.7), 0.7);
         config.without("speed").unwrap();
-        assert_eq!(config.first_unit(0.7), 1.0, "nothing measured enters");
+        assert_eq!(config.first_unit(0.7), 1.0, "no measured motion is used");
         config.validate().unwrap();
         for motion in [ViewMotion::Distance, ViewMotion::Vehicle, ViewMotion::Auto] {
             config.view_motion = motion;
@@ -635,7 +632,7 @@ mod tests {
             };
             assert_eq!(*field, "view_motion");
             assert_eq!(found.to_string(), format!("{motion:?}").to_lowercase());
-            assert!(error.to_string().contains("posenet where loss.speed is 0"));
+            assert!(error.to_string().contains("posenet if loss.speed is 0"));
         }
     }
 }

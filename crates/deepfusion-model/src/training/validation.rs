@@ -1,4 +1,4 @@
-//! Which settings of a run mean something.
+//! Checks that the settings of a run are valid together.
 
 use deepfusion_hint::count_of;
 
@@ -7,8 +7,8 @@ use crate::{
 };
 
 impl TrainConfig {
-    /// That video at several sizes has a canonical focal length: without it one sigmoid disparity would have to mean the same metres at
-    /// every size. [`Self::validate`] leaves this open, as the network that a run starts from may bring it.
+    /// Checks that video at several sizes has a canonical focal length: without it, one sigmoid disparity would have to mean the same
+    /// metres at every size. [`Self::validate`] leaves this open, as the network that a run starts from may provide it.
     ///
     /// # Errors
     /// [`Error::Config`].
@@ -25,7 +25,7 @@ impl TrainConfig {
     }
 
     /// # Errors
-    /// [`Error::Config`] naming the first setting that means nothing.
+    /// [`Error::Config`] naming the first invalid setting.
     pub fn validate(&self) -> Result<(), Error> {
         self.size.validate()?;
         self.depth_net.validate()?;
@@ -85,7 +85,7 @@ impl TrainConfig {
             }
         }
         let augmentation = &self.augmentation;
-        // Its own digits are found, not those of an f64.
+        // The message shows the digits of an f32, not of its f64.
         let zoom = augmentation.zoom;
         if !(1.0..=8.0).contains(&zoom) {
             let expected = ExpectedSetting::Within { from: 1.0, to: 8.0 };
@@ -103,8 +103,8 @@ impl TrainConfig {
         ] {
             within(field, share, (0.0, 1.0))?;
         }
-        // Without the speed term a run learns from images alone; and PoseNet would have no loss at all where
-        // the vehicle's motion synthesises the views.
+        // Without the speed loss a run learns from images alone. PoseNet would have no loss at all if the vehicle's motion were used for
+        // warping.
         if self.loss.speed == 0.0 && self.view_motion != ViewMotion::PoseNet {
             let found = format!("{:?}", self.view_motion).to_lowercase();
             return fail("view_motion", AskedBy::NoSpeedLoss, found);
@@ -127,7 +127,7 @@ impl TrainConfig {
         }
     }
 
-    /// Masks and their term need each other, and every source's own error; the automask compares the sources'.
+    /// Masks and their term need each other, and the separate error of each source. The automask compares sources instead.
     fn validate_explainability(&self) -> Result<(), Error> {
         let weight = self.loss.explainability;
         let mean = self.reprojection == Reprojection::Mean;
@@ -150,7 +150,7 @@ impl TrainConfig {
         }
     }
 
-    /// What the other camera's view cannot be beside.
+    /// Checks settings that conflict with the other camera's view.
     fn validate_stereo(&self) -> Result<(), Error> {
         if !self.stereo {
             return Ok(());
@@ -194,7 +194,7 @@ fn above_zero(field: &'static str, value: f64) -> Result<(), Error> {
     }
 }
 
-/// Between two ends, which are included; NaN is not.
+/// Within two limits, both included; NaN is not.
 fn within(field: &'static str, value: f64, (from, to): (f64, f64)) -> Result<(), Error> {
     if (from..=to).contains(&value) {
         Ok(())

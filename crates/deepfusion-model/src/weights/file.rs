@@ -13,21 +13,21 @@ use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorView};
 use super::{FormatProblem, WeightTensor, Weights};
 use crate::NetworkError;
 
-/// What kind of file holds weights.
+/// Format of a file of weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
     /// A safetensors file.
     Safetensors,
-    /// What `torch.save` writes.
+    /// A file written by `torch.save`.
     PyTorch,
 }
 
 impl FileKind {
-    /// Recognised by content, not by name: PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol);
-    /// a safetensors file starts with the length of its JSON header, whose first byte stands at offset 8.
+    /// The format, recognised by content and not by name. PyTorch writes a zip archive ("PK"), or before version 1.6 a bare pickle (0x80,
+    /// protocol). A safetensors file starts with the length of its JSON header, whose first byte is at offset 8.
     ///
     /// # Errors
-    /// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is neither.
+    /// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one of neither format.
     pub fn of(path: &Path) -> Result<Self, NetworkError> {
         let mut start = [0_u8; 9];
         let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
@@ -58,16 +58,16 @@ impl FileKind {
 /// Reads every float tensor of a safetensors file. f64, f16 and bf16 become f32; integers are skipped.
 ///
 /// # Errors
-/// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is no such file.
+/// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is not a safetensors file.
 pub fn read_safetensors(path: &Path) -> Result<Weights, NetworkError> {
     read_safetensors_under(path, "")
 }
 
-/// The same for the tensors alone whose names start with `prefix`, without it; there may be none. The others are not even
-/// read: a checkpoint holds the optimiser's state beside the networks.
+/// Like [`read_safetensors`], but only the tensors whose names start with `prefix`, which is removed; there may be none. The others are not
+/// even read: a checkpoint also contains the optimiser's state.
 ///
 /// # Errors
-/// As [`read_safetensors`].
+/// As for [`read_safetensors`].
 pub fn read_safetensors_under(path: &Path, prefix: &str) -> Result<Weights, NetworkError> {
     if FileKind::of(path)? == FileKind::PyTorch {
         return Err(format_error(path, FormatProblem::PyTorch));
@@ -80,16 +80,16 @@ pub fn read_safetensors_under(path: &Path, prefix: &str) -> Result<Weights, Netw
     safetensors_of(file, length, path, prefix)
 }
 
-/// The float tensors of a safetensors file that is in memory; `origin` is what error messages call it.
+/// The float tensors of a safetensors file in memory; error messages call it `origin`.
 ///
 /// # Errors
-/// [`NetworkError::Format`] for bytes that are no such file.
+/// [`NetworkError::Format`] for bytes that are not a safetensors file.
 pub fn read_bytes(origin: &str, bytes: &[u8]) -> Result<Weights, NetworkError> {
     let length = bytes.len() as u64;
     safetensors_of(std::io::Cursor::new(bytes), length, Path::new(origin), "")
 }
 
-/// Of `length` bytes; `path` is what error messages call them.
+/// Reads a file of `length` bytes; error messages call it `path`.
 fn safetensors_of(
     mut file: impl Read + Seek,
     length: u64,
@@ -143,17 +143,16 @@ fn safetensors_of(
     Ok(weights)
 }
 
-/// Packed numbers of `N` bytes each, converted; a rest that is shorter is left out.
+/// Converts packed numbers of `N` bytes each; a shorter remainder is left out.
 pub fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
     let (chunks, _) = bytes.as_chunks::<N>();
     chunks.iter().map(|chunk| convert(*chunk)).collect()
 }
 
-/// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is
-/// complete and on the disk.
+/// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is complete and on disk.
 ///
 /// # Errors
-/// [`NetworkError::Io`] naming the file; what was written of it is removed.
+/// [`NetworkError::Io`] naming the file; a partly written file is removed.
 pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkError> {
     let bytes: Vec<(&String, &WeightTensor, Cow<'_, [u8]>)> = weights
         .tensors
@@ -185,7 +184,7 @@ pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkEr
         })
 }
 
-/// The numbers as a file has them, which on most machines is how they are in memory: a checkpoint is written without a copy of it.
+/// The numbers in the file's byte order. On most machines this is the order in memory, so a checkpoint is written without a copy.
 fn little_endian(values: &[f32]) -> Cow<'_, [u8]> {
     if cfg!(target_endian = "little") {
         bytemuck::cast_slice(values).into()

@@ -15,16 +15,16 @@ pub use problem::FormatProblem;
 /// One tensor's values, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightTensor {
-    /// Extents, outermost first.
+    /// Shape, outermost dimension first.
     pub shape: Vec<usize>,
-    /// As many values as the extents' product.
+    /// The values; their number is the product of `shape`.
     pub values: Vec<f32>,
 }
 
-/// Tensors by name, and where they come from.
+/// Tensors by name, and their origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weights {
-    /// What error messages call them: the file's path, or a description.
+    /// Name in error messages: the file's path, or a description.
     pub origin: String,
     /// The tensors.
     pub tensors: BTreeMap<String, WeightTensor>,
@@ -33,7 +33,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// No tensors yet.
+    /// A set without tensors.
     #[must_use]
     pub fn new(origin: impl Into<String>) -> Self {
         Self {
@@ -43,7 +43,7 @@ impl Weights {
         }
     }
 
-    /// The tensors whose names start with `prefix`, without it.
+    /// The tensors whose names start with `prefix`, which is removed.
     #[must_use]
     pub fn under(&self, prefix: &str) -> Self {
         Self {
@@ -59,13 +59,13 @@ impl Weights {
         }
     }
 
-    /// All tensors, `prefix` before their names.
+    /// All tensors, with `prefix` added to their names.
     #[must_use]
     pub fn with_prefix(self, prefix: &str) -> Self {
         self.renamed(|name| Some(format!("{prefix}{name}")))
     }
 
-    /// The tensors under the names that `rename` gives them; those it gives none are dropped.
+    /// The tensors under the names that `rename` returns; those with `None` are dropped.
     #[must_use]
     pub fn renamed(self, rename: impl Fn(&str) -> Option<String>) -> Self {
         Self {
@@ -78,20 +78,20 @@ impl Weights {
         }
     }
 
-    /// These and the other's tensors, the other's where both have one.
+    /// These tensors and the other's; of two with the same name, the other's.
     #[must_use]
     pub fn merged(mut self, other: Self) -> Self {
         self.tensors.extend(other.tensors);
         self
     }
 
-    /// The name of the first tensor, for messages; empty without any.
+    /// The name of the first tensor, for messages; empty if there is none.
     #[must_use]
     pub fn first_name(&self) -> &str {
         self.tensors.keys().next().map_or("", String::as_str)
     }
 
-    /// How many values all tensors hold.
+    /// The number of values of all tensors.
     #[must_use]
     pub fn value_count(&self) -> usize {
         self.tensors

@@ -1,44 +1,44 @@
-//! Why a file holds no weights.
+//! Why a file has no readable weights.
 
 use safetensors::tensor::SafeTensorError;
 
-/// Why a file is no weights file, or cannot become one.
+/// Why a file is not a weights file, or cannot be written as one.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatProblem {
-    /// It has no bytes.
+    /// The file has no bytes.
     #[error("the file is empty")]
     Empty,
-    /// It begins like none of the known formats.
+    /// The file starts like none of the known formats.
     #[error("it starts with the bytes {start:02x?}")]
     Unknown {
-        /// Its first bytes.
+        /// The file's first bytes.
         start: Vec<u8>,
     },
-    /// PyTorch's format, which is read elsewhere.
-    #[error("a PyTorch file, where safetensors are expected")]
+    /// A PyTorch file, which another function reads.
+    #[error("it is a PyTorch file, expected safetensors")]
     PyTorch,
-    /// It is shorter than it says, as a partial download is.
+    /// The file is shorter than its header states, like a partial download.
     #[error("the file ends within its header or its tensors")]
     CutOff,
-    /// Nothing in it is a tensor of floats.
-    #[error("it holds no float tensors")]
+    /// The file has no tensor of floats.
+    #[error("it has no float tensors")]
     NoTensors,
-    /// A header of safetensors that is not one.
+    /// A safetensors header that cannot be parsed.
     #[error("{0}")]
     Header(#[source] serde_json::Error),
-    /// A tensor whose values are not as many as its shape says.
+    /// A tensor whose number of values does not match its shape.
     #[error("tensor `{name}`: {source}")]
     Tensor {
-        /// Its name.
+        /// The tensor's name.
         name: String,
-        /// What the format's library says.
+        /// The safetensors library's message.
         source: Box<SafeTensorError>,
     },
-    /// Tensors that do not make a file.
+    /// Tensors that cannot be written to a file.
     #[error("{0}")]
     Unwritten(#[source] Box<SafeTensorError>),
-    /// What the reader of another format says.
+    /// The message of another format's reader.
     #[error("{0}")]
     Reader(#[source] Box<dyn std::error::Error + Send + Sync>),
 }

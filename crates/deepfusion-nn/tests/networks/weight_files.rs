@@ -162,7 +162,7 @@ fn values_that_are_not_finite_are_refused() {
     });
     assert_eq!(
         error.to_string(),
-        "some.safetensors: tensor `encoder.bn1.weight` holds 1 value that is not finite"
+        "some.safetensors: tensor `encoder.bn1.weight` has 1 value that is not finite"
     );
 }
 
@@ -228,7 +228,7 @@ fn weights_of_another_architecture_are_refused() {
     let encoder = ResNet::new(&config, &mut WeightRng::new(0), &device).unwrap();
     let error = load_torchvision_resnet(encoder, &resnet18).unwrap_err();
     assert!(matches!(error, Error::MissingTensor { .. }), "{error}");
-    assert!(error.hint().unwrap().contains("another architecture"));
+    assert!(error.hint().unwrap().contains("same architecture"));
 
     let pose = unpack("pose.pth", folder.path());
     let config = ResNetConfig::new(ResNetDepth::ResNet18);

@@ -1,4 +1,4 @@
-//! Both products with AVX-512's dot products of pairs: a word of the row in all lanes, times sixteen words of the column.
+//! Both products with AVX-512's dot products of pairs: a word of the row, broadcast to all lanes, times sixteen words of the columns.
 
 use super::{PixelPairs, ROWS, TapPairs};
 use std::arch::x86_64::{
@@ -8,13 +8,13 @@ use std::arch::x86_64::{
 use std::mem::transmute;
 use std::ops::Range;
 
-/// Rows whose sums are kept in registers.
+/// Number of rows whose sums are kept in registers.
 const HEIGHT: usize = 8;
-/// Lanes of a vector.
+/// Number of lanes of a vector.
 const LANES: usize = 16;
-/// Steps summed before the sums go back to memory: the rows' factors stay in the first cache.
+/// Steps summed before the sums are written to memory, so that the rows' factors stay in the L1 cache.
 const STEPS_AT_ONCE: usize = 18;
-/// Pairs of pixels: the columns' factors stay there, which all channels and taps multiply.
+/// Pairs of pixels at once, so that the columns' factors, which all channels and taps multiply, stay in the L1 cache.
 const PIXEL_PAIRS_AT_ONCE: usize = 128;
 
 pub(super) fn available() -> bool {
@@ -39,7 +39,7 @@ impl<const V: usize> Sums<V> {
         let mut sums = Self::zero();
         for row in 0..HEIGHT {
             for v in 0..V {
-                // SAFETY: the caller's promise.
+                // SAFETY: guaranteed by the caller.
                 sums.0[row][v] = unsafe { _mm512_loadu_ps(from.add(row * stride + v * LANES)) };
             }
         }
@@ -47,32 +47,32 @@ impl<const V: usize> Sums<V> {
     }
 
     /// # Safety
-    /// As [`Self::load`], and writable.
+    /// As for [`Self::load`]; they must also be writable.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn store(&self, to: *mut f32, stride: usize) {
         for row in 0..HEIGHT {
             for v in 0..V {
-                // SAFETY: the caller's promise.
+                // SAFETY: guaranteed by the caller.
                 unsafe { _mm512_storeu_ps(to.add(row * stride + v * LANES), self.0[row][v]) };
             }
         }
     }
 
-    /// Adds the products of each row's word, `stride` bytes from one to the next, with the columns' words.
+    /// Adds the products of each row's word (`stride` bytes from one row to the next) and the columns' words.
     ///
     /// # Safety
-    /// Every row's word, which may lie at any address, and the columns' must be readable.
+    /// Every row's word, at any alignment, and the columns' words must be readable.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn add(&mut self, rows: *const u8, stride: usize, columns: *const u32) {
         let mut factors = [_mm512_set1_epi32(0); V];
         for v in 0..V {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             factors[v] = unsafe { _mm512_loadu_si512(columns.add(v * LANES).cast()) };
         }
         for row in 0..HEIGHT {
-            // SAFETY: the caller's promise. Vectors of pairs and of integers are the same bits.
+            // SAFETY: guaranteed by the caller. A vector of pairs has the same bits as one of integers.
             unsafe {
                 let word = _mm512_set1_epi32(rows.add(row * stride).cast::<i32>().read_unaligned());
                 for v in 0..V {
@@ -88,7 +88,7 @@ impl<const V: usize> Sums<V> {
 }
 
 /// # Safety
-/// The processor must have the instructions; bounds as [`TapPairs::run`] checks them.
+/// The processor must have the instructions; bounds must be as [`TapPairs::run`] checks them.
 #[target_feature(enable = "avx512f,avx512bf16")]
 pub(super) unsafe fn taps(product: TapPairs) {
     let TapPairs {
@@ -108,7 +108,7 @@ pub(super) unsafe fn taps(product: TapPairs) {
         for row in (0..rows).step_by(HEIGHT) {
             let of_rows = row / ROWS * block + first_step * tile + row % ROWS * pairs;
             for column in (0..columns).step_by(2 * LANES) {
-                // SAFETY: the caller's promise.
+                // SAFETY: guaranteed by the caller.
                 unsafe {
                     let to = out.as_mut_ptr().add(row * columns + column);
                     let mut sums = if index > 0 {
@@ -131,12 +131,12 @@ pub(super) unsafe fn taps(product: TapPairs) {
 }
 
 /// # Safety
-/// The processor must have the instructions; bounds as [`PixelPairs::run`] checks them.
+/// The processor must have the instructions; bounds must be as [`PixelPairs::run`] checks them.
 #[target_feature(enable = "avx512f,avx512bf16")]
 pub(super) unsafe fn pixels(product: PixelPairs) {
     let outputs = product.outputs;
     let wide = outputs / (2 * LANES) * (2 * LANES);
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         let PixelPairs {
             offsets,
@@ -163,7 +163,7 @@ pub(super) unsafe fn pixels(product: PixelPairs) {
     }
 }
 
-/// A [`PixelPairs`], whose sums are written in parts.
+/// A [`PixelPairs`] whose sums are computed in parts.
 struct Pixels<'a> {
     offsets: &'a [usize],
     plane_len: usize,
@@ -176,10 +176,10 @@ struct Pixels<'a> {
 }
 
 impl Pixels<'_> {
-    /// The sums of some outputs, `V` vectors at once.
+    /// Computes the sums of some outputs, `V` vectors at once.
     ///
     /// # Safety
-    /// As [`pixels`]; the range must be a multiple of `V` vectors.
+    /// As for [`pixels`]; the range must be a multiple of `V` vectors.
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn columns<const V: usize>(&self, outputs: Range<usize>) {
         let taps = self.offsets.len();
@@ -188,7 +188,7 @@ impl Pixels<'_> {
             for output in outputs.clone().step_by(V * LANES) {
                 for channel in (0..self.channels).step_by(HEIGHT) {
                     for (t, offset) in self.offsets.iter().enumerate() {
-                        // SAFETY: the caller's promise.
+                        // SAFETY: guaranteed by the caller.
                         unsafe {
                             let to = self.out.add((channel * taps + t) * self.outputs + output);
                             let mut sums = Sums::<V>::load(to, taps * self.outputs);

@@ -1,20 +1,20 @@
-//! Both products on the matrix unit: 2×2 tiles of sums, for which four tiles of factors are loaded a step.
+//! Both products on the matrix unit: 2×2 tiles of sums, for which each step loads four tiles of factors.
 //!
-//! Tiles 0 to 3 are the sums, 4 and 5 the factors of the rows, 6 and 7 those of the columns.
+//! Tiles 0 to 3 contain the sums, 4 and 5 the factors of the rows, 6 and 7 those of the columns.
 
 use super::{COLUMNS, PixelPairs, ROWS, TapPairs};
 use crate::matrix_unit::{TileSizes, configured};
 use std::arch::asm;
 
-/// Steps summed before the sums go back to memory: the rows' factors stay in the first cache.
+/// Steps summed before the sums are written to memory, so that the rows' factors stay in the L1 cache.
 const STEPS_AT_ONCE: usize = 18;
-/// Steps of the weight gradient: the columns' factors stay there, which all channels and taps multiply.
+/// Steps of the weight gradient, so that the columns' factors, which all channels and taps multiply, stay in the L1 cache.
 const PIXEL_STEPS_AT_ONCE: usize = 16;
 /// Words of a tile's row.
 const WORDS: usize = 16;
 
 /// # Safety
-/// The processor must have the unit; bounds as [`TapPairs::run`] checks them.
+/// The processor must have the unit; bounds must be as [`TapPairs::run`] checks them.
 pub(super) unsafe fn taps(product: TapPairs) {
     let TapPairs {
         weights,
@@ -52,7 +52,7 @@ pub(super) unsafe fn taps(product: TapPairs) {
                         sum_stride: 4 * columns,
                         add: index > 0,
                     };
-                    // SAFETY: the caller's promise.
+                    // SAFETY: guaranteed by the caller.
                     unsafe {
                         if two {
                             at.two_by_two()
@@ -64,38 +64,38 @@ pub(super) unsafe fn taps(product: TapPairs) {
             }
         }
     };
-    // SAFETY: the processor has the unit (the caller's promise).
+    // SAFETY: the processor has the unit (guaranteed by the caller).
     unsafe { configured(sizes, work) };
 }
 
-/// Sums over steps whose column factors lie where a table says.
+/// Sums over steps; a table contains the offsets of the column factors.
 struct Steps<'a> {
     rows: [*const u32; 2],
-    /// Bytes from a row to the next.
+    /// Bytes from one row to the next.
     row_stride: usize,
-    /// Bytes from a step to the next.
+    /// Bytes from one step to the next.
     row_step: usize,
     columns: *const u32,
-    /// Bytes from a pair to the next.
+    /// Bytes from one pair to the next.
     column_stride: usize,
-    /// In words, a step's first pair.
+    /// Offset of each step's first pair, in words.
     offsets: &'a [usize],
     sums: *mut f32,
-    /// Bytes from a row of sums to the next.
+    /// Bytes from one row of sums to the next.
     sum_stride: usize,
-    /// Adds to what is there.
+    /// Whether to add to the existing sums.
     add: bool,
 }
 
 impl Steps<'_> {
-    /// Two tiles of rows.
+    /// Computes two tiles of rows.
     ///
     /// # Safety
-    /// Everything named must be in bounds, the tiles configured, and the offsets not empty.
+    /// All pointers and strides must be in bounds, the tiles configured, and the offsets not empty.
     unsafe fn two_by_two(&self) {
         let below = self.sums.wrapping_byte_add(ROWS * self.sum_stride);
         let range = self.offsets.as_ptr_range();
-        // SAFETY: the caller's promise; the registers that are written are declared.
+        // SAFETY: guaranteed by the caller; the written registers are declared.
         unsafe {
             asm!(
                 "test {add}, {add}",
@@ -150,13 +150,13 @@ impl Steps<'_> {
         }
     }
 
-    /// One tile of rows.
+    /// Computes one tile of rows.
     ///
     /// # Safety
-    /// As [`Self::two_by_two`].
+    /// As for [`Self::two_by_two`].
     unsafe fn one_by_two(&self) {
         let range = self.offsets.as_ptr_range();
-        // SAFETY: as there.
+        // SAFETY: as in [`Self::two_by_two`].
         unsafe {
             asm!(
                 "test {add}, {add}",
@@ -200,7 +200,7 @@ impl Steps<'_> {
 }
 
 /// # Safety
-/// The processor must have the unit; bounds as [`PixelPairs::run`] checks them.
+/// The processor must have the unit; bounds must be as [`PixelPairs::run`] checks them.
 pub(super) unsafe fn pixels(product: PixelPairs) {
     let PixelPairs {
         offsets,
@@ -236,7 +236,7 @@ pub(super) unsafe fn pixels(product: PixelPairs) {
                             sums: [sum(channel), sum(channel + ROWS * usize::from(two))],
                             sum_stride: 4 * taps * outputs,
                         };
-                        // SAFETY: the caller's promise.
+                        // SAFETY: guaranteed by the caller.
                         unsafe {
                             match (two, wide) {
                                 (true, true) => at.two_by_two(),
@@ -250,23 +250,23 @@ pub(super) unsafe fn pixels(product: PixelPairs) {
             }
         }
     };
-    // SAFETY: the processor has the unit (the caller's promise).
+    // SAFETY: the processor has the unit (guaranteed by the caller).
     unsafe { configured(sizes, work) };
 }
 
-/// Sums over neighbouring pixels, added to what is there.
+/// Sums over neighbouring pixels, added to the existing sums.
 struct PixelSteps {
     rows: [*const u16; 2],
-    /// Bytes from a channel to the next.
+    /// Bytes from one channel to the next.
     row_stride: usize,
     columns: *const u32,
-    /// Bytes from a pair of pixels to the next.
+    /// Bytes from one pair of pixels to the next.
     column_stride: usize,
-    /// Bytes from a step to the next.
+    /// Bytes from one step to the next.
     column_step: usize,
     steps: usize,
     sums: [*mut f32; 2],
-    /// Bytes from a channel's sums to the next.
+    /// Bytes from one channel's sums to the next channel's.
     sum_stride: usize,
 }
 
@@ -276,9 +276,9 @@ macro_rules! block {
         #[doc = $doc]
         ///
         /// # Safety
-        /// Everything named must be in bounds, the tiles configured, and the steps at least one.
+        /// All pointers and strides must be in bounds, the tiles configured, and the number of steps at least one.
         unsafe fn $name(&self) {
-            // SAFETY: the caller's promise; the registers that are written are declared.
+            // SAFETY: guaranteed by the caller; the written registers are declared.
             unsafe {
                 asm!(
                     $($load,)*
@@ -291,7 +291,7 @@ macro_rules! block {
                     "dec {left}",
                     "jnz 3b",
                     $($store,)*
-                    // An operand must be named, also where the block has no second row of sums.
+                    // Every operand must be used, even if the block has no second row of sums.
                     "/* {c1} */",
                     c0 = in(reg) self.sums[0],
                     c1 = in(reg) self.sums[1],

@@ -1,9 +1,8 @@
-//! Convolutions with numbers rounded to bf16 and sums in f32: what the matrix unit (AMX) and the dot products of pairs
-//! (AVX512-BF16) are fast at.
+//! Convolutions of numbers rounded to bf16, with sums in f32, for the matrix unit (AMX) and the dot products of pairs (AVX512-BF16).
 //!
-//! Both multiply pairs. For the forward pass and the input gradient the numbers of two neighbouring channels are one
-//! 32-bit word of the tile's planes, and a step of the product sums a tap over up to sixteen such pairs. For the weight
-//! gradient two neighbouring pixels are a word, and a step sums sixteen of those.
+//! Both multiply pairs. In the forward pass and the input gradient, the values of two neighbouring channels are one 32-bit word of the
+//! tile's planes, and a step of the product sums a tap over up to sixteen such pairs. In the weight gradient, two neighbouring pixels are a
+//! word, and a step sums sixteen of those.
 
 #[cfg(target_arch = "x86_64")]
 mod dot;
@@ -19,9 +18,9 @@ pub(super) use taps::TapPairs;
 
 use super::ConvShape;
 
-/// Channels come in multiples of this: rows of a tile of the matrix unit.
+/// Channels must be a multiple of this: the rows of a tile of the matrix unit.
 pub(super) const ROWS: usize = 16;
-/// Columns come in multiples of this: two tiles side by side.
+/// Columns must be a multiple of this: two tiles side by side.
 pub(super) const COLUMNS: usize = 32;
 
 /// How convolutions multiply and add.
@@ -42,7 +41,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Whether a convolution of so many channels multiplies in bf16.
+    /// Whether a convolution with these numbers of channels multiplies in bf16.
     #[must_use]
     pub fn is_bf16_for(self, in_channels: usize, out_channels: usize) -> bool {
         let fits = |channels: usize| channels > 0 && channels.is_multiple_of(ROWS);
@@ -50,7 +49,7 @@ impl Precision {
     }
 }
 
-/// What multiplies pairs of bf16.
+/// The processor's instructions that multiply pairs of bf16.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(
     not(target_arch = "x86_64"),
@@ -64,7 +63,7 @@ pub(super) enum Unit {
 }
 
 impl Unit {
-    /// That of this processor, the faster where it has both.
+    /// The unit of this processor; the faster one if it has both.
     #[cfg(target_arch = "x86_64")]
     pub(super) fn found() -> Option<Self> {
         if crate::matrix_unit::available() {
@@ -78,7 +77,7 @@ impl Unit {
         None
     }
 
-    /// That for a convolution; `None`: f32.
+    /// The unit to use for a convolution; `None` for f32.
     pub(super) fn of(shape: &ConvShape) -> Option<Self> {
         let pairs = shape
             .precision
@@ -87,14 +86,14 @@ impl Unit {
     }
 }
 
-/// Whether this processor convolves in [`Precision::Bf16`]: it has AVX512-BF16, or AMX and the system lets this process
-/// use it.
+/// Whether this processor can compute convolutions in [`Precision::Bf16`]: it has AVX512-BF16, or it has AMX and the system allows this
+/// process to use it.
 #[must_use]
 pub fn has_bf16() -> bool {
     Unit::found().is_some()
 }
 
-/// Pairs of channels in a step: sixteen, or a number that divides them all.
+/// Number of pairs of channels in a step: the largest, up to sixteen, that divides all pairs evenly.
 pub(super) fn pairs_of(channels: usize) -> usize {
     let pairs = channels / 2;
     (1..=ROWS)
@@ -145,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Every block's shape, several rounds of sums, steps of eight and of sixteen pairs; both units where there are two.
+    /// All shapes of blocks, several rounds of sums, steps of eight and of sixteen pairs; with both units if the processor has them.
     #[test]
     fn products_over_taps_are_their_definition() {
         for (rows, pairs, steps) in [(16, 8, 3), (48, 16, 19), (64, 10, 40)] {

@@ -1,10 +1,10 @@
-//! From f32 to words of two bf16.
+//! Conversion of f32 to words of two bf16.
 
 use super::super::arithmetic::Weights;
 use super::ROWS;
 use rayon::prelude::*;
 
-/// The nearest bf16 (ties to even), as the upper half of a word; a NaN stays one.
+/// The nearest bf16 (ties to even), as the upper half of a word; NaN stays NaN.
 #[inline(always)]
 fn rounded(value: f32) -> u32 {
     let bits = value.to_bits();
@@ -16,17 +16,17 @@ fn rounded(value: f32) -> u32 {
     }
 }
 
-/// Two numbers as a word, the first below.
+/// Two numbers as a word, the first in the lower half.
 #[inline(always)]
 pub(super) fn pair(first: f32, second: f32) -> u32 {
     (rounded(first) >> 16) | (rounded(second) & 0xffff_0000)
 }
 
-/// Neighbours of two rows as words: `to[q] = (first[q], second[q])`.
+/// Values of two rows as words: `to[q] = (first[q], second[q])`.
 pub(in super::super) fn zipped(first: &[f32], second: &[f32], to: &mut [u32]) {
     #[cfg(target_arch = "x86_64")]
     if pulp::x86::V4::try_new().is_some() {
-        // SAFETY: the processor has the instructions: they are among those of V4.
+        // SAFETY: the processor has the instructions, which are part of V4.
         return unsafe { zipped_wide(first, second, to) };
     }
     zip(first, second, to);
@@ -45,11 +45,11 @@ fn zip(first: &[f32], second: &[f32], to: &mut [u32]) {
     }
 }
 
-/// A row rounded.
+/// A row, rounded.
 pub(in super::super) fn planar(from: &[f32], to: &mut [u16]) {
     #[cfg(target_arch = "x86_64")]
     if pulp::x86::V4::try_new().is_some() {
-        // SAFETY: the processor has the instructions: they are among those of V4.
+        // SAFETY: the processor has the instructions, which are part of V4.
         return unsafe { planar_wide(from, to) };
     }
     narrow(from, to);
@@ -68,8 +68,7 @@ fn narrow(from: &[f32], to: &mut [u16]) {
     }
 }
 
-/// Weights as tiles: for every [`ROWS`] rows and each step (a group of `pairs` pairs of channels, and of those a tap) the
-/// rows' pairs.
+/// Weights as tiles: for every [`ROWS`] rows and each step (a tap of a group of `pairs` pairs of channels), the rows' pairs.
 pub(in super::super) fn pack_weights(weights: Weights, pairs: usize, to: &mut [u32]) {
     let Weights {
         values,

@@ -4,18 +4,18 @@ use super::{COLUMNS, ROWS, Unit};
 
 /// `out[c·taps + t][o] += Σ_q source[c·plane_len + offsets[t] + q] · grad[q][o]`, both factors bf16.
 pub(in super::super) struct PixelPairs<'a> {
-    /// Where each tap of the first channel reads.
+    /// Offset of each tap in the first channel.
     pub(in super::super) offsets: &'a [usize],
-    /// From a channel to the next.
+    /// Distance from one channel to the next.
     pub(in super::super) plane_len: usize,
-    /// A multiple of [`ROWS`].
+    /// Number of channels, a multiple of [`ROWS`].
     pub(in super::super) channels: usize,
     pub(in super::super) source: &'a [u16],
-    /// A multiple of [`COLUMNS`].
+    /// Number of pixels, a multiple of [`COLUMNS`].
     pub(in super::super) pixels: usize,
-    /// `pixels / 2` × `outputs`: words of two pixels.
+    /// `pixels / 2` × `outputs` words of two pixels.
     pub(in super::super) grad: &'a [u32],
-    /// A multiple of [`ROWS`].
+    /// Number of outputs, a multiple of [`ROWS`].
     pub(in super::super) outputs: usize,
     /// (`channels` · `offsets.len()`) × `outputs`.
     pub(in super::super) out: &'a mut [f32],
@@ -40,7 +40,7 @@ impl PixelPairs<'_> {
         let last = last + self.channels.saturating_sub(1) * self.plane_len;
         assert!(self.source.len() >= last + self.pixels, "source length");
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: all bounds were just checked; `Unit` is what the processor has.
+        // SAFETY: all bounds were just checked, and the processor has the `Unit`.
         unsafe {
             match unit {
                 Unit::Matrix => super::matrix::pixels(self),

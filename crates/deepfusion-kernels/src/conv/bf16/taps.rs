@@ -4,20 +4,20 @@ use super::{COLUMNS, ROWS, Unit};
 
 /// `out[m][q] = Σ_step Σ_p weights[m][step, p] · source[offsets[step] + p·plane_len + q]`, both factors pairs of bf16.
 pub(in super::super) struct TapPairs<'a> {
-    /// For every [`ROWS`] rows: a tile of rows × `pairs` for each step ([`super::pack_weights`]).
+    /// For every [`ROWS`] rows and each step: a tile of rows × `pairs` ([`super::pack_weights`]).
     pub(in super::super) weights: &'a [u32],
-    /// Where the first pair of each step's tap reads.
+    /// Offset of the first pair of each step's tap.
     pub(in super::super) offsets: &'a [usize],
-    /// Pairs of a step, at most [`ROWS`].
+    /// Number of pairs in a step, at most [`ROWS`].
     pub(in super::super) pairs: usize,
-    /// From a pair to the next.
+    /// Distance from one pair to the next.
     pub(in super::super) plane_len: usize,
     pub(in super::super) source: &'a [u32],
-    /// A multiple of [`COLUMNS`].
+    /// Number of columns, a multiple of [`COLUMNS`].
     pub(in super::super) columns: usize,
     /// `rows` × `columns`, overwritten.
     pub(in super::super) out: &'a mut [f32],
-    /// A multiple of [`ROWS`].
+    /// Number of rows, a multiple of [`ROWS`].
     pub(in super::super) rows: usize,
 }
 
@@ -40,7 +40,7 @@ impl TapPairs<'_> {
             .map_or(0, |first| first + (self.pairs - 1) * self.plane_len);
         assert!(self.source.len() >= last + self.columns, "source length");
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: all bounds were just checked; `Unit` is what the processor has.
+        // SAFETY: all bounds were just checked, and the processor has the `Unit`.
         unsafe {
             match unit {
                 Unit::Matrix => super::matrix::taps(self),

@@ -1,11 +1,11 @@
-//! The transforms of the weight gradient: of output gradients, and of sums of products to taps.
+//! The transforms of the weight gradient: of output gradients, and from sums of products to taps.
 
 use super::transform::{load, store};
 use crate::conv::product::LANES;
 use crate::winograd::{AREA, IN, OUT};
 use pulp::{Simd, WithSimd};
 
-/// A m along one axis: the transpose of the outputs' Aᵀ.
+/// A m along one axis, with A the transpose of the outputs' Aᵀ.
 #[inline(always)]
 fn gradient_axis<S: Simd>(simd: S, m: [S::f32s; OUT]) -> [S::f32s; IN] {
     let by = |factor: f32| simd.splat_f32s(factor);
@@ -23,7 +23,7 @@ fn gradient_axis<S: Simd>(simd: S, m: [S::f32s; OUT]) -> [S::f32s; IN] {
     ]
 }
 
-/// Gᵀ g along one axis: the transpose of the kernels' G.
+/// Gᵀ g along one axis, with Gᵀ the transpose of the kernels' G.
 #[inline(always)]
 fn taps_axis<S: Simd>(simd: S, g: [S::f32s; IN]) -> [S::f32s; 3] {
     let by = |factor: f32| simd.splat_f32s(factor);
@@ -40,13 +40,13 @@ fn taps_axis<S: Simd>(simd: S, g: [S::f32s; IN]) -> [S::f32s; 3] {
     ]
 }
 
-/// A y Aᵀ of neighbouring tiles' output gradients, whose channels lie side by side: `to[p·to_pitch + t·channels + c]` of
+/// A y Aᵀ of neighbouring tiles' output gradients with interleaved channels: `to[p·to_pitch + t·channels + c]` from
 /// `from[row·pitch + (4·t + column)·channels + c]`.
 pub(super) struct TransformGradients<'a> {
     pub(super) from: &'a [f32],
     pub(super) pitch: usize,
     pub(super) tiles: usize,
-    /// A multiple of [`LANES`].
+    /// Number of channels, a multiple of [`LANES`].
     pub(super) channels: usize,
     pub(super) to: &'a mut [f32],
     pub(super) to_pitch: usize,
@@ -91,11 +91,11 @@ impl WithSimd for TransformGradients<'_> {
     }
 }
 
-/// Gᵀ z G of one input channel's sums: `to[tap·outputs + o]` of `from[p·pitch + o]`.
+/// Gᵀ z G of one input channel's sums: `to[tap·outputs + o]` from `from[p·pitch + o]`.
 pub(super) struct TransformTaps<'a> {
     pub(super) from: &'a [f32],
     pub(super) pitch: usize,
-    /// A multiple of [`LANES`].
+    /// Number of outputs, a multiple of [`LANES`].
     pub(super) outputs: usize,
     pub(super) to: &'a mut [f32],
 }

@@ -1,4 +1,4 @@
-//! From planar images to tiles and back.
+//! Conversion from planar images to tiles and back.
 
 use super::tiles::Run;
 use super::transform::TransformInputs;
@@ -16,9 +16,9 @@ pub(in crate::conv) struct Image<'a> {
     pub(in crate::conv) channels: usize,
     /// Height and width.
     pub(in crate::conv) size: (usize, usize),
-    /// Rows and columns before the first.
+    /// Rows and columns of padding before the first.
     pub(in crate::conv) padding: usize,
-    /// The padding mirrors the image instead of being zero.
+    /// Whether the padding mirrors the image instead of being zero.
     pub(in crate::conv) reflect: bool,
 }
 
@@ -35,14 +35,14 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Floats of a buffer for one line of a run's inputs, or of its outputs.
+    /// Number of floats in a buffer for one line of a run's inputs, or of its outputs.
     pub(super) fn line_len(&self, runs: &[Run]) -> usize {
         let tiles = runs.iter().map(|run| run.tiles).max().unwrap_or(0);
         OUT * (tiles + 1)
     }
 
-    /// Bᵀ d B of the inputs of all tiles of some channels: `to[((channel − first)·36 + product)·tiles + tile]`, where `tiles` are
-    /// whole vectors. `plain` has room for a channel's inputs, `line` for [`Self::line_len`].
+    /// Bᵀ d B of the inputs of all tiles of some channels: `to[((channel − first)·36 + product)·tiles + tile]`, where `tiles` must be whole
+    /// vectors. `plain` must have room for a channel's inputs, `line` for [`Self::line_len`].
     pub(super) fn transform(
         &self,
         channels: Range<usize>,
@@ -131,7 +131,7 @@ impl WithSimd for Gather<'_> {
                 });
                 let [a, b, c, d, e, f] = columns;
                 deinterleave(line, [&mut *a, &mut *b, c, d]);
-                // The fifth and sixth of a tile are the first and second of the next.
+                // The fifth and sixth column of a tile are the first and second of the next.
                 let last = run.tiles - 1;
                 e[..last].copy_from_slice(&a[1..]);
                 f[..last].copy_from_slice(&b[1..]);
@@ -141,8 +141,8 @@ impl WithSimd for Gather<'_> {
     }
 }
 
-/// Calls `write` with each line of outputs that lies in an image of `size`: its row, its first column and its values,
-/// of `from[(4·row + column)·pitch + tile]`.
+/// Calls `write` with each line of outputs in an image of `size`: its row, its first column and its values, from
+/// `from[(4·row + column)·pitch + tile]`.
 pub(super) fn scatter(
     size: (usize, usize),
     runs: &[Run],
@@ -180,8 +180,8 @@ impl WithSimd for Interleave<'_> {
     }
 }
 
-/// What falls on the mirrored margin, one pixel wide, of an image's gradient: kept until all of the image is there,
-/// as it belongs to pixels that other tasks write.
+/// The gradient in the mirrored margin, one pixel wide, of an image. It is kept until all of the image is complete, as it belongs to pixels
+/// that other tasks write.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::conv) struct Margins {
     /// Height and width of the image.
@@ -193,14 +193,14 @@ impl Margins {
         Self { size }
     }
 
-    /// Values of a plane: the rows above and below with their corners, the columns left and right.
+    /// Number of values of a plane's margin: the rows above and below with their corners, and the columns left and right.
     pub(in crate::conv) fn len(self) -> usize {
         let (height, width) = self.size;
         2 * (width + 2) + 2 * height
     }
 
-    /// Sorts a line of the padded plane, at row `y` and column `x`: `inner` gets what lies in the image (its row,
-    /// column and values), `margin` the rest (its place in the margins and values).
+    /// Splits a line of the padded plane, at row `y` and column `x`. `inner` gets the part in the image (its row, column and values),
+    /// `margin` the rest (its place in the margins and values).
     pub(in crate::conv) fn split(
         self,
         (y, x): (usize, usize),

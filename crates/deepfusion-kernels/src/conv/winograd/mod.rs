@@ -1,12 +1,12 @@
 //! 3×3 sums at stride 1 by Winograd's F(4×4, 3×3): 36 products for 16 outputs instead of 144.
 //!
-//! Here are the forward pass and the input's gradient; [`weight_gradient`] is the third. Rounding is some four times that of
-//! plain sums.
+//! This module has the forward pass and the input gradient; [`weight_gradient`] has the weight gradient. Rounding errors are about four
+//! times those of plain sums.
 //!
-//! Y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs Y (Lavin and Gray, "Fast
-//! Algorithms for Convolutional Neural Networks", 2016). The sums of ⊙ over channels are 36 matrix products, whose
-//! columns are tiles: images stay planar. A tile's sums do not depend on what it is computed with, so neither threads
-//! nor tasks change a bit.
+//! Y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs Y (Lavin and Gray, "Fast Algorithms for
+//! Convolutional Neural Networks", 2016). The sums of ⊙ over channels are 36 matrix products, whose columns are tiles, so images stay
+//! planar. A tile's sums do not depend on the other tiles computed with it, so the result is bit for bit the same for any number of threads
+//! and tasks.
 
 mod backward_transform;
 mod image;
@@ -30,9 +30,9 @@ use std::ops::Range;
 use tiles::{Grid, Run};
 use transform::{TransformKernels, TransformOutputs};
 
-/// Tiles of a batch below which transforming the kernels, which become four times as many, costs more than it saves.
+/// Number of tiles of a batch below which transforming the kernels, which become four times as large, costs more than it saves.
 const FEWEST_TILES: usize = 64;
-/// Kernels below which moving values takes as long as multiplying them.
+/// Number of kernels below which moving values takes as long as multiplying them.
 const FEWEST_KERNELS: usize = 512;
 
 /// A sum over channels and 3×3 taps at stride 1: a convolution, or the gradient of its input.
@@ -47,19 +47,19 @@ pub(super) struct Sum<'a> {
     pub(super) bias: Option<&'a [f32]>,
 }
 
-/// The kernels of a sum, as they lie in a convolution's weights: nine taps each, one after the other.
+/// The kernels of a sum, in the layout of a convolution's weights: nine taps each, one after the other.
 #[derive(Clone, Copy)]
 pub(super) struct Kernels<'a> {
     pub(super) values: &'a [f32],
-    /// From an output channel's to the next one's, and from an input channel's to the next one's.
+    /// Distance from one output channel to the next, and from one input channel to the next.
     pub(super) strides: (usize, usize),
-    /// Turned by half a turn.
+    /// Whether the kernels are rotated by 180 degrees.
     pub(super) turned: bool,
 }
 
 impl Sum<'_> {
-    /// Whether this form is faster than plain sums, by `benches/conv.rs`. It depends on the number of images, so that an
-    /// image alone and the same in a batch may differ by rounding.
+    /// Whether this form is faster than plain sums, according to `benches/conv.rs`. It depends on the number of images, so the results for
+    /// an image alone and in a batch may differ by rounding.
     pub(super) fn pays(&self) -> bool {
         let grid = Grid::new(self.source.images, self.out);
         self.source.channels.is_multiple_of(LANES)
@@ -68,11 +68,11 @@ impl Sum<'_> {
             && grid.saves_half(self.out)
     }
 
-    /// Calls `write` with all outputs, line by line: image, output channel, row and first column, values. No two lines
-    /// overlap, and together they are the whole output.
+    /// Calls `write` with all outputs, line by line: image, output channel, row and first column, values. No two lines overlap, and
+    /// together they cover the whole output.
     ///
     /// # Panics
-    /// When the input channels are no whole vectors.
+    /// If the input channels are not whole vectors.
     pub(super) fn run(&self, write: impl Fn(usize, usize, (usize, usize), &[f32]) + Sync) {
         let channels = self.source.channels;
         assert!(channels.is_multiple_of(LANES), "whole vectors of channels");
@@ -101,7 +101,7 @@ impl Sum<'_> {
         write: &impl Fn(usize, usize, (usize, usize), &[f32]),
     ) {
         let (channels, tiles) = (self.source.channels, padded(tiles));
-        // Products of neighbouring numbers do not lie whole pages apart.
+        // Avoids a distance of whole pages between the products of neighbouring numbers.
         let product_len = rows.len() * tiles + LANES;
         let lens = [
             AREA * tiles * channels,
@@ -148,7 +148,7 @@ impl Sum<'_> {
 
     /// G g Gᵀ of every kernel: `to[(product·rows + row)·channels + channel]`.
     fn transform_kernels(&self, to: &mut [f32]) {
-        /// Rows of a task: a channel's of them lie near each other.
+        /// Rows of a task: a channel's kernels of these rows are near each other in memory.
         const GROUP: usize = 8;
         let Kernels {
             values,
@@ -178,7 +178,7 @@ impl Sum<'_> {
                     });
                     for (product, values) in transformed.iter().enumerate() {
                         let at = (product * rows + row) * channels + first;
-                        // SAFETY: whole vectors (asserted in `run`), so that each task writes its own rows alone.
+                        // SAFETY: whole vectors (asserted in `run`), so each task writes its own rows only.
                         unsafe { to.slice(at, LANES) }.copy_from_slice(values);
                     }
                 }

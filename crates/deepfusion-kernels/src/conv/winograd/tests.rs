@@ -1,4 +1,4 @@
-//! The form against the definition, whether or not it pays, and its transforms on every instruction set.
+//! Compares Winograd's form with the definition, whether or not it is faster, and its transforms on all instruction sets.
 
 use super::backward_transform::{TransformGradients, TransformTaps};
 use super::transform::{TransformInputs, TransformKernels, TransformOutputs};
@@ -11,7 +11,7 @@ use crate::winograd::{AREA, OUT};
 use proptest::prelude::*;
 use pulp::Simd;
 
-/// Every pass that takes the form at this shape, in both its ways for weights.
+/// Every pass in this form for this shape, with both ways of dividing weights.
 fn check(s: &ConvShape) {
     let [x, w, b, g] = inputs(s);
     let exact = Exact::of(s);
@@ -99,7 +99,7 @@ fn parts_of_every_kind_equal_the_definition() {
     }
 }
 
-/// Root mean squares of error over value: what a layer of 64 channels loses.
+/// Root mean square of error over value: the loss of precision in a layer of 64 channels.
 #[test]
 fn rounding_stays_small() {
     let s = shape(1, (64, 64), (24, 80), false);

@@ -1,14 +1,14 @@
-//! How outputs are cut into tiles of 4×4, and these into tasks.
+//! Divides outputs into tiles of 4×4, and these into tasks.
 
 use crate::conv::product::{LANES, padded};
 use crate::winograd::{AREA, OUT};
 use std::ops::{Range, RangeInclusive};
 
-/// Transformed inputs and products of a part of the tiles, in floats: they stay near the core.
+/// Transformed inputs and products of a part of the tiles, in floats, so that they stay in a cache near the core.
 const PART_FLOATS: usize = 300_000;
-/// Tiles of a part: at least as many as make reading the transformed weights pay.
+/// Number of tiles in a part; at least enough to make up for reading the transformed weights.
 const PART_TILES: RangeInclusive<usize> = 48..=192;
-/// Tasks below which the output channels are shared out too, so that no core waits.
+/// If there are fewer tasks, the output channels are also divided among tasks, so that no core is idle.
 const TASKS: usize = 4;
 
 /// The tiles of a batch.
@@ -27,7 +27,7 @@ pub(super) struct Run {
     pub(super) y: usize,
     pub(super) x: usize,
     pub(super) tiles: usize,
-    /// The first tile's number in its task.
+    /// Index of the first tile in its task.
     pub(super) at: usize,
 }
 
@@ -44,7 +44,7 @@ impl Grid {
         self.images * self.down * self.across
     }
 
-    /// The tiles and output channels of every task; cut by sizes alone.
+    /// The tiles and output channels of every task; they depend on sizes only.
     pub(super) fn tasks(self, channels: usize, rows: usize) -> Vec<(Range<usize>, Range<usize>)> {
         let parts = self.parts(channels + rows);
         let groups = TASKS.div_ceil(parts.len());
@@ -58,17 +58,17 @@ impl Grid {
         tasks
     }
 
-    /// Whether tiles, those that reach beyond an edge included, take at most half of the products of plain sums.
+    /// Whether the tiles, including those that extend beyond an edge, need at most half of the products of plain sums.
     pub(super) fn saves_half(self, (height, width): (usize, usize)) -> bool {
         2 * AREA * self.count() <= 9 * self.images * height * width
     }
 
-    /// All tiles in parts, where a tile takes `channels` transformed values of each product: whole rows of tiles, or
-    /// pieces of rows that are longer than a part.
+    /// All tiles in parts, where a tile has `channels` transformed values for each product: whole rows of tiles, or pieces of rows that are
+    /// longer than a part.
     pub(super) fn parts(self, channels: usize) -> Vec<Range<usize>> {
         let all = self.count();
         let most = (PART_FLOATS / (AREA * channels)).clamp(*PART_TILES.start(), *PART_TILES.end());
-        // What fills up the last vector is computed in vain.
+        // Results for the padding of the last vector are discarded.
         let waste = |rows: &usize| {
             let tiles = rows * self.across;
             (padded(tiles) * 1000 / tiles, usize::MAX - rows)
@@ -81,7 +81,7 @@ impl Grid {
             .collect()
     }
 
-    /// A task's tiles, row by row.
+    /// The runs of a task's tiles, row by row.
     pub(super) fn runs(self, tiles: Range<usize>) -> Vec<Run> {
         let (start, mut next, mut runs) = (tiles.start, tiles.start, Vec::new());
         while next < tiles.end {

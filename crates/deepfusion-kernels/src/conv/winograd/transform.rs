@@ -7,20 +7,20 @@ use pulp::{Simd, WithSimd};
 /// Reads a vector.
 ///
 /// # Safety
-/// It must lie within what `from` points into.
+/// It must be within the memory that `from` points into.
 #[inline(always)]
 pub(super) unsafe fn load<S: Simd>(from: *const f32, at: usize) -> S::f32s {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { from.add(at).cast::<S::f32s>().read_unaligned() }
 }
 
 /// Writes a vector.
 ///
 /// # Safety
-/// As [`load`]; nobody else may use that place.
+/// As for [`load`]; nobody else may use that memory.
 #[inline(always)]
 pub(super) unsafe fn store<S: Simd>(to: *mut f32, at: usize, value: S::f32s) {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { to.add(at).cast::<S::f32s>().write_unaligned(value) }
 }
 
@@ -42,11 +42,11 @@ fn kernel_axis<S: Simd>(simd: S, g: [S::f32s; 3]) -> [S::f32s; IN] {
     ]
 }
 
-/// Bᵀ d B of the tiles of one channel: `to[p·to_pitch + t]` of `from[p·pitch + t]`, p = 6·row + column.
+/// Bᵀ d B of the tiles of one channel: `to[p·to_pitch + t]` from `from[p·pitch + t]`, p = 6·row + column.
 pub(super) struct TransformInputs<'a> {
     pub(super) from: &'a [f32],
     pub(super) pitch: usize,
-    /// Tiles, a multiple of [`LANES`].
+    /// Number of tiles, a multiple of [`LANES`].
     pub(super) tiles: usize,
     pub(super) to: &'a mut [f32],
     pub(super) to_pitch: usize,
@@ -85,11 +85,11 @@ impl WithSimd for TransformInputs<'_> {
     }
 }
 
-/// Aᵀ m A and `bias` for the tiles of one output channel: `to[(4·row + column)·to_pitch + t]` of `from[p·pitch + t]`.
+/// Aᵀ m A plus `bias` for the tiles of one output channel: `to[(4·row + column)·to_pitch + t]` from `from[p·pitch + t]`.
 pub(super) struct TransformOutputs<'a> {
     pub(super) from: &'a [f32],
     pub(super) pitch: usize,
-    /// Tiles, a multiple of [`LANES`].
+    /// Number of tiles, a multiple of [`LANES`].
     pub(super) tiles: usize,
     pub(super) bias: f32,
     pub(super) to: &'a mut [f32],
@@ -131,7 +131,7 @@ impl WithSimd for TransformOutputs<'_> {
     }
 }
 
-/// G g Gᵀ of [`LANES`] kernels: `to[p][lane]` of `taps[tap][lane]`.
+/// G g Gᵀ of [`LANES`] kernels: `to[p][lane]` from `taps[tap][lane]`.
 pub(super) struct TransformKernels<'a> {
     pub(super) taps: &'a [[f32; LANES]; 9],
     pub(super) to: &'a mut [[f32; LANES]; AREA],

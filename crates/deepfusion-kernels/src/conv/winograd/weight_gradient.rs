@@ -1,5 +1,5 @@
-//! The weight gradient by the same products: ∂g = Gᵀ [ Σ (A ∂Y Aᵀ) ⊙ (Bᵀ d B) ] G, the transpose of the forward form.
-//! The sums over tiles are 36 matrix products. Parts and groups are cut by sizes alone, and added in order.
+//! The weight gradient by the same products: ∂g = Gᵀ [ Σ (A ∂Y Aᵀ) ⊙ (Bᵀ d B) ] G, the transpose of the forward form. The sums over tiles
+//! are 36 matrix products. Parts and groups depend on sizes only, and are added in order.
 
 use super::backward_transform::{TransformGradients, TransformTaps};
 use super::image::Image;
@@ -12,10 +12,10 @@ use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Tiles of a batch below which plain sums are as fast.
+/// Number of tiles of a batch below which plain sums are as fast.
 const FEWEST_TILES: usize = 32;
-/// Input channels below which transforming the output gradients takes as long as is saved: with 8 the form takes 0.84 of the time of plain sums,
-/// with 4 already 0.95 (to 16 outputs, 320×96).
+/// Number of input channels below which transforming the output gradients takes as long as it saves. With 8, this form takes 0.84 of the
+/// time of plain sums, with 4 already 0.95 (with 16 outputs, at 320×96).
 const FEWEST_CHANNELS: usize = 8;
 
 /// A weight gradient as sums over the tiles of a batch.
@@ -30,7 +30,7 @@ pub(in crate::conv) struct WeightGradient<'a> {
     pub(in crate::conv) out: (usize, usize),
 }
 
-/// Neighbouring tiles, and their output gradients transformed: `values[p·pitch + t·outputs + o]`.
+/// Neighbouring tiles, and their transformed output gradients: `values[p·pitch + t·outputs + o]`.
 struct TileBlock<'a> {
     runs: Vec<Run>,
     tiles: usize,
@@ -38,7 +38,7 @@ struct TileBlock<'a> {
 }
 
 impl WeightGradient<'_> {
-    /// Whether this form is faster than plain sums, by `benches/conv.rs`.
+    /// Whether this form is faster than plain sums, according to `benches/conv.rs`.
     pub(in crate::conv) fn pays(&self) -> bool {
         let grid = self.grid();
         self.source.channels >= FEWEST_CHANNELS
@@ -57,7 +57,7 @@ impl WeightGradient<'_> {
         9 * channels * padded(self.outputs)
     }
 
-    /// Sums of all channels over some parts, to `to`, taps × outputs.
+    /// Writes the sums of all channels over some parts to `to`, taps × outputs.
     pub(in crate::conv) fn over(&self, parts: &[Range<usize>], to: &mut [f32]) {
         let all = 0..self.source.channels;
         self.summed(all, to, |add| {
@@ -99,7 +99,7 @@ impl WeightGradient<'_> {
         Grid::new(self.source.images, self.out)
     }
 
-    /// Values between the products of a part's transformed gradients, not whole pages apart.
+    /// Number of values from one product of a part's transformed gradients to the next; not a multiple of whole pages.
     fn pitch(&self, tiles: usize) -> usize {
         tiles * padded(self.outputs) + LANES
     }
@@ -134,7 +134,7 @@ impl WeightGradient<'_> {
         }
     }
 
-    /// The lines of a run's output gradients with their channels side by side; zero outside the image.
+    /// The lines of a run's output gradients with interleaved channels; zero outside the image.
     fn transposed(&self, run: &Run, outputs: usize, lines: &mut [f32]) {
         let (height, width) = self.out;
         let count = (OUT * run.tiles).min(width - run.x);
@@ -155,7 +155,7 @@ impl WeightGradient<'_> {
         }
     }
 
-    /// Lets `each` add parts to the sums of `channels`, and writes these to `to`, taps × outputs.
+    /// `each` adds parts to the sums of `channels`, which are then written to `to`, taps × outputs.
     fn summed(
         &self,
         channels: Range<usize>,

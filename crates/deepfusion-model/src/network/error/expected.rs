@@ -4,71 +4,69 @@
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpectedNetworkSetting {
-    /// A number from 1 to this.
+    /// A number from 1 to the given one.
     #[error("1 to {0}")]
     UpTo(usize),
     /// One of two numbers.
     #[error("{0} or {1}")]
     Either(usize, usize),
-    /// A number that has a half.
+    /// An even number.
     #[error("an even number, 2 to {0}")]
     EvenUpTo(usize),
-    /// A number that has a middle.
+    /// An odd number.
     #[error("odd, at most {0}")]
     OddUpTo(usize),
-    /// The frames of a depth network.
-    #[error("1 (a depth network sees one image)")]
+    /// Number of images that a depth network reads.
+    #[error("1 (a depth network reads one image)")]
     OneImage,
-    /// The frames of a pose network.
-    #[error("2 (a pose network sees a pair)")]
+    /// Number of images that a pose network reads.
+    #[error("2 (a pose network reads a pair)")]
     Pair,
-    /// The factors of the last stage's dilations.
+    /// Factors of the dilations in a ResNet's last layer.
     #[error("three factors of 1 to 16")]
     MultiGrid,
-    /// The dilations of the context encoding.
+    /// Dilations of the context encoding.
     #[error("up to eight rates of 1 to 64")]
     Rates,
-    /// Those of a Lite-Mono's stages.
-    #[error("for each of three stages up to 64 rates of 1 to 64")]
+    /// Dilations of Lite-Mono's stages.
+    #[error("up to 64 rates of 1 to 64 for each of three stages")]
     RatesOfStages,
     /// Channels of the decoder's stages.
     #[error("five widths of 1 to 4096")]
     FiveWidths,
     /// Channels of the flow decoder.
-    #[error("one width or more, of 1 to 4096")]
+    #[error("at least one width of 1 to 4096")]
     OneWidth,
     /// Channels of a Lite-Mono's stages.
-    #[error("three even widths of 2 to 2048, multiples of the {heads} heads")]
+    #[error("three even widths of 2 to 2048, multiples of the number of heads ({heads})")]
     WidthsOfHeads {
-        /// Heads of its attention.
+        /// Number of attention heads.
         heads: usize,
     },
-    /// A length that one unit stands for.
+    /// Metres per unit of PoseNet's translation.
     #[error("a positive number of metres")]
     Metres,
     /// Two depths, the smaller one first.
     #[error("0 < min_m < max_m, finite")]
     DepthRange,
-    /// A depth of the network's range.
-    #[error("between {min_m} and {max_m} m, the ends of the range")]
+    /// A depth within the network's range.
+    #[error("within the range, {min_m} to {max_m} m")]
     InRange {
-        /// The smallest of the range, metres.
+        /// Smallest depth of the range in metres.
         min_m: f64,
-        /// The largest, metres.
+        /// Largest depth of the range in metres.
         max_m: f64,
     },
-    /// The output stride of a network with explainability masks.
-    #[error("32 where explainability is on")]
+    /// Output stride of a network with explainability masks.
+    #[error("32 if explainability is on")]
     StrideOfMasks,
-    /// What the network has another part for.
-    #[error(
-        "left as it is where there is a lite_mono, an r_msfm or a disp_net, which do not read it"
-    )]
+    /// A part of a ResNet's network, beside a network that does not read it.
+    #[error("its default, as lite_mono, r_msfm and disp_net do not read it")]
     NotRead,
-    /// What does not go with R-MSFM.
-    #[error("absent where there is an r_msfm")]
+    /// A part that R-MSFM cannot have.
+    #[error("absent if r_msfm is given")]
     NotBesideRMsfm,
-    /// What does not go with SfMLearner's network.
-    #[error("absent where there is a disp_net")]
+    /// A part that SfMLearner's network cannot have.
+    #[error("absent if disp_net is given")]
     NotBesideDispNet,
 }
