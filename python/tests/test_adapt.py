@@ -29,7 +29,7 @@ def test_what_gets_no_worse_is_kept_and_can_be_undone(street, tmp_path):
     assert not np.array_equal(found.load().predict(frame.image, frame.intrinsics).depth, given)
     found.undo()
     assert np.array_equal(depth(found.path), given)
-    with pytest.raises(deepfusion.DeepFusionError, match="undone already"):
+    with pytest.raises(deepfusion.DeepFusionError, match="already undone"):
         found.undo()
 
 

@@ -453,7 +453,7 @@ mod tests {
         let path = "mine.refused".into();
         assert_eq!(
             CliError::NothingJudged { path }.to_string(),
-            "not kept: the held-out frames can no longer judge it; moved to mine.refused"
+            "not kept: the held-out frames can no longer be used to judge it; moved to mine.refused"
         );
     }
 }

@@ -87,7 +87,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
     }
     let text = fs::read_to_string(at.join("table/table.txt")).unwrap();
     assert!(
-        text.contains("measured on the recordings trained on"),
+        text.contains("evaluated on the training recordings"),
         "{text}"
     );
 }

@@ -84,7 +84,7 @@ fn what_gets_no_worse_is_kept_and_can_be_undone() {
     ok(at, "adapt --undo mine");
     assert_eq!(depth_of(at, "mine", "undone"), given);
     assert!(at.join("mine/adapted-last.safetensors").exists());
-    fails(at, "adapt --undo mine", &["mine", "undone already"]);
+    fails(at, "adapt --undo mine", &["mine", "already undone"]);
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     // A run by its settings is not the mean of anything, and goes on.
     let from = format!("{train} --config mean/config.toml --data third");
     let went_on = ok(at, &format!("{from} --init mean --out on"));
-    assert!(!went_on.stderr.contains("of a mean"), "{}", went_on.stderr);
+    assert!(!went_on.stderr.contains("to a mean"), "{}", went_on.stderr);
     // Else it would be the first network's run again.
     fails(
         at,
@@ -101,17 +101,17 @@ fn a_mean_of_runs_is_a_run_that_has_seen_what_they_saw() {
     fails(
         at,
         "weights average a street --out no",
-        &["street: has other layers", "hint:"],
+        &["street: its layers differ", "hint:"],
     );
     fails(
         at,
         "weights average street a --out no",
-        &["street", "must be a run's"],
+        &["street", "expected a run"],
     );
     fails(
         at,
         "weights average a b --out mean",
-        &["mean: is not empty"],
+        &["mean: the folder is not empty"],
     );
     ok(
         at,

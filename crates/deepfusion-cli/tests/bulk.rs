@@ -198,7 +198,8 @@ fn an_image_of_extreme_size_is_warned_of() {
     let predict = |input: &str, out: &str| {
         let args = format!("predict odd/{input} --model tiny --save npy --out {out}");
         let said = ok(at, &args).stderr;
-        let about = |line: &&str| line.contains("WARN") && line.contains("learned from nothing");
+        let about =
+            |line: &&str| line.contains("WARN") && line.contains("not trained on such images");
         said.lines().filter(about).count()
     };
     assert_eq!(predict("c.png", "fits"), 0);

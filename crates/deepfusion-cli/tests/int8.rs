@@ -86,7 +86,7 @@ fn a_network_is_calibrated_and_measured_in_int8() {
     fails(
         at,
         &format!("{CALIBRATE} --model run sim --most-deviation 0"),
-        &["int8", "what was calibrated before stays"],
+        &["int8", "an earlier calibration stays"],
     );
     ok(at, &format!("{CALIBRATE} --model run sim"));
     ok(at, &format!("{eval} int8"));

@@ -183,7 +183,7 @@ fn depth_of_a_stream_stops_where_it_is_told() {
         let odd = piped(at, &args, stream_of((960, 64), 3));
         assert_eq!(odd.code, 0, "{}", odd.stderr);
         let about = odd.stderr.lines();
-        let about = about.filter(|line| line.contains("learned from nothing"));
+        let about = about.filter(|line| line.contains("not trained on such images"));
         assert_eq!(about.count(), 1, "{}", odd.stderr);
     }
 }
@@ -326,7 +326,11 @@ fn a_folder_in_which_a_run_is_at_work_is_left_alone() {
         "perceive a.png",
     ] {
         let args = format!("{command} --model tiny {CAMERA} --overwrite --out seen");
-        fails(at, &args, &["at work there", "choose another folder"]);
+        fails(
+            at,
+            &args,
+            &["already writing to this folder", "choose another folder"],
+        );
     }
     for file in written {
         assert_eq!(std::fs::read(out.join(file)).unwrap(), b"{}\n", "{file}");

@@ -348,7 +348,7 @@ fn what_is_wrong_is_named() {
         [
             "wrong.toml",
             "unknown field `min_pixel`",
-            "hint: mend what is named there",
+            "hint: correct the setting",
             "max_depth_m"
         ]
         .iter()

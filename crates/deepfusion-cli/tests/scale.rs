@@ -93,7 +93,7 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
     fails(
         at,
         &format!("predict --model run {images} --camera-height 1.6 --out none"),
-        &["an image stands for itself", "--camera-height", "hint:"],
+        &["a single image has no motion", "--camera-height", "hint:"],
     );
     fails(
         at,

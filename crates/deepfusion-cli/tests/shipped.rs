@@ -155,7 +155,7 @@ fn a_packed_network_stands_for_its_run() {
     fails(
         at,
         "weights pack --model packed/hut.safetensors --name x --out y",
-        &["packed already"],
+        &["already packed"],
     );
     fails(
         at,

@@ -42,20 +42,20 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
         assert_eq!(found, 1, "{part}: {}", printed.stderr);
     };
     warned(
-        "part.txt: 3 of its 5 frames are there (60.0 %), the first that is not: 2026_01_01/2026_01_01_drive_0009_sync 0 l",
+        "part.txt: found 3 of 5 frames (60.0 %); the first missing one is 2026_01_01/2026_01_01_drive_0009_sync 0 l",
     );
-    warned("part.txt: 2 of its 5 frames have ground truth (40.0 %)");
+    warned("part.txt: 2 of 5 frames have ground truth (40.0 %)");
     let report = json(at, &format!("{eval} --split part.txt --json"));
     assert_eq!((&report["n"], &report["expected"]), (&2.into(), &5.into()));
     fails(
         at,
         &format!("{eval} --split part.txt --strict"),
-        &["part.txt", "3 of its 5 frames"],
+        &["part.txt", "only 3 of 5 frames"],
     );
     fails(
         at,
         &format!("{eval} --split bare.txt --strict"),
-        &["bare.txt", "2 of its 3 frames have ground truth"],
+        &["bare.txt", "only 2 of 3 frames have ground truth"],
     );
     let whole = run(at, &format!("{eval} --split whole.txt --strict"));
     assert_eq!(whole.code, 0, "{}", whole.stderr);
@@ -72,7 +72,7 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
         (&2.into(), &5.into())
     );
     assert!(
-        printed.stderr.contains("3 of its 5 frames are there"),
+        printed.stderr.contains("found 3 of 5 frames"),
         "{}",
         printed.stderr
     );
@@ -135,7 +135,7 @@ fn validation_frames_that_are_learned_from_are_refused() {
     let next = ok(at, &train("--split train.txt --val-split next.txt --out d"));
     assert!(
         next.stderr
-            .contains("drive_0003_sync: 1 of its validation frames is a neighbour"),
+            .contains("drive_0003_sync: 1 validation frame is a neighbour"),
         "{}",
         next.stderr
     );

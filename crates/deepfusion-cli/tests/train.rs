@@ -39,7 +39,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     fails(
         at,
         "train --out run --resume --steps 2",
-        &["made 3 steps already", "more than 3 steps"],
+        &["already made 3 steps", "more than 3 steps"],
     );
     let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
     assert!(config.contains("\nsteps = 3\n"), "{config}");
@@ -530,7 +530,7 @@ fn a_run_is_gone_on_with_by_one_process_at_a_time() {
     let kept = fs::read(at.join("run/config.toml")).unwrap();
     let at_work = deepfusion_fs::FolderLock::take(&at.join("run")).unwrap();
     let resume = "train --out run --resume --steps 2";
-    fails(at, resume, &["run", "another process is at work"]);
+    fails(at, resume, &["run", "another process is already writing"]);
     assert_eq!(fs::read(at.join("run/config.toml")).unwrap(), kept);
     drop(at_work);
     ok(at, resume);

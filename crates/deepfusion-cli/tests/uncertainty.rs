@@ -120,19 +120,19 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
     for (command, names) in [
         (
             "predict --model plain other --save sigma --out no",
-            ["does not say how sure", "sigma"],
+            ["does not predict uncertainty", "sigma"],
         ),
         (
             "predict --model plain other --save confidence --out no",
-            ["does not say how sure", "confidence"],
+            ["does not predict uncertainty", "confidence"],
         ),
         (
             "eval --model plain --data other --calibrate-uncertainty",
-            ["does not say how sure", "uncertainty"],
+            ["does not predict uncertainty", "uncertainty"],
         ),
         (
             "predict --model plain other --save ply --max-sigma 0.2 --out no",
-            ["does not say how sure", "--max-sigma"],
+            ["does not predict uncertainty", "--max-sigma"],
         ),
     ] {
         fails(at, command, &names);
@@ -214,7 +214,7 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
     fs::write(&kept, good.replacen("step = ", "step = 9", 1)).unwrap();
     let stale = ok(at, "predict --model sure sim --save sigma --out stale");
     assert!(
-        stale.stderr.contains("found for the network of step 9"),
+        stale.stderr.contains("measured for the network at step 9"),
         "{}",
         stale.stderr
     );

@@ -1,4 +1,4 @@
-//! What the system says of a file or folder.
+//! Why a file or folder could not be used, as the system reports it.
 
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -17,18 +17,18 @@ pub enum FileError {
         /// The path given.
         path: PathBuf,
     },
-    /// The system gave another reason.
+    /// The system gave another error.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
 }
 
 impl FileError {
-    /// An error of the system's at `path`.
+    /// The system's error `source` at `path`.
     #[must_use]
     pub fn new(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
@@ -38,7 +38,7 @@ impl FileError {
         }
     }
 
-    /// The same error with `to` in place of `from` in its path: what was written aside is gone when the error is read.
+    /// The same error with `from` replaced by `to` at the start of its path. When the error is read, the temporary file is gone.
     #[must_use]
     pub fn moved(mut self, from: &Path, to: &Path) -> Self {
         let (Self::NoSuchPath { path } | Self::Io { path, .. }) = &mut self;

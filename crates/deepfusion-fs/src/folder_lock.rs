@@ -1,24 +1,25 @@
-//! A folder that one process at a time works in.
+//! A lock on a folder that only one process may work in.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
-/// Held while a folder is worked in, so that nobody else does. The system frees it with the process, however that ends.
+/// A lock on a folder: while it is held, no other process works in it. The system releases it when the process ends, however that happens.
 ///
-/// It is the folder itself that is locked: no file is added to it, and one that is renamed stays locked. Elsewhere than on Unix, where a folder is
-/// not opened as a file, nothing is locked.
+/// The folder itself is locked: no file is added to it, and it stays locked if it is renamed. Except on Unix, a folder cannot be opened as
+/// a file, and nothing is locked.
 #[derive(Debug)]
 pub struct FolderLock {
     folder: Option<File>,
-    /// The process that took it.
+    /// Id of the process that took the lock.
     process: u32,
 }
 
 impl FolderLock {
-    /// Takes the lock of a folder that is there.
+    /// Takes the lock of an existing folder.
     ///
     /// # Errors
-    /// [`TryLockError::WouldBlock`] where another has it; else what the system says: some network file systems do not lock folders.
+    /// [`TryLockError::WouldBlock`] if another process holds it; otherwise the system's error: some network file systems do not lock
+    /// folders.
     pub fn take(folder: &Path) -> Result<Self, TryLockError> {
         if !cfg!(unix) {
             return Ok(Self::of(None));
@@ -37,12 +38,13 @@ impl FolderLock {
 }
 
 impl Drop for FolderLock {
-    /// The children of a fork hold the same lock: closed here, it would last as long as they do, and closed there, it goes on here.
+    /// Unlocks explicitly, and only in the process that took the lock. Forked children share it: if the parent only closed its file, the
+    /// lock would last until they end, and a child that unlocked it would release the parent's.
     fn drop(&mut self) {
         if let Some(folder) = &self.folder
             && self.process == std::process::id()
         {
-            // What cannot be unlocked is freed with the last process that has it.
+            // If it cannot be unlocked, the last process that has the file open releases it.
             let _ = folder.unlock();
         }
     }

@@ -1,4 +1,4 @@
-//! Whether a folder is as empty as a writer wants it.
+//! Checks that a folder is empty before something is written into it.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -9,19 +9,19 @@ use deepfusion_hint::Hint;
 use crate::partial::Partial;
 use crate::partial_folder::{PartialFolder, folder_of_lock};
 
-/// What a folder holds that was to be empty.
+/// What was found in a folder that should be empty.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum InTheWay {
-    /// Files or folders.
+    /// Visible or other hidden files or folders.
     Content,
-    /// Nothing that is seen.
+    /// Only hidden temporary files or folders of a writer.
     Unfinished(Unfinished),
 }
 
-/// Why a folder that looks empty is not: a hidden file or folder, this one, that a writer is writing, or left when it died, and which cannot be
-/// removed or is another machine's.
+/// A hidden file or folder in an otherwise empty folder. A writer is still writing it, or left it behind when it died. It could not be
+/// removed, or another machine wrote it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}: the output folder is not empty: a writer left this in it, or is still writing it", path.display())]
+#[error("{}: the output folder is not empty: a program left this behind or is still writing it", path.display())]
 pub struct Unfinished {
     /// The hidden file or folder.
     pub path: PathBuf,
@@ -29,15 +29,15 @@ pub struct Unfinished {
 
 impl Hint for Unfinished {
     fn hint(&self) -> Option<String> {
-        Some("if no program is writing there, remove it, and the file of its name with .lock; or choose another folder".into())
+        Some("if no program is writing it, remove it and the file of the same name with .lock, or choose another folder".into())
     }
 }
 
-/// Removes what writers that died left in a folder ([`PartialFolder::remove_leftovers`]), and says whether something is in it still; there may be
-/// no such folder.
+/// Removes what dead writers left in a folder ([`PartialFolder::remove_leftovers`]), and returns what is still in it. The folder need not
+/// exist.
 ///
 /// # Errors
-/// The system's error where it cannot be read.
+/// The system's error if the folder cannot be read.
 pub fn in_the_way(folder: &Path) -> io::Result<Option<InTheWay>> {
     PartialFolder::remove_leftovers(folder);
     let entries = match fs::read_dir(folder) {
@@ -51,7 +51,7 @@ pub fn in_the_way(folder: &Path) -> io::Result<Option<InTheWay>> {
         if !is_aside {
             return Ok(Some(InTheWay::Content));
         }
-        // The first by name, and so a folder before its lock's file.
+        // The first by name, so that a folder comes before its lock file.
         if unfinished.as_ref().is_none_or(|first| path < *first) {
             unfinished = Some(path);
         }

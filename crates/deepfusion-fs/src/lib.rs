@@ -1,5 +1,5 @@
-//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut. And the order of names with numbers in them, and
-//! [`FileError`]: what the system says of a file.
+//! Atomic writes: a file or folder is complete or absent, even after a crash or a power cut. Also the order of names with numbers in them,
+//! and [`FileError`]: why a file could not be used.
 
 mod content;
 mod file_error;

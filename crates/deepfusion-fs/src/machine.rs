@@ -1,8 +1,8 @@
-//! Which machine this is: on a file system that machines share, one may not see what another has locked.
+//! Identifies the machine: on a shared file system, one machine may not see what another has locked.
 
 use std::fs;
 
-/// A machine from its start to its end: its name, and a number that it draws at each start. Empty where the system does not say.
+/// A machine from one start to the next: its name, and a random number drawn at each start. Empty if the system does not provide them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Machine {
     name: String,
@@ -10,7 +10,7 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    /// The one that this process runs on.
+    /// The machine that this process runs on.
     pub(crate) fn this() -> Self {
         let said = |path: &str| {
             let text = fs::read_to_string(path).unwrap_or_default();
@@ -18,7 +18,7 @@ impl Machine {
         };
         let mut name = said("/proc/sys/kernel/hostname");
         if name.is_empty() {
-            // Windows has it there.
+            // Windows has the name there.
             name = std::env::var("COMPUTERNAME").unwrap_or_default();
         }
         Self {
@@ -27,12 +27,12 @@ impl Machine {
         }
     }
 
-    /// A line for each.
+    /// The text form: one line for each field.
     pub(crate) fn to_text(&self) -> String {
         format!("{}\n{}\n", self.name, self.boot)
     }
 
-    /// `None` of a text that is not whole.
+    /// Reads [`Self::to_text`]; `None` if the text is incomplete.
     pub(crate) fn from_text(text: &str) -> Option<Self> {
         let mut lines = text.split_terminator('\n').map(str::to_owned);
         Some(Self {
@@ -41,8 +41,8 @@ impl Machine {
         })
     }
 
-    /// Whether a process of `other` that is alive would be known here by its lock: both are under one kernel, as containers are, or `other` is this
-    /// machine before it was started again, and its processes have ended.
+    /// Whether locks held by living processes of `other` are visible on this machine. They are if both run under one kernel, as containers
+    /// do, or if `other` is this machine before a restart, whose processes have ended.
     pub(crate) fn sees_locks_of(&self, other: &Self) -> bool {
         let same_start = !self.boot.is_empty() && self.boot == other.boot;
         let same_name = is_own_name(&self.name) && self.name == other.name;
@@ -50,7 +50,7 @@ impl Machine {
     }
 }
 
-/// Whether a name tells a machine from others.
+/// Whether a name distinguishes a machine from others.
 fn is_own_name(name: &str) -> bool {
     !name.is_empty() && !name.starts_with("localhost") && name != "(none)"
 }
@@ -79,7 +79,7 @@ mod tests {
         ] {
             assert_eq!(this.sees_locks_of(&other), expected, "{other:?}");
         }
-        // Where nothing is known, and where the name is everybody's.
+        // Nothing is known, and a name that many machines have.
         assert!(machine("", "").sees_locks_of(&machine("", "")));
         assert!(!machine("", "").sees_locks_of(&this));
         assert!(!machine("localhost", "1").sees_locks_of(&machine("localhost", "2")));

@@ -1,4 +1,4 @@
-//! Folders that are made for something, and go again if nothing comes of it.
+//! Folders that are made for an output, and removed if nothing is written into them.
 
 use std::fs;
 use std::io;
@@ -6,33 +6,33 @@ use std::path::{Path, PathBuf};
 
 use crate::sync::{folder_of, sync_folder};
 
-/// Folders that were made, the innermost first. Dropped, it removes those in which nothing is, unless they were [kept](Self::keep).
+/// Folders that were made, innermost first. When dropped, it removes the empty ones, unless they were [kept](Self::keep).
 #[derive(Debug, Default)]
 pub(crate) struct MadeFolders(Vec<PathBuf>);
 
 impl MadeFolders {
-    /// Makes a folder, and those around it that are not there.
+    /// Makes a folder and its missing parents.
     pub(crate) fn make(folder: &Path) -> io::Result<Self> {
         let missing: Vec<&Path> = folder
             .ancestors()
             .take_while(|around| !around.as_os_str().is_empty() && !around.exists())
             .collect();
-        // Grows as they are made: what is made before one that cannot be is removed, too, and what was there is not.
+        // Filled one by one: if a folder cannot be made, those made before it are removed. Existing ones stay.
         let mut made = Self::default();
         for around in missing.into_iter().rev() {
             match fs::create_dir(around) {
                 Ok(()) => made.0.insert(0, around.to_owned()),
-                // Another process was quicker, or it is there by way of `..`.
+                // Another process was quicker, or the folder exists by way of `..`.
                 Err(_) if around.is_dir() => {}
                 Err(error) => return Err(error),
             }
         }
-        // The error where a file is in its place.
+        // Fails with the right error if a file is in its place.
         fs::create_dir_all(folder)?;
         Ok(made)
     }
 
-    /// They stay, and their names are on the disk once this returns.
+    /// Keeps the folders. When this returns, their names are on the disk.
     pub(crate) fn keep(&mut self) -> io::Result<()> {
         std::mem::take(&mut self.0)
             .iter()
@@ -43,7 +43,7 @@ impl MadeFolders {
 impl Drop for MadeFolders {
     fn drop(&mut self) {
         for made in &self.0 {
-            // Fails where there is something in it, and that is meant.
+            // Fails if the folder is not empty, as intended.
             let _ = fs::remove_dir(made);
         }
     }
@@ -67,14 +67,14 @@ mod tests {
         fs::write(there.join("a/x"), "x").unwrap();
         drop(made);
         assert!(there.join("a/x").exists() && !there.join("a/b").exists());
-        // There already, and only not seen until `a` is.
+        // It exists already, but is only visible once `a` is made.
         drop(MadeFolders::make(&there.join("new/../../there")).unwrap());
         assert!(there.is_dir());
         let mut made = MadeFolders::make(&folder).unwrap();
         made.keep().unwrap();
         drop(made);
         assert!(folder.is_dir());
-        // One that was there is nobody's to remove.
+        // A folder that existed before is not removed.
         drop(MadeFolders::make(&folder).unwrap());
         assert!(folder.is_dir());
     }

@@ -1,4 +1,4 @@
-//! Names that nobody has yet.
+//! Unused names for files and folders.
 
 use std::borrow::Cow;
 use std::collections::hash_map::RandomState;
@@ -7,14 +7,14 @@ use std::hash::{BuildHasher, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The longest part of a temporary name that stands for the target, in bytes. File systems have names of up to 255 bytes, of which the dots, a
-/// process's number, the chance, `.partial` and `.lock` take 42.
+/// The most bytes of the target's name in a temporary name. File systems allow names of up to 255 bytes, of which the dots, the process id,
+/// the random number, `.partial` and `.lock` take 42.
 const LONGEST: usize = 213;
 
-/// A hidden name beside `target` that nobody else has.
+/// A hidden, unused name beside `target`.
 pub(crate) fn temporary_name(target: &Path) -> PathBuf {
-    // Threads, processes, and machines that share the folder may write the same target: the last rename wins, whole. A
-    // process's number alone would come again after a kill, in a container every time.
+    // Threads, processes and machines that share the folder may write the same target: the last rename wins, with its whole file. A process
+    // id alone could recur after a kill; in a container it always does.
     let chance = RandomState::new().build_hasher().finish();
     let target_name = target.file_name().unwrap_or_default();
     let mut name = OsString::from(".");
@@ -27,7 +27,7 @@ pub(crate) fn temporary_name(target: &Path) -> PathBuf {
     target.with_file_name(name)
 }
 
-/// How a target's name stands in a temporary one: a name that leaves too little room is cut, and ends in a checksum of all of it.
+/// A target's name as used in a temporary name: one that is too long is cut, and ends in a checksum of the whole name.
 pub(crate) fn shortened(name: &str) -> Cow<'_, str> {
     if name.len() <= LONGEST {
         return Cow::Borrowed(name);
@@ -40,20 +40,20 @@ pub(crate) fn shortened(name: &str) -> Cow<'_, str> {
     Cow::Owned(format!("{}{checksum}", &name[..end]))
 }
 
-/// `path` with `to` in place of `from`, where it begins with that. For errors: they outlive the file that was written aside, and name its place.
+/// `path`, with `from` replaced by `to` if it begins with `from`. For errors: they outlive the temporary file, and should name its target.
 #[must_use]
 pub fn moved_path(path: PathBuf, from: &Path, to: &Path) -> PathBuf {
     let moved = path.strip_prefix(from).map(|rest| to.join(rest));
     moved.unwrap_or(path)
 }
 
-/// A path from the root. An empty one stays, and any one whose working directory is gone: opening it then says so.
+/// An absolute path. An empty path stays as it is, and so does any path if the working directory is gone: opening it then fails.
 #[must_use]
 pub fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// `path`, or `path-2`, `path-3` … where that is taken.
+/// `path`, or `path-2`, `path-3` … if that is taken.
 #[must_use]
 pub fn unused(path: &Path) -> PathBuf {
     numbered(path)
@@ -61,11 +61,11 @@ pub fn unused(path: &Path) -> PathBuf {
         .unwrap_or_else(|| path.to_owned())
 }
 
-/// Makes the folder `path`, or `path-2`, `path-3` … where that is taken, in a folder that is there. Of two processes that ask at once each has its
-/// own.
+/// Makes the folder `path`, or `path-2`, `path-3` … if that is taken; its parent must exist. Two processes that do this at the same time
+/// get different folders.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn create_unused(path: &Path) -> io::Result<PathBuf> {
     for folder in numbered(path) {
         match std::fs::create_dir(&folder) {
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(unused(&path), dir.path().join("run-3"));
     }
 
-    /// All that ask at once look before any of them makes its folder.
+    /// All threads look for a free name before any of them makes its folder.
     #[test]
     fn folders_that_are_made_at_once_are_each_ones_own() {
         let dir = tempfile::tempdir().unwrap();

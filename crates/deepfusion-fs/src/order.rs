@@ -3,15 +3,15 @@
 use std::cmp::Ordering;
 use std::path::{Component, Path};
 
-/// The order in which a person puts paths: folder by folder as paths are ordered, but the numbers in names by their values, so that
-/// `frame_2.png` is before `frame_10.png`. Digits behind a decimal point are a fraction: `0.15` is before `0.2`. Names whose numbers have as
-/// many digits are in the order of their bytes, as are those that differ in leading zeros alone.
+/// Orders paths as a person would: folder by folder, with the numbers in names compared by value, so that `frame_2.png` comes before
+/// `frame_10.png`. Digits after a decimal point are a fraction: `0.15` comes before `0.2`. Names with equally long numbers are ordered by
+/// their bytes, as are those that differ only in leading zeros.
 #[must_use]
 pub fn natural_order(a: &Path, b: &Path) -> Ordering {
     let (mut rest_a, mut rest_b) = (a.components(), b.components());
     loop {
         let order = match (rest_a.next(), rest_b.next()) {
-            // `a//b` and `a/b` are one path; what else is left differs in leading zeros.
+            // `a//b` and `a/b` are one path; any others that reach this point differ only in leading zeros.
             (None, None) => return a.cmp(b),
             (None, Some(_)) => Ordering::Less,
             (Some(_), None) => Ordering::Greater,
@@ -26,9 +26,9 @@ pub fn natural_order(a: &Path, b: &Path) -> Ordering {
     }
 }
 
-/// Two names, byte by byte, their numbers as numbers; equal where they differ in leading zeros alone.
+/// Compares two names byte by byte, but numbers by value; equal if they differ only in leading zeros.
 fn of_names(mut a: &[u8], mut b: &[u8]) -> Ordering {
-    // What both had last before the place: a number, or a point behind one.
+    // What precedes the current position in both: a number, or a point after a number.
     let (mut number, mut point) = (false, false);
     loop {
         let (digits_a, digits_b) = (digits(a), digits(b));
@@ -47,7 +47,7 @@ fn of_names(mut a: &[u8], mut b: &[u8]) -> Ordering {
             } else {
                 of_numbers(digits_a, digits_b)
             };
-            // A fraction has no point of its own.
+            // A fraction is not followed by a decimal point.
             (number, point) = (!point, false);
             (order, (digits_a.len(), digits_b.len()))
         };
@@ -62,13 +62,13 @@ fn of_names(mut a: &[u8], mut b: &[u8]) -> Ordering {
     }
 }
 
-/// The digits that a name begins with.
+/// The digits at the start of a name.
 fn digits(name: &[u8]) -> &[u8] {
     let count = name.iter().take_while(|b| b.is_ascii_digit()).count();
     &name[..count]
 }
 
-/// Two written whole numbers of any length.
+/// Compares two whole numbers of any length, written in digits.
 fn of_numbers(a: &[u8], b: &[u8]) -> Ordering {
     let (a, b) = (without_zeros(a), without_zeros(b));
     a.len().cmp(&b.len()).then_with(|| a.cmp(b))
@@ -107,7 +107,7 @@ mod tests {
                 "99999999999999999999999.png",
                 "100000000000000000000000.png",
             ],
-            // Of one value, as bytes.
+            // Equal value: by bytes.
             &["02.png", "2.png", "3.png"],
             &["a.png", "a1.png", "a1b.png", "aa.png"],
         ] {
@@ -130,7 +130,7 @@ mod tests {
         let mut wrong = names;
         wrong.reverse();
         assert_eq!(sorted(&wrong), names.map(PathBuf::from));
-        // A point behind letters is none of a number.
+        // A point after letters is not a decimal point.
         let names = ["frame.9.png", "frame.10.png"];
         assert_eq!(
             sorted(&["frame.10.png", "frame.9.png"]),
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(sorted(&names), right);
     }
 
-    /// No order is a circle, whatever the names.
+    /// The order has no cycles, whatever the names.
     #[test]
     fn the_order_is_total() {
         let parts = ["", "0", "1", "01", "10", ".", "a", "-", "/"];

@@ -8,15 +8,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::names::{shortened, temporary_name};
 use crate::sync::{folder_of, publish, sync_files, sync_folder};
 
-/// A temporary file beside its target, on the same file system, until the file is complete. It is removed on drop unless
-/// it was published, or is [to stay](Self::keep).
+/// A temporary file beside its target, on the same file system, until it is complete. It is removed on drop, unless it was published or
+/// [kept](Self::keep).
 #[derive(Debug)]
 pub struct Partial {
     temporary: PathBuf,
     target: PathBuf,
-    /// Whether readers know the temporary name, and an earlier writer may have left it.
+    /// Whether the temporary name is known to readers, so that an earlier writer may have left a file there.
     watched: bool,
-    /// Whether a drop removes what lies under the temporary name: not a file that somebody else made.
+    /// Whether drop removes the file with the temporary name; false if another writer made it.
     ours: AtomicBool,
 }
 
@@ -32,8 +32,8 @@ impl Partial {
         }
     }
 
-    /// The target's name with `.partial` behind it, for a file that readers watch while it grows. It has one writer at a time; what a killed one
-    /// left there is replaced. Nothing is created yet.
+    /// The target's name with `.partial` appended, for a file that readers watch while it grows. Only one writer at a time may use it; a
+    /// file left by a killed writer is replaced. Nothing is created yet.
     #[must_use]
     pub fn watched(target: &Path) -> Self {
         let mut name = target.file_name().unwrap_or_default().to_owned();
@@ -66,7 +66,7 @@ impl Partial {
         Ok(file)
     }
 
-    /// From now on the file stays where it is if it is not published: what it holds is worth more than nothing.
+    /// From now on the file stays even if it is not published: a part of it is better than nothing.
     pub fn keep(&self) {
         self.ours.store(false, Ordering::Relaxed);
     }
@@ -77,7 +77,7 @@ impl Partial {
     /// The system's error. If syncing the file or renaming failed, the target is unchanged.
     pub fn publish(self) -> io::Result<()> {
         publish(&self.temporary, &self.target)?;
-        // Under its old name may be the file of whoever writes it next.
+        // The next writer's file may already have the temporary name.
         self.keep();
         Ok(())
     }
@@ -90,7 +90,7 @@ impl Partial {
         std::fs::rename(&self.temporary, &self.target)
     }
 
-    /// The target's name ([as it stands there](Self::name_of)), if `path` is a temporary file or folder that a killed program left behind.
+    /// The target's name ([possibly cut](Self::name_of)), if `path` is a temporary file or folder that a killed program left behind.
     #[must_use]
     pub fn target_of(path: &Path) -> Option<&str> {
         let name = path.file_name()?.to_str()?;
@@ -99,7 +99,8 @@ impl Partial {
         process.contains('-').then_some(file)
     }
 
-    /// What [`Self::target_of`] gives of a target of this name: a long one is cut, so that the temporary name is not longer than names can be.
+    /// What [`Self::target_of`] returns for this target: a long name is cut, so that the temporary name does not exceed the limit of file
+    /// systems.
     #[must_use]
     pub fn name_of(target: &str) -> Cow<'_, str> {
         shortened(target)
@@ -115,12 +116,12 @@ impl Drop for Partial {
     }
 }
 
-/// Writes a temporary file, syncs it, renames it to `path` and syncs the folder: `path` never holds half a file, even
-/// after a power cut, and is durable once this returns. `failed` converts the system's error into the caller's.
+/// Writes a temporary file, syncs it, renames it to `path` and syncs the folder: `path` is never a part of a file, even after a power cut,
+/// and is durable once this returns. `failed` converts the system's error into the caller's.
 ///
 /// # Errors
-/// The error of `write`, or `failed` of the system's error. The temporary file is then removed and `path` is unchanged; only
-/// the last step, syncing the folder, may fail with the new file in place.
+/// The error of `write`, or `failed` of the system's error. The temporary file is then removed and `path` is unchanged; only if the last
+/// step, syncing the folder, fails is the new file in place.
 pub fn write_atomically<E>(
     path: &Path,
     failed: impl Fn(io::Error) -> E,
@@ -129,16 +130,16 @@ pub fn write_atomically<E>(
     write_aside(path, &failed, write)?.publish().map_err(failed)
 }
 
-/// [`write_atomically`] of bytes that are there already.
+/// [`write_atomically`] for bytes already in memory.
 ///
 /// # Errors
-/// What the system says; the partial file is then gone.
+/// The system's error; the temporary file is then removed.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     write_atomically(path, |e| e, |out| out.write_all(bytes.as_ref()))
 }
 
-/// As [`write_atomically`], without waiting for the disk: a reader never sees half a file, but after a power cut there may
-/// be one. For many files whose completion another file, written after [`crate::sync_files`], records.
+/// [`write_atomically`] without waiting for the disk: a reader never sees part of a file, but a power cut may leave one. For many files
+/// whose completion is recorded by another file, written after [`crate::sync_files`].
 ///
 /// # Errors
 /// As [`write_atomically`].
@@ -171,7 +172,7 @@ pub fn write_aside<E>(
 /// Publishes many files at once: waiting for the disk takes hardly longer than for one.
 ///
 /// # Errors
-/// The system's error. If syncing failed, no target was touched; if renaming failed, the targets before it are in place.
+/// The system's error. If syncing failed, no target was changed; if renaming failed, the targets before that one are in place.
 pub fn publish_all(partials: Vec<Partial>) -> io::Result<()> {
     sync_files(partials.iter().map(Partial::path))?;
     let mut folders = BTreeSet::new();
@@ -229,7 +230,7 @@ mod tests {
         .unwrap_err();
         assert!(error.to_string().contains("out of ideas"));
         assert!(names(dir.path()).is_empty());
-        // A folder in the way: the rename fails, and what was written aside goes.
+        // A folder is in the way: the rename fails, and the temporary file is removed.
         std::fs::create_dir(&path).unwrap();
         std::fs::write(path.join("x"), "x").unwrap();
         write_atomically(&path, |e| e, |out| out.write_all(b"whole")).unwrap_err();
@@ -243,7 +244,7 @@ mod tests {
         assert_eq!(error.kind(), io::ErrorKind::NotFound);
     }
 
-    /// A file in the current folder has no folder in its path; that folder must be synced all the same.
+    /// The path of a file in the current folder names no folder; that folder must still be synced.
     #[test]
     fn a_bare_name_is_of_this_folder() {
         let path = PathBuf::from(format!("bare-name-{}.txt", std::process::id()));
@@ -265,7 +266,7 @@ mod tests {
             let content = std::fs::read(dir.path().join(name)).unwrap();
             assert_eq!(content, name.as_bytes());
         }
-        // One whose file is gone: none of the others gets its name.
+        // If one file is missing, none of the others is renamed.
         let gone = aside("d");
         std::fs::remove_file(gone.path()).unwrap();
         publish_all(vec![aside("e"), gone]).unwrap_err();
@@ -275,7 +276,7 @@ mod tests {
         publish_all(Vec::new()).unwrap();
     }
 
-    /// What a killed program left behind must not be in the way of the next one, whatever its process id.
+    /// What a killed program left behind must not block the next one, whatever its process id.
     #[test]
     fn two_of_one_process_never_share_a_name() {
         let target = Path::new("out/a_depth.png");
@@ -311,7 +312,7 @@ mod tests {
         assert!(!target.exists());
         partial.publish().unwrap();
         assert_eq!(names(dir.path()), ["a.jsonl"]);
-        // One that is given up is gone, unless it is to stay; what was there before stays.
+        // An abandoned file is removed, unless it was kept; the earlier target stays.
         let partial = Partial::watched(&target);
         drop(partial.create().unwrap());
         drop(partial);
@@ -322,7 +323,7 @@ mod tests {
         partial.keep();
         drop(partial);
         assert!(known.exists());
-        // Another's, where nothing was created.
+        // Another writer's file, when this one created nothing.
         drop(Partial::watched(&target));
         assert!(known.exists());
     }

@@ -8,31 +8,30 @@ use crate::names::temporary_name;
 use crate::partial::Partial;
 use crate::sync::{folder_of, publish_folder, sync_folder, sync_tree};
 
-/// What the name of a lock's file ends in, after the partial folder's.
+/// The extension of a lock file, appended to the partial folder's name.
 const LOCK: &str = "lock";
 
-/// A new folder beside its destination, on the same file system, until it is complete: written into, then renamed by
-/// [`Self::commit`]. Dropped without that, it removes itself, so it also serves as a scratch folder.
+/// A new folder beside its destination, on the same file system. It is written into until it is complete, then renamed by [`Self::commit`].
+/// If it is dropped without that, it is removed, so it also serves as a scratch folder.
 ///
-/// Its name is hidden, and no other writer's. As long as it is there a file beside it is locked, of the same name with
-/// `.lock` behind it, that says on which machine its writer runs. A process that dies leaves both, without the lock, which is how
-/// [`Self::remove_leftovers`] knows them.
+/// Its name is hidden and unique. As long as it exists, a lock file is beside it, of the same name with `.lock` appended, which says on
+/// which machine the writer runs. A process that dies leaves both, unlocked: this is how [`Self::remove_leftovers`] recognises them.
 #[derive(Debug)]
 pub struct PartialFolder {
     folder: PathBuf,
     destination: PathBuf,
     /// Held as long as the folder is to be removed on drop.
     lock: Option<File>,
-    /// The folders around it that were made for it.
+    /// Parent folders that were made for it.
     made: MadeFolders,
 }
 
 impl PartialFolder {
-    /// An empty folder beside `destination`, in a folder that is made where there is none, with those around it, and is removed again if
-    /// nothing comes of it. What writers that died left there is removed first.
+    /// An empty folder beside `destination`. Missing parents are made, and removed again if the folder is not committed. What dead writers
+    /// left there is removed first.
     ///
     /// # Errors
-    /// The system's error, for instance if that folder cannot be written to.
+    /// The system's error, for instance if the parent folder is not writable.
     pub fn beside(destination: &Path) -> io::Result<Self> {
         let around = folder_of(destination);
         let made = MadeFolders::make(around)?;
@@ -43,21 +42,21 @@ impl PartialFolder {
         Ok(partial)
     }
 
-    /// A locked name without a folder. The lock comes first: a folder without one could not be told from a leftover.
+    /// A locked name without a folder. The lock comes first: a folder without a lock would look like a leftover.
     fn reserve(destination: &Path) -> io::Result<Self> {
         loop {
             let folder = temporary_name(destination);
             let path = lock_of(&folder);
             let mut lock = File::create_new(&path)?;
-            // A file system without locks is no reason to stop: there nobody can lock a leftover's, either, and all stay.
+            // A file system without locks is no reason to stop: there, no leftover can be locked either, so all of them stay.
             let is_taken = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
-            // Between making and locking it, another process may have taken it for a leftover's: then it is, or will be, gone.
+            // Between creating and locking the file, another process may have taken it for a leftover and removed it, or be about to.
             if is_taken || !path.exists() {
                 let _ = fs::remove_file(&path);
                 continue;
             }
             let written = lock.write_all(Machine::this().to_text().as_bytes());
-            // After a power cut it is to say whose it was; where that cannot be waited for, it may not.
+            // After a power cut the file should say which machine wrote it. If it cannot be synced, it may not.
             let _ = lock.sync_all();
             let partial = Self {
                 folder,
@@ -65,7 +64,7 @@ impl PartialFolder {
                 lock: Some(lock),
                 made: MadeFolders::default(),
             };
-            // From here on its drop removes the lock's file.
+            // From here on, dropping `partial` removes the lock file.
             return written.map(|()| partial);
         }
     }
@@ -76,8 +75,8 @@ impl PartialFolder {
         &self.folder
     }
 
-    /// Syncs the folder with all its content, renames it to its destination and syncs the folders around it. A destination that
-    /// exists and is not an empty folder stays as it is.
+    /// Syncs the folder with all its content, renames it to its destination and syncs the folders around it. An existing destination that
+    /// is not an empty folder stays as it is.
     ///
     /// # Errors
     /// The system's error, for instance [`ErrorKind::DirectoryNotEmpty`]. The destination is then unchanged; only the last step,
@@ -87,14 +86,14 @@ impl PartialFolder {
         self.made.keep()
     }
 
-    /// As [`Self::commit`], in place of a folder that is at the destination: that is renamed out of the way and removed once
-    /// the new one has its name. A process that dies between the two leaves nothing at the destination, never half a folder.
+    /// As [`Self::commit`], but replaces a folder at the destination: the old one is renamed out of the way and removed once the new one
+    /// has its name. A process that dies between the two leaves nothing at the destination, never part of a folder.
     ///
     /// # Errors
-    /// As [`Self::commit`]. Where the old folder cannot get its name back, it stays beside the destination, and the error names it.
+    /// As [`Self::commit`]. If the old folder cannot be renamed back, it stays beside the destination, and the error names it.
     pub fn commit_replacing(mut self) -> io::Result<()> {
         sync_tree(&self.folder)?;
-        // Its drop removes what is moved there.
+        // Dropping `old` removes the folder that is moved there.
         let old = Self::reserve(&self.destination)?;
         if let Err(error) = fs::rename(&self.destination, &old.folder)
             && error.kind() != ErrorKind::NotFound
@@ -108,24 +107,24 @@ impl PartialFolder {
         self.made.keep()
     }
 
-    /// Renames a folder that was moved away to its destination again, as nothing took its place; gives the error that says why not.
+    /// Renames a folder that was moved away back to its destination, since nothing took its place. Returns the error to report.
     fn put_back(self, error: io::Error) -> io::Error {
         let is_back = fs::rename(&self.folder, &self.destination).is_ok();
-        // Where another process was quicker, its folder replaces this one.
+        // If another process was quicker, its folder replaces this one.
         if is_back || !self.folder.exists() || self.destination.is_dir() {
             return error;
         }
         let kept = self.keep();
-        let message = format!("{error}; what was there is now {}", kept.display());
+        let message = format!("{error}; the old folder is now {}", kept.display());
         io::Error::new(error.kind(), message)
     }
 
-    /// Syncs files of the folder and renames them, in this order, into the folder around it, then syncs that: the last one is there only if all
-    /// are. Whatever else is in the folder goes.
+    /// Syncs files of the folder, renames them in this order into the parent folder, then syncs that: the last file exists only if all do.
+    /// Everything else in the folder is removed.
     ///
     /// # Errors
-    /// The system's error; [`ErrorKind::AlreadyExists`] where a name is taken. None of them is there then; only the last step,
-    /// syncing the folders around them, may fail with all in place.
+    /// The system's error; [`ErrorKind::AlreadyExists`] if a name is taken. None of the files is then in place, unless the last step,
+    /// syncing the folders around them, failed: then all are.
     pub fn commit_files<P: AsRef<Path>>(mut self, names: &[P]) -> io::Result<()> {
         sync_tree(&self.folder)?;
         let around = folder_of(&self.destination);
@@ -147,11 +146,12 @@ impl PartialFolder {
         self.made.keep()
     }
 
-    /// Removes the partial folders in a folder whose writers died, whatever their destinations; those that are still written
-    /// are locked and stay. For those who ask whether the folder is empty: [`Self::beside`] does it by itself.
+    /// Removes the partial folders of dead writers in a folder, whatever their destinations; those still being written are locked and stay.
+    /// Call it before checking whether a folder is empty; [`Self::beside`] does so itself.
     ///
-    /// On a file system that machines share, a lock may be seen on the writer's machine alone: what another machine's process left or is
-    /// writing stays. So does everything where a file system has no locks, and what cannot be removed: [`crate::in_the_way()`] says what.
+    /// On a file system shared by machines, a lock may be visible only on the writer's machine: what another machine's process left or is
+    /// writing stays. So does everything on a file system without locks, and what cannot be removed. [`crate::in_the_way()`] reports what
+    /// stayed.
     pub fn remove_leftovers(folder: &Path) {
         let here = Machine::this();
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -159,7 +159,7 @@ impl PartialFolder {
             let Some(partial) = folder_of_lock(&path) else {
                 continue;
             };
-            // For writing, without which shared file systems do not lock.
+            // Opened for writing, since shared file systems do not lock otherwise.
             let Ok(mut lock) = File::options().read(true).write(true).open(&path) else {
                 continue;
             };
@@ -168,13 +168,13 @@ impl PartialFolder {
                 && lock.read_to_string(&mut text).is_ok()
                 && Machine::from_text(&text).is_some_and(|writer| here.sees_locks_of(&writer));
             if is_dead && remove_folder(&partial).is_ok() {
-                // Last, and while it is locked: without it nobody would know the folder.
+                // Last, and while it is locked: without the lock file, the folder would not be recognised as a leftover.
                 let _ = fs::remove_file(&path);
             }
         }
     }
 
-    /// Leaves the folder where it is, for nobody to remove: without its lock's file it is no leftover.
+    /// Leaves the folder where it is; nothing removes it: without a lock file it is not a leftover.
     fn keep(mut self) -> PathBuf {
         if let Some(lock) = self.lock.take() {
             let _ = fs::remove_file(lock_of(&self.folder));
@@ -183,7 +183,7 @@ impl PartialFolder {
         std::mem::take(&mut self.folder)
     }
 
-    /// Leaves the folder as a process does that dies. For tests of what comes after.
+    /// Leaves the folder as a process that dies would. For tests of what happens next.
     #[doc(hidden)]
     pub fn abandon(mut self) {
         self.lock = None;
@@ -195,11 +195,11 @@ impl Drop for PartialFolder {
         let Some(lock) = self.lock.take() else {
             return;
         };
-        // Best effort: nothing can be done about failures here. After a commit there is no such folder.
+        // Best effort: nothing can be done about failures here. After a commit the folder no longer exists.
         if remove_folder(&self.folder).is_ok() {
             let _ = fs::remove_file(lock_of(&self.folder));
         }
-        // An open file may keep its name in the folders around it, as on NFS, and they go next.
+        // On NFS, an open file may keep an entry in the parent folder, which is removed next. So close it first.
         drop(lock);
     }
 }
@@ -211,14 +211,14 @@ fn lock_of(folder: &Path) -> PathBuf {
     path.into()
 }
 
-/// The partial folder that `path` is the lock's file of.
+/// The partial folder whose lock file is `path`.
 pub(crate) fn folder_of_lock(path: &Path) -> Option<PathBuf> {
     path.extension().filter(|end| *end == LOCK)?;
     let folder = path.with_extension("");
     Partial::target_of(&folder).is_some().then_some(folder)
 }
 
-/// Removes a folder, which may not be there.
+/// Removes a folder, which may not exist.
 fn remove_folder(folder: &Path) -> io::Result<()> {
     match fs::remove_dir_all(folder) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
@@ -251,7 +251,7 @@ mod tests {
         fs::read_to_string(destination.join("sub/a")).unwrap()
     }
 
-    /// What a process leaves that died while it wrote, on the machine that the lock's text says.
+    /// Leaves what a process leaves that died while writing, on the machine that the lock file names.
     fn leftover(dir: &Path, machine: &str) {
         let folder = dir.join(".drive.17-00ab.partial");
         fs::create_dir_all(folder.join("sub")).unwrap();
@@ -281,7 +281,7 @@ mod tests {
         drop(filled(&dir.path().join("drive"), "half"));
         drop(filled(&dir.path().join("all/are/made/drive"), "half"));
         assert!(names(dir.path()).is_empty());
-        // What else came into the folder that was made for it stays.
+        // Another file in the parent that was made for it stays.
         let partial = filled(&dir.path().join("made/drive"), "half");
         fs::write(dir.path().join("made/other"), "x").unwrap();
         drop(partial);
@@ -310,9 +310,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let destination = dir.path().join("drive");
         leftover(dir.path(), &here());
-        // Of one that died before it made its folder.
+        // Left by a writer that died before it made its folder.
         fs::write(dir.path().join(".other.18-1.partial.lock"), here()).unwrap();
-        // Nobody's, or a file's: no lock is theirs.
+        // No lock belongs to these: a folder without a writer, and a file.
         fs::create_dir(dir.path().join(".drive.17-2.partial")).unwrap();
         fs::write(dir.path().join("package.lock"), "").unwrap();
         let at_work = filled(&destination, "one");
@@ -362,7 +362,7 @@ mod tests {
         let (aside, replaced) = old();
         replaced.put_back(refused());
         assert!(!aside.exists());
-        // A file is no folder that could be meant.
+        // A file at the destination is not another process's folder.
         fs::remove_dir_all(&destination).unwrap();
         fs::write(&destination, "x").unwrap();
         let (aside, kept) = old();
@@ -389,7 +389,7 @@ mod tests {
         made("first").commit_files(&["a", "b"]).unwrap();
         assert_eq!(names(&out), ["a", "b"]);
         fs::remove_file(out.join("a")).unwrap();
-        // One name is taken, or one file is not there: none of the others stays.
+        // If one name is taken or one file missing, none of the others stays.
         let refused = made("second").commit_files(&["a", "b"]).unwrap_err();
         assert_eq!(refused.kind(), ErrorKind::AlreadyExists);
         made("second").commit_files(&["a", "c"]).unwrap_err();

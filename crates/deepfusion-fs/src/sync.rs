@@ -17,10 +17,10 @@ pub fn publish(file: &Path, target: &Path) -> io::Result<()> {
 /// exists and is not an empty folder.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn publish_folder(folder: &Path, target: &Path) -> io::Result<()> {
     sync_tree(folder)?;
-    // Elsewhere than on Unix an empty folder would be in the way; one that is not empty stays.
+    // Except on Unix, even an empty folder would block the rename; one that is not empty stays.
     let _ = std::fs::remove_dir(target);
     std::fs::rename(folder, target)?;
     sync_folder(folder_of(target))
@@ -32,7 +32,7 @@ const WAITING: usize = 8;
 /// Waits until the content of files is on the disk. Their names need [`sync_folder`].
 ///
 /// # Errors
-/// The system's error for one that failed.
+/// The system's error for one of the files that failed.
 pub fn sync_files<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> io::Result<()> {
     let files: Vec<P> = files.into_iter().collect();
     let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
@@ -62,7 +62,7 @@ pub fn sync_files<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> io::Res
 /// # Errors
 /// The system's error. A file system that cannot sync folders is not an error: nothing more can be done.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
-    // Elsewhere than on Unix a folder cannot be opened as a file, and its names are journalled.
+    // Except on Unix, a folder cannot be opened as a file, and its names are journalled.
     if !cfg!(unix) {
         return Ok(());
     }
@@ -79,7 +79,7 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// Syncs all files below a folder, and all folders.
+/// Syncs all files and folders below a folder.
 ///
 /// # Errors
 /// The system's error for the first that failed.
@@ -100,7 +100,7 @@ pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
 }
 
 fn sync_file(file: &Path) -> io::Result<()> {
-    // Windows syncs only what is open for writing.
+    // Windows syncs only files that are open for writing.
     File::options()
         .read(true)
         .write(cfg!(windows))

@@ -1,8 +1,8 @@
 //! What to do about an error, in one line.
 //!
-//! An error's message says what is wrong and where. [`Hint`] adds what its reader can do about it. Every error type of this
-//! project that a public function gives back implements it. Where an error holds a reason of a type of its own, the error's hint
-//! speaks for the reason too. So a program that shows errors needs one rule for all of them:
+//! An error's message says what is wrong and where. [`Hint`] adds what the reader can do about it. Every error type that a public function
+//! of this project returns implements it. If an error wraps a reason of its own type, the error's hint covers the reason too. So a program
+//! that shows errors needs one rule for all of them:
 //!
 //! ```
 //! use deepfusion_hint::Hint;
@@ -15,14 +15,14 @@
 //! }
 //! ```
 //!
-//! [`system_hint`] is the hint of an error that holds a reason of the system's: a missing file, a full disk. [`count_of`]
-//! writes the counts of a message: `1 frame`, `2 frames`.
+//! [`system_hint`] is the hint for an error of the operating system: a missing file, a full disk. [`count_of`] writes the counts in a
+//! message: `1 frame`, `2 frames`.
 
 mod system;
 
 pub use self::system::system_hint;
 
-/// A count with its noun, in the plural where it is not one; for nouns with a regular plural.
+/// A count with its noun, in the plural unless the count is one. For nouns with a regular plural.
 ///
 /// ```
 /// use deepfusion_hint::count_of;
@@ -49,10 +49,9 @@ where
 
 /// An error that may say what to do about it.
 ///
-/// The hint is in the library's words: fields, files and values, never the options of a program. The command line says
-/// which option is meant.
+/// The hint is in the library's terms: fields, files and values, never a program's options. The command line adds which option to use.
 pub trait Hint: std::error::Error {
-    /// What to do about it, in one line; none where the message itself says it.
+    /// What to do about it, in one line; `None` if the message already says it.
     #[must_use]
     fn hint(&self) -> Option<String>;
 }

@@ -1,10 +1,9 @@
-//! What to do about the system's own reasons.
+//! What to do about errors of the operating system.
 
 use std::io::ErrorKind;
 
-/// What to do about a reason of the system's, whichever file or stream it is about. For errors that
-/// hold a [`std::io::Error`] and know nothing better of their own. Where another crate's error may hold one, its own variant says so
-/// (`image::ImageError::IoError`).
+/// What to do about an error of the operating system, whichever file or stream it concerns. For errors that contain a [`std::io::Error`]
+/// and have no better hint of their own. If another crate's error may contain one, match its variant for it (`image::ImageError::IoError`).
 ///
 /// ```
 /// use deepfusion_hint::system_hint;
@@ -24,7 +23,7 @@ pub fn system_hint(kind: ErrorKind) -> &'static str {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "the disk is full: free some space and run again"
         }
-        _ => "the system gave this reason: look at the disk or the network that the file is on",
+        _ => "check the disk or the network that the file is on",
     }
 }
 
@@ -40,7 +39,7 @@ mod tests {
             (ErrorKind::ReadOnlyFilesystem, "written to"),
             (ErrorKind::StorageFull, "disk is full"),
             (ErrorKind::QuotaExceeded, "disk is full"),
-            (ErrorKind::TimedOut, "the system gave this reason"),
+            (ErrorKind::TimedOut, "check the disk"),
         ] {
             let hint = system_hint(kind);
             assert!(hint.contains(said), "{kind}");

@@ -1,11 +1,11 @@
 //! The mean of several networks' weights, as a run of its own.
 //!
-//! Networks that were trained from the same one lie in one valley of the loss. So the mean of their weights is a network as well, and can be a
-//! better one on images that none of them saw: "model soups" (Wortsman et al., arXiv 2203.05482); of a network and the one it began from,
-//! arXiv 2109.01903.
+//! Networks fine-tuned from the same network usually lie in one valley of the loss. So the mean of their weights is a working network too,
+//! and can be a better one on images that none of them saw: "model soups" (Wortsman et al., arXiv 2203.05482); for a network and the one it
+//! was fine-tuned from, arXiv 2109.01903.
 //!
-//! What batch norms measured of their inputs is averaged like weights, and not measured anew. Where they were frozen (`frozen_statistics`), as in
-//! `adapt`, all networks have the same, and the mean is exact; where they were not, [`Averaged::statistics`] says how far apart they are.
+//! The statistics of batch norms are averaged like weights, and not measured again. If they were frozen (`frozen_statistics`), as in
+//! `adapt`, all networks have the same ones, and the mean is exact; otherwise [`Averaged::statistics`] says how far apart they are.
 
 mod ancestors;
 mod fit;
@@ -26,7 +26,7 @@ pub use self::ancestors::Kinship;
 pub use self::statistics::StatisticsSpread;
 use crate::{Error, NoMean, Result};
 
-/// The parts of a run's checkpoint beside the depth network that training goes on with.
+/// The parts of a checkpoint, besides the depth network, that training continues with.
 const OTHER_PARTS: [&str; 2] = ["pose.", "flow."];
 
 /// What [`average`] wrote.
@@ -35,23 +35,25 @@ const OTHER_PARTS: [&str; 2] = ["pose.", "flow."];
 pub struct Averaged {
     /// The new run's checkpoint.
     pub checkpoint: PathBuf,
-    /// What it is the mean of, in the order given.
+    /// The averaged networks, in the order given.
     pub networks: Vec<AveragedNetwork>,
-    /// What is known of where they come from.
+    /// What is known of their common origin.
     pub kinship: Kinship,
-    /// Whether some could say how sure they are and others could not, so that the mean cannot.
+    /// Whether the mean has no uncertainty head because only some of the networks had one.
     pub lost_uncertainty: bool,
-    /// How far apart their batch norms measured their inputs; `None` where all measured the same.
+    /// How far apart the statistics of their batch norms are; `None` if all are the same.
     pub statistics: Option<StatisticsSpread>,
 }
 
-/// Writes the mean of the depth networks' weights as a new run into `out`: Σ sᵢ·wᵢ / Σ sᵢ, computed in f64; without `shares` all count alike.
+/// Writes the mean of the depth networks' weights as a new run into `out`: Σ sᵢ·wᵢ / Σ sᵢ, computed in f64; without `shares`, all weigh the
+/// same.
 ///
-/// The first must be a run: settings, camera and PoseNet are its own. The others may be packed, or embedded ones by their names. A run's folder
-/// stands for the checkpoint that it prefers. Factors of intervals and ranges for int8 belong to one network's weights and are not taken over.
+/// The first must be a run: the new run takes its settings, camera and PoseNet. The others may be packed networks, or embedded ones by
+/// name. A run's folder stands for its preferred checkpoint. Interval factors and int8 ranges belong to one network's weights and are not
+/// copied.
 ///
 /// # Errors
-/// [`Error::NoMean`] for networks that are not alike, [`Error::Shares`] for shares that cannot be such, [`Error::Occupied`] where `out` holds anything;
+/// [`Error::NoMean`] for networks that do not match, [`Error::Shares`] for invalid shares, [`Error::Occupied`] if `out` is not empty;
 /// networks that cannot be read.
 pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result<Averaged> {
     let shares = parts_of(models.len(), shares)?;
@@ -130,7 +132,7 @@ pub fn average(models: &[PathBuf], shares: Option<&[f64]>, out: &Path) -> Result
     })
 }
 
-/// The shares as parts of 1.
+/// The shares, scaled to add up to 1.
 fn parts_of(networks: usize, shares: Option<&[f64]>) -> Result<Vec<f64>> {
     let equal = vec![1.0; networks];
     let shares = shares.unwrap_or(&equal);
@@ -145,7 +147,7 @@ fn parts_of(networks: usize, shares: Option<&[f64]>) -> Result<Vec<f64>> {
     Ok(shares.iter().map(|share| share / total).collect())
 }
 
-/// The network, whichever of several data sets it learned: their metres do not matter here.
+/// Loads the network. If it learned several data sets, any will do: their metres do not matter here.
 fn load(source: &ModelSource) -> Result<StoredNetwork> {
     match source {
         ModelSource::Packed { network, .. } => Ok(unpacked(network, None)?),
@@ -168,7 +170,7 @@ fn load(source: &ModelSource) -> Result<StoredNetwork> {
     }
 }
 
-/// Σ sᵢ·wᵢ of the tensors that all have, for shares that add up to 1.
+/// Σ sᵢ·wᵢ of the tensors that all networks have, for shares that add up to 1.
 fn mean(networks: &[(&Weights, f64)]) -> Weights {
     let mut mean = networks[0].0.clone();
     mean.tensors
@@ -196,7 +198,7 @@ fn origin((source, share): (&ModelSource, &f64)) -> AveragedNetwork {
             sha256: None,
             share,
         },
-        // A packed file is found again by its path; an embedded network has a name alone.
+        // A packed file can be found again by its path; an embedded network only has a name.
         ModelSource::Packed { given, .. } if Shipped::is_at(given) => AveragedNetwork {
             path: absolute(given),
             sha256: None,

@@ -24,33 +24,33 @@ pub use self::report::{BenchReport, BenchRequest};
 use crate::Result;
 use crate::bulk::pipeline::{self, Threads};
 
-/// The picture that is decoded and resized, a simulated street: a KITTI frame's size.
+/// Size of the picture that is decoded and resized, a simulated street: a KITTI frame's size.
 pub const PICTURE_SIZE: (u32, u32) = (1242, 375);
 
-/// Frames a second are measured over this many images for every repeat of a stage.
+/// Frames per second are measured over this many images for every repeat of a stage.
 pub const IMAGES_PER_REPEAT: usize = 3;
 
 /// Milliseconds of each stage.
 #[derive(Debug, Default, Clone, Copy, Serialize)]
 pub struct Stages {
-    /// The JPEG to pixels.
+    /// Decoding the JPEG to pixels.
     pub decode: f64,
-    /// To the network's size and numbers.
+    /// Resizing to the network's input and converting to floats.
     pub resize: f64,
     /// The network.
     pub network: f64,
     /// Disparity to metres.
     pub depth: f64,
-    /// Coloured points.
+    /// Computing coloured points.
     pub cloud: f64,
-    /// Boxes and tracks, from the picture's true depth.
+    /// Finding boxes and tracks, in the picture's true depth.
     pub targets: f64,
-    /// Depth as a picture.
+    /// Drawing depth as a picture.
     pub colour: f64,
 }
 
 impl Stages {
-    /// What an image waits, one stage after another.
+    /// Time for one image, one stage after another.
     #[must_use]
     pub fn sum(&self) -> f64 {
         self.decode
@@ -63,16 +63,16 @@ impl Stages {
     }
 }
 
-/// What the stages work on: a simulated street's picture.
+/// The input of the stages: a picture of a simulated street.
 pub struct StreetBench {
     jpeg: Vec<u8>,
     k: Intrinsics,
-    /// The picture's true depth at the network's size: a network with random weights sees no targets.
+    /// The picture's true depth at the network's size: a network with random weights finds no targets.
     truth: DepthMap,
 }
 
 impl StreetBench {
-    /// For a network of this configuration.
+    /// A benchmark for a network of this configuration.
     ///
     /// # Errors
     /// A street that cannot be simulated or encoded.
@@ -95,7 +95,10 @@ impl StreetBench {
     }
 
     fn decode(&self) -> Result<RgbImage> {
-        Ok(decode_rgb(&self.jpeg, Path::new("the bench's picture"))?)
+        Ok(decode_rgb(
+            &self.jpeg,
+            Path::new("the benchmark's picture"),
+        )?)
     }
 
     fn resize(&self, picture: &RgbImage) -> Vec<f32> {
@@ -115,10 +118,10 @@ impl StreetBench {
         Ok(PointCloud::from_depth(depth, &self.k, Some(small), 80.0)?)
     }
 
-    /// Each stage alone, the median of so many runs.
+    /// The median time of each stage alone, over `repeats` runs.
     ///
     /// # Errors
-    /// What the network's engine says.
+    /// The error of the network's engine.
     pub fn stages(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<Stages> {
         let picture = self.decode()?;
         let small = resize_rgb(&picture, self.k.width, self.k.height);
@@ -138,7 +141,7 @@ impl StreetBench {
         })
     }
 
-    /// Ground, boxes and tracks of a picture that is seen again and again.
+    /// Finding ground, boxes and tracks in the same picture, again and again.
     fn targets(&self, repeats: usize) -> Result<f64> {
         let mut perception = Perception::new(PerceptionConfig::default().with_parking_rows());
         let mut time_s = 0.0;
@@ -152,7 +155,7 @@ impl StreetBench {
         })
     }
 
-    /// The least milliseconds that each step of the network took; empty where its engine cannot time them.
+    /// The shortest time of each step of the network, in milliseconds; empty if its engine cannot time them.
     ///
     /// # Errors
     /// A picture that cannot be decoded.
@@ -181,10 +184,10 @@ impl StreetBench {
         Ok(least)
     }
 
-    /// Images a second through all stages at once, from the JPEG to cloud and coloured depth in memory.
+    /// Images per second through all stages at once, from the JPEG to cloud and coloured depth in memory.
     ///
     /// # Errors
-    /// The first of any stage.
+    /// The first error of any stage.
     pub fn overlapped_fps(&self, runner: &mut dyn DepthRunner, repeats: usize) -> Result<f64> {
         let small = resize_rgb(&self.decode()?, self.k.width, self.k.height);
         let failure = Mutex::new(None);
@@ -228,7 +231,7 @@ impl StreetBench {
 /// The weights of a configuration's depth network before its first step: how fast a network is does not depend on what it learned.
 ///
 /// # Errors
-/// A network that cannot be built so.
+/// A network that cannot be built.
 #[cfg(feature = "train")]
 pub fn first_weights(config: &TrainConfig) -> Result<deepfusion_model::weights::Weights> {
     let device = deepfusion_train::Device::flex();

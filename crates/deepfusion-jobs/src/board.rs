@@ -1,4 +1,4 @@
-//! The board of a calibration in pictures and videos, and the camera by it.
+//! Finds a calibration board in pictures and videos, and computes the camera from it.
 
 mod left_out;
 mod page;
@@ -27,49 +27,49 @@ pub use self::warning::BoardWarning;
 use self::warning::turned;
 use crate::{Error, Result, find_inputs};
 
-/// A video is looked at in so many parts, of each the sharpest of so many frames.
+/// A video is divided into at most this many parts; the sharpest frame of each is searched.
 const PARTS: usize = 200;
 const FRAMES_OF_A_PART: usize = 4;
-/// Pictures that are in memory at once.
+/// Number of pictures in memory at once.
 const BATCH: usize = 8;
 
-/// How far the search for the board is.
+/// Progress of the search for the board.
 #[derive(Debug, Clone, Copy)]
 pub enum SearchProgress<'a> {
-    /// A video, its frames decoded, begins.
+    /// The search of a video begins; its frames are decoded first.
     Video {
-        /// Its file.
+        /// Path of the video.
         file: &'a Path,
-        /// How many frames it has.
+        /// Number of frames in the video.
         frames: usize,
     },
-    /// So many pictures of all, or parts of a video, are done.
+    /// Number of pictures, or of parts of a video, searched so far, and of all.
     Done(usize, usize),
 }
 
-/// What was seen of the board in all pictures.
+/// What was found of the board in all pictures.
 #[derive(Debug, Default)]
 pub struct BoardViews {
-    /// The board in pictures, and in the frames picked of videos.
+    /// The views of the board, in pictures and in frames picked from videos.
     pub views: Vec<View>,
     /// Width and height of all of them.
     pub size: (u32, u32),
-    /// How many were looked at.
+    /// Number of pictures and frames that were searched.
     pub looked_at: usize,
-    /// Those without the board.
+    /// Pictures and frames without the whole board.
     pub left_out: Vec<LeftOut>,
-    /// Frames with the board that were not picked.
+    /// Number of frames with the board that were not picked.
     pub not_picked: usize,
     /// The first picture's name, and its orientation by EXIF.
     first: Option<(String, u8)>,
-    /// Whole grids of other sizes, and how often each was seen.
+    /// Complete grids of other sizes, and how often each was seen.
     others: BTreeMap<(usize, usize), usize>,
 }
 
-/// Looks for the board in everything that the inputs mean (pictures, folders, patterns, videos); of each video at most so many frames are kept.
+/// Searches all inputs for the board (pictures, folders, patterns, videos); keeps at most `most` frames of each video.
 ///
 /// # Errors
-/// Inputs that cannot be read, or that are of several sizes or orientations.
+/// Inputs that cannot be read, or whose sizes or orientations differ.
 pub fn find_views(
     inputs: &[String],
     board: &Board,
@@ -111,7 +111,7 @@ fn images_of(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 impl BoardViews {
-    /// That there are views enough to calibrate by.
+    /// Checks that there are enough views to calibrate.
     ///
     /// # Errors
     /// [`BoardError::NoBoard`] or [`BoardError::TooFewViews`], with the grid that was seen instead.
@@ -139,10 +139,10 @@ impl BoardViews {
         .into())
     }
 
-    /// The camera that explains the views, and its lens; [`Self::warnings`] say how sure they are.
+    /// Computes the camera and its lens from the views; [`Self::warnings`] say how accurate they are.
     ///
     /// # Errors
-    /// As [`Self::require_enough`] and [`calibrate`]; [`BoardError::Undetermined`] for numbers that cannot be a lens'.
+    /// As [`Self::require_enough`] and [`calibrate`]; [`BoardError::Undetermined`] for impossible lens parameters.
     pub fn calibrate(&self, board: &Board, model: LensModel) -> Result<(Calibration, Distortion)> {
         self.require_enough(board)?;
         let found = calibrate(&self.views, board, self.size, model)?;
@@ -154,7 +154,7 @@ impl BoardViews {
         Ok((found, lens))
     }
 
-    /// What makes a camera of these views less sure, what the pictures alone know of it, and whether images can be corrected with its lens.
+    /// Warnings about too few or too similar views, about orientation by EXIF, and about a lens that images cannot be corrected with.
     #[must_use]
     pub fn warnings(&self, found: &Calibration, lens: &Distortion) -> Vec<BoardWarning> {
         let of_itself = found.warnings().into_iter();
@@ -198,7 +198,7 @@ impl BoardViews {
         Ok(())
     }
 
-    /// Of each part of a video the sharpest frame is looked at; of those with the board, the most different are kept.
+    /// Searches the sharpest frame of each part of a video. Of those with the board, it keeps the most different ones.
     fn add_video(
         &mut self,
         file: &Path,
@@ -213,7 +213,7 @@ impl BoardViews {
         let name = file.display().to_string();
         progress(SearchProgress::Video { file, frames });
         if frames > 0 {
-            // The first pass decodes all of them.
+            // The first call decodes all frames.
             video.frame(0)?;
         }
         let part = |i: usize| (i * frames / parts)..((i + 1) * frames / parts);
@@ -256,7 +256,7 @@ impl BoardViews {
         Ok(())
     }
 
-    /// Checks that a picture is of the size and orientation of the first.
+    /// Checks that a picture has the size and orientation of the first.
     fn fits(&mut self, name: &str, size: (u32, u32), orientation: u8) -> Result<()> {
         let Some((first, first_orientation)) = &self.first else {
             self.first = Some((name.to_owned(), orientation));
@@ -299,7 +299,7 @@ impl BoardViews {
                     *self.others.entry((c, r)).or_default() += 1;
                 }
                 if corners * 2 < board.corners() {
-                    // A fence has some, too.
+                    // A fence has some corners, too.
                     LeftOutReason::NoBoard
                 } else if c > longer || r > shorter {
                     LeftOutReason::OtherGrid {
@@ -318,14 +318,14 @@ impl BoardViews {
         self.left_out.push(LeftOut { name, why });
     }
 
-    /// The whole grid of another size that was seen most often: columns, rows, how often.
+    /// The complete grid of another size that was seen most often: columns, rows, how often.
     #[must_use]
     pub fn other_grid(&self) -> Option<(usize, usize, usize)> {
         let most = self.others.iter().max_by_key(|(_, n)| **n);
         most.map(|((columns, rows), n)| (*columns, *rows, *n))
     }
 
-    /// That pictures were turned upright, which the calibration then is of.
+    /// A warning that pictures were turned upright, so that the calibration is for upright ones.
     fn turned(&self) -> Option<BoardWarning> {
         let (_, orientation) = self.first.as_ref()?;
         (*orientation != 1).then_some(BoardWarning::Turned {
@@ -335,7 +335,7 @@ impl BoardViews {
     }
 }
 
-/// The sharpest of some frames of a part, and its number.
+/// The sharpest of a part's frames, its number and its sharpness.
 fn sharpest(video: &VideoFrames, part: std::ops::Range<usize>) -> Result<(usize, GrayImage, f64)> {
     let step = part.len().div_ceil(FRAMES_OF_A_PART).max(1);
     let mut best: Option<(usize, GrayImage, f64)> = None;
@@ -346,6 +346,6 @@ fn sharpest(video: &VideoFrames, part: std::ops::Range<usize>) -> Result<(usize,
             best = Some((number, image, sharp));
         }
     }
-    // No part is empty; a frame that is would be no board.
+    // No part is empty. An empty frame would contain no board.
     Ok(best.unwrap_or_default())
 }

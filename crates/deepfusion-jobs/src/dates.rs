@@ -1,16 +1,16 @@
-//! Times of the calendar (UTC), for names and cards.
+//! Dates and times (UTC), for names and model cards.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use jiff::Timestamp;
 
-/// The time now (UTC), such as `20260131-235959`.
+/// The current time (UTC), such as `20260131-235959`.
 #[must_use]
 pub fn now() -> String {
     stamp(SystemTime::now())
 }
 
-/// The day of a time (UTC), such as `2026-01-31`.
+/// The date of a time (UTC), such as `2026-01-31`.
 #[must_use]
 pub fn day(time: SystemTime) -> String {
     timestamp(time).strftime("%Y-%m-%d").to_string()
@@ -21,7 +21,7 @@ fn stamp(time: SystemTime) -> String {
     timestamp(time).strftime("%Y%m%d-%H%M%S").to_string()
 }
 
-/// 1970's first for what is before it, as of a clock that was never set, or beyond the calendar.
+/// The time stamp; 1970-01-01 for times before it, such as those of a clock that was never set, and for times beyond the calendar.
 fn timestamp(time: SystemTime) -> Timestamp {
     Timestamp::try_from(time.max(UNIX_EPOCH)).unwrap_or_default()
 }

@@ -29,15 +29,15 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// Each, those that this build lacks as well ([`Self::is_built`]): they are known, so that they are answered with how to build them.
+    /// All backends, including those that this build lacks ([`Self::is_built`]), so that the error can say how to build them.
     pub const ALL: [Self; 5] = [Self::Cpu, Self::Vulkan, Self::Wgpu, Self::Cuda, Self::Metal];
 
-    /// Those that this build has.
+    /// The backends that this build has.
     pub fn built() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|one| one.is_built())
     }
 
-    /// Its name, as in `cuda:1`.
+    /// The backend's name, as in `cuda:1`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl Backend {
         }
     }
 
-    /// What it is, in a line.
+    /// A description in one line.
     #[must_use]
     pub fn meaning(self) -> &'static str {
         match self {
@@ -61,7 +61,7 @@ impl Backend {
         }
     }
 
-    /// Whether this build has it: a GPU's is a feature of the same name.
+    /// Whether this build has it: a GPU backend is a feature of the same name.
     #[must_use]
     pub fn is_built(self) -> bool {
         match self {
@@ -74,19 +74,19 @@ impl Backend {
     }
 }
 
-/// As its name.
+/// The name, as printed.
 impl Serialize for Backend {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }
 }
 
-/// A device of a backend: the one with an index, or the one that the backend takes by itself. By default the processor.
+/// A device of a backend: the one with an index, or the backend's default. By default the processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ComputeDevice {
-    /// What computes.
+    /// The backend.
     pub backend: Backend,
-    /// Which of the backend's devices, from 0 and in its own order; `None`: the one that it prefers.
+    /// Index of the device, from 0, in the backend's own order; `None` for its default.
     pub index: Option<usize>,
 }
 
@@ -97,7 +97,7 @@ impl Default for ComputeDevice {
 }
 
 impl ComputeDevice {
-    /// The device that a backend takes by itself.
+    /// The default device of a backend.
     #[must_use]
     pub fn of(backend: Backend) -> Self {
         Self {
@@ -106,10 +106,10 @@ impl ComputeDevice {
         }
     }
 
-    /// The device of a word: a backend's name, perhaps with an index (`cuda:1`), or `auto`, which is [`fastest`].
+    /// Parses a device: a backend's name, optionally with an index (`cuda:1`), or `auto` for [`fastest`].
     ///
     /// # Errors
-    /// [`NoDevice`] for any other word. Whether build and machine have the device is found out where it is opened.
+    /// [`NoDevice`] for any other word. Whether the build and the machine have the device is checked when it is opened.
     pub fn chosen(word: &str) -> Result<Self, NoDevice> {
         match word {
             "auto" => Ok(fastest()),
@@ -117,7 +117,7 @@ impl ComputeDevice {
         }
     }
 
-    /// What a preset's sizes follow.
+    /// The kind of device, which determines a preset's sizes.
     #[must_use]
     pub fn compute(self) -> Compute {
         match self.backend {
@@ -127,7 +127,7 @@ impl ComputeDevice {
     }
 }
 
-/// As it is given: `cpu`, `cuda:1`.
+/// The name, as given: `cpu`, `cuda:1`.
 impl fmt::Display for ComputeDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.backend.name())?;
@@ -138,15 +138,15 @@ impl fmt::Display for ComputeDevice {
     }
 }
 
-/// Why a word is no device.
+/// Why a word is not a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoDevice {
     /// No backend has this name.
     #[error("no device has this name")]
     Name,
-    /// Something else than a number behind the colon, or the processor is asked for one.
-    #[error("behind the colon stands the number of a GPU")]
+    /// The part after the colon is not a number, or the device is the processor.
+    #[error("expected the number of a GPU after the colon")]
     Index,
 }
 
@@ -158,7 +158,7 @@ impl Hint for NoDevice {
                 let names: Vec<&str> = built.chain(["auto"]).collect();
                 format!("this build has {}", names.join(", "))
             }
-            Self::Index => "such as cuda:1 or vulkan:0; they are counted from 0".into(),
+            Self::Index => "give a number from 0, such as cuda:1 or vulkan:0".into(),
         })
     }
 }
@@ -184,7 +184,7 @@ impl FromStr for ComputeDevice {
 /// Opens a device.
 ///
 /// # Errors
-/// [`Error::NoBackend`] where this build lacks its backend, [`Error::NoSuchDevice`] where this machine has none of that index.
+/// [`Error::NoBackend`] if this build lacks the backend, [`Error::NoSuchDevice`] if this machine has no device with the index.
 #[cfg(feature = "train")]
 pub fn open(device: ComputeDevice) -> Result<Device> {
     if device.backend == Backend::Cpu {
@@ -194,7 +194,7 @@ pub fn open(device: ComputeDevice) -> Result<Device> {
     let found = found(device.backend).ok_or(Error::NoBackend { device: backend })?;
     let count = found.len();
     let chosen = match device.index {
-        // The backend's own choice: the faster of two.
+        // The backend's default: the faster of two.
         None if count > 0 => Some(preferred(device.backend)),
         None => None,
         Some(index) => found.into_iter().nth(index),
@@ -206,8 +206,8 @@ pub fn open(device: ComputeDevice) -> Result<Device> {
     })
 }
 
-/// A GPU, where this build has a backend for one that this machine has, else the processor: what `auto` stands for. A processor that acts
-/// as a GPU (Mesa's lavapipe) is not one.
+/// The device that `auto` stands for: a GPU, if this machine has one for which this build has a backend, otherwise the processor. A
+/// processor that emulates a GPU (Mesa's lavapipe) does not count as one.
 #[must_use]
 pub fn fastest() -> ComputeDevice {
     #[cfg(feature = "train")]
@@ -228,13 +228,13 @@ pub fn fastest() -> ComputeDevice {
     ComputeDevice::of(Backend::Cpu)
 }
 
-/// Bytes in the unit that memory is reported in: 2^20.
+/// Bytes in the unit in which memory is reported: 2^20.
 #[must_use]
 pub fn megabytes(bytes: u64) -> f64 {
     bytes as f64 / 1024.0 / 1024.0
 }
 
-/// This machine's devices of a backend other than the processor's own; `None` where this build does not have it.
+/// This machine's devices of a GPU backend; `None` if this build lacks the backend.
 #[cfg(feature = "train")]
 fn found(backend: Backend) -> Option<Vec<Device>> {
     #[allow(unused_imports, reason = "builds without a GPU backend")]
@@ -253,7 +253,7 @@ fn found(backend: Backend) -> Option<Vec<Device>> {
     }
 }
 
-/// The device that a backend takes by itself.
+/// The default device of a backend.
 #[cfg(feature = "train")]
 fn preferred(backend: Backend) -> Device {
     #[allow(unused_imports, reason = "builds without a GPU backend")]
@@ -272,7 +272,7 @@ fn preferred(backend: Backend) -> Device {
     }
 }
 
-/// Whether there is a card behind a device: none is behind a processor that acts as one.
+/// Whether a device is hardware, not a processor that emulates a GPU.
 #[cfg(any(
     feature = "vulkan",
     feature = "wgpu",
@@ -284,7 +284,7 @@ fn is_a_card(device: &Device) -> bool {
     identity.is_some_and(|identity| identity.physical.is_some())
 }
 
-/// A build without a GPU's backend finds no device to ask.
+/// A build without GPU backends finds no device.
 #[cfg(all(
     feature = "train",
     not(any(
@@ -325,7 +325,7 @@ mod tests {
         }
     }
 
-    /// Sizes follow what a device is, whichever of several it is.
+    /// Sizes depend on the kind of device, not on its index.
     #[test]
     fn presets_follow_the_kind_of_device() {
         let of = |word: &str| word.parse::<ComputeDevice>().unwrap().compute();
@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(of("cuda:1"), Compute::Gpu);
     }
 
-    /// A word that is no device is answered with those that are.
+    /// The error for a wrong device lists the right ones.
     #[test]
     fn a_wrong_word_is_answered_with_right_ones() {
         let hint = ComputeDevice::chosen("gpu").unwrap_err().hint().unwrap();
@@ -342,7 +342,7 @@ mod tests {
         assert!(hint.contains("cuda:1"), "{hint}");
     }
 
-    /// What is not built is an error of its own, apart from what the machine lacks.
+    /// A backend that is not built gives a different error from a device that the machine lacks.
     #[cfg(feature = "train")]
     #[test]
     fn a_backend_that_is_not_built_is_named() {

@@ -1,11 +1,11 @@
-//! Which recordings are of one drive.
+//! Finds out which recordings belong to one drive.
 
 use std::collections::HashMap;
 
 use deepfusion_data::Dataset;
 
-/// For each recording the number of the first one of its drive: what two cameras of a drive see is not independent. The drives of a folder of bags
-/// share the folder, and two videos' names may differ in their endings alone.
+/// For each recording, the index of the first recording of its drive: images of two cameras of a drive are not independent. The drives of a
+/// folder of bags share the folder, and names of two videos may differ only in their extensions.
 pub(crate) fn first_of_drive(datasets: &[Dataset]) -> Vec<usize> {
     let mut first = HashMap::new();
     let numbered = datasets.iter().enumerate();

@@ -1,4 +1,4 @@
-//! How long something takes, for people.
+//! Durations as text for people.
 
 /// Seconds as minutes and seconds, or hours and minutes: `1:15 min`, `2 h 02 min`.
 #[must_use]

@@ -1,4 +1,4 @@
-//! What runs a trained network: the fused engine on the processor, Burn on any device, or the user's ONNX Runtime.
+//! The engines that run a trained network: the fused engine on the processor, Burn on any device, or the user's ONNX Runtime.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,22 +10,22 @@ use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, OrtRunner, Pr
 use crate::devices::{Backend, ComputeDevice};
 use crate::{Error, Result};
 
-/// What runs a network.
+/// An engine that runs a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
     /// [`Self::Fused`] on the processor, [`Self::Burn`] on any other device.
     #[default]
     Auto,
-    /// The network as it is trained. Needs the feature `train`.
+    /// The training framework. Needs the feature `train`.
     Burn,
     /// This library's own engine for processors.
     Fused,
-    /// ONNX Runtime, a library of the user's own.
+    /// ONNX Runtime, a library that the user provides.
     Ort,
 }
 
 impl Engine {
-    /// Its name.
+    /// The engine's name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -43,21 +43,21 @@ impl fmt::Display for Engine {
     }
 }
 
-/// What runs a network, in which numbers and where. By default the fused engine in f32, on the processor.
+/// The engine, its precision and its device. By default the fused engine in f32 on the processor.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct EngineSettings {
-    /// What runs it.
+    /// The engine.
     pub engine: Engine,
-    /// In which numbers the fused engine computes; the others compute in f32.
+    /// Precision of the fused engine; the others compute in f32.
     pub precision: Precision,
-    /// The library of [`Engine::Ort`]; `None`: found.
+    /// The library of [`Engine::Ort`]; `None`: it is searched for.
     pub ort_library: Option<PathBuf>,
-    /// Where.
+    /// The device.
     pub device: ComputeDevice,
 }
 
 impl EngineSettings {
-    /// What is chosen by itself on a device.
+    /// The default settings for a device.
     #[must_use]
     pub fn on(device: ComputeDevice) -> Self {
         Self {
@@ -66,7 +66,7 @@ impl EngineSettings {
         }
     }
 
-    /// The engine that these settings come to: never [`Engine::Auto`].
+    /// The engine that these settings select: never [`Engine::Auto`].
     ///
     /// # Errors
     /// [`Error::OnlyOnCpu`], [`Error::OnlyFused`] and [`Error::OnlyOrt`] for settings that contradict one another.
@@ -91,7 +91,7 @@ impl EngineSettings {
         Ok(engine)
     }
 
-    /// What a network was calibrated to, where these settings need it.
+    /// A network's int8 calibration, if these settings need it.
     ///
     /// # Errors
     /// A calibration that cannot be read.
@@ -105,11 +105,11 @@ impl EngineSettings {
         }
     }
 
-    /// What runs a network of this configuration with these weights. `int8` is what it was calibrated to ([`Self::calibration`]).
+    /// The runner for a network of this configuration with these weights. `int8` is its calibration ([`Self::calibration`]).
     ///
     /// # Errors
-    /// As [`Self::chosen`], [`FusedRunner::with_calibration`] and [`OrtRunner::new`]; [`Error::NoBackend`] and [`Error::NoSuchDevice`] for a
-    /// device that is not there, [`Error::NoFramework`] for Burn in a build without it.
+    /// As [`Self::chosen`], [`FusedRunner::with_calibration`] and [`OrtRunner::new`]; [`Error::NoBackend`] and [`Error::NoSuchDevice`] for
+    /// a missing device, [`Error::NoFramework`] for Burn in a build without it.
     pub fn runner(
         &self,
         config: &TrainConfig,
@@ -132,7 +132,7 @@ impl EngineSettings {
         })
     }
 
-    /// A stored network, ready for images.
+    /// A stored network, ready to predict images.
     ///
     /// # Errors
     /// As [`Self::calibration`] and [`Self::runner`].
@@ -144,7 +144,7 @@ impl EngineSettings {
     }
 }
 
-/// The network as it is trained.
+/// Runs the network in Burn.
 #[cfg(feature = "train")]
 fn in_burn(
     device: ComputeDevice,
@@ -202,7 +202,7 @@ mod tests {
         assert!(matches!(library.chosen(), Err(Error::OnlyOrt)));
     }
 
-    /// Whatever runs a network, it is the same network.
+    /// All engines compute the same network.
     #[cfg(feature = "train")]
     #[test]
     fn burn_and_the_fused_engine_agree() {

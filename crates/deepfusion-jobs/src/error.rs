@@ -15,478 +15,478 @@ mod reasons;
 pub use self::contradiction::{Contradiction, RequestedValue, RunHas, Setting};
 pub use self::reasons::{NoMean, OtherJob, StaleReason, UnfitCamera};
 
-/// What can go wrong with work over recordings and folders.
+/// What can go wrong when working with recordings and folders.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A folder or pattern without images.
-    #[error("{input}: no image (.png, .jpg, .jpeg) there")]
+    #[error("{input}: no images (.png, .jpg, .jpeg) found")]
     NoImages {
-        /// What was given.
+        /// The folder or pattern as given.
         input: String,
     },
     /// A point cloud without a camera.
-    #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
+    #[error("a point cloud needs the camera's intrinsics, which are unknown")]
     NoCamera,
-    /// The error of a prediction asked for of a network, or an engine, that does not say it.
-    #[error("this network, or the engine that runs it, does not say how sure it is of its depth")]
+    /// Uncertainty was requested, but this network or engine does not predict it.
+    #[error("this network, or the engine that runs it, does not predict uncertainty")]
     NoUncertainty,
-    /// Pictures of a network's layers, without what shows these.
-    #[error("pictures of the network's layers are asked for, and nothing shows what these do")]
+    /// Pictures of a network's layers were requested, but there is nothing to show them.
+    #[error("cannot make pictures of the network's layers: this job does not compute them")]
     NoLayers,
-    /// A pattern of file names that cannot be one.
+    /// An invalid pattern of file names.
     #[error(transparent)]
     Pattern(#[from] glob::PatternError),
-    /// Intrinsics that cannot be the image's.
+    /// Intrinsics that do not fit the image.
     #[error("the intrinsics do not fit the image: {0}")]
     Camera(UnfitCamera),
-    /// The same of one image among others.
+    /// Intrinsics that do not fit one image among others.
     #[error("{}: {source}", path.display())]
     CameraOf {
-        /// The image.
+        /// Path of the image.
         path: PathBuf,
-        /// Why it cannot be its camera, or what is wrong with the file that says it.
+        /// Why the camera does not fit, or what is wrong with its file.
         source: Box<Error>,
     },
-    /// A topic of bags that is not named as one.
+    /// An invalid topic of bags.
     #[error("setting `data.topics`: {text}: {problem}")]
     NoTopic {
-        /// What stands in the configuration.
+        /// The text in the configuration.
         text: String,
         /// What is wrong with it.
         problem: NoNamedTopic,
     },
-    /// A split of which not everything could be used, where everything has to be.
-    #[error("{}: {found} of its {} {what}", split.display(), count_of(*expected, "frame"))]
+    /// A split of which all frames are needed, but not all could be used.
+    #[error("{}: only {found} of {} {what}", split.display(), count_of(*expected, "frame"))]
     Incomplete {
-        /// The split file.
+        /// Path of the split file.
         split: PathBuf,
-        /// Frames that could be used.
+        /// Number of frames that could be used.
         found: usize,
-        /// Frames that the file lists.
+        /// Number of frames that the file lists.
         expected: usize,
-        /// What those have that could be.
+        /// What the usable frames have.
         what: &'static str,
-        /// How many of the others are of a camera that was not opened.
+        /// Number of other frames that belong to a camera that was not opened.
         of_other_camera: usize,
     },
-    /// No frame of a recording has both labels and the depth asked for.
-    #[error("{}: no frame has the depth that was asked for", path.display())]
+    /// No frame of a recording has both labels and the requested depth.
+    #[error("{}: no frame has the requested depth", path.display())]
     NothingToMeasure {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
     },
-    /// Ground truth without names, and not an array for each frame.
+    /// Ground truth without names whose number of arrays is not the number of frames.
     #[error(
         "{} of ground truth without names for {}",
         count_of(*found, "array"),
         count_of(*expected, "frame")
     )]
     StackLength {
-        /// How many arrays there are.
+        /// Number of arrays.
         found: usize,
-        /// How many frames are evaluated.
+        /// Number of frames to evaluate.
         expected: usize,
     },
-    /// An image whose path is no text, as JSON needs it.
-    #[error("{}: its path is not UTF-8, and the JSON beside its outputs has to name it", path.display())]
+    /// An image whose path is not text, as JSON needs it.
+    #[error("{}: the path is not UTF-8, as needed for the JSON beside the outputs", path.display())]
     NotText {
-        /// The image.
+        /// Path of the image.
         path: PathBuf,
     },
-    /// Something that would be overwritten.
+    /// A file that would be overwritten.
     #[error("{}: already exists", path.display())]
     Exists {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A file of KITTI's object frames cannot be read.
+    /// A file of KITTI's object frames that cannot be read.
     #[error("{}: {problem}", path.display())]
     ObjectFrame {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is wrong with it.
         problem: crate::labelled::ObjectFrameProblem,
     },
-    /// Settings of the perception that cannot be read.
+    /// Perception settings that cannot be read.
     #[error("{}: {problem}", path.display())]
     PerceptionFile {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the parser says.
+        /// The parser's error.
         problem: deepfusion_model::TomlProblem,
     },
-    /// Settings of the perception that contradict one another.
+    /// Perception settings that contradict one another.
     #[error("{}: {source}", path.display())]
     PerceptionSettings {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// In what.
+        /// The contradiction.
         source: deepfusion_perception::Error,
     },
     /// A frame of an earlier live run.
     #[error("{}: already exists", path.display())]
     LiveFrameExists {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// An output that another run made, or this one of another image.
+    /// An output of another run, or of this run for another image.
     #[error("{}: already exists, {why}", path.display())]
     Stale {
-        /// The sidecar.
+        /// Path of the sidecar.
         path: PathBuf,
-        /// In what it differs.
+        /// How it differs.
         why: StaleReason,
     },
-    /// A shard of a job beside shards of another.
-    #[error("{}: the shards of this folder were begun with {why}", path.display())]
+    /// A shard of one job beside shards of another.
+    #[error("{}: the shards in this folder were started with {why}", path.display())]
     OtherJob {
-        /// The other shard's manifest.
+        /// Path of the other shard's manifest.
         path: PathBuf,
-        /// In what it differs.
+        /// How the other job differs.
         why: OtherJob,
     },
-    /// A shard that another process works on.
-    #[error("{}: another run is at work on shard {shard} there", folder.display())]
+    /// A shard that another process is working on.
+    #[error("{}: another run is already working on shard {shard}", folder.display())]
     Busy {
         /// The output folder.
         folder: PathBuf,
         /// The shard.
         shard: Shard,
     },
-    /// A folder that another process writes into.
-    #[error("{}: another run is at work there", folder.display())]
+    /// A folder that another process is writing to.
+    #[error("{}: another run is already writing to this folder", folder.display())]
     FolderBusy {
         /// The output folder.
         folder: PathBuf,
     },
-    /// What is kept beside a network cannot be read.
+    /// A file beside a network that cannot be read.
     #[error("{}", path.display())]
     Kept {
-        /// The file, or the network's name.
+        /// Path of the file, or the network's name.
         path: PathBuf,
-        /// Why not.
+        /// The parser's error.
         source: toml::de::Error,
     },
-    /// Factors of intervals that cannot be read, or cannot be such.
+    /// Interval factors that cannot be read, or that are invalid.
     #[error("{}", path.display())]
     KeptFactors {
-        /// The file, or the network's name.
+        /// Path of the file, or the network's name.
         path: PathBuf,
-        /// Why not.
+        /// What is wrong.
         source: Box<deepfusion_eval::Error>,
     },
-    /// Encoders without a depth network.
-    #[error("{}: only its encoders were ever trained: there is no depth to pack", path.display())]
+    /// Trained encoders without a depth network.
+    #[error("{}: only its encoders were trained: there is no depth network to pack", path.display())]
     NothingToPack {
-        /// The checkpoint.
+        /// Path of the checkpoint.
         path: PathBuf,
     },
-    /// A network that is to count as one that saw no real image, and did.
+    /// A network that was trained on real images, but was said to be trained on simulated ones only.
     #[error(
-        "{} learned from {}, which is real: drives of {}",
+        "{}: learned from {}, which is real ({})",
         run.display(), recording.display(), layout.label()
     )]
     SawReal {
-        /// The run, which may be one that the network began from or is the mean of.
+        /// The run, which may be an ancestor of the given one.
         run: PathBuf,
-        /// The recording.
+        /// Path of the recording.
         recording: PathBuf,
-        /// Whose drives it is or has.
+        /// Layout of the recording.
         layout: DatasetKind,
     },
-    /// Networks whose weights have no mean.
+    /// Networks whose weights cannot be averaged.
     #[error("{}: {why}", path.display())]
     NoMean {
-        /// The network that does not fit the first.
+        /// The network that does not match the first.
         path: PathBuf,
-        /// Why not.
+        /// Why it does not match.
         why: NoMean,
     },
-    /// A folder for something new that is not empty.
-    #[error("{}: is not empty", path.display())]
+    /// A folder for a new output that is not empty.
+    #[error("{}: the folder is not empty", path.display())]
     Occupied {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// Shares of a mean that cannot be such.
+    /// Invalid shares of a mean.
     #[error(
-        "{} for {}: one positive number for each is needed",
+        "{} for {}: expected one positive number for each network",
         count_of(*found, "share"), count_of(*networks, "network")
     )]
     Shares {
-        /// How many there are.
+        /// Number of shares.
         found: usize,
-        /// How many networks.
+        /// Number of networks.
         networks: usize,
     },
     /// A packed network where a run is needed.
-    #[error("{}: is packed already", path.display())]
+    #[error("{}: already packed", path.display())]
     PackedAlready {
-        /// What was given.
+        /// The network as given.
         path: PathBuf,
     },
-    /// A network of which no convolution bears int8.
+    /// A network of which no convolution can be computed in int8.
     #[error(
-        "int8: even one convolution alone changes depth by more than {} % on average",
+        "int8: even a single convolution changes depth by more than {} % on average",
         100.0 * most_deviation
     )]
     NothingInInt8 {
         /// How far depth may differ from that in f32: mean |ln|.
         most_deviation: f64,
     },
-    /// A network inside the program, whose card nobody can write to.
-    #[error("{name}: is embedded in the program, and calibrated there")]
+    /// An embedded network, whose card cannot be changed.
+    #[error("{name}: embedded networks cannot be calibrated again")]
     EmbeddedNetwork {
-        /// Its name.
+        /// The network's name.
         name: String,
     },
-    /// Something of a card that TOML has no form for.
+    /// A part of a card that cannot be written as TOML.
     #[error("{what}")]
     NoTomlForm {
-        /// What, in a sentence.
+        /// The part, as a message.
         what: &'static str,
-        /// Why not.
+        /// The serialiser's error.
         source: toml::ser::Error,
     },
     /// A device whose backend was not compiled in.
     #[error("this build has no `{device}` backend")]
     NoBackend {
-        /// The backend's name, which is that of its feature.
+        /// The backend's name, which is also its feature's name.
         device: &'static str,
     },
     /// A device that this machine does not have.
-    #[error("no device `{device}`: this machine has {count} of the `{backend}` backend")]
+    #[error("no device `{device}`: the backend `{backend}` has {} on this machine", count_of(*count, "device"))]
     NoSuchDevice {
-        /// As it was given.
+        /// The device as given.
         device: String,
         /// Its backend.
         backend: &'static str,
-        /// How many devices that has here.
+        /// Number of the backend's devices on this machine.
         count: usize,
     },
-    /// An engine for processors on another device.
-    #[error("only Burn computes on other devices than the processor")]
+    /// An engine for processors, on another device.
+    #[error("only Burn runs on devices other than the processor")]
     OnlyOnCpu,
     /// A precision that an engine does not have.
-    #[error("only the fused engine, on the processor, computes in {}", precision.name())]
+    #[error("only the fused engine on the processor computes in {}", precision.name())]
     OnlyFused {
-        /// What was asked for.
+        /// The requested precision.
         precision: Precision,
     },
-    /// A library for another engine.
-    #[error("a library of ONNX Runtime is given, and another engine runs the network")]
+    /// A library for an engine that was not chosen.
+    #[error("an ONNX Runtime library is given, but another engine runs the network")]
     OnlyOrt,
     /// Burn, in a build without it.
-    #[error("Burn, and with it any device but the processor, is left out of this build")]
+    #[error("this build lacks Burn, which all devices except the processor need")]
     NoFramework,
-    /// An embedded network that is not the one a configuration began from.
+    /// An embedded network that differs from the one a configuration started from.
     #[cfg(feature = "train")]
     #[error(
-        "the embedded network `{name}` is another one than this configuration began from: SHA-256 {found}, not {expected}"
+        "the embedded network `{name}` is not the one that this configuration started from: SHA-256 {found}, expected {expected}"
     )]
     OtherStart {
-        /// Its name.
+        /// The network's name.
         name: String,
-        /// Of the weights in this build.
+        /// SHA-256 of the weights in this build.
         found: String,
-        /// In the configuration.
+        /// SHA-256 in the configuration.
         expected: String,
     },
-    /// A run, or a table of runs, that another process writes.
+    /// A run, or a table of runs, that another process is writing.
     #[cfg(feature = "train")]
-    #[error("{}: another process is at work there", folder.display())]
+    #[error("{}: another process is already writing to this folder", folder.display())]
     AtWork {
-        /// The folder.
+        /// Path of the folder.
         folder: PathBuf,
     },
-    /// A folder for an adapted network that is not new.
+    /// A folder for an adapted network that already exists.
     #[cfg(feature = "train")]
     #[error("{}: already exists", path.display())]
     AdaptedBefore {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// A folder for an adapted network that no other one can be renamed to.
+    /// A folder for an adapted network that cannot be replaced by a rename.
     #[cfg(feature = "train")]
-    #[error("{}: is a mount point, which a finished run cannot take the place of", path.display())]
+    #[error("{}: is a mount point, which a finished run cannot replace", path.display())]
     MountPoint {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
     /// An interrupted adaptation with other settings.
     #[cfg(feature = "train")]
     #[error("{}: already exists", path.display())]
     OtherSettings {
-        /// Its folder.
+        /// Path of its folder.
         path: PathBuf,
     },
-    /// Drives that a network cannot be judged on, and so not adapted to.
+    /// Drives on which a network cannot be judged, so that it cannot be adapted to them.
     #[cfg(feature = "train")]
-    #[error("{frames} of the frames that are held out can show how good a network is, too few to adapt by{}", because(*why))]
+    #[error("only {} can be used to judge the network, too few to adapt it{}", count_of(*frames, "held-out frame"), because(*why))]
     NotJudged {
-        /// How many.
+        /// Number of held-out frames that can be used.
         frames: usize,
-        /// Why there are none.
+        /// Why none can be used.
         why: Option<deepfusion_eval::verdict::NoCertificate>,
     },
-    /// A folder without a network to go back to.
+    /// A folder without an adaptation that can be undone.
     #[cfg(feature = "train")]
-    #[error("{}: no network was adapted there, or it is undone already", path.display())]
+    #[error("{}: no network was adapted here, or it was already undone", path.display())]
     NotAdapted {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// What an ablation keeps of a run cannot be read.
+    /// A result of an ablation that cannot be read.
     #[cfg(feature = "train")]
     #[error("{}: not a result of an ablation", path.display())]
     NoResult {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why not.
+        /// The parser's error.
         source: serde_json::Error,
     },
-    /// A process that is to check a device cannot be started.
+    /// A process for checking a device that cannot be started.
     #[cfg(feature = "train")]
     #[error("cannot start the process that checks the device")]
     CheckNotStarted {
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Nobody can say how a process ended that checked a device.
+    /// A process for checking a device whose end cannot be waited for.
     #[cfg(feature = "train")]
     #[error("cannot wait for the process that checks the device")]
     CheckNotEnded {
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A file that was written and cannot be read again.
+    /// A written file that cannot be read back.
     #[cfg(feature = "train")]
     #[error("cannot read {} back", path.display())]
     ReadBack {
-        /// Where it would have gone.
+        /// The path that the file should have had.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// An exported file that is not the network.
+    /// An exported file that computes something else than the network.
     #[cfg(feature = "train")]
     #[error(
-        "{}: {engine} is {deviation:.1e} away from the network (max |difference| / max |value|), more than {:.0e}; not kept",
+        "{}: {engine} differs from the network by {deviation:.1e} (max |difference| / max |value|), expected at most {:.0e}; not kept",
         path.display(),
         deepfusion_onnx::check::TOLERANCE
     )]
     Deviates {
-        /// The file that would have been written.
+        /// The path that the file should have had.
         path: PathBuf,
-        /// What ran it.
+        /// The engine that ran it.
         engine: String,
-        /// How far it is from the network.
+        /// Its relative difference from the network.
         deviation: f64,
     },
-    /// Something asked of a run that goes on, and that is not what it has.
+    /// A requested setting that contradicts the resumed run.
     #[cfg(feature = "train")]
     #[error(transparent)]
     Contradiction(Contradiction),
-    /// A run that has made more steps than it is asked for.
+    /// A run that has already made more steps than requested.
     #[cfg(feature = "train")]
-    #[error("the run has made {} already, more than the {asked} that it is to have", count_of(*made, "step"))]
+    #[error("the run has already made {}, more than the {asked} requested", count_of(*made, "step"))]
     FewerSteps {
-        /// Steps that it has made.
+        /// Number of steps that it has made.
         made: usize,
-        /// Steps of the whole run, as asked for.
+        /// Requested number of steps of the whole run.
         asked: usize,
     },
-    /// Recordings, or something of how they are opened, that are asked for beside a configuration's data sets.
+    /// Recordings, or settings for opening them, that were given in addition to a configuration's data sets.
     #[cfg(feature = "train")]
     #[error(
         "setting `{setting}`: expected none beside data.sets: each set has its own, found both"
     )]
     BesideSets {
-        /// What is asked for.
+        /// The setting.
         setting: Setting,
     },
-    /// Something that has no TOML form.
+    /// A value that cannot be written as TOML.
     #[error(transparent)]
     Toml(#[from] toml::ser::Error),
-    /// Something that has no JSON form.
+    /// A value that cannot be written as JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// A picture that cannot be encoded.
     #[error(transparent)]
     Picture(#[from] image::ImageError),
-    /// A map whose values do not fill it.
+    /// A map whose values do not match its shape.
     #[error(transparent)]
     Shape(#[from] ndarray::ShapeError),
-    /// A map that cannot be written as NumPy's.
+    /// A map that cannot be written as a NumPy file.
     #[error(transparent)]
     Npy(#[from] ndarray_npy::WriteNpyError),
-    /// A video.
+    /// An error of a video.
     #[error(transparent)]
     Video(#[from] deepfusion_video::Error),
-    /// A picture.
+    /// An error of an image.
     #[error(transparent)]
     Images(#[from] deepfusion_images::Error),
-    /// A recording, or another file.
+    /// An error of a recording, or of another file.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
-    /// A scan.
+    /// An error of a scan.
     #[error(transparent)]
     Cloud(#[from] deepfusion_geometry::cloud::Error),
-    /// A file of poses.
+    /// An error of a file of poses.
     #[error(transparent)]
     PoseFile(#[from] deepfusion_eval::odometry::PoseFileError),
-    /// Poses that cannot be a camera's path.
+    /// Poses that are not a camera's trajectory.
     #[error(transparent)]
     Track(#[from] deepfusion_eval::odometry::TrackError),
-    /// A board in pictures.
+    /// An error of a calibration.
     #[error(transparent)]
     Calibrate(#[from] deepfusion_calibrate::Error),
-    /// What was measured.
+    /// An error of an evaluation.
     #[error(transparent)]
     Eval(#[from] deepfusion_eval::Error),
-    /// An evaluation that is kept beside a run.
+    /// An error of an evaluation saved beside a run.
     #[error(transparent)]
     Compare(#[from] deepfusion_eval::compare::Error),
-    /// A configuration or a run's folder.
+    /// An error of a configuration or a run's folder.
     #[error(transparent)]
     Model(#[from] deepfusion_model::Error),
-    /// A packed network.
+    /// An error of a packed network.
     #[error(transparent)]
     Weights(#[from] deepfusion_weights::Error),
-    /// A simulated street.
+    /// An error of the simulator.
     #[error(transparent)]
     Simulator(#[from] deepfusion_sim::Error),
-    /// A network, or what runs it.
+    /// An error of a network, or of its engine.
     #[error(transparent)]
     Runtime(#[from] deepfusion_runtime::Error),
-    /// An ONNX file, or what runs it.
+    /// An error of an ONNX file, or of its engine.
     #[cfg(feature = "train")]
     #[error(transparent)]
     Onnx(#[from] deepfusion_onnx::Error),
-    /// Weights of another project.
+    /// An error of another project's weights.
     #[cfg(feature = "train")]
     #[error(transparent)]
     Network(#[from] deepfusion_model::NetworkError),
-    /// Samples that cannot be learned from.
+    /// An error of training.
     #[cfg(feature = "train")]
     #[error(transparent)]
     Train(#[from] deepfusion_train::Error),
-    /// A picture that cannot be drawn.
+    /// An error of drawing a picture.
     #[error(transparent)]
     Render(#[from] deepfusion_render::Error),
-    /// A user's model that tells things apart.
+    /// An error of the user's segmentation model.
     #[error(transparent)]
     Instances(#[from] deepfusion_instances::Error),
-    /// A depth image that nothing can be found in.
+    /// An error of the perception.
     #[error(transparent)]
     Perception(#[from] deepfusion_perception::Error),
 }
 
-/// A result of this crate.
+/// A result with this crate's error.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// For networks of other input sizes: what the runtime says stays its own.
+/// For networks of other input sizes: the runtime's own errors keep their type.
 impl From<Error> for deepfusion_runtime::EngineProblem {
     fn from(error: Error) -> Self {
         match error {

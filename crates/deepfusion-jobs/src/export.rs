@@ -1,4 +1,4 @@
-//! A network as an ONNX file that was compared with it before it is kept.
+//! Exports a network as an ONNX file, which is compared with the network before it is kept.
 
 use std::io::Write;
 use std::path::Path;
@@ -18,32 +18,33 @@ use crate::{Error, Result};
 /// A file that was written.
 #[derive(Debug)]
 pub struct Exported {
-    /// What it holds.
+    /// The model in the file.
     pub model: DepthModel,
-    /// Its size.
+    /// Size of the file.
     pub bytes: usize,
-    /// How it was run and compared with the network.
+    /// The engines that ran the file, and how they compare with the network.
     pub checks: Vec<Check>,
-    /// Why ONNX Runtime did not run it, where it did not: no library was named, and none is found.
+    /// Why ONNX Runtime did not run the file: no library was given, and none was found. `None` if it did.
     pub no_runtime: Option<deepfusion_onnx::Error>,
 }
 
-/// A way in which a file was run and compared with the network.
+/// An engine that ran the file, compared with the network.
 #[derive(Debug)]
 pub struct Check {
-    /// What ran it.
+    /// Name of the engine.
     pub engine: String,
-    /// How far its depth is from the network's: max |difference| / max |value|.
+    /// Difference of its depth from the network's: max |difference| / max |value|.
     pub depth_deviation: f64,
-    /// The same of disparity.
+    /// Difference of its disparity, in the same measure.
     pub disparity_deviation: f64,
 }
 
-/// Writes a network as `out`, for pictures of `size` (its own by default); `library`: ONNX Runtime's. What is there already is replaced.
+/// Writes a network as `out`, for pictures of `size` (by default the network's own); `library` is ONNX Runtime's. An existing file is
+/// replaced.
 ///
 /// # Errors
-/// [`Error::Deviates`] where what was written is not the network, and then nothing is kept; a size that the network does not take; a
-/// library that was named and cannot be loaded; a file that cannot be written.
+/// [`Error::Deviates`] if the file computes something else than the network; nothing is kept then. A size that the network does not
+/// support; a given library that cannot be loaded; a file that cannot be written.
 pub fn export(
     network: &StoredNetwork,
     size: Option<InputSize>,
@@ -77,7 +78,7 @@ fn model_of(
         Some(size) => InputSize::new(size.width, size.height)?,
         None => config.size,
     };
-    // Of the pictures trained on, whatever the size now: a network sees metres through those.
+    // The training camera, whatever the size: the network's metres belong to it.
     let camera = network
         .camera
         .map(|k| k.resized(config.size.width as u32, config.size.height as u32));
@@ -87,7 +88,7 @@ fn model_of(
         width: size.width,
         height: size.height,
         trained_with: match config.canonical_focal_px {
-            // The camera that its depth is of.
+            // The focal length that its depth is for.
             Some(focal) => Some(FocalLength {
                 fx: focal,
                 fy: focal,
@@ -98,7 +99,7 @@ fn model_of(
     })
 }
 
-/// Reads the file back and compares it with the network, in every engine there is.
+/// Reads the file back and compares it with the network in every available engine.
 fn check(
     (out, file): (&Path, &Path),
     model: &DepthModel,
@@ -139,7 +140,7 @@ fn check(
     Ok((checks, None))
 }
 
-/// What an engine made of the file, beside what the network sees.
+/// Compares an engine's output for the file with the network's.
 fn compare(
     out: &Path,
     engine: String,
@@ -161,7 +162,7 @@ fn compare(
     })
 }
 
-/// What the Burn network sees.
+/// The output of the network in Burn.
 fn burn_maps(model: &DepthModel, net: &DepthNet, rgb: &[u8], device: &Device) -> DepthMaps {
     let (w, h) = (model.width, model.height);
     let unit = rgb.iter().map(|v| f32::from(*v) / 255.0).collect();
@@ -202,7 +203,7 @@ mod tests {
         let error = compared(6.0).unwrap_err().to_string();
         assert_eq!(
             error,
-            "depth.onnx: an engine is 1.7e-1 away from the network (max |difference| / max |value|), more than 1e-4; \
+            "depth.onnx: an engine differs from the network by 1.7e-1 (max |difference| / max |value|), expected at most 1e-4; \
              not kept"
         );
         assert!(compared(f32::NAN).is_err());

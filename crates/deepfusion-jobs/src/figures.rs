@@ -1,12 +1,12 @@
-//! What was measured of a checkpoint, from the evaluations that its run keeps.
+//! Metrics of a checkpoint, from the evaluations saved beside its run.
 
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::compare::SavedEvaluation;
 use deepfusion_weights::Figure;
 
-/// The evaluations of the checkpoint with this SHA-256, in the order of their files' names. A file that cannot be read, or is of another
-/// checkpoint, says nothing.
+/// The evaluations of the checkpoint with this SHA-256, in the order of their files' names. Files that cannot be read or belong to another
+/// checkpoint are skipped.
 #[must_use]
 pub(crate) fn figures(run: &Path, sha256: &str) -> Vec<Figure> {
     let Ok(entries) = std::fs::read_dir(run.join("eval")) else {
@@ -32,7 +32,7 @@ pub(crate) fn figures(run: &Path, sha256: &str) -> Vec<Figure> {
         .collect()
 }
 
-/// The last part of each path, once: where the recordings lay on a machine is nobody's matter elsewhere.
+/// The last part of each path, each only once: the rest is specific to one machine.
 #[must_use]
 pub(crate) fn names<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Vec<String> {
     let mut names = Vec::new();

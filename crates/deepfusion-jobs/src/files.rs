@@ -1,28 +1,28 @@
-//! How files are written, and under which names.
+//! Writes files and chooses their names.
 
 use std::collections::HashSet;
 use std::path::Path;
 
 use deepfusion_data::Error as DataError;
 
-/// Writes a file, whole or not at all.
+/// Writes a file atomically.
 pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), DataError> {
     deepfusion_fs::write(path, bytes).map_err(|e| DataError::file(path, e))
 }
 
-/// Names for outputs of which no two are the same, not even to a file system for which `A` is `a`.
+/// Makes unique names for outputs, also for file systems that do not distinguish `A` from `a`.
 #[derive(Debug, Default)]
 pub(crate) struct UniqueNames {
     lowercase: HashSet<String>,
 }
 
 impl UniqueNames {
-    /// This name, with a number where it is taken: `a`, `a-2`, `a-3`.
+    /// This name, or with a number if it is taken: `a`, `a-2`, `a-3`.
     pub(crate) fn take(&mut self, name: &str) -> String {
         self.take_if(name, |_| true)
     }
 
-    /// The same, among the names that `free` allows in small letters.
+    /// As [`Self::take`], but only names for which `free` is true; `free` receives them in lower case.
     pub(crate) fn take_if(&mut self, name: &str, free: impl Fn(&str) -> bool) -> String {
         let mut candidate = name.to_owned();
         let mut number = 1;

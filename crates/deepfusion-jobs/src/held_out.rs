@@ -1,4 +1,4 @@
-//! Whether training saw what is measured on.
+//! Finds out whether training has seen the evaluated frames.
 
 #[cfg(feature = "train")]
 mod of_run;
@@ -17,15 +17,15 @@ use crate::verdict::Unseen;
 #[cfg(feature = "train")]
 pub use of_run::{held_out, unseen_frames};
 
-/// Whether a path is a run's folder, or in one.
+/// Whether a path is a run's folder, or inside one.
 #[must_use]
 pub fn is_run(path: &Path) -> bool {
     let in_a_run = |p: &Path| p.join("config.toml").exists();
     path.is_dir() || path.parent().is_some_and(in_a_run)
 }
 
-/// Whether a packed network cannot have seen these recordings. What it saw is gone, but for its kind: one that saw simulated drives
-/// alone saw no recording that is surely real.
+/// Whether a packed network cannot have seen these recordings. Its card only says whether its training data were all simulated. If so, it
+/// has not seen recordings that are certainly real.
 #[must_use]
 pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
     /// Exact poses, which no real drive has.
@@ -37,7 +37,7 @@ pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
     card.simulated_only && datasets.iter().all(surely_real)
 }
 
-/// Whether a network learned from none of the evaluated images; `None` where that is not known. `config`: its run's.
+/// Whether a network learned from none of the evaluated images; `None` if that is unknown. `config` is its run's.
 ///
 /// # Errors
 /// A run's findings that cannot be read.
@@ -55,7 +55,7 @@ pub fn learned_from_none(
     })
 }
 
-/// Which of the recordings' frames a network's training did not see. `config`: its run's.
+/// The frames of the recordings that a network's training did not see. `config` is its run's.
 ///
 /// # Errors
 /// A run's findings that cannot be read.
@@ -73,7 +73,7 @@ pub fn unseen_by(
     })
 }
 
-/// What training took of a run's recordings is not known to a build without it.
+/// A build without training cannot know which frames a run was trained on.
 #[cfg(not(feature = "train"))]
 #[must_use]
 pub fn held_out(
@@ -85,7 +85,7 @@ pub fn held_out(
     None
 }
 
-/// As [`held_out`], frame by frame.
+/// As [`held_out`], for each frame.
 #[cfg(not(feature = "train"))]
 #[must_use]
 pub fn unseen_frames(
@@ -103,7 +103,7 @@ mod tests {
     use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag};
     use std::ops::ControlFlow;
 
-    /// What became of a simulated bag may be what a network of simulated drives saw: only without the mark nothing tells it from a real drive.
+    /// A network trained on simulated drives may have seen a converted simulated bag: without its mark, it looks like a real drive.
     #[test]
     fn a_simulated_drive_is_not_surely_real_in_another_layout() {
         let at = tempfile::tempdir().unwrap();

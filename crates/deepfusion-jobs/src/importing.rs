@@ -1,4 +1,4 @@
-//! Other projects' weights as a run: which are known, and with the feature `train` how they become one.
+//! Other projects' weights as a run: which are known and, with the feature `train`, how to make a run of them.
 
 #[cfg(feature = "train")]
 mod foreign_network;

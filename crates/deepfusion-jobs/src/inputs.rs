@@ -1,4 +1,4 @@
-//! The images that the arguments mean, each with the name of its outputs.
+//! Finds the images that the arguments stand for, each with a name for its outputs.
 
 use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
@@ -13,14 +13,14 @@ use deepfusion_video::is_video;
 use crate::files::UniqueNames;
 use crate::{Error, Result};
 
-/// An image, and what its outputs are called.
+/// An image, and the name of its outputs.
 #[derive(Debug, Clone)]
 pub struct Input {
-    /// The image, or the file it is in.
+    /// Path of the image, or of the file that contains it.
     pub path: PathBuf,
     /// What the names of its outputs begin with.
     pub name: String,
-    /// The recording it is a frame of, and which.
+    /// Its recording and the frame's index in it, if it is a frame.
     pub frame: Option<(Arc<Dataset>, usize)>,
 }
 
@@ -30,19 +30,19 @@ impl PartialEq for Input {
     }
 }
 
-/// Endings of ROS bags.
+/// Extensions of ROS bags.
 const BAGS: [&str; 3] = ["bag", "mcap", "db3"];
 
-/// The images that files, folders, patterns and recordings mean: in the natural order of their paths, each once, then the frames of
-/// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
-/// apart agree on both.
+/// The images that files, folders, patterns and recordings stand for: first images in the natural order of their paths, each once, then the
+/// frames of recordings in order. Order and names do not depend on the order of the arguments, so that separately started shards agree on
+/// both.
 ///
-/// A folder with images in it is a folder of images, unless it has a `dataset.toml` or one above it is for it, depth beside colour, or is a comma2k19 segment, in
-/// which a picture for an overview lies beside the video. Any other that [`Dataset::open`] takes is a recording, whose cameras are
-/// `options`' and its own. `opened` sees the recordings.
+/// A folder with images is a folder of images, except in three cases: a `dataset.toml` in it or above it applies to it, it has depth beside
+/// colour, or it is a comma2k19 segment, which has a preview image beside the video. Any other folder that [`Dataset::open`] accepts is a
+/// recording; `options` select its cameras. `opened` is called with the recordings.
 ///
 /// # Errors
-/// [`Error::NoImages`], a pattern that cannot be one, and what cannot be opened.
+/// [`Error::NoImages`], an invalid pattern, and files that cannot be opened.
 pub fn find_inputs(
     arguments: &[String],
     options: &OpenOptions,
@@ -65,7 +65,7 @@ pub fn find_inputs(
         } else if path.exists() && (is_bag(&path) || is_video(&path)) {
             recordings.extend(open(&path, argument, options)?);
         } else if path.exists() || !argument.contains(['*', '?', '[']) {
-            // One of several files that is not there is an error of whoever opens it.
+            // If one of several files is missing, opening it fails later.
             found.push(path);
         } else {
             let paths = glob::glob(argument)?.filter_map(Result::ok);
@@ -86,7 +86,7 @@ pub fn find_inputs(
     Ok(inputs)
 }
 
-/// The first inputs of each recording, at most so many, and of the images that are of none.
+/// The first `most` inputs of each recording, and of the images that belong to none.
 #[must_use]
 pub fn first_of_each(mut inputs: Vec<Input>, most: usize) -> Vec<Input> {
     let mut seen: HashMap<Option<*const Dataset>, usize> = HashMap::new();
@@ -99,18 +99,18 @@ pub fn first_of_each(mut inputs: Vec<Input>, most: usize) -> Vec<Input> {
     inputs
 }
 
-/// Whether a folder has images that are not its frames alone: colour beside depth, or the picture for an overview of a comma2k19 segment.
+/// Whether a folder has images other than its frames: colour beside depth, or the preview image of a comma2k19 segment.
 fn has_other_pictures(folder: &Path) -> bool {
     let such = [DatasetKind::RgbD, DatasetKind::Comma2k19];
-    // What is wrong with the folder as a recording says nothing of its images.
+    // An error about the folder as a recording does not concern its images.
     Dataset::kind_at(folder).is_ok_and(|kind| such.contains(&kind))
 }
 
-/// Opens a recording; that it cannot be one is an error that names the argument.
+/// Opens a recording; if the folder is not a recording, the error names the argument.
 fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
     match Dataset::open(path, options) {
         Ok(datasets) => Ok(datasets),
-        // A folder of ROS 2 bags has a hint of its own.
+        // A folder of ROS 2 bags has its own hint.
         Err(deepfusion_data::Error::UnknownLayout { found, .. })
             if path.is_dir() && !found.has_ros2_bags() =>
         {
@@ -121,7 +121,7 @@ fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Datase
     }
 }
 
-/// Sorts recordings, and drops those given twice.
+/// Sorts recordings, and removes duplicates.
 fn each_once(mut recordings: Vec<Dataset>) -> Vec<Dataset> {
     let first = |dataset: &Dataset| -> PathBuf {
         let frame = dataset.frames().first();
@@ -129,7 +129,7 @@ fn each_once(mut recordings: Vec<Dataset>) -> Vec<Dataset> {
     };
     recordings.sort_by(|a, b| {
         let names = (a.folder(), a.name()).cmp(&(b.folder(), b.name()));
-        // Files side by side may differ in their endings alone.
+        // Names of files side by side may differ only in their extensions.
         names.then_with(|| first(a).cmp(&first(b)))
     });
     let mut seen = HashSet::new();
@@ -143,8 +143,8 @@ fn each_once(mut recordings: Vec<Dataset>) -> Vec<Dataset> {
     recordings
 }
 
-/// The selected frames of recordings. They are named by their numbers, after the recording's name where there are others: a name that is another's
-/// too has a number, and so has one whose frames might be named as one of `images`, in small letters.
+/// The selected frames of recordings. They are named by their numbers; if there are other inputs, the recording's name comes first. That
+/// name gets a number if another recording has the same, or if its frames could be named like one of `images` (in lower case).
 fn frames_of(recordings: Vec<Dataset>, images: &[String]) -> Vec<Input> {
     let alone = recordings.len() == 1 && images.is_empty();
     let mut names = UniqueNames::default();
@@ -177,7 +177,7 @@ fn frames_of(recordings: Vec<Dataset>, images: &[String]) -> Vec<Input> {
     inputs
 }
 
-/// The images among the paths; that there is none is an error that names the argument.
+/// The images among the paths; if there are none, the error names the argument.
 fn images_among(paths: impl Iterator<Item = PathBuf>, argument: &str) -> Result<Vec<PathBuf>> {
     let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
     if images.is_empty() {
@@ -193,7 +193,7 @@ fn is_bag(path: &Path) -> bool {
         .is_some_and(|e| BAGS.contains(&e.to_ascii_lowercase().as_str()))
 }
 
-/// Sorts the paths, drops those given twice, and names each after its file, numbered where two files share a name.
+/// Sorts the paths, removes duplicates, and names each after its file, with a number if two files have the same name.
 fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     let mut paths: Vec<PathBuf> = paths.iter().map(|p| without_dots(p)).collect();
     paths.sort_by(|a, b| natural_order(a, b));
@@ -214,7 +214,7 @@ fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     .collect()
 }
 
-/// `./a/./b` is `a/b`.
+/// Removes `.` components: `./a/./b` becomes `a/b`.
 fn without_dots(path: &Path) -> PathBuf {
     path.components()
         .filter(|c| *c != Component::CurDir)
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn inputs_of_the_same_name_do_not_overwrite_each_other() {
         assert_eq!(names(&["a/0.png", "b/0.png", "b/1.jpg"]), ["0", "0-2", "1"]);
-        // Not even where the number makes the name of another.
+        // Also if the number produces another file's name.
         assert_eq!(
             names(&["a/0.png", "b/0.png", "c/0-2.png", "d/A.png", "e/a.png"]),
             ["0", "0-2", "0-2-2", "A", "a-2"]
@@ -254,7 +254,7 @@ mod tests {
         assert_eq!(names(&twice), ["0"]);
     }
 
-    /// A folder of one frame with tables beside it.
+    /// A folder with one frame and its tables.
     fn write_drive(folder: &Path) {
         let images = folder.join("images");
         std::fs::create_dir_all(&images).unwrap();
@@ -281,9 +281,9 @@ mod tests {
         let both = ["drive-0000000000", "Drive-2-0000000000"];
         assert_eq!(names(&[&monday, &tuesday]), both);
         assert_eq!(names(&[&tuesday, &monday]), both);
-        // Given twice it is one.
+        // A recording given twice counts once.
         assert_eq!(names(&[&monday, &monday]), ["0000000000"]);
-        // An image may have the name of a frame, or begin like it and have none.
+        // An image may have the name of a frame, or only begin like one.
         let beside = root.path().join("drive-front.png");
         std::fs::copy(root.path().join("monday/drive/images/0.png"), &beside).unwrap();
         assert_eq!(
@@ -298,7 +298,7 @@ mod tests {
         );
     }
 
-    /// What a fleet's file says holds here as in training: else the same drive would have other metres.
+    /// A `dataset.toml` for several folders applies here as in training: otherwise the same drive would have other metres.
     #[test]
     fn settings_for_folders_make_one_a_recording() {
         let root = tempfile::tempdir().unwrap();
@@ -318,14 +318,14 @@ mod tests {
         assert!(is_recording());
     }
 
-    /// A comma2k19 segment has a picture for an overview beside its video.
+    /// A comma2k19 segment has a preview image beside its video.
     #[test]
     fn a_picture_beside_a_recording_is_no_input() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         std::fs::write(at.join("preview.png"), []).unwrap();
         let found = || find_inputs(&[at.display().to_string()], &OpenOptions::default(), |_| ());
-        // Calibration and times as beside an odometry sequence do not make the pictures another's.
+        // Calibration and times as in an odometry sequence do not turn the folder into another recording.
         for name in ["calib.txt", "times.txt"] {
             std::fs::write(at.join(name), []).unwrap();
         }

@@ -1,4 +1,4 @@
-//! Calibration for int8: what a network's convolutions read on images of the user's, and which of them bear it.
+//! Calibration for int8: the input ranges of a network's convolutions on the user's images, and which convolutions tolerate int8.
 
 use std::path::{Path, PathBuf};
 
@@ -13,24 +13,24 @@ use deepfusion_weights::Shipped;
 use crate::packing::simulated_input;
 use crate::{Error, Input, Result};
 
-/// Images on which depth in int8 is compared with depth in f32.
+/// Number of images on which depth in int8 is compared with depth in f32.
 const COMPARED_ON: usize = 4;
 
-/// How to calibrate.
+/// Options of the calibration.
 #[derive(Debug, Clone, Copy)]
 pub struct Int8Options<'a> {
-    /// Look at this many of the images, evenly spread.
+    /// Number of images to use, evenly spread.
     pub images: usize,
-    /// Depth may differ from that in f32 by so much on average (|ln|): convolutions that harm it most stay in bf16 until it does not.
+    /// How far depth may differ from that in f32 on average (|ln|): the convolutions that harm it most stay in bf16 until it does not.
     pub most_deviation: f64,
-    /// One of the data sets that the network learned from, where it learned several.
+    /// One of the network's training data sets, if there were several.
     pub set: Option<&'a str>,
 }
 
-/// That a network can be calibrated here.
+/// Checks that a network can be calibrated on this machine.
 ///
 /// # Errors
-/// [`Error::EmbeddedNetwork`], a processor without int8.
+/// [`Error::EmbeddedNetwork`]; a processor without int8.
 pub fn check(source: &ModelSource) -> Result<()> {
     match source {
         ModelSource::Packed { given, .. } if !Shipped::is_at(given) => {
@@ -42,12 +42,12 @@ pub fn check(source: &ModelSource) -> Result<()> {
     }
 }
 
-/// Finds the ranges of a network, and keeps them beside it: in the run's folder, or in the packed file's card. `shown` hears how far it is,
-/// of how far. Returns what was found and the file that holds it.
+/// Measures the input ranges of a network's convolutions, and saves them beside it: in the run's folder, or in the packed file's card.
+/// `shown` receives the number of steps done, and of all. Returns the calibration and the path of its file.
 ///
 /// # Errors
-/// As [`check`]; [`Error::NoImages`] for none, [`Error::NothingInInt8`] where no convolution bears int8, images that cannot be read, a
-/// file that cannot be written.
+/// As [`check`]; [`Error::NoImages`] without images, [`Error::NothingInInt8`] if no convolution tolerates int8; images that cannot be read;
+/// a file that cannot be written.
 pub fn calibrate(
     source: &ModelSource,
     images: &[Input],
@@ -80,7 +80,7 @@ pub fn calibrate(
     Ok((calibration, path))
 }
 
-/// What a network of these weights reads of a simulated street: enough to time int8 where no weights are trained.
+/// The calibration of a network with these weights on a simulated street: enough to time int8 without trained weights.
 ///
 /// # Errors
 /// Weights of another network.
@@ -89,7 +89,7 @@ pub fn on_a_street(config: &TrainConfig, weights: &Weights) -> Result<Int8Calibr
     observed(config, weights, 0, std::iter::once(Ok(input)))
 }
 
-/// An image as the network sees it, at the size trained with.
+/// An image as the network's input, at the training size.
 fn prepared(network: &StoredNetwork, input: &Input) -> Result<Vec<f32>> {
     let preparer = Preparer {
         size: network.config.size,
@@ -111,13 +111,13 @@ fn prepared(network: &StoredNetwork, input: &Input) -> Result<Vec<f32>> {
     Ok(seen.views.into_iter().flat_map(|view| view.input).collect())
 }
 
-/// Up to `most` of them, evenly spread.
+/// Up to `most` items, evenly spread.
 fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
     let count = most.min(all.len());
     (0..count).map(move |i| &all[i * all.len() / count])
 }
 
-/// The ranges of all convolutions that int8 computes, on images as the network sees them.
+/// The input ranges of all convolutions that can be computed in int8.
 fn observed(
     config: &TrainConfig,
     weights: &Weights,
@@ -140,7 +140,7 @@ fn observed(
     })
 }
 
-/// Ranges, without those of the convolutions that harm depth most in int8, as many as it takes.
+/// The input ranges, without as many as necessary of the convolutions that harm depth most in int8.
 fn found(
     network: &StoredNetwork,
     images: &[Input],
@@ -154,7 +154,7 @@ fn found(
     }
     let (config, weights) = (&network.config, &network.weights);
     let chosen: Vec<&Input> = spread(images, options.images).collect();
-    // Looking at the images, then at each convolution alone.
+    // One step for each image, then one for each convolution alone.
     let convolutions = FusedRunner::computed_in_int8(config, weights.clone())?.len();
     let all = chosen.len() + convolutions;
     let inputs = chosen.iter().enumerate().map(|(i, input)| {
@@ -204,7 +204,7 @@ fn disparities(runner: &mut FusedRunner, inputs: &[Vec<f32>]) -> Result<Vec<f32>
     Ok(all)
 }
 
-/// Mean |ln(a / b)|, of disparities as of depths.
+/// Mean |ln(a / b)|; the same for disparities and for depths.
 fn mean_deviation(a: &[f32], b: &[f32]) -> f64 {
     let off = a.iter().zip(b);
     let off = off.map(|(a, b)| (f64::from(*a) / f64::from(*b)).ln().abs());

@@ -1,4 +1,4 @@
-//! How sure a network is: whether its intervals hold, and by how much they must be stretched so that they do.
+//! The intervals of a network that predicts uncertainty: whether they hold, and the factors that make them hold.
 
 use std::path::{Path, PathBuf};
 
@@ -12,12 +12,12 @@ use crate::evaluation::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files;
 use crate::{Error, ModelFacts, Result, StaleCalibration};
 
-/// The file in a run's folder.
+/// Name of the file in a run's folder.
 const FILE: &str = "uncertainty.toml";
-/// Its key of the network's step.
+/// The file's key for the network's step.
 const STEP: &str = "step";
 
-/// What the file of a run holds: the factors, and the step of the network that they were found for.
+/// The contents of a run's file: the factors, and the step of the network that they were measured for.
 fn kept(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
     let path = run.join(FILE);
     let text = match std::fs::read_to_string(&path) {
@@ -35,16 +35,16 @@ fn kept(run: &Path) -> Result<Option<(IntervalFactors, Option<usize>)>> {
     }
 }
 
-/// The factors that were found for a run's network at this step. Those of another step are not its own: [`stale`].
+/// The factors of a run's network at this step. Those of another step do not apply: [`stale`].
 ///
 /// # Errors
-/// A file that holds none.
+/// A file without factors.
 pub fn read(run: &Path, step: usize) -> Result<Option<IntervalFactors>> {
     let kept = kept(run)?.filter(|(_, found)| *found == Some(step));
     Ok(kept.map(|(factors, _)| factors))
 }
 
-/// The factors beside a run that are not its network's at this step, where it has such.
+/// The factors beside a run, if they were measured at another step of the network.
 ///
 /// # Errors
 /// As [`read`].
@@ -57,7 +57,7 @@ pub fn stale(run: &Path, step: usize) -> Result<Option<StaleCalibration>> {
     }))
 }
 
-/// Factors that can be used; `path` names where they come from.
+/// Checks factors; `path` is the file named in the error.
 pub(crate) fn validated(factors: IntervalFactors, path: &Path) -> Result<IntervalFactors> {
     match factors.validate() {
         Ok(()) => Ok(factors),
@@ -71,16 +71,16 @@ pub(crate) fn validated(factors: IntervalFactors, path: &Path) -> Result<Interva
 fn write(factors: &IntervalFactors, step: usize, run: &Path) -> Result<PathBuf> {
     let path = run.join(FILE);
     let text = format!(
-        "# The interval of a depth is depth * exp(-q * b) to depth * exp(q * b); b is what the network says, and q stands here for\n\
-         # each level and range of predicted depth. Found by an evaluation, for the network of this step.\n{STEP} = {step}\n{}",
+        "# The interval of a depth is depth * exp(-q * b) to depth * exp(q * b); b is the network's prediction; q follows for\n\
+         # each level and range of predicted depth. Measured by an evaluation, for the network at this step.\n{STEP} = {step}\n{}",
         toml::to_string(factors)?
     );
     files::write(&path, text)?;
     Ok(path)
 }
 
-/// Standard deviation of a prediction's depth (`depth`, at the image's size), metres, stretched as the intervals of 80 % are;
-/// `None` of a network that does not say how sure it is.
+/// Standard deviation of a prediction's depth (`depth`, at the image's size) in metres, scaled by the factors of the 80 % interval; `None`
+/// if the network does not predict uncertainty.
 #[must_use]
 pub fn sigma(
     prediction: &Prediction,
@@ -94,7 +94,7 @@ pub fn sigma(
     Some(sigma)
 }
 
-/// A depth without the pixels whose standard deviation is above a share of it.
+/// A depth map without the pixels whose standard deviation exceeds `most`, as a share of their depth.
 #[must_use]
 pub fn without_unsure(depth: &DepthMap, sigma: &DepthMap, most: f64) -> DepthMap {
     let mut sure = depth.clone();
@@ -106,11 +106,11 @@ pub fn without_unsure(depth: &DepthMap, sigma: &DepthMap, most: f64) -> DepthMap
     sure
 }
 
-/// Adds to an evaluation whether the network's intervals hold on its frames; with `calibrate` finds new factors on them, keeps
-/// those beside the run, gives them with their file, and marks what they hold of the same frames.
+/// Adds to an evaluation whether the network's intervals hold on its frames. With `calibrate`, it measures new factors on these frames,
+/// saves them beside the run, returns them with their file, and marks the result as measured on the same frames.
 ///
 /// # Errors
-/// What cannot be read, predicted or written.
+/// A file or image that cannot be read, predicted or written.
 pub fn measure(
     (model, estimator): (&ModelSource, &mut DepthEstimator),
     datasets: &[Dataset],

@@ -1,4 +1,4 @@
-//! What this machine has for the program: vector instructions, memory, disk, and programs from outside. Megabytes are of 2²⁰ bytes.
+//! What this machine has: vector instructions, memory, disk, and external programs. A megabyte is 2²⁰ bytes.
 
 mod overview;
 mod tool;
@@ -11,26 +11,26 @@ use serde::{Serialize, Serializer};
 pub use self::overview::Machine;
 pub use self::tool::{NoTool, Tool};
 
-/// Instructions that the kernels make use of.
+/// An instruction set that the kernels use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum InstructionSet {
     /// x86: vectors of 256 bits.
     Avx2,
-    /// x86: a product and a sum in one.
+    /// x86: fused multiply-add.
     Fma,
     /// x86: vectors of 512 bits.
     Avx512f,
-    /// x86: products of numbers in bf16.
+    /// x86: dot products in bf16.
     Avx512Bf16,
-    /// x86: products of matrices in bf16.
+    /// x86: matrix products in bf16.
     AmxBf16,
     /// ARM: vectors of 128 bits.
     Neon,
 }
 
 impl InstructionSet {
-    /// As processors' makers write it, in small letters.
+    /// The name that processor makers use, in lower case.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -44,14 +44,14 @@ impl InstructionSet {
     }
 }
 
-/// As its name.
+/// The name, as printed.
 impl Serialize for InstructionSet {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }
 }
 
-/// Those that this processor has. AMX is known on Linux alone.
+/// The instruction sets of this processor. AMX is only detected on Linux.
 #[must_use]
 pub fn instruction_sets() -> Vec<InstructionSet> {
     #[cfg(target_arch = "x86_64")]
@@ -83,7 +83,7 @@ pub fn instruction_sets() -> Vec<InstructionSet> {
     }
 }
 
-/// Whether Linux lists a flag of the processor, in `/proc/cpuinfo`.
+/// Whether Linux lists a flag of the processor in `/proc/cpuinfo`.
 #[cfg(target_arch = "x86_64")]
 fn has_flag(cpuinfo: &str, flag: &str) -> bool {
     let flags = cpuinfo.lines().find(|line| line.starts_with("flags"));
@@ -91,17 +91,17 @@ fn has_flag(cpuinfo: &str, flag: &str) -> bool {
     flags.any(|known| known == flag)
 }
 
-/// The machine's memory, MB, as Linux reports it; `None` elsewhere.
+/// The machine's memory in MB, as Linux reports it; `None` elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Memory {
-    /// All of it.
+    /// Total memory.
     pub total_mb: Option<u64>,
-    /// What programs can still have.
+    /// Memory still available to programs.
     pub free_mb: Option<u64>,
 }
 
 impl Memory {
-    /// As it is now.
+    /// The current figures.
     #[must_use]
     pub fn now() -> Self {
         Self::of(&std::fs::read_to_string("/proc/meminfo").unwrap_or_default())
@@ -116,54 +116,54 @@ impl Memory {
     }
 }
 
-/// The most memory that this process ever had, MB, where the system reports it (Linux).
+/// The peak memory of this process in MB, if the system reports it (Linux).
 #[must_use]
 pub fn peak_rss_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     kilobytes(&status, "VmHWM:").map(|kilobytes| kilobytes as f64 / 1024.0)
 }
 
-/// A figure of `/proc`, where it stands behind its key.
+/// The number after a key in a file of `/proc`.
 fn kilobytes(text: &str, key: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// Free space of the current folder's disk, MB, as `df` reports it; `None` without it.
+/// Free space on the current folder's disk in MB, as `df` reports it; `None` without `df`.
 #[must_use]
 pub fn free_disk_mb() -> Option<u64> {
     let output = Command::new("df").args(["-Pk", "."]).output().ok()?;
     free_by_df(&String::from_utf8(output.stdout).ok()?)
 }
 
-/// The fourth column of the second line, in the form that POSIX asks for.
+/// The fourth column of the second line, in POSIX's output format.
 fn free_by_df(printed: &str) -> Option<u64> {
     let line = printed.lines().nth(1)?;
     let kilobytes: u64 = line.split_whitespace().nth(3)?.parse().ok()?;
     Some(kilobytes / 1024)
 }
 
-/// Why a program from outside cannot be used.
+/// Why an external program cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoProgram {
-    /// There is none of its name.
+    /// No program with this name is on the PATH.
     #[error("not on the PATH")]
     NotFound,
-    /// It does not even say its version.
+    /// It fails even to print its version.
     #[error("`{program} -version` fails ({status})")]
     Fails {
-        /// Its name.
+        /// Name of the program.
         program: String,
-        /// How it ended.
+        /// Its exit status.
         status: ExitStatus,
     },
-    /// The system does not start it.
+    /// The system cannot start it.
     #[error(transparent)]
     System(io::Error),
 }
 
-/// The first line that a program of ffmpeg's family prints for `-version`.
+/// The first line that one of ffmpeg's programs prints for `-version`.
 ///
 /// # Errors
 /// [`NoProgram`].

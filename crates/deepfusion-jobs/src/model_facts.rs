@@ -1,4 +1,4 @@
-//! What there is to say of a network beside what it predicts.
+//! Facts about a network besides its predictions.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::evaluation::confidence::Confidence;
 use crate::{Error, Result, StaleCalibration, intervals};
 
-/// The last part of a path, for people: a folder given as `.` by its own name.
+/// The last part of a path, for people; for `.`, the folder's own name.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -18,7 +18,7 @@ pub fn name_of(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// What else there is to say of a network.
+/// Facts about a network besides its predictions.
 pub trait ModelFacts {
     /// Its name, for people.
     fn name(&self) -> String;
@@ -26,30 +26,29 @@ pub trait ModelFacts {
     /// SHA-256 of the weights' file, in hexadecimal.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// A file that cannot be read.
     fn sha256(&self) -> Result<String>;
 
-    /// SHA-256 of configuration, weights, the factors of the intervals and, in int8, the calibration for it: all that what it predicts
-    /// depends on.
+    /// SHA-256 of everything that its predictions depend on: configuration, weights, interval factors and, for int8, the calibration.
     ///
     /// # Errors
-    /// Where they cannot be read.
+    /// A file that cannot be read.
     fn content_sha256(&self, precision: Precision) -> Result<String>;
 
-    /// The factors of the intervals of a network that says how sure it is: those found for it, else it is taken at its word.
+    /// The interval factors of a network that predicts uncertainty; if none were measured, its intervals are used unchanged.
     ///
     /// # Errors
-    /// For a file or a card that holds none.
+    /// A file or a card without factors.
     fn interval_factors(&self) -> Result<IntervalFactors>;
 
-    /// What is kept beside a run and was found for another step of its network: it is not used.
+    /// Calibrations beside a run that were made for another step of its network, and are therefore not used.
     ///
     /// # Errors
     /// For a file that cannot be read.
     fn stale_calibrations(&self) -> Result<Vec<StaleCalibration>>;
 
-    /// What evaluations that the run's folder keeps say of this checkpoint's metres, with the metres of a data set, for a network that
-    /// has learned for `steps`. A packed network keeps none.
+    /// The scale of this checkpoint's depth according to the evaluations saved beside its run, for the metres of a data set and a network
+    /// that was trained for `steps`. A packed network has no saved evaluations.
     ///
     /// # Errors
     /// As [`Self::sha256`].
@@ -83,7 +82,7 @@ impl ModelFacts for ModelSource {
             Self::Run { folder, kind, .. } => {
                 for path in [folder.config_path(), folder.checkpoint_path(*kind)] {
                     let failed = |e| deepfusion_data::Error::file(&path, e);
-                    // In pieces: a checkpoint may be larger than what predicting takes.
+                    // In pieces: a checkpoint may be larger than the memory needed for predicting.
                     let mut file = std::fs::File::open(&path).map_err(failed)?;
                     std::io::copy(&mut file, &mut hash).map_err(failed)?;
                 }

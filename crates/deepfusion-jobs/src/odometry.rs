@@ -1,4 +1,4 @@
-//! The pose network's motions, chained, beside the drives' true paths.
+//! Compares the chained motions of the pose network with the drives' true trajectories.
 
 use std::path::Path;
 
@@ -13,34 +13,35 @@ use deepfusion_train::PosePredictor;
 use crate::Result;
 use crate::files::{UniqueNames, write};
 
-/// Exact poses of simulated drives.
+/// File with the exact poses of simulated drives.
 const EXACT_POSES: &str = "poses.txt";
-/// Pairs of frames that the network sees at once.
+/// Number of frame pairs in a batch.
 const PAIRS: usize = 8;
-/// Another focal length than the one trained with, at network size, by more than this share is a warning.
+/// Largest accepted relative difference between the focal length and the one trained with, at the network's size; a larger one gives a
+/// warning.
 const FOCAL_TOLERANCE: f64 = 0.05;
 
-/// By what a path of the pose network may be wrong.
+/// Why a trajectory of the pose network may be wrong.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OdometryWarning {
-    /// The network sees pixels, and another focal length shows it another motion.
+    /// The network's motion depends on the focal length, which differs from the one trained with.
     #[error(
         "{drive}: its focal length is {ratio:.2} times the one trained with, at network size; poses are not corrected for it"
     )]
     OtherFocalLength {
         /// The drive's name.
         drive: String,
-        /// Its focal length over the one trained with, both at the network's size.
+        /// Its focal length divided by the one trained with, both at the network's size.
         ratio: f64,
     },
 }
 
-/// A track for each stretch of the recordings without a gap, and in words what their truth is. `progress` takes the frames seen and in
-/// all, `warn` by what a drive's path may be wrong.
+/// A track for each section of the recordings without a gap, and a description of its ground truth. `progress` receives the number of
+/// frames done, and of all; `warn` receives warnings.
 ///
 /// # Errors
-/// [`TrackError::TooShort`] where no stretch has two frames; recordings without poses, and images that cannot be read.
+/// [`TrackError::TooShort`] if no section has two frames; recordings without poses; images that cannot be read.
 pub fn tracks(
     predictor: &PosePredictor,
     datasets: &[Dataset],
@@ -96,7 +97,7 @@ pub fn tracks(
         tracks.push(track.with_times(path.times_s));
     }
     if tracks.is_empty() {
-        let name = datasets.first().map_or("the data given", Dataset::name);
+        let name = datasets.first().map_or("the given data", Dataset::name);
         return Err(TrackError::TooShort {
             name: name.to_owned(),
             poses: 1,
@@ -109,13 +110,13 @@ pub fn tracks(
         (0, 0, _) => "the recordings' own poses",
         (_, _, 1..) => "each recording's own: exact poses, OXTS, or a tracker's poses",
         _ => {
-            "the simulator's exact poses where there are any, else OXTS attitude and integrated velocity"
+            "the simulator's exact poses if available, otherwise OXTS attitude and integrated velocity"
         }
     };
     Ok((tracks, truth))
 }
 
-/// Writes both paths of a track in the world of their first pose, and their picture from above, into a folder that is there.
+/// Writes both trajectories of a track relative to their first pose, and their picture from above, into an existing folder.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -128,7 +129,7 @@ pub fn write_track(folder: &Path, track: &TrackPair) -> Result<()> {
             write(&file("tum"), tum_text(poses, &track.times_s))?;
         }
     }
-    // From above: the first camera's x to the right, its z ahead.
+    // From above: the first camera's x to the right, its z upwards.
     let seen = |poses: &[Se3]| -> Vec<[f64; 2]> {
         let place = |p: &Se3| [p.translation().x, p.translation().z];
         poses.iter().map(place).collect()
@@ -141,7 +142,7 @@ pub fn write_track(folder: &Path, track: &TrackPair) -> Result<()> {
     Ok(write(&folder.join(format!("{}.svg", track.name)), svg)?)
 }
 
-/// The exact path of a simulated drive; `None` for real ones.
+/// The exact trajectory of a simulated drive; `None` for real ones.
 fn exact_paths(dataset: &Dataset) -> Result<Option<Vec<CameraPath>>> {
     let file = dataset.folder().join(EXACT_POSES);
     if dataset.kind() != DatasetKind::KittiRaw
@@ -170,7 +171,7 @@ fn exact_paths(dataset: &Dataset) -> Result<Option<Vec<CameraPath>>> {
     Ok(Some(paths))
 }
 
-/// A drive's name, with the camera where both are looked at, and the first frame where it has gaps.
+/// A drive's name, with the camera if both are evaluated, and with the first frame if the drive has gaps.
 fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool) -> String {
     let mut name = dataset.name().to_owned();
     if cameras {
@@ -183,7 +184,7 @@ fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool
     name
 }
 
-/// A drive's focal length over the one trained with, both at the network's size; `None` where either is not known.
+/// A drive's focal length divided by the one trained with, both at the network's size; `None` if either is unknown.
 fn focal_ratio(predictor: &PosePredictor, dataset: &Dataset) -> Option<f64> {
     let train = predictor.training_camera()?;
     let frame = *dataset.selected().first()?;

@@ -1,4 +1,4 @@
-//! A run's depth network as a file of its own, with a card that says what it is.
+//! Packs a run's depth network into a file, with a card that describes it.
 
 mod past;
 
@@ -18,40 +18,40 @@ use deepfusion_weights::{Card, FORMAT_VERSION, NUMBERS, Shipped, Tensor, pack};
 use crate::figures::{figures, names};
 use crate::{Error, Result, StaleCalibration, dates, intervals};
 
-/// What a card says that the run does not know.
+/// Entries of the card that do not follow from the run.
 #[derive(Debug, Clone, Default)]
 pub struct PackOptions {
-    /// Which checkpoint; the one that was named with the run, or the one that the folder prefers.
+    /// Which checkpoint to pack; `None`: the one given with the run, or the one that the folder prefers.
     pub checkpoint: Option<CheckpointKind>,
-    /// What the network is called: letters a to z, digits and dashes.
+    /// The network's name: letters a to z, digits and dashes.
     pub name: String,
-    /// What else there is to say of it.
+    /// A note about it.
     pub note: Option<String>,
     /// How to make it again.
     pub recipe: Option<String>,
-    /// Under which terms it may be used.
+    /// Its licence.
     pub licence: String,
-    /// Whether it learned from no real image. That is checked as far as its run, those it began from and those that it is the mean of can tell.
+    /// Whether it was trained only on simulated images. This is checked as far as its run and its ancestors record it.
     pub simulated_only: bool,
 }
 
-/// What [`pack_run`] made.
+/// The result of [`pack_run`].
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PackedRun {
     /// The network with its card.
     pub shipped: Shipped,
-    /// Where it is to count as one that saw no real image: the recordings and networks of its past of which nothing shows it. The card says it
-    /// all the same.
+    /// If it should count as trained only on simulated images: the recordings and networks in its past for which this cannot be shown. The
+    /// card contains the claim nevertheless.
     pub not_known_as_simulated: Vec<PathBuf>,
-    /// The factors of intervals beside the run, where they are another step's: the card has none.
+    /// Interval factors beside the run that belong to another step, so that the card has none.
     pub stale: Option<StaleCalibration>,
 }
 
 /// Packs the depth network of a run (its folder, or a checkpoint in it): kernels rounded to bf16, vectors in f32.
 ///
 /// # Errors
-/// [`Error::PackedAlready`], [`Error::NothingToPack`], [`Error::SawReal`], and a run that cannot be read.
+/// [`Error::PackedAlready`], [`Error::NothingToPack`], [`Error::SawReal`]; a run that cannot be read.
 pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
     if Shipped::is_at(model) {
         let path = model.to_owned();
@@ -74,7 +74,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
     if state.focal_ratio.is_some()
         && let Some(camera) = folder.camera_of(&state, None)?
     {
-        // That of this step, and no spread of another's.
+        // The camera at this step, without the standard deviation of another step.
         findings.learn_camera(&config, camera);
         findings.learned_camera = findings.learned_camera.filter(|l| l.step == state.step);
     }
@@ -85,7 +85,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
         step: state.step,
         int8: Int8Calibration::of_run(folder.path(), state.step),
     };
-    // All of it, and nothing else.
+    // Checks that the weights are complete, and contain nothing else.
     depth_graph_with_uncertainty(&network.config.depth_net, network.weights.clone())
         .map_err(ModelError::from)?;
     let tensors = network.weights.tensors.iter();
@@ -102,7 +102,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
     let parts = config.depth_net.costs(config.size);
     let no_form = |what| move |source| Error::NoTomlForm { what, source };
     let data = recordings(&config, &findings.averaged);
-    // Where the others lay means nothing elsewhere.
+    // Paths on this machine mean nothing elsewhere.
     findings.averaged.clear();
     let card = Card {
         format_version: FORMAT_VERSION,
@@ -125,7 +125,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
         uncertainty: intervals::read(folder.path(), state.step)?
             .map(toml::Table::try_from)
             .transpose()
-            .map_err(no_form("the factors of its intervals have no TOML form"))?,
+            .map_err(no_form("the interval factors cannot be written as TOML"))?,
         int8: network
             .int8
             .clone()
@@ -133,11 +133,11 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
             .as_ref()
             .map(toml::Table::try_from)
             .transpose()
-            .map_err(no_form("the ranges for int8 have no TOML form"))?,
+            .map_err(no_form("the int8 ranges cannot be written as TOML"))?,
         config: config
             .without_places()
             .to_run_table(&findings)
-            .map_err(no_form("the run's configuration has no TOML form"))?,
+            .map_err(no_form("the run's configuration cannot be written as TOML"))?,
     };
     Ok(PackedRun {
         shipped: Shipped::new(card, bytes)?,
@@ -146,7 +146,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<PackedRun> {
     })
 }
 
-/// The names of the recordings that a run learned from, or those that it is the mean of, as far as these are there.
+/// The names of the recordings that a run, or the runs that it is the mean of, learned from, as far as these exist.
 fn recordings(config: &TrainConfig, averaged: &[AveragedNetwork]) -> Vec<String> {
     let mut all = learned_from(config);
     for network in averaged {
@@ -197,7 +197,7 @@ fn difference(network: &StoredNetwork, bytes: &[u8]) -> Result<f64> {
     Ok(relative.fold(0.0, f64::max))
 }
 
-/// A picture of a simulated street as the network sees it.
+/// A picture of a simulated street, as the network's input.
 ///
 /// # Errors
 /// A size that cannot be simulated.
@@ -218,7 +218,7 @@ pub(crate) fn simulated_input(config: &TrainConfig) -> Result<Vec<f32>> {
     ))
 }
 
-/// To three digits: the last ones depend on the processor.
+/// Rounds to three digits: the last ones depend on the processor.
 fn rounded(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }

@@ -4,8 +4,8 @@ use deepfusion_perception::PerceptionConfig;
 
 use crate::{Error, Result};
 
-/// Settings of the perception from a TOML file over `base`, with rows of parked cars unless the file says otherwise: what is not in the file
-/// keeps its default.
+/// Settings of the perception from a TOML file over `base`, with rows of parked cars unless the file switches them off. Settings that are
+/// not in the file keep their defaults.
 ///
 /// # Errors
 /// [`Error::PerceptionFile`], [`Error::PerceptionSettings`]; a file that cannot be read.

@@ -1,4 +1,4 @@
-//! The recordings that a configuration names.
+//! Opens the recordings of a configuration.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ mod warnings;
 use self::kept_turns::seen_turns;
 pub use self::warnings::{PlacedWarning, placed_warnings, warning_line, warnings_of};
 
-/// Opens the recordings at several paths, each drive and camera a data set.
+/// Opens the recordings at several paths; each drive and camera is a data set.
 ///
 /// # Errors
-/// A path that holds no recording, or a broken one.
+/// A path without a recording, or with a broken one.
 pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let mut datasets = Vec::new();
     for path in paths {
@@ -30,9 +30,9 @@ pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
     Ok(datasets)
 }
 
-/// As [`open_recordings`], for what takes the vehicle's motion: a camera whose mount is not given is turned to where its images show that
-/// it looks ([`heading`]), where they do, and the drive's warnings then say so. Two cameras of a drive are turned as the images of the first
-/// show it: how they are to each other is known. Reads up to 160 images of such a drive, if its yaw rate is known.
+/// As [`open_recordings`], for uses of the vehicle's motion. If a camera's mount is not given, its direction is measured in the images
+/// ([`heading`]), if they show it; the drive's warnings then say so. Two cameras of a drive are turned together, by the images of the
+/// first, since their relative pose is known. Reads up to 160 images of such a drive, if its yaw rate is known.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -44,11 +44,11 @@ pub fn open_aimed(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Datase
     Ok(datasets)
 }
 
-/// As [`open_aimed`], for what learns from the vehicle's motion: where its roll and pitch are not recorded, they are taken from the images
-/// ([`deepfusion_doctor::seen_turns`]), with its turns to the side where there is no yaw rate, and the drive's warnings say so. Reads all images of
-/// such a drive, twice where neither mount nor yaw rate is known; each of two cameras has the turns that its own images show. Turns that took
-/// more than ten seconds are kept in the user's cache folder, where there is one, and are found anew once the images or what else they follow
-/// from have changed.
+/// As [`open_aimed`], for learning from the vehicle's motion. If roll and pitch are not recorded, they are measured in the images
+/// ([`deepfusion_doctor::seen_turns`]), together with yaw if there is no yaw rate; the drive's warnings say so. Reads all images of such a
+/// drive, or twice if neither mount nor yaw rate is known; each of two cameras gets the turns that its own images show. Turns that took
+/// more than ten seconds are kept in the user's cache folder, if there is one, and are measured again if the images or anything else that
+/// they depend on has changed.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -56,8 +56,8 @@ pub fn open_with_turns(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
     open_turning(paths, options, Dataset::tilt_unknown)
 }
 
-/// As [`open_aimed`], for what measures by the vehicle's motion and takes roll and pitch from the images itself: its turns are taken from
-/// all images of a drive only where there is no yaw rate.
+/// As [`open_aimed`], for measurements by the vehicle's motion that take roll and pitch from the images themselves: turns are measured in
+/// all images of a drive only if there is no yaw rate.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -74,7 +74,7 @@ fn open_turning(
 ) -> Result<Vec<Dataset>> {
     let mut datasets = open_aimed(paths, options)?;
     for rig in unaimed_rigs(&datasets, |d| is_to_turn(d) && !d.yaw_known()) {
-        // Where it heads shows once its turns are known, and these are surer once it is known where it heads.
+        // The heading can only be measured once the turns are known, and the turns are more accurate once the heading is known.
         aim(&mut datasets, &rig, |dataset| {
             let mut turning = dataset.clone();
             turning.take_turns(&seen_turns(dataset));
@@ -88,8 +88,8 @@ fn open_turning(
     Ok(datasets)
 }
 
-/// The cameras of such drives whose mounts are not given, by index: the two of one drive together. Where those of two topics of a bag are to each
-/// other, nobody knows.
+/// The cameras of selected drives whose mounts are not given, by index: the two of one drive together, except those of two topics of a bag,
+/// whose relative pose is unknown.
 fn unaimed_rigs(datasets: &[Dataset], is_such: impl Fn(&Dataset) -> bool) -> Vec<Vec<usize>> {
     let drives = first_of_drive(datasets);
     let mut rigs: Vec<Vec<usize>> = Vec::new();
@@ -108,7 +108,7 @@ fn unaimed_rigs(datasets: &[Dataset], is_such: impl Fn(&Dataset) -> bool) -> Vec
     rigs
 }
 
-/// Aims the cameras of a rig as the images of the first show it that do.
+/// Aims the cameras of a rig by the images of the first one that show the heading.
 fn aim(datasets: &mut [Dataset], rig: &[usize], heading: impl Fn(&Dataset) -> Option<Heading>) {
     let seen = rig.iter().find_map(|i| {
         let dataset = &datasets[*i];
@@ -121,20 +121,20 @@ fn aim(datasets: &mut [Dataset], rig: &[usize], heading: impl Fn(&Dataset) -> Op
     }
 }
 
-/// Where a camera heads, where its images show it well enough.
+/// A camera's heading, if its images show it well enough.
 fn sure_heading(dataset: &Dataset) -> Option<Heading> {
     heading(dataset).ok().filter(Heading::is_sure)
 }
 
-/// The split file of a name, read.
+/// Reads a split file.
 ///
 /// # Errors
-/// A file that is no split.
+/// A file that is not a split.
 pub fn read_split(path: Option<&Path>) -> Result<Option<Split>> {
     Ok(path.map(Split::read).transpose()?)
 }
 
-/// Cameras as configurations name them.
+/// The word for cameras in configurations.
 #[must_use]
 pub fn camera_word(camera: Cameras) -> &'static str {
     match camera.cameras() {
@@ -144,8 +144,8 @@ pub fn camera_word(camera: Cameras) -> &'static str {
     }
 }
 
-/// All recordings to train on, with the place of their set in `data.sets`: the samples of a run are theirs. Roll and pitch, on which these
-/// do not depend, are not taken from the images; without a yaw rate the turns to the side are, where the run takes them.
+/// All recordings to train on, with the index of their set in `data.sets`; a run's samples come from them. Roll and pitch do not affect the
+/// samples and are not measured in the images. If there is no yaw rate, yaw is, if the run uses turns.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -154,7 +154,7 @@ pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>
     open_sets(config, RecordingRole::Training, opened_by, &mut |_, _| ())
 }
 
-/// The same for what takes nothing of the vehicle's motion: no image is read.
+/// As [`training_recordings`], for uses that need no motion of the vehicle: no image is read.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -163,19 +163,19 @@ pub fn plain_training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dat
     open_sets(config, RecordingRole::Training, opened_by, &mut |_, _| ())
 }
 
-/// How recordings are opened.
+/// A function that opens recordings.
 type OpenFn = fn(&[PathBuf], &OpenOptions) -> Result<Vec<Dataset>>;
 
-/// What recordings are for.
+/// What recordings are used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordingRole {
-    /// To learn from.
+    /// Learning.
     Training,
-    /// To judge by.
+    /// Validation.
     Validation,
 }
 
-/// Whether there are recordings or frames to validate on; else the end of each drive is held out.
+/// Whether there are recordings or frames to validate on; otherwise the end of each drive is held out.
 #[must_use]
 pub fn validates(config: &TrainConfig) -> bool {
     let data = &config.data;
@@ -183,8 +183,8 @@ pub fn validates(config: &TrainConfig) -> bool {
     own || data.sets.iter().any(DataSetConfig::validates)
 }
 
-/// The recordings for training or validation, with the place of their set in `data.sets`; `opened` sees those of each set, with how they were
-/// opened.
+/// The recordings for training or validation, with the index of their set in `data.sets`; `opened` is called with those of each set, and
+/// with the options they were opened with.
 ///
 /// # Errors
 /// As [`open_recordings`].
@@ -196,7 +196,7 @@ pub fn open_for(
     open_sets(config, role, (open_aimed, open_with_turns), opened)
 }
 
-/// The recordings of a role, those whose turns the images are to show opened by `open_turned`, the others by `open_plain`.
+/// The recordings of a role: opened by `open_turned` if their turns are measured in the images, otherwise by `open_plain`.
 fn open_sets(
     config: &TrainConfig,
     role: RecordingRole,
@@ -246,24 +246,24 @@ fn open_sets(
     Ok(all)
 }
 
-/// Whether a set's drives are to turn as their images show: not where nothing reads how they turned, nor where turns are to tell the
-/// focal length, as those of the images follow from it.
+/// Whether the turns of a set's drives are measured in the images. They are not if nothing uses turns, or if turns determine the focal
+/// length, since turns from images depend on it.
 fn takes_turns(config: &TrainConfig, set: usize) -> bool {
     let wanted = !config.data.measured_turns_only && config.learned_camera().is_none();
     wanted && reads_turns(config, set)
 }
 
-/// Whether something that is learned from a set depends on how its vehicles turned.
+/// Whether anything that is learned from a set depends on its vehicles' turns.
 pub(crate) fn reads_turns(config: &TrainConfig, set: usize) -> bool {
     let reads = matches!(config.view_motion, ViewMotion::Vehicle | ViewMotion::Auto)
         || config.reads_rotation();
     reads && config.learn(set).from_motion()
 }
 
-/// Paths and the split file that selects their frames.
+/// Paths, and the split file that selects their frames.
 type Frames<'a> = (&'a Vec<PathBuf>, &'a Option<PathBuf>);
 
-/// Those for one role. A split of training frames says nothing about which to validate on, nor the other way round.
+/// The paths and the split for one role. A split of training frames does not select validation frames, nor the other way round.
 fn of_role<'a>(
     role: RecordingRole,
     training: Frames<'a>,
@@ -277,12 +277,12 @@ fn of_role<'a>(
     (paths, split.as_deref())
 }
 
-/// Each with the place of its set.
+/// Pairs each with the index of its set.
 fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
     datasets.into_iter().map(|d| (set, d)).collect()
 }
 
-/// Topics as configurations name them.
+/// Parses the topics in a configuration.
 ///
 /// # Errors
 /// [`Error::NoTopic`] for one that is not written as [`NamedTopic`].
@@ -297,7 +297,7 @@ pub fn named_topics(topics: &[String]) -> Result<Vec<NamedTopic>> {
     topics.iter().map(read).collect()
 }
 
-/// How a configuration wants recordings opened: by its words for cameras and topics.
+/// The options for opening a configuration's recordings, with its cameras and topics.
 fn open_options(
     config: &TrainConfig,
     split: Option<&Path>,
@@ -328,7 +328,7 @@ fn open_options(
 /// A file that cannot be written.
 ///
 /// # Panics
-/// Where the part reaches beyond the frames.
+/// If the part exceeds the frames.
 pub fn write_split(drive: &Dataset, part: Range<usize>, path: &Path) -> Result<()> {
     let line =
         |frame: &deepfusion_data::Frame| format!("{} {:010} l\n", drive.split_name(), frame.number);
@@ -345,11 +345,11 @@ mod tests {
     use std::fs;
     use std::ops::ControlFlow;
 
-    /// Pixels by which the folder's principal point is lower than the camera's: its way ahead is then so much above it, as if it looked
-    /// down by some degrees.
+    /// Pixels by which the folder's principal point is lower than the camera's: its direction of travel is then this far above it, as if
+    /// the camera looked down by some degrees.
     const TOO_LOW_PX: f64 = 13.0;
 
-    /// A drive long enough to show where its camera looks.
+    /// A drive long enough to measure where its camera looks.
     fn street() -> SimConfig {
         SimConfig {
             seed: 5,
@@ -361,7 +361,7 @@ mod tests {
         }
     }
 
-    /// A simulated drive as a folder of images with speeds, whose mount nothing says.
+    /// A simulated drive as a folder of images with speeds, without a mount.
     fn folder(at: &Path) -> std::result::Result<PathBuf, Box<dyn Error>> {
         let simulation = Simulation::new(&street())?;
         let kitti = write_kitti(&simulation, &at.join("kitti"), &mut |_, _| {
@@ -443,7 +443,7 @@ mod tests {
             "{said}"
         );
 
-        // What is given is believed.
+        // A given mount is used as it is.
         fs::write(folder.join("dataset.toml"), "[mount]\nup_m = 1.65\n")?;
         let given = &open_aimed(&[folder], &options)?[0];
         assert!(!given.mount_assumed());
@@ -451,7 +451,7 @@ mod tests {
         Ok(())
     }
 
-    /// Each by itself, two cameras would look apart by what their images do not show so well, and be no stereo pair any more.
+    /// If each were turned by itself, the errors would make two cameras diverge, and they would no longer be a stereo pair.
     #[test]
     fn two_cameras_of_a_drive_are_aimed_as_one() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
@@ -490,7 +490,8 @@ mod tests {
         Ok(())
     }
 
-    /// Of a drive with a speed alone the images tell how it turned and where its camera looks; with `measured_turns_only` nothing is taken from them.
+    /// For a drive with only a speed, the images show its turns and its camera's heading; with `measured_turns_only`, nothing is taken from
+    /// them.
     #[test]
     fn a_speed_is_enough() -> std::result::Result<(), Box<dyn Error>> {
         let at = tempfile::tempdir()?;
@@ -516,7 +517,7 @@ mod tests {
         assert!(turning.yaw_known() && !turning.tilt_unknown());
         let known = |drive: &Dataset| drive.camera_motion(1, 2).is_some();
         assert!(known(&turning));
-        // Whoever asks later what the run has seen finds its samples.
+        // A later check of what the run has seen finds its samples.
         assert!(known(&training_recordings(&config)?.remove(0).1));
         config.assumed_camera = Some(deepfusion_model::AssumedCamera {
             learn: true,

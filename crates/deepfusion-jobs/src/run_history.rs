@@ -1,4 +1,4 @@
-//! How a run learned, by what its folder keeps.
+//! A run's training history, from the files in its folder.
 
 use std::path::Path;
 
@@ -8,23 +8,23 @@ use serde::Deserialize;
 
 use crate::Result;
 
-/// How a run learned, by what its folder keeps.
+/// A run's training history, from the files in its folder.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct RunHistory {
-    /// Its losses, step by step; `None` of a run that has no log.
+    /// Its losses, step by step; `None` without a log.
     pub log: Option<LearningLog>,
-    /// Images that went through the network in a step, where its configuration says so.
+    /// Number of images that go through the network in a step, if the configuration says so.
     pub images_a_step: Option<f64>,
-    /// The text of its `config.toml`, where there is one.
+    /// The text of its `config.toml`, if it exists.
     pub settings: Option<String>,
 }
 
 impl RunHistory {
-    /// That of the run in a folder.
+    /// Reads the history of the run in a folder.
     ///
     /// # Errors
-    /// A `log.csv` that is another program's.
+    /// A `log.csv` that another program wrote.
     pub fn read(run: &Path) -> Result<Self> {
         let settings = std::fs::read_to_string(run.join("config.toml")).ok();
         let log = run.join("log.csv");
@@ -39,14 +39,14 @@ impl RunHistory {
         })
     }
 
-    /// Adds to a page how the run learned, and its settings; nothing of what the folder does not keep.
+    /// Adds the training curves and the settings to a page, as far as the folder has them.
     #[must_use]
     pub fn add_to(&self, mut page: HtmlReport) -> HtmlReport {
         if let Some(log) = &self.log {
             page = page
                 .section("How it learned")
                 .note(&format!(
-                    "{}; training curves are means over stretches of steps, held out: the samples never trained on.",
+                    "{}; training curves are means over intervals of steps; held-out curves are on samples never trained on.",
                     count_of(log.steps(), "step")
                 ))
                 .learning(log, self.images_a_step);
@@ -60,7 +60,7 @@ impl RunHistory {
     }
 }
 
-/// Images that go through the network in a step, by a run's configuration, whatever else may be wrong with it.
+/// Number of images that go through the network in a step, from a run's configuration, even if other parts of it are invalid.
 fn images_a_step(config: &str) -> Option<f64> {
     #[derive(Deserialize)]
     struct Batch {

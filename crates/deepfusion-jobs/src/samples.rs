@@ -1,4 +1,4 @@
-//! The samples that a configuration is trained and validated with.
+//! The samples that a configuration is trained and validated on.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -15,17 +15,17 @@ mod faults;
 pub use self::faults::Fault;
 use self::faults::faults;
 
-/// Something that training goes on with, and that may not be meant.
+/// A problem that does not stop training, but may not be intended.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum SampleWarning {
-    /// Drives whose camera or turns are wrong.
+    /// Drives with a wrong camera or wrong turns.
     Fault(Fault),
-    /// The speeds of a drive, by its name, do not fit its images.
+    /// The speeds of a drive, by its name, do not match its images.
     Speed(String, SpeedWarning),
-    /// A drive that gives no samples, or fewer, and why.
+    /// A drive that gives no samples, or fewer, with the reason.
     Skipped(Skipped),
-    /// Images of a drive that cannot be read, and are done without.
+    /// Images of a drive that cannot be read and are left out.
     BrokenImages(Skipped),
     /// Validation frames that are sources of training samples.
     Neighbours(SharedFrames),
@@ -42,11 +42,11 @@ impl fmt::Display for SampleWarning {
                 drive, sources: 1, ..
             }) => write!(
                 f,
-                "{drive}: 1 of its validation frames is a neighbour of training frames, and was seen as such"
+                "{drive}: 1 validation frame is a neighbour of training frames and was seen in training"
             ),
             Self::Neighbours(shared) => write!(
                 f,
-                "{}: {} of its validation frames are neighbours of training frames, and were seen as such",
+                "{}: {} validation frames are neighbours of training frames and were seen in training",
                 shared.drive, shared.sources
             ),
         }
@@ -56,18 +56,18 @@ impl fmt::Display for SampleWarning {
 impl From<Skipped> for SampleWarning {
     fn from(reason: Skipped) -> Self {
         match reason {
-            // Their drive is learned from.
+            // The drive itself is used.
             Skipped::BrokenImages { .. } => Self::BrokenImages(reason),
             _ => Self::Skipped(reason),
         }
     }
 }
 
-/// The training and validation samples of a configuration; `opened` sees the recordings of each set, with how they were opened,
-/// `warn` what should be known before training.
+/// The training and validation samples of a configuration. `opened` is called with the recordings of each set and the options they were
+/// opened with, `warn` with each problem to know before training.
 ///
 /// # Errors
-/// Recordings that cannot be opened, and what [`SampleSet::split_sets`] says.
+/// Recordings that cannot be opened; an error of [`SampleSet::split_sets`].
 pub fn open_samples(
     config: &TrainConfig,
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
@@ -75,7 +75,7 @@ pub fn open_samples(
 ) -> Result<(SampleSet, SampleSet)> {
     let train = open_for(config, RecordingRole::Training, opened)?;
     let mut known = HashSet::new();
-    // Both cameras of a drive have one speed.
+    // Both cameras of a drive have the same speed.
     let is_new = |(_, dataset): &&(usize, Dataset)| {
         known.insert((dataset.place().to_owned(), dataset.name().to_owned()))
     };
@@ -112,7 +112,7 @@ pub fn open_samples(
 
 fn speed_warning(dataset: &Dataset) -> Option<SpeedWarning> {
     speed_unit_warning(dataset).unwrap_or_else(|error| {
-        // The check is a service: what is really wrong with the images, training will say.
+        // The check is optional: training reports images that cannot be read.
         tracing::debug!("speed check of {}: {error}", dataset.name());
         None
     })

@@ -1,14 +1,14 @@
 use std::fmt;
 use std::path::PathBuf;
 
-/// What was found for a network at one step, beside that of another: it is not used.
+/// A calibration made for a network at another step, which is not used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StaleCalibration {
-    /// The file.
+    /// Path of its file.
     pub path: PathBuf,
-    /// The step that it was found for, where it says so.
+    /// The step that it was made for, if the file contains it.
     pub found: Option<usize>,
-    /// That of the network.
+    /// The network's step.
     pub step: usize,
 }
 
@@ -18,11 +18,11 @@ impl fmt::Display for StaleCalibration {
         match self.found {
             Some(found) => write!(
                 f,
-                "{path}: found for the network of step {found}, not for this of step {}",
+                "{path}: measured for the network at step {found}, but the network is at step {}",
                 self.step
             )?,
-            None => write!(f, "{path}: does not say for which step it was found")?,
+            None => write!(f, "{path}: does not say for which step it was measured")?,
         }
-        f.write_str("; it is not used, and can be found anew by `eval`")
+        f.write_str("; it is not used (`eval` can measure it again)")
     }
 }

@@ -1,4 +1,4 @@
-//! Frame after frame to 3D targets: depth, ground, things, boxes, tracks, and whether the metres still hold.
+//! Finds 3D targets in one frame after another: depth, ground, objects, boxes, tracks; also monitors the scale.
 
 use std::time::Instant;
 
@@ -20,69 +20,69 @@ use crate::outputs::{Drawing, SeenDepth, TargetOutput, TargetScene, draw};
 use crate::scene::{Motion, ScaleWatch};
 use crate::{Error, Input, ModelFacts, Result, intervals};
 
-/// How targets are found, beside the network.
+/// Settings for finding targets, besides the network.
 #[derive(Debug)]
 pub struct TargetSettings {
-    /// The perception's own.
+    /// Settings of the perception.
     pub perception: PerceptionConfig,
-    /// A user's model of segmentation: what it knows becomes targets of a class.
+    /// The user's segmentation model: the objects it finds become targets with a class.
     pub instances: Option<InstanceModel>,
-    /// How the scale is watched, where a recording's motion is known.
+    /// How the scale is monitored if a recording's motion is known.
     pub scale: ScaleMonitorConfig,
-    /// Whether depth is brought back where its scale has drifted.
+    /// Whether depth is corrected if its scale has drifted.
     pub correct_scale: bool,
-    /// What is drawn of each frame.
+    /// What is drawn for each frame.
     pub draw: Vec<TargetOutput>,
 }
 
-/// A frame that is loaded, and when that began.
+/// A loaded frame, and when loading began.
 pub struct StartedFrame {
-    /// What it is.
+    /// The input.
     pub input: Input,
-    /// As it was read.
+    /// The image as read.
     pub loaded: LoadedImage,
-    /// As the network takes it.
+    /// The network's input.
     pub prepared: PreparedImage,
     /// When its file was opened, or when a live frame arrived.
     pub start: Instant,
 }
 
-/// A frame with all that was found in it.
+/// A frame with everything that was found in it.
 pub struct PerceivedFrame {
-    /// What it is.
+    /// The input.
     pub input: Input,
-    /// As it was read.
+    /// The image as read.
     pub loaded: LoadedImage,
     /// Its depth.
     pub seen: SeenDepth,
     /// Its targets.
     pub record: FrameRecord,
-    /// From [`StartedFrame::start`] to having the targets.
+    /// Time from [`StartedFrame::start`] to its targets, in milliseconds.
     pub latency_ms: f64,
-    /// How many times their first size metres are now, where that is seen for the first time here.
+    /// The current scale divided by its first value, if a drift is first found in this frame.
     pub drift: Option<f64>,
     /// What was drawn.
     pub pictures: Vec<(TargetOutput, Drawing)>,
 }
 
-/// Finds the targets of frame after frame, and follows them.
+/// Finds the targets in one frame after another, and tracks them.
 pub struct TargetFinder<'a> {
     estimator: &'a mut DepthEstimator,
     perception: Perception,
     watch: ScaleWatch,
     instances: Option<InstanceModel>,
-    /// What a pixel's depth is worth, where the run was calibrated.
+    /// The confidence of each pixel, if it was learned for the run.
     confidence: Option<ConfidenceModel>,
-    /// How the intervals are stretched that the network says.
+    /// The factors of the network's intervals.
     intervals: IntervalFactors,
     draw: Vec<TargetOutput>,
 }
 
 impl<'a> TargetFinder<'a> {
-    /// Of a network, nothing seen yet.
+    /// A finder for a network, without frames yet.
     ///
     /// # Errors
-    /// What is kept beside the network cannot be read.
+    /// Files beside the network that cannot be read.
     pub fn open(
         model: &ModelSource,
         estimator: &'a mut DepthEstimator,
@@ -103,10 +103,10 @@ impl<'a> TargetFinder<'a> {
         })
     }
 
-    /// The targets of the next frame; `motion`: how the camera came there.
+    /// The targets in the next frame; `motion` is the camera's motion up to it.
     ///
     /// # Errors
-    /// [`Error::NoCamera`]; what the network's engine, the perception or the user's model says.
+    /// [`Error::NoCamera`]; an error of the network's engine, of the perception or of the user's model.
     pub fn next(&mut self, started: StartedFrame, motion: Motion) -> Result<PerceivedFrame> {
         let StartedFrame {
             input,
@@ -142,7 +142,7 @@ impl<'a> TargetFinder<'a> {
             time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
         });
         let latency_ms = start.elapsed().as_secs_f64() * 1e3;
-        // The targets need not wait for it.
+        // Results are not delayed by this.
         let (image, ground) = (&loaded.image, surroundings.ground.as_ref());
         let scale = self.watch.add(image, &camera, &motion, ground);
         let drift = self.watch.first_drift();
@@ -183,7 +183,7 @@ impl<'a> TargetFinder<'a> {
     }
 }
 
-/// The things in an image by a user's model, in the size of its depth.
+/// The objects that the user's model finds in an image, at the size of its depth.
 fn things_of(
     model: &mut InstanceModel,
     image: &RgbImage,

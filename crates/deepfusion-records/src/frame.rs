@@ -1,53 +1,53 @@
-//! What `perceive` writes of a frame.
+//! What `perceive` writes for a frame.
 
 use deepfusion_perception::{Collision, Stamp, Surroundings, Target};
 use serde::{Deserialize, Serialize};
 
 use crate::ScaleRecord;
 
-/// A frame's targets; everything in the camera's axes (x right, y down, z forward), metres and seconds.
+/// A frame's targets. Everything is in the camera's axes (x right, y down, z forward), in metres and seconds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrameRecord {
     /// The frame's name.
     pub frame: String,
-    /// When it was taken, seconds from the recording's first stamp.
+    /// When it was taken, in seconds from the recording's first time stamp.
     pub time_s: Option<f64>,
-    /// In order of distance.
+    /// The targets, nearest first.
     pub targets: Vec<Target>,
-    /// The road.
+    /// The road plane.
     pub ground: Option<GroundPlane>,
     /// `world_from_cam`, 3×4 row by row; the world is the recording's first camera.
     pub camera_motion: Option<[f64; 12]>,
-    /// The vehicle's speed, m/s.
+    /// The vehicle's speed, in m/s.
     pub speed_mps: Option<f64>,
-    /// When its front would meet a target, if all went on as they do.
+    /// Time until the vehicle's front reaches a target, if both continue to move as they do.
     pub time_to_collision_s: Option<f64>,
-    /// That target.
+    /// Id of that target.
     pub collision_with: Option<u64>,
-    /// Whether metres still are what they were, where that is watched.
+    /// Whether the scale of depth has changed, if it is monitored.
     pub scale_monitor: Option<ScaleRecord>,
-    /// From opening the file, or from a live frame's arrival, to having the targets.
+    /// Time from opening the file, or from a live frame's arrival, to its targets, in milliseconds.
     pub latency_ms: Option<f64>,
-    /// When a live frame arrived, seconds since 1970.
+    /// When a live frame arrived, in seconds since 1970.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arrived_unix_s: Option<f64>,
-    /// Frames of the live source that were skipped so far.
+    /// Number of frames of the live source that were skipped so far.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dropped: Option<u64>,
 }
 
-/// Points p with normal·p + offset = 0.
+/// The road plane: points p with normal·p + offset = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GroundPlane {
-    /// Upwards, of length 1.
+    /// Unit normal, pointing up.
     pub normal: [f32; 3],
-    /// The camera's height above it, metres.
+    /// The camera's height above the plane, in metres.
     pub offset_m: f32,
 }
 
 impl FrameRecord {
-    /// Of what was found in a frame that was taken at `stamp`, by a vehicle of `speed_mps` m/s.
+    /// The record of the `surroundings` found in a frame taken at `stamp` by a vehicle moving at `speed_mps` m/s.
     #[must_use]
     pub fn new(
         frame: &str,

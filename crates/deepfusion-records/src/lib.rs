@@ -1,12 +1,12 @@
-//! The JSON that stands beside predictions and targets: the same structs for who writes it and who reads it.
+//! The JSON files beside predictions and targets, as structs that writers and readers share.
 //!
 //! | File | Struct |
 //! |---|---|
-//! | `NAME.json`, the sidecar of a prediction | [`Sidecar`]; what can be shown of any program's is its [`PredictionRecord`] |
+//! | `NAME.json`, the sidecar of a prediction | [`Sidecar`]; the part that any program's sidecar has is its [`PredictionRecord`] |
 //! | `NAME_targets.json`, and each line of `targets.jsonl` | [`FrameRecord`] |
 //!
-//! Field names and their order are fixed: scripts rely on them. A field that is not in a file takes its default, where the struct
-//! says so; fields that are not known are ignored.
+//! Field names and their order are fixed: scripts rely on them. A missing field takes its default if the struct defines one; unknown fields
+//! are ignored.
 
 mod frame;
 mod made_with;

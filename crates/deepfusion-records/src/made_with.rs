@@ -1,55 +1,55 @@
-//! What else than its image an output depends on.
+//! What an output depends on besides its image.
 
 use deepfusion_eval::PostProcess;
 use serde::{Deserialize, Serialize};
 
-/// Program, weights and options: outputs of the same image with equal ones are equal (on one machine; the last digits
-/// depend on the processor).
+/// Program, weights and options: if they are equal, outputs of the same image are equal (on one machine; the last digits depend on the
+/// processor).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MadeWith {
     /// The program's version.
     pub version: String,
     /// SHA-256 of the network's configuration and weights.
     pub weights: String,
-    /// What ran the network, and on which device.
+    /// The engine that ran the network, and its device.
     pub engine: String,
-    /// The outputs' kinds.
+    /// The kinds of outputs.
     pub save: Vec<String>,
-    /// How far clouds reach, metres.
+    /// Largest depth of the points in clouds, in metres.
     pub max_depth_m: f64,
     /// Largest standard deviation of a cloud's points, as a share of their depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_sigma: Option<f64>,
-    /// fx, fy, cx, cy that were given for all images.
+    /// fx, fy, cx, cy in pixels, if given for all images.
     pub intrinsics: Option<[f64; 4]>,
-    /// The field of view from left to right that was given for all images, in degrees.
+    /// The horizontal field of view in degrees, if given for all images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hfov_deg: Option<f64>,
     /// SHA-256 of a calibration tool's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_sha256: Option<String>,
-    /// Whether depth is corrected for another focal length than the one trained with.
+    /// Whether depth is corrected for a focal length other than the one trained with.
     pub focal_correction: bool,
-    /// Whether images are stretched to the network's aspect ratio, not cut.
+    /// Whether images are stretched to the network's aspect ratio rather than cropped.
     pub stretch: bool,
-    /// Whether the scale monitor brings depth back to the metres that were learned.
+    /// Whether depth is corrected by the scale monitor.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub correct_scale: bool,
-    /// In how many ways the network looked at each image; absent: in one.
+    /// Of which predictions of an image the mean is taken (test-time augmentation); absent: only one prediction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub post_process: Option<PostProcess>,
-    /// The data set, of those that the network learned from, whose metres are meant.
+    /// The training data set whose metres are meant, if there were several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
-    /// The topics that were named for bags: `image=/left`.
+    /// The topics chosen for bags: `image=/left`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
-    /// The camera's height above the road that was given, metres, where depth is brought back by it.
+    /// The given height of the camera above the road in metres, if depth is corrected by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_height_m: Option<f64>,
 }
 
-/// In what two [`MadeWith`] differ.
+/// A setting in which two [`MadeWith`] differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Difference {
@@ -57,27 +57,27 @@ pub enum Difference {
     Version,
     /// The network.
     Weights,
-    /// What ran it.
+    /// The engine or its device.
     Engine,
-    /// The outputs' kinds.
+    /// The kinds of outputs.
     Save,
-    /// The data set whose metres are meant.
+    /// The training data set whose metres are meant.
     Set,
-    /// How far clouds reach.
+    /// Largest depth of the points in clouds.
     MaxDepth,
-    /// How sure the points of clouds must be.
+    /// Largest standard deviation of the points in clouds.
     MaxSigma,
-    /// The camera that was given.
+    /// The given camera.
     Camera,
-    /// The correction for the focal length.
+    /// The focal correction.
     FocalCorrection,
     /// Whether images are stretched.
     Stretch,
     /// Whether the scale is corrected.
     CorrectScale,
-    /// In how many ways the network looked.
+    /// The test-time augmentation.
     PostProcess,
-    /// The topics that bags are read by.
+    /// The topics chosen for bags.
     Topics,
 }
 
@@ -102,7 +102,7 @@ impl std::fmt::Display for Difference {
 }
 
 impl MadeWith {
-    /// The first thing that differs.
+    /// The first setting that differs.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<Difference> {
         let camera =
@@ -155,7 +155,7 @@ impl MadeWith {
     }
 }
 
-/// Whether two numbers are the same but for the last digits, which JSON may lose.
+/// Whether two numbers are equal except for the last digits, which JSON may lose.
 #[must_use]
 pub fn same_number(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-12 * a.abs()

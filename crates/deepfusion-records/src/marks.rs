@@ -1,4 +1,4 @@
-//! What records have in common.
+//! Parts that several records share.
 
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -6,17 +6,17 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use deepfusion_motion::ScaleReading;
 use serde::{Deserialize, Serialize};
 
-/// A file's size and time of change, as `make` and `rsync` compare them.
+/// A file's size and modification time, as `make` and `rsync` compare them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileMark {
     /// Size in bytes.
     pub bytes: u64,
-    /// Time of the last change, nanoseconds since 1970, where the system knows it.
+    /// Modification time in nanoseconds since 1970, if the system knows it.
     pub modified_ns: Option<u64>,
 }
 
 impl FileMark {
-    /// Of an image that came without a file: its size in bytes, and when it came.
+    /// The mark of an image without a file: its size in bytes, and when it arrived.
     #[must_use]
     pub fn of_arrival(bytes: u64, arrived_at: SystemTime) -> Self {
         let since_1970 = arrived_at.duration_since(UNIX_EPOCH);
@@ -26,10 +26,10 @@ impl FileMark {
         }
     }
 
-    /// The file's mark now.
+    /// The file's current mark.
     ///
     /// # Errors
-    /// Where the system does not tell.
+    /// The system's error if it cannot read the file's metadata.
     pub fn of(path: &Path) -> std::io::Result<Self> {
         let meta = std::fs::metadata(path)?;
         let since = meta.modified().ok().map(|t| t.duration_since(UNIX_EPOCH));
@@ -41,19 +41,19 @@ impl FileMark {
     }
 }
 
-/// What a frame has for having been live.
+/// What is recorded of a live frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LiveMark {
-    /// When it arrived, seconds since 1970.
+    /// When it arrived, in seconds since 1970.
     pub arrived_unix_s: f64,
-    /// Frames of the source that were skipped so far.
+    /// Number of frames of the source that were skipped so far.
     pub dropped: u64,
-    /// From there to its depth (`predict`) or targets (`perceive`), milliseconds.
+    /// Time from its arrival to its depth (`predict`) or targets (`perceive`), in milliseconds.
     pub latency_ms: f64,
 }
 
 impl LiveMark {
-    /// Of a frame at which nobody has looked yet.
+    /// The mark of a frame that has not been processed yet.
     #[must_use]
     pub fn of_arrival(arrived_at: SystemTime, dropped: u64) -> Self {
         let since_1970 = arrived_at.duration_since(UNIX_EPOCH);
@@ -65,13 +65,13 @@ impl LiveMark {
     }
 }
 
-/// What the scale monitor says of a frame.
+/// The scale monitor's reading for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleRecord {
     /// The reading.
     #[serde(flatten)]
     pub reading: ScaleReading,
-    /// What the next frame's depth is multiplied by, where that was asked for.
+    /// What the next frame's depth is multiplied by, if correction is on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<f64>,
 }

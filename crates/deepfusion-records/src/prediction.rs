@@ -1,4 +1,4 @@
-//! What stands beside every prediction.
+//! The record beside every prediction.
 
 use std::path::PathBuf;
 
@@ -7,64 +7,64 @@ use serde::{Deserialize, Serialize};
 
 use crate::{FileMark, LiveMark, MadeWith, ScaleRecord};
 
-/// What is known of an image's depth: its camera, and what its metres are worth. What a file does not hold takes its default, so
-/// that other programs' and older ones' can be shown.
+/// What is known of an image's depth: its camera, and how far its metres can be trusted. Missing fields take their defaults, so that files
+/// of other programs and older versions can be shown.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PredictionRecord {
-    /// The input.
+    /// Path of the input.
     pub image: Option<PathBuf>,
-    /// The input's file, to notice that it changed; of a live source's frame its pixels, and when they arrived.
+    /// Mark of the input's file, to notice changes; for a live source's frame, the size of its pixels and when they arrived.
     pub image_file: Option<FileMark>,
     /// The input's width and height.
     pub size: Option<[u32; 2]>,
-    /// Whether depth, camera and boxes are of the picture without the lens's distortion, which the input's file has.
+    /// Whether depth, camera and boxes refer to the image after the lens's distortion was removed; the input's file still has it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub undistorted: bool,
-    /// What the depths are.
+    /// Unit of the depths.
     pub unit: String,
-    /// The run or checkpoint given, or the embedded network's name.
+    /// The given run or checkpoint, or the embedded network's name.
     pub model: PathBuf,
-    /// SHA-256 of an embedded or packed network's weights: a name alone does not say which version of it this was.
+    /// SHA-256 of an embedded or packed network's weights: the name does not determine the version.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model_sha256: Option<String>,
     /// Steps the checkpoint was trained for.
     pub checkpoint_step: usize,
     /// fx, fy, cx, cy in pixels of the input.
     pub intrinsics: Option<[f64; 4]>,
-    /// `given`, `recording` (its own calibration), `exif` (the lens's nominal focal length), `learned` (by the network's run, of recordings
-    /// that did not say it), `assumed` or `unknown`.
+    /// `given`, `recording` (its own calibration), `exif` (the lens's nominal focal length), `learned` (by the network's run, from
+    /// recordings without calibration), `assumed` or `unknown`.
     pub intrinsics_from: String,
-    /// Whether the camera is known, so that depth is right for its focal length: given, the recording's own, or EXIF's.
+    /// Whether the camera is known, so that depth is right for its focal length: it was given, or comes from the recording or from EXIF.
     pub camera_known: bool,
-    /// What was measured of this checkpoint's metres on recordings that it has not learned from.
+    /// The scale of this checkpoint's depth, as measured on recordings that it was not trained on.
     pub scale: MetricScale,
-    /// What depth was multiplied by for another focal length than the one trained with.
+    /// The factor by which depth was multiplied, for a focal length other than the one trained with.
     pub focal_factor: f64,
-    /// x, y, width and height of the part that was looked at; depth is 0 outside.
+    /// x, y, width and height of the part of the image that the network saw; depth is 0 outside.
     pub window: [u32; 4],
-    /// Smallest and largest depth, in metres; none where no pixel has one.
+    /// Smallest and largest depth, in metres; `None` if no pixel has a depth.
     pub depth_m: Option<[f32; 2]>,
-    /// Whether the recording's metres still are what they were, where that is watched.
+    /// Whether the scale of the recording's depth has changed, if it is monitored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_monitor: Option<ScaleRecord>,
 }
 
-/// A prediction's description. It is written last, so that it also says that its outputs are there.
+/// A prediction's sidecar. It is written last, so its presence means that the outputs are complete.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sidecar {
     /// The image and its depth.
     #[serde(flatten)]
     pub prediction: PredictionRecord,
-    /// The outputs, in the sidecar's folder.
+    /// The outputs' names, in the sidecar's folder.
     pub files: Vec<String>,
-    /// The outputs' sizes in bytes, to notice a file that was cut off.
+    /// The outputs' sizes in bytes, to notice a truncated file.
     pub file_bytes: Vec<u64>,
-    /// The outputs' CRC-32 as eight hexadecimal digits, to notice one that a power cut left as zeros. A sidecar of an older
-    /// version has none: what it stands for is made again.
+    /// The outputs' CRC-32 as eight hexadecimal digits, to notice a file that a power cut left as zeros. A sidecar of an older version has
+    /// none: its outputs are made again.
     #[serde(default)]
     pub file_crc32: Vec<String>,
-    /// Of a live source's frame: when it arrived, and how late its depth was.
+    /// For a live source's frame: when it arrived, and how late its depth was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub live: Option<LiveMark>,
     /// What else the outputs depend on.

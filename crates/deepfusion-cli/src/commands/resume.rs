@@ -181,11 +181,11 @@ mod tests {
             (&["--camera", "both"], "both", "2"),
             (&["--stereo"], "on", "has it off"),
             (&["--view-motion", "vehicle"], "vehicle", "auto"),
-            (&["--with", "hce"], "hce", "learned without it"),
+            (&["--with", "hce"], "hce", "trained without it"),
             (
                 &["--without", "smoothness"],
                 "smoothness",
-                "learned with it",
+                "trained with it",
             ),
             (&["--init", "/w.pth"], "/w.pth", "none"),
             (&["--split", "/s.txt"], "/s.txt", "has none"),

@@ -28,7 +28,7 @@ impl Reportable for Error {
                 path,
                 why: OtherJob::MadeWith(what),
             } => format!(
-                "{}: the shards of this folder were begun with {}",
+                "{}: the shards in this folder were started with {}",
                 path.display(),
                 options_of(*what)
             ),
@@ -53,7 +53,7 @@ impl Reportable for Error {
             #[cfg(feature = "train")]
             Self::CheckNotEnded { .. } => "cannot wait for this program".into(),
             Self::OnlyOnCpu => {
-                "only `--engine burn` computes on other devices than the processor".into()
+                "only `--engine burn` runs on devices other than the processor".into()
             }
             Self::OnlyFused { precision } => {
                 format!("`--precision {}` is the fused engine's", precision.name())

@@ -1,4 +1,4 @@
-//! Whether networks come from one.
+//! Finds out whether networks have a common ancestor.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -6,20 +6,20 @@ use std::path::{Path, PathBuf};
 use deepfusion_model::{AveragedNetwork, RunFolder, TrainConfig};
 use deepfusion_weights::Shipped;
 
-/// What networks have in common.
+/// The common origin of several networks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kinship {
-    /// All were trained from one network, or one of them is it.
+    /// All were trained from one network, or one of them is that network.
     Network,
-    /// Nothing but the random weights that they began with, of one seed. They are usually not in one valley: their mean is often worse than
-    /// each of them.
+    /// Only the random weights of one seed that they began with. Such networks are usually not in one valley: their mean is often worse
+    /// than each of them.
     FirstWeights,
-    /// Nothing that is known. The mean of unrelated networks is worth nothing.
+    /// Nothing known. The mean of unrelated networks is useless.
     Unknown,
 }
 
-/// What networks have in common, as far as their configurations say: all come from one where one of them does from the other, or all from
-/// another one.
+/// The common origin of networks, as far as their configurations record it: one of two networks was trained from the other, or both from a
+/// third.
 pub(super) fn kinship(networks: &[AveragedNetwork]) -> Kinship {
     let mut common: Option<HashSet<Ancestor>> = None;
     for network in networks {
@@ -41,16 +41,16 @@ pub(super) fn kinship(networks: &[AveragedNetwork]) -> Kinship {
     }
 }
 
-/// What a network comes from.
+/// A possible origin of a network.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Ancestor {
-    /// A trained network: a run by its folder, a packed one by what is in it.
+    /// A trained network: a run by its folder, a packed one by its checksum.
     Network(String),
-    /// The first weights of a seed, by what they follow from.
+    /// The first weights of a seed, by the settings that determine them.
     FirstWeights(String),
 }
 
-/// A network and those it came from. ImageNet's encoders are no ancestor: the rest of the network came from a seed.
+/// Adds a network and its ancestors. ImageNet's encoders are not an ancestor: the rest of the network came from a seed.
 fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
     if let Some(sha256) = sha256 {
         found.insert(Ancestor::Network(sha256.to_owned()));
@@ -62,7 +62,7 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
         return;
     }
     let Ok((folder, kind)) = RunFolder::open(path) else {
-        // A run that is not there any more still has its name; a file of a ResNet is no run.
+        // A run that no longer exists still has its name; a ResNet's weights file is not a run.
         if !path.is_file() {
             found.insert(Ancestor::Network(place_of(path)));
         }
@@ -73,12 +73,12 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
     if state.is_some_and(|s| s.encoders_only) {
         return;
     }
-    // Once around is enough.
+    // Stops at a cycle.
     if !found.insert(Ancestor::Network(place_of(folder.path()))) {
         return;
     }
     let findings = folder.read_findings().unwrap_or_default();
-    // Weights that were imported or averaged came from no seed, whatever their configuration says.
+    // Imported or averaged weights came from no seed, whatever their configuration says.
     let learned = state.is_some_and(|s| s.step > 0) && findings.averaged.is_empty();
     if let Ok(config) = folder.read_settings() {
         match &config.init {
@@ -91,8 +91,8 @@ fn add(path: &Path, sha256: Option<&str>, found: &mut HashSet<Ancestor>) {
     }
 }
 
-/// What the depth network's weights follow from where a run begins from nothing: its seed and its layers. The head for uncertainty is drawn
-/// last, and changes no other weight.
+/// What determines the depth network's weights at the start of training from scratch: the seed and the layers. The uncertainty head is
+/// initialised last, and changes no other weight.
 fn first_weights(config: &TrainConfig) -> Option<Ancestor> {
     let mut layers = config.depth_net.of_the_weights();
     layers.initial_depth_m = config.depth_net.initial_depth_m;
@@ -101,7 +101,7 @@ fn first_weights(config: &TrainConfig) -> Option<Ancestor> {
     Some(Ancestor::FirstWeights(of_seed))
 }
 
-/// A run's folder, by whichever way it was named.
+/// The path of a run's folder, however it was given.
 fn place_of(path: &Path) -> String {
     let folder = match path.extension() {
         Some(end) if end == "safetensors" => path.parent().unwrap_or(path),
@@ -111,7 +111,7 @@ fn place_of(path: &Path) -> String {
         .canonicalize()
         .or_else(|_| std::path::absolute(folder));
     let whole = whole.unwrap_or_else(|_| folder.to_owned());
-    // Without a slash at its end.
+    // Removes a slash at the end.
     whole
         .components()
         .collect::<PathBuf>()

@@ -1,14 +1,14 @@
-//! Whether two networks' weights mean the same, so that they have a mean.
+//! Checks that the weights of two networks have the same meaning, so that they can be averaged.
 
 use deepfusion_model::{StoredNetwork, UNCERTAINTY_PREFIX};
 use toml::Value;
 
 use crate::NoMean;
 
-/// Focal lengths that differ by less are one camera's.
+/// Focal lengths whose ratio differs from 1 by less than this belong to one camera.
 const SAME_FOCAL: f64 = 1e-3;
 
-/// What stands in the way of a mean with the first network; `None` where nothing does.
+/// Why a network cannot be averaged with the first one; `None` if it can.
 pub(super) fn hindrance(first: &StoredNetwork, other: &StoredNetwork) -> Option<NoMean> {
     if other.config.learned_camera().is_some() {
         return Some(NoMean::LearnedCamera);
@@ -20,7 +20,7 @@ pub(super) fn hindrance(first: &StoredNetwork, other: &StoredNetwork) -> Option<
             .or_else(|| difference("canonical_focal_px", &canonical(first), &canonical(other)))
     };
     tensors(first, other).or_else(settings).or_else(|| {
-        // With a canonical focal length metres do not depend on the camera that was trained with.
+        // With a canonical focal length, metres do not depend on the training camera.
         if first.config.canonical_focal_px.is_some() {
             return None;
         }
@@ -39,7 +39,7 @@ pub(super) fn hindrance(first: &StoredNetwork, other: &StoredNetwork) -> Option<
     })
 }
 
-/// A tensor that one of them lacks, or that has another shape. The head for uncertainty may be missing.
+/// The first tensor that only one of them has, or whose shape differs. Only one may have an uncertainty head.
 fn tensors(first: &StoredNetwork, other: &StoredNetwork) -> Option<NoMean> {
     let (a, b) = (&first.weights.tensors, &other.weights.tensors);
     let mut names = a.keys().chain(b.keys());
@@ -71,7 +71,7 @@ fn difference(key: &str, first: &Option<Value>, other: &Option<Value>) -> Option
     })
 }
 
-/// f_y of the camera trained with, in pixels of the network's input.
+/// f_y of the training camera, in pixels of the network's input.
 fn focal(network: &StoredNetwork) -> Option<f64> {
     let camera = network.camera?;
     Some(camera.fy * network.config.size.height as f64 / f64::from(camera.height))

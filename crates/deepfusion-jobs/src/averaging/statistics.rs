@@ -1,31 +1,32 @@
-//! What the batch norms of several networks measured of their inputs, and what a mean of it leaves out.
+//! The batch norm statistics of several networks, and what their mean leaves out.
 
 use deepfusion_model::BATCH_NORM_EPSILON;
 use deepfusion_model::weights::Weights;
 use serde::Serialize;
 
-/// The ends of the names of a batch norm's running statistics, after its own.
+/// Last part of the names of a batch norm's running statistics.
 const MEAN: &str = "running_mean";
 const VARIANCE: &str = "running_var";
 
-/// How far apart networks' batch norms measured their inputs.
+/// How far apart the statistics of the networks' batch norms are.
 ///
-/// Inputs of several networks together have the variance Σ sᵢ·σᵢ² + Σ sᵢ·(μᵢ − μ)²; the mean of the variances has the first part alone. The mean
-/// network's own inputs are neither's: only data that goes through it tells their statistics, as stochastic weight averaging measures them anew
-/// (Izmailov et al., arXiv 1803.05407).
+/// The inputs of several networks together have the variance Σ sᵢ·σᵢ² + Σ sᵢ·(μᵢ − μ)²; the mean of the variances is only the first part.
+/// The averaged network's own inputs have different statistics again, which can only be measured by passing data through it, as stochastic
+/// weight averaging does (Izmailov et al., arXiv 1803.05407).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct StatisticsSpread {
-    /// Batch norms that have other statistics in one network than in another.
+    /// Number of batch norms whose statistics differ between networks.
     pub layers: usize,
-    /// All batch norms.
+    /// Number of all batch norms.
     pub of: usize,
-    /// What the mean of the variances leaves out, as a share of it: Σ sᵢ·(μᵢ − μ)² / Σ sᵢ·σᵢ², of the channel of all batch norms where that is
-    /// largest.
+    /// What the mean of the variances leaves out, relative to it: Σ sᵢ·(μᵢ − μ)² / Σ sᵢ·σᵢ², for the channel of all batch norms where that
+    /// is largest.
     pub left_out: f64,
 }
 
-/// How far apart the statistics of these networks are, for shares that add up to 1; `None` where all have the same, whose mean is exact.
+/// How far apart the statistics of these networks are, for shares that add up to 1; `None` if all are the same, since their mean is then
+/// exact.
 pub(super) fn spread(networks: &[(&Weights, f64)]) -> Option<StatisticsSpread> {
     let shares: Vec<f64> = networks.iter().map(|(_, share)| *share).collect();
     let (first, _) = networks.first()?;
@@ -50,7 +51,7 @@ pub(super) fn spread(networks: &[(&Weights, f64)]) -> Option<StatisticsSpread> {
     (spread.layers > 0).then_some(spread)
 }
 
-/// A tensor of each network; `None` where one of them lacks it.
+/// A tensor in each network; `None` if one of them lacks it.
 fn values_of<'a>(networks: &[(&'a Weights, f64)], name: &str) -> Option<Vec<&'a [f32]>> {
     let values = |(weights, _): &(&'a Weights, f64)| {
         let tensor = weights.tensors.get(name)?;
@@ -59,7 +60,7 @@ fn values_of<'a>(networks: &[(&'a Weights, f64)], name: &str) -> Option<Vec<&'a 
     networks.iter().map(values).collect()
 }
 
-/// [`StatisticsSpread::left_out`] of the channels of one batch norm.
+/// [`StatisticsSpread::left_out`] for the channels of one batch norm.
 fn left_out(means: &[&[f32]], variances: &[&[f32]], shares: &[f64]) -> f64 {
     let lengths = means.iter().chain(variances).map(|values| values.len());
     let channels = lengths.min().unwrap_or_default();

@@ -21,7 +21,7 @@ const STATE: Checkpoint = Checkpoint {
     focal_ratio: None,
 };
 
-/// A run of that folder's name with a checkpoint.
+/// A run with a checkpoint, in the given folder.
 fn run(
     (folder, kind): (&Path, CheckpointKind),
     tensors: &[(&str, &[f32])],
@@ -38,7 +38,7 @@ fn run(
     folder.to_owned()
 }
 
-/// The depth network's values of the mean.
+/// The averaged depth network's weights.
 fn depth_of(made: &Averaged) -> Weights {
     read_safetensors(&made.checkpoint).unwrap().under("depth.")
 }
@@ -82,16 +82,16 @@ fn depth_is_the_mean_and_the_rest_the_firsts() {
     let shares = [3.0, 1.0];
     let less = average(&both, Some(&shares), &at.join("less")).unwrap();
     assert_eq!(depth_of(&less).tensors["a"].values, [1.5, 3.0]);
-    // What is there stays.
+    // An existing run stays.
     let again = average(&both, None, &at.join("mean"));
     assert!(matches!(again, Err(Error::Occupied { .. })), "{again:?}");
-    // A mean comes from what it is the mean of, by whichever way that was named.
+    // The mean's ancestors are the networks it was made of, however they were given.
     let by_slash = at.join("second/../second/");
     let again = average(&[at.join("mean"), by_slash], None, &at.join("again"));
     assert_eq!(again.unwrap().kinship, Kinship::Network);
 }
 
-/// The mean of the variances lacks what the means are apart: of the first channel 1 beside 2, of the second nothing.
+/// The mean of the variances leaves out how far apart the means are: 1 beside a variance of 2 in the first channel, nothing in the second.
 #[test]
 fn statistics_that_differ_are_said_and_averaged_as_they_are() {
     let at = tempfile::tempdir().unwrap();
@@ -133,7 +133,7 @@ fn shares_are_positive_and_one_for_each() {
     assert!(average(&[], None, &at.join("no")).is_err());
 }
 
-/// A seed's weights and another seed's or another network's, and a run of which nothing is left but its name.
+/// The weights of one seed, of another seed, of another network, and a run of which only the name is left.
 #[test]
 fn relatives_are_told_from_strangers() {
     let at = tempfile::tempdir().unwrap();
@@ -165,14 +165,14 @@ fn relatives_are_told_from_strangers() {
         let made = average(&networks, None, &at.join(name)).unwrap();
         made.kinship
     };
-    // A mean of them and what went on from one come from that one, what went on from each from the seed alone.
+    // A mean of them and a network fine-tuned from one of them share that one; networks fine-tuned from each share only the seed.
     let on = from("on", Some("seed1"), 9);
     let of_mean = of([at.join("seed"), on.clone()], "of-mean");
     assert_eq!(of_mean, Kinship::Network);
     let other = from("other-on", Some("seed0"), 8);
     assert_eq!(of([on, other], "of-both"), Kinship::FirstWeights);
 
-    // Weights of other projects, and a network that begins otherwise, have nothing of a seed in common with it.
+    // Weights of other projects, and a network that starts differently, share nothing of a seed with it.
     let of_the_seed = at.join("seed0");
     let imported = Checkpoint { step: 0, ..STATE };
     let imported = run((&at.join("imported"), LAST), &LAYERS, imported, |c, _| {
@@ -188,7 +188,7 @@ fn relatives_are_told_from_strangers() {
     }
 }
 
-/// It stays where all have it, and goes where one has not: it reads the others' features.
+/// The uncertainty head stays if all have it, and is dropped if one has not: it depends on the other layers' features.
 #[test]
 fn the_head_for_uncertainty_is_everyones_or_no_ones() {
     let at = tempfile::tempdir().unwrap();
@@ -196,7 +196,7 @@ fn the_head_for_uncertainty_is_everyones_or_no_ones() {
     let sure: [(&str, &[f32]); 2] = [("depth.a", &[1.0, 2.0]), ("depth.uncertainty.bias", &[4.0])];
     let has = |config: &mut TrainConfig, _: &mut TrainFindings| {
         config.depth_net.uncertainty = true;
-        // The head learns from known depth alone.
+        // The head learns only from ground truth.
         let set = "sets = [{ name = 'streets', learn = 'depth', simulated = { seed = 1 } }]";
         config.data = toml::from_str(set).unwrap();
     };

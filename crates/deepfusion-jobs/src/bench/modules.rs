@@ -5,8 +5,8 @@ use std::fmt;
 use deepfusion_model::{ModuleCost, TrainConfig};
 use serde::{Serialize, Serializer};
 
-/// The depth network's parts in the order in which they run, and the pose network, which only trains: a table for people, and for scripts a
-/// list.
+/// The depth network's parts in the order in which they run, and the pose network, which is only used in training: a table for people, a
+/// list for scripts.
 #[derive(Debug, Clone)]
 pub struct ModuleCosts {
     depth: Vec<ModuleCost>,
@@ -14,7 +14,7 @@ pub struct ModuleCosts {
 }
 
 impl ModuleCosts {
-    /// Those of a configuration.
+    /// The costs for a configuration.
     #[must_use]
     pub fn new(config: &TrainConfig) -> Self {
         Self {
@@ -23,30 +23,29 @@ impl ModuleCosts {
         }
     }
 
-    /// The depth network as one.
+    /// The sum over the depth network.
     #[must_use]
     pub fn whole(&self) -> ModuleCost {
         ModuleCost::sum("depth network", &self.depth)
     }
 
-    /// All of them.
+    /// All parts of both networks.
     fn all(&self) -> impl Iterator<Item = &ModuleCost> {
         self.depth.iter().chain([&self.pose])
     }
 }
 
-/// A part of the networks, as scripts read it.
+/// A part of the networks, as written for scripts.
 #[derive(Serialize)]
 struct ModuleRecord<'a> {
     name: &'a str,
-    /// Numbers that are learned.
+    /// Number of learned parameters.
     parameters: u64,
-    /// For one image; the pose network's for one pair.
+    /// Number for one image; the pose network's for a pair of images.
     multiply_adds: u64,
-    /// Its parameters in f32.
+    /// Size of its parameters in f32.
     weights_mb: f64,
-    /// What its operations give for one image, in f32. The fused engine's buffers share memory, a training step
-    /// keeps more.
+    /// Size of its operations' outputs for one image, in f32. The fused engine's buffers share memory; a training step keeps more.
     values_mb: f64,
 }
 

@@ -1,4 +1,4 @@
-//! All that is measured of a network, in words and as JSON.
+//! All that is measured of a network, as lines and as JSON.
 
 use std::fmt;
 
@@ -11,34 +11,34 @@ use super::{IMAGES_PER_REPEAT, ModuleCosts, PICTURE_SIZE, Stages, StreetBench};
 use crate::devices::megabytes;
 use crate::{Result, machine};
 
-/// What a network costs, and how fast every stage around it is: its lines for people, and its JSON for scripts.
+/// What a network costs, and how fast every stage around it is: lines for people, JSON for scripts.
 #[derive(Debug, Serialize)]
 pub struct BenchReport {
-    /// What runs it.
+    /// The engine that runs it.
     pub engine: &'static str,
-    /// Where.
+    /// The device that it runs on.
     pub device: String,
-    /// Its name.
+    /// The network's name.
     pub network: String,
     /// Width and height of its input.
     pub size: [usize; 2],
-    /// That the depth network learns.
+    /// Number of parameters that the depth network learns.
     pub parameters: u64,
-    /// In the depth network's convolutions, for one image.
+    /// Multiply-adds in the depth network's convolutions, for one image.
     pub multiply_adds: u64,
-    /// Median of each stage.
+    /// Median time of each stage.
     pub stages_ms: Stages,
-    /// From decode to colour, one after another.
+    /// Time for one image from decoding to colour, one stage after another.
     pub latency_ms: f64,
-    /// Of all stages, overlapped as in a bulk run.
+    /// Frames per second of all stages, overlapped as in a bulk run.
     pub fps: f64,
-    /// The most memory that the process had.
+    /// The process's peak memory.
     pub peak_rss_mb: Option<f64>,
-    /// The most that the device had.
+    /// The peak memory on the device.
     pub peak_device_mb: Option<f64>,
     /// What each part of the networks costs.
     pub modules: ModuleCosts,
-    /// Least milliseconds of each step of the network, where asked for and known.
+    /// The shortest time of each step of the network in milliseconds, if requested and known.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile_ms: Vec<(String, f64)>,
     /// How often every stage was run.
@@ -46,26 +46,26 @@ pub struct BenchReport {
     pub repeats: usize,
 }
 
-/// A network to be measured.
+/// A network to measure.
 #[derive(Debug, Clone, Copy)]
 pub struct BenchRequest<'a> {
-    /// Its name.
+    /// The network's name.
     pub network: &'a str,
-    /// Its configuration.
+    /// The network's configuration.
     pub config: &'a TrainConfig,
-    /// The name of what it computes on.
+    /// Name of the device that it runs on.
     pub device: &'a str,
     /// How often every stage is run, at least once.
     pub repeats: usize,
-    /// Whether the network's steps are timed, too, by the engine that can.
+    /// Whether the network's steps are timed too, if the engine can.
     pub profile: bool,
 }
 
 impl BenchRequest<'_> {
-    /// Measures it by what runs it.
+    /// Measures the network on `runner`.
     ///
     /// # Errors
-    /// A street that cannot be simulated or encoded; what the network's engine says.
+    /// A street that cannot be simulated or encoded; an error of the network's engine.
     pub fn measure(self, runner: &mut dyn DepthRunner) -> Result<BenchReport> {
         let (config, repeats) = (self.config, self.repeats.max(1));
         let modules = ModuleCosts::new(config);
@@ -145,7 +145,7 @@ impl fmt::Display for BenchReport {
     }
 }
 
-/// The steps in order, a line each with its share.
+/// The steps in order, a line each with its share of the time.
 fn write_profile(f: &mut fmt::Formatter<'_>, steps: &[(String, f64)]) -> fmt::Result {
     let total: f64 = steps.iter().map(|(_, ms)| ms).sum();
     steps

@@ -4,12 +4,12 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// A picture without the board.
+/// A picture without the whole board.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// The picture.
+    /// The picture's name.
     pub name: String,
-    /// Why.
+    /// Why it was left out.
     pub why: LeftOutReason,
 }
 
@@ -17,7 +17,7 @@ pub struct LeftOut {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LeftOutReason {
-    /// It shows none, or too few corners to be one.
+    /// No board, or too few corners.
     NoBoard,
     /// A grid with more corners on a side than the board.
     OtherGrid {
@@ -26,11 +26,11 @@ pub enum LeftOutReason {
         /// Corners from top to bottom.
         rows: usize,
     },
-    /// A part of the board.
+    /// Only a part of the board.
     Incomplete {
-        /// Corners that were found.
+        /// Number of corners found.
         corners: usize,
-        /// Corners of the board.
+        /// Number of corners of the board.
         of: usize,
     },
 }
@@ -45,7 +45,7 @@ impl fmt::Display for LeftOutReason {
     }
 }
 
-/// As its words.
+/// The text form, as printed.
 impl Serialize for LeftOutReason {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)

@@ -1,4 +1,4 @@
-//! A calibration as a page.
+//! A calibration as an HTML page.
 
 use deepfusion_data::RgbImage;
 use deepfusion_render::{HtmlReport, PictureFormat};
@@ -11,7 +11,7 @@ use crate::Result;
 const WIDTH: u32 = 720;
 
 impl CalibrationReport<'_> {
-    /// The page: the numbers, where corners were seen, every view and its error; `command` makes it again.
+    /// The page: the numbers, where corners were seen, every view and its error, and the `command` that makes it again.
     ///
     /// # Errors
     /// A picture that cannot be encoded.
@@ -22,7 +22,7 @@ impl CalibrationReport<'_> {
         if !self.warnings.is_empty() {
             let warnings = self.warnings.iter().map(ToString::to_string);
             page = page
-                .section("What would make it surer")
+                .section("How to improve it")
                 .list(&warnings.collect::<Vec<_>>());
         }
         page = page.section("Where corners were seen").picture(
@@ -50,7 +50,7 @@ impl CalibrationReport<'_> {
         Ok(page.section("Again").command(command))
     }
 
-    /// The image's frame, with a dot for each corner.
+    /// The image's area, with a dot for each corner.
     fn corners(&self) -> RgbImage {
         let camera = &self.calibration.intrinsics;
         let scale = f64::from(WIDTH) / f64::from(camera.width);

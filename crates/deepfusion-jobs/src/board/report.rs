@@ -1,4 +1,4 @@
-//! A calibration as it is reported: JSON, lines, and the file that it becomes.
+//! A calibration's report: JSON, lines, and the calibration's file.
 
 use std::fmt;
 use std::path::Path;
@@ -11,29 +11,29 @@ use serde::{Serialize, Serializer};
 
 use super::{BoardViews, BoardWarning, LeftOut};
 
-/// Pictures left out that are named; the others are counted.
+/// At most this many left-out pictures are named; the others are counted.
 const NAMED: usize = 6;
 
-/// What is reported of a calibration: its lines for people, and its JSON for scripts.
+/// A calibration's report: lines for people, JSON for scripts.
 #[derive(Debug, Serialize)]
 pub struct CalibrationReport<'a> {
     /// The camera.
     #[serde(flatten)]
     pub calibration: &'a Calibration,
-    /// What makes it less sure than it could be.
+    /// What makes the calibration less accurate than it could be.
     #[serde(serialize_with = "in_words")]
     pub warnings: Vec<BoardWarning>,
     /// Names of `coefficients`.
     pub coefficient_names: &'static [&'static str],
     /// The board.
     pub board: Board,
-    /// Pictures and frames of videos that were looked at.
+    /// Number of pictures and frames of videos that were searched.
     pub looked_at: usize,
-    /// Those that show no whole board.
+    /// Pictures and frames that show no whole board.
     pub left_out: &'a [LeftOut],
-    /// Frames of videos that show the board where another does already, or less sharply.
+    /// Number of video frames left out because another frame shows the board in the same place, or more sharply.
     pub not_picked: usize,
-    /// The calibration's file.
+    /// Path of the calibration's file.
     pub written: &'a Path,
     /// Where the board was seen.
     #[serde(skip)]
@@ -48,7 +48,7 @@ fn in_words<S: Serializer>(warnings: &[BoardWarning], serializer: S) -> Result<S
 }
 
 impl BoardViews {
-    /// What is reported of the camera that these views gave, with its lens ([`Self::calibrate`]); `written` is the calibration's file.
+    /// The report of the camera computed from these views, with its lens ([`Self::calibrate`]); `written` is the calibration's file.
     #[must_use]
     pub fn report<'a>(
         &'a self,
@@ -74,7 +74,7 @@ impl BoardViews {
 }
 
 impl CalibrationReport<'_> {
-    /// The camera as ROS's camera_info YAML, which says of itself what it was made from.
+    /// The camera as ROS's camera_info YAML, with a comment that says what it was made from.
     #[must_use]
     pub fn yaml(&self, name: &str) -> String {
         let (found, board) = (self.calibration, &self.board);
@@ -96,7 +96,7 @@ impl CalibrationReport<'_> {
         camera_info_yaml(name, &found.intrinsics, self.lens, &comments)
     }
 
-    /// All that was found: a name and a value each. The name is empty where the value goes on.
+    /// All results: a name and a value each. The name is empty if the value continues the one above.
     #[must_use]
     pub fn rows(&self) -> Vec<(String, String)> {
         let found = self.calibration;
@@ -158,7 +158,7 @@ impl CalibrationReport<'_> {
         rows
     }
 
-    /// How many views there are, and of what.
+    /// How many views were used, and of how many pictures and frames.
     fn counted_views(&self) -> String {
         let used = self.calibration.used();
         let looked_at = format!("{used} used of {} looked at", self.looked_at);
@@ -171,7 +171,7 @@ impl CalibrationReport<'_> {
         )
     }
 
-    /// The pictures that gave nothing, and why: those that disagree with the others, then those without the board.
+    /// The pictures that were not used, and why: first those that disagree with the others, then those without the board.
     fn without_use(&self) -> Vec<(&str, String)> {
         let disagree = self.calibration.views.iter().filter(|v| !v.used);
         let disagree = disagree.map(|v| match v.rms_px {

@@ -1,51 +1,53 @@
-//! What makes a camera by a board's pictures less sure, or of other images than one may think.
+//! Warnings about a calibration: it is inaccurate, or applies to other images than one may think.
 
 use deepfusion_calibrate::{Board, CalibrationWarning};
 use deepfusion_data::NoLens;
 
-/// The longest side of a board's squares, in metres, that is taken without a word.
+/// Largest side of a board's squares, in metres, that gives no warning.
 const LARGEST_SQUARE_M: f64 = 0.5;
 
-/// What makes a camera by a board's pictures less sure, or of other images than one may think.
+/// A warning about a calibration: it is inaccurate, or applies to other images than one may think.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoardWarning {
-    /// What the calibration says of itself.
+    /// A warning of the calibration itself.
     #[error(transparent)]
     Calibration(#[from] CalibrationWarning),
-    /// Pictures were turned upright, which the calibration then is of.
+    /// Pictures were turned upright, and the calibration is for upright ones.
     #[error(
-        "EXIF turns the pictures by {}: the calibration is of the upright ones, {}x{}, which a network sees where it is given the pictures alone; a recording's images are used as they are stored",
+        "EXIF turns the pictures by {}: the calibration is for upright pictures, {}x{}, as used for single pictures; images of recordings are used as stored",
         turned(*orientation), size.0, size.1
     )]
     Turned {
-        /// How they were, by EXIF's number.
+        /// EXIF's number for the orientation of the pictures.
         orientation: u8,
-        /// Width and height of the upright ones.
+        /// Width and height of the upright pictures.
         size: (u32, u32),
     },
-    /// The squares are said to be larger than anybody prints them.
-    #[error("squares of {square_m} m: their side is in metres, not millimetres; 25 mm are 0.025 m")]
+    /// The given squares are larger than anybody prints them.
+    #[error(
+        "squares of {square_m} m: expected the side in metres, not millimetres (25 mm is 0.025 m)"
+    )]
     LargeSquares {
         /// The side of a square, metres.
         square_m: f64,
     },
     /// Images cannot be corrected with the lens.
     #[error(
-        "images cannot be corrected with this lens: {0}; show the board nearer to the image's border"
+        "images cannot be corrected with this lens: {0}; show the board closer to the border of the image"
     )]
     NotCorrectable(#[source] NoLens),
 }
 
 impl BoardWarning {
-    /// Where a board's squares are so large that their side was hardly meant in metres.
+    /// A warning if a board's squares are so large that their side was probably not given in metres.
     pub(super) fn of_squares(board: &Board) -> Option<Self> {
         let square_m = board.square_m.filter(|side| *side > LARGEST_SQUARE_M)?;
         Some(Self::LargeSquares { square_m })
     }
 }
 
-/// What EXIF's orientation does to a picture.
+/// How EXIF's orientation turns a picture.
 pub(super) fn turned(orientation: u8) -> &'static str {
     match orientation {
         1 => "0 degrees",
@@ -74,15 +76,15 @@ mod tests {
             ),
             (
                 BoardWarning::Turned { orientation, size },
-                "EXIF turns the pictures by 90 degrees: the calibration is of the upright ones, 480x640, which a network sees where it is given the pictures alone; a recording's images are used as they are stored",
+                "EXIF turns the pictures by 90 degrees: the calibration is for upright pictures, 480x640, as used for single pictures; images of recordings are used as stored",
             ),
             (
                 BoardWarning::LargeSquares { square_m: 25.0 },
-                "squares of 25 m: their side is in metres, not millimetres; 25 mm are 0.025 m",
+                "squares of 25 m: expected the side in metres, not millimetres (25 mm is 0.025 m)",
             ),
             (
                 BoardWarning::NotCorrectable(NoLens::FoldsOver),
-                "images cannot be corrected with this lens: the distortion folds over within the image: it does not fit this camera matrix; show the board nearer to the image's border",
+                "images cannot be corrected with this lens: the distortion folds over within the image: it does not fit this camera matrix; show the board closer to the border of the image",
             ),
         ] {
             assert_eq!(warning.to_string(), said);

@@ -10,41 +10,41 @@ use sha2::{Digest, Sha256};
 use crate::error::UnfitCamera;
 use crate::{Error, Result};
 
-/// The camera that was given for all inputs.
+/// A camera given for all inputs.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GivenCamera {
     /// fx, fy, cx, cy in pixels, for images of any size.
     Numbers([f64; 4]),
-    /// The field of view from left to right in degrees, for images of any size.
+    /// The horizontal field of view in degrees, for images of any size.
     Hfov(f64),
-    /// A calibration file; of KITTI's also the folder.
+    /// A calibration file; KITTI's may also be given by its folder.
     File(PathBuf),
 }
 
-/// Where the inputs' camera comes from.
+/// The source of the inputs' camera.
 #[derive(Debug, Clone)]
 pub enum CameraSource {
-    /// fx, fy, cx, cy that were given, in pixels, for images of any size.
+    /// fx, fy, cx, cy as given, in pixels, for images of any size.
     Given([f64; 4]),
-    /// The field of view from left to right that was given, in degrees, for images of any size.
+    /// The horizontal field of view as given, in degrees, for images of any size.
     Hfov(f64),
     /// KITTI's calibration file, for images of its size.
     File(Intrinsics),
-    /// A calibration tool's file, with the lens that is undone.
+    /// A calibration tool's file, with the lens whose distortion is removed.
     Lens(Arc<LensFile>),
-    /// The camera trained with: the inputs are taken to see what it saw.
+    /// The training camera: the inputs are assumed to have its field of view.
     Trained(Intrinsics),
-    /// The camera that the run learned, in the same way.
+    /// The camera that the run learned, used in the same way.
     Learned(Intrinsics),
-    /// Nothing is known.
+    /// The camera is unknown.
     Unknown,
 }
 
 impl CameraSource {
-    /// The camera that was given; where none was, the one that the network was trained with, or that its run `learned`.
+    /// The given camera, or else the one that the network was trained with or that its run `learned`.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no calibration.
+    /// A file that cannot be read or is not a calibration.
     pub fn chosen(
         given: Option<&GivenCamera>,
         trained: Option<Intrinsics>,
@@ -60,7 +60,7 @@ impl CameraSource {
         })
     }
 
-    /// KITTI's calibration by its folder or its file, or a calibration tool's file.
+    /// KITTI's calibration by its folder or file, or a calibration tool's file.
     fn of_file(path: &Path) -> Result<Self> {
         if !(path.is_dir()
             || path
@@ -84,7 +84,7 @@ impl CameraSource {
         ))
     }
 
-    /// Width and height of the images that it was measured with, where its file says them.
+    /// Width and height of the images that it was measured with, if its file contains them.
     #[must_use]
     pub fn image_size(&self) -> Option<(u32, u32)> {
         match self {
@@ -94,7 +94,7 @@ impl CameraSource {
         }
     }
 
-    /// What it is to an image that says nothing itself.
+    /// The camera's source for an image without a camera of its own.
     #[must_use]
     pub fn from(&self) -> CameraFrom {
         match self {
@@ -105,11 +105,10 @@ impl CameraSource {
         }
     }
 
-    /// The image as a pinhole camera would have taken it, that camera, and where it comes from. What EXIF says
-    /// comes before what would only be assumed.
+    /// The image as a pinhole camera would have taken it, with that camera and its source. EXIF takes precedence over an assumed camera.
     ///
     /// # Errors
-    /// [`Error::Camera`] for a camera of other images.
+    /// [`Error::Camera`] for the camera of images of another size.
     pub fn see(&self, image: RgbImage, exif: Option<Intrinsics>) -> Result<PinholeImage> {
         if let Self::Lens(file) = self {
             let lens = file.lens_for(image.dimensions())?;
@@ -163,36 +162,36 @@ impl CameraSource {
 /// An image as a pinhole camera would have taken it.
 #[derive(Debug, Clone)]
 pub struct PinholeImage {
-    /// The pixels, without the lens.
+    /// The pixels, after the lens's distortion was removed.
     pub image: RgbImage,
-    /// The camera, where it is known or assumed.
+    /// The camera, if it is known or assumed.
     pub camera: Option<Intrinsics>,
-    /// Where that comes from.
+    /// The camera's source.
     pub from: CameraFrom,
-    /// Whether a distortion was undone: then the pixels are not those of the file.
+    /// Whether a distortion was removed, so that the pixels are not those of the file.
     pub undistorted: bool,
 }
 
-/// Where an image's camera comes from.
+/// The source of an image's camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CameraFrom {
-    /// Who started it said it.
+    /// It was given.
     Given,
-    /// The recording says it.
+    /// The recording's calibration.
     Recording,
-    /// The image's EXIF says it.
+    /// The image's EXIF.
     Exif,
     /// The network's run learned it.
     Learned,
-    /// The one that the network was trained with is taken for it.
+    /// The training camera, assumed to be the image's.
     Assumed,
-    /// Nothing says it.
+    /// The camera is unknown.
     Unknown,
 }
 
 impl CameraFrom {
-    /// One word for the sidecar.
+    /// The word for it in the sidecar.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -212,8 +211,9 @@ impl CameraFrom {
     }
 }
 
-/// How far a principal point may lie from the middle of the image, as a share of its side, in both axes and the same way. Numbers of an
-/// image half as large again are 0.25 off, those of a cut image in one axis alone.
+/// Largest offset of a principal point from the middle of the image, as a share of the image's side. A camera looks wrong only if both axes
+/// exceed it in the same direction: the numbers of an image 1.5 times as large are off by 0.25 in both, those of a cropped image in one
+/// axis only.
 const MOST_OFF: f64 = 0.2;
 
 /// Whether a camera's numbers look like those of images of another size.
@@ -228,16 +228,16 @@ pub fn looks_of_another_size(k: &Intrinsics) -> bool {
 #[derive(Debug)]
 pub struct LensFile {
     path: PathBuf,
-    /// Of the file: outputs made with another are others.
+    /// SHA-256 of the file: outputs depend on it.
     pub sha256: String,
-    /// Made for the first image's size.
+    /// The lens, made for the first image's size.
     lens: OnceLock<((u32, u32), Lens)>,
 }
 
 impl LensFile {
-    /// The size of its images, where it says one.
+    /// The size of the file's images, if it contains one.
     fn image_size(&self) -> Option<(u32, u32)> {
-        // A file that says none is read with any; what is wrong with it is said when the first image is there.
+        // A file without a size can be read with any. What is wrong with the file is reported with the first image.
         const ANY: (u32, u32) = (1920, 1080);
         let calibration = CameraCalibration::read(&self.path, ANY).ok()?;
         let k = &calibration.intrinsics;
@@ -258,12 +258,12 @@ impl LensFile {
                 let calibration = CameraCalibration::read(&self.path, size)?;
                 let k = &calibration.intrinsics;
                 let said = (k.width, k.height);
-                // A lens takes memory for each pixel: not for a size that no image has.
+                // A lens takes memory for each pixel, so none is made for a size that no image has.
                 if said != size {
                     return Err(other_size(said));
                 }
                 let made = (said, calibration.lens()?);
-                // Another thread may have been first: it made the same.
+                // If another thread was first, it made the same lens.
                 self.lens.get_or_init(|| made)
             }
         };
@@ -275,8 +275,8 @@ impl LensFile {
     }
 }
 
-/// A camera of the same field of view from left to right, pixels of the same shape, the same height of the horizon. Of an upright
-/// image the field of view is that from top to bottom: the camera was turned, not its lens changed.
+/// A camera with the same horizontal field of view, pixel aspect ratio and relative height of the horizon. For an upright image, that is
+/// the vertical field of view: the camera was turned, its lens is the same.
 fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
     let along = k.fx * f64::from(width.max(height)) / f64::from(k.width);
     let across = along * k.fy / k.fx;
@@ -300,7 +300,7 @@ fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
 mod tests {
     use super::*;
 
-    /// An image of the training camera has that camera, whatever the shape of its pixels, and upright it is turned.
+    /// An image of the training camera's size gets that camera, whatever the shape of its pixels; an upright image gets it turned.
     #[test]
     fn the_training_cameras_own_images_have_its_numbers() {
         let k = Intrinsics {

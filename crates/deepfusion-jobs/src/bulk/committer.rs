@@ -1,7 +1,7 @@
-//! When an image counts as done: outputs are on the disk, then sidecars, many images at a time.
+//! Marks images as done: their outputs are synced first, then their sidecars are written, many images at a time.
 //!
-//! A disk takes milliseconds for each thing that is waited for, and hardly more for many at once. So the threads that write
-//! outputs wait for nothing; one thread takes all images that were written while it waited for those before.
+//! A disk takes milliseconds for each sync, and hardly more for many at once. So the threads that write outputs do not wait; one thread
+//! takes all images that were written while it waited for the previous ones.
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 use deepfusion_records::Sidecar;
@@ -10,10 +10,10 @@ use super::progress::BulkProgress;
 use super::sidecars;
 use crate::{Error, Input};
 
-/// Images that may wait for the disk: a power cut costs no more than twice these.
+/// Largest number of images that may wait for the disk: a power cut costs at most twice as many.
 const MOST: usize = 64;
 
-/// An image's place among the shard's, and its sidecar.
+/// An image's index in the shard, and its sidecar.
 pub type Written = (usize, Sidecar);
 
 /// The queue to [`commit`].
@@ -22,7 +22,7 @@ pub fn queue() -> (Sender<Written>, Receiver<Written>) {
     bounded(MOST)
 }
 
-/// Writes the sidecars of images whose outputs are written, group by group, until no more come.
+/// Writes the sidecars of images whose outputs are written, group by group, until the queue closes.
 pub fn commit<E: From<Error>>(
     progress: &BulkProgress<E>,
     mine: &[&Input],

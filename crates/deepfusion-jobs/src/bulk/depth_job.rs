@@ -1,4 +1,4 @@
-//! What is the same for all images of a run: how they are read, looked at and written.
+//! What all images of a run share: how they are read, predicted and written.
 
 use std::path::Path;
 
@@ -13,14 +13,14 @@ use crate::outputs::{DepthOutput, DepthOutputs, DepthWriter, SeenDepth};
 use crate::scene::DepthWatch;
 use crate::{Error, Input, ModelFacts, Result};
 
-/// Shows what a network's layers do: of an image 3×H×W at this size, RGB in [0, 1], channel by channel.
+/// Shows what a network's layers compute for an image 3×H×W of this size, RGB in [0, 1], channel by channel.
 pub type ShowLayers = Box<dyn Fn(&[f32], InputSize) -> Vec<LayerMaps> + Sync>;
 
-/// Depth of many images through one network, into one folder. Threads share it.
+/// Depth of many images by one network, into one folder. Threads share it.
 pub struct DepthJob<'a> {
     /// Reads each image.
     pub loader: ImageLoader,
-    /// Writes what is kept of each.
+    /// Writes the outputs of each image.
     pub writer: DepthWriter<'a>,
     show_layers: Option<ShowLayers>,
     scale: ScaleMonitorConfig,
@@ -29,12 +29,12 @@ pub struct DepthJob<'a> {
 }
 
 impl<'a> DepthJob<'a> {
-    /// The work that these settings ask of a network; `estimator` runs that of `model`, and `show_layers` shows what its layers do, where
-    /// pictures of that are kept ([`DepthOutputs::need_layers`]). What may be wrong with an image's metres goes to `warn`.
+    /// The job for these settings. `estimator` runs the network of `model`. `show_layers` shows what its layers compute, if pictures of
+    /// that are saved ([`DepthOutputs::need_layers`]). Warnings about an image's metres go to `warn`.
     ///
     /// # Errors
-    /// [`Error::NoUncertainty`] for outputs that need it of a network that does not know it; [`Error::NoLayers`] for those that need
-    /// `show_layers`; a camera's file that cannot be read; what is kept beside the network and cannot be read.
+    /// [`Error::NoUncertainty`] for outputs that need an uncertainty head which the network lacks; [`Error::NoLayers`] for outputs that
+    /// need `show_layers`; a camera's file that cannot be read; files beside the network that cannot be read.
     pub fn new(
         settings: DepthSettings,
         folder: &'a Path,
@@ -75,10 +75,10 @@ impl<'a> DepthJob<'a> {
         })
     }
 
-    /// What there is of the job in its folder.
+    /// The job as its folder records it.
     #[must_use]
     pub fn bulk(&self, shard: Shard, overwrite: bool, videos: bool) -> BulkJob<'_> {
-        // Of a frame of a video more is kept than of a photograph: whatever it may be.
+        // Frames of a video may have more outputs than a photograph, so these cover both.
         let save = self.writer.outputs.of_image(false).into_iter();
         BulkJob {
             folder: self.writer.folder,
@@ -90,7 +90,7 @@ impl<'a> DepthJob<'a> {
         }
     }
 
-    /// Reads an image; warns where its camera may not be its own, or its size and shape are far from what the network takes.
+    /// Reads an image; warns if its camera may not be its own, or if its size and shape are far from the network's input.
     ///
     /// # Errors
     /// As [`ImageLoader::load`].
@@ -101,7 +101,7 @@ impl<'a> DepthJob<'a> {
         Ok((loaded, prepared))
     }
 
-    /// Takes a live source's frame; warns where its size and shape are far from what the network takes.
+    /// Takes a live source's frame; warns if its size and shape are far from the network's input.
     ///
     /// # Errors
     /// As [`ImageLoader::load_live`].
@@ -120,10 +120,10 @@ impl<'a> DepthJob<'a> {
         self.warnings.of_fit(image, network, prepared);
     }
 
-    /// What the network says about an image, and what its layers do where that is kept.
+    /// Predicts an image, and shows what the network's layers compute if that is saved.
     ///
     /// # Errors
-    /// What the network's engine says.
+    /// The error of the network's engine.
     pub fn see(
         &self,
         estimator: &mut DepthEstimator,
@@ -139,12 +139,12 @@ impl<'a> DepthJob<'a> {
         })
     }
 
-    /// The watch over the metres, from the first frame on.
+    /// A watch over the scale, starting at the first frame.
     pub(super) fn watch(&self) -> DepthWatch {
         DepthWatch::new(self.scale.clone(), self.correct_scale)
     }
 
-    /// As [`Self::see`], of the next image of those whose metres are watched; warns where they have changed.
+    /// As [`Self::see`], for the next image of a sequence whose scale is watched; warns if it has changed.
     ///
     /// # Errors
     /// As [`Self::see`].
@@ -162,7 +162,7 @@ impl<'a> DepthJob<'a> {
         Ok(seen)
     }
 
-    /// Warns where metres were found to be so many times their first size.
+    /// Warns if the scale has drifted by this factor.
     pub(crate) fn warn_of_drift(&self, frame: &str, drift: Option<f64>) {
         if let Some(ratio) = drift {
             self.warnings.of_drift(frame, ratio);

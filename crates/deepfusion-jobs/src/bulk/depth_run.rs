@@ -1,4 +1,4 @@
-//! Depth of many images: while the network runs on one, the next are read and the last are written.
+//! Depth of many images: while the network runs on one, the next are read and the previous ones written.
 
 use deepfusion_runtime::{DepthEstimator, PreparedImage};
 
@@ -7,12 +7,12 @@ use super::{BulkProgress, DepthJob, LoadedImage, commit, queue};
 use crate::outputs::SeenDepth;
 use crate::{Error, Input, Result};
 
-/// Predicts those images `todo` of `mine` that are not done, and writes what is kept of each; an image's sidecar last, when the rest is on
-/// the disk. What becomes of them goes to `progress`: an image that cannot be read fails by itself, where nothing can be predicted or written
-/// the run ends. It also ends, with what is at work, where `stop` says so.
+/// Predicts the images `todo` of `mine`, and writes their outputs; an image's sidecar comes last, once the rest is on the disk. Results go
+/// to `progress`. An image that cannot be read only fails itself; if predicting or writing fails, the run ends. It also ends, with the
+/// images in progress, when `stop` returns true.
 ///
 /// # Panics
-/// Where a thread of it panics.
+/// If one of its threads panics.
 pub fn predict<E: From<Error> + Send>(
     job: &DepthJob<'_>,
     estimator: &mut DepthEstimator,
@@ -38,7 +38,7 @@ pub fn predict<E: From<Error> + Send>(
     let write = move |i: usize, (loaded, seen): (LoadedImage, Result<SeenDepth>)| {
         let input = mine[todo[i]];
         match seen.and_then(|seen| job.writer.write_outputs(input, &loaded, &seen)) {
-            // Fails only where the other thread has panicked, which ends the program below.
+            // Fails only if the other thread has panicked, which ends the program below.
             Ok(sidecar) => drop(to_disk.send((todo[i], sidecar))),
             Err(error) => progress.stop(error.into()),
         }
@@ -46,10 +46,10 @@ pub fn predict<E: From<Error> + Send>(
     let stop = || stop() || progress.stopped();
     let threads = Threads::for_this_machine();
     std::thread::scope(|scope| {
-        // It owns its end of the queue: should it panic, nobody waits for it.
+        // It owns its end of the queue: if it panics, no other thread waits for it.
         scope.spawn(move || commit(progress, mine, &written));
         pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
-        // The committer ends with the last image written.
+        // The committer ends after the last image.
         drop(write);
     });
 }

@@ -1,4 +1,4 @@
-//! How images become depth, and what of it their outputs depend on.
+//! How images become depth, and on which of these settings the outputs depend.
 
 use deepfusion_data::NamedTopic;
 use deepfusion_eval::PostProcess;
@@ -14,33 +14,33 @@ use crate::{ModelFacts, Result};
 /// How images become depth.
 #[derive(Debug, Clone)]
 pub struct DepthSettings {
-    /// The camera of inputs that do not say it themselves.
+    /// The camera of inputs without a camera of their own.
     pub camera: Option<GivenCamera>,
-    /// Whether depth is corrected for another focal length than the one trained on.
+    /// Whether depth is corrected for a focal length other than the one trained with.
     pub focal_correction: bool,
-    /// Whether images of another aspect ratio are stretched, and not cut.
+    /// Whether images of another aspect ratio are stretched rather than cropped.
     pub stretch: bool,
-    /// Of which predictions of an image the mean is taken (test-time augmentation); `None`: of one alone.
+    /// Of which predictions of an image the mean is taken (test-time augmentation); `None`: only one prediction.
     pub post_process: Option<PostProcess>,
-    /// How the scale is watched, where a recording's motion is known.
+    /// How the scale is monitored if a recording's motion is known.
     pub scale: ScaleMonitorConfig,
-    /// Whether depth is brought back where its scale has drifted.
+    /// Whether depth is corrected if its scale has drifted.
     pub correct_scale: bool,
-    /// The data set, of those that the network learned from, whose metres are meant.
+    /// The training data set whose metres are meant, if there were several.
     pub set: Option<String>,
-    /// The topics that bags are read by, where they were named.
+    /// The topics chosen for bags.
     pub topics: Vec<NamedTopic>,
-    /// In which numbers the network computes.
+    /// The precision in which the network computes.
     pub precision: Precision,
-    /// The name of what it computes on.
+    /// Name of the device.
     pub device: String,
 }
 
 impl DepthSettings {
-    /// What reads the images.
+    /// The loader that reads the images.
     ///
     /// # Errors
-    /// A camera's file that cannot be read; several input sizes of a network that has one.
+    /// A camera's file that cannot be read; several input sizes for a network that takes one.
     pub(super) fn loader(&self, estimator: &DepthEstimator) -> Result<ImageLoader> {
         let trained = estimator.training_camera();
         let camera_learned = estimator.config().learned_camera().is_some();
@@ -53,7 +53,7 @@ impl DepthSettings {
         })
     }
 
-    /// What the outputs depend on, beside the image.
+    /// What the outputs depend on besides the image.
     ///
     /// # Errors
     /// Weights that cannot be read.

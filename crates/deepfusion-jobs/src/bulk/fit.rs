@@ -1,34 +1,34 @@
-//! How far an image is from what its network takes.
+//! Checks how far an image is from what its network was trained on.
 
 use std::fmt;
 
 use deepfusion_runtime::{PreparedImage, Preparer};
 
-/// The factor by which two aspect ratios may differ, as a fraction: 4:3 is exactly that far from 10:3.
+/// The largest factor, as a fraction, by which two aspect ratios may differ: 4:3 is exactly that far from 10:3.
 const MOST_ASPECT: (u64, u64) = (5, 2);
-/// The part of an image that the network sees may be enlarged so many times, in either direction.
+/// The largest factor by which the part of an image that the network sees may be enlarged, in either direction.
 const MOST_ENLARGED: u64 = 4;
 
-/// An image so unlike what the network learned from that its depth means little.
+/// An image so unlike the training images that its depth is unreliable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PoorFit {
     /// Width and height of the image.
     pub image: [u32; 2],
-    /// Of the part of it that the network sees.
+    /// Width and height of the part of it that the network sees.
     pub seen: [u32; 2],
-    /// Of the network's input.
+    /// Width and height of the network's input.
     pub input: [u32; 2],
-    /// Of the images that the network learned from; `None` where it learned with many cameras, or nothing says it.
+    /// Width and height of the training images; `None` if the network was trained with many cameras, or if they are unknown.
     pub learned: Option<[u32; 2]>,
 }
 
 impl PoorFit {
-    /// Whether an image that was prepared for a network is one. A side of the part that the network sees is shorter than a quarter of
-    /// the input's, or the part's aspect ratio differs by more than a factor of 2.5 from that of the images it learned from. Training
-    /// resizes those to its input whatever their shape, so the input says nothing of them.
+    /// Checks an image that was prepared for a network. It fits poorly if a side of the part that the network sees is shorter than a
+    /// quarter of the input's side, or if the part's aspect ratio differs by more than a factor of 2.5 from that of the training images.
+    /// Training resizes images to the network's input whatever their shape, so the input's aspect ratio does not matter.
     ///
-    /// A network that learned with many cameras has inputs of many shapes: the aspect ratio of the one that fits the image best is then
-    /// what counts, of several input sizes the largest's. So is the input's where nothing says what the network learned from.
+    /// A network trained with many cameras has inputs of many shapes. The part is then compared with the input that fits the image best; of
+    /// several input sizes, with the largest. If nothing records what the network was trained on, it is compared with the input, too.
     #[must_use]
     pub fn of(network: &Preparer, prepared: &PreparedImage) -> Option<Self> {
         let size = prepared.largest()?.size;
@@ -46,7 +46,7 @@ impl PoorFit {
         (tiny || fit.is_odd()).then_some(fit)
     }
 
-    /// Whether the aspect ratio of what the network sees is too far from that of what it learned from, or of its input.
+    /// Whether the aspect ratio of the part that the network sees is too far from that of the training images, or of the input.
     fn is_odd(&self) -> bool {
         let (wider, higher) = self.aspects();
         let (most, of) = MOST_ASPECT;
@@ -84,20 +84,22 @@ impl fmt::Display for PoorFit {
             times(1)
         )?;
         if self.is_odd() {
-            write!(f, "; the aspect ratios of what the network sees and of ")?;
+            let (wider, higher) = self.aspects();
+            let ratio = wider.max(higher) as f64 / wider.min(higher).max(1) as f64;
+            write!(
+                f,
+                "; the aspect ratio of what the network sees differs by a factor of {ratio:.1} from that of "
+            )?;
             match learned {
                 Some([width, height]) => {
                     write!(f, "the {width}x{height} images that it learned from")?;
                 }
                 None => write!(f, "its input")?,
             }
-            let (wider, higher) = self.aspects();
-            let ratio = wider.max(higher) as f64 / wider.min(higher).max(1) as f64;
-            write!(f, " differ by a factor of {ratio:.1}")?;
         }
         write!(
             f,
-            "): the network learned from nothing like it, and its depth means little"
+            "): the network was not trained on such images, so its depth is unreliable"
         )
     }
 }
@@ -124,7 +126,7 @@ mod tests {
         prepared(network, size, true)
     }
 
-    /// Cut where the network wants another shape, or stretched.
+    /// How well an image fits, cropped to the network's aspect ratio or stretched.
     fn prepared(network: &Preparer, (width, height): (u32, u32), crop: bool) -> Option<PoorFit> {
         let image = RgbImage::new(width, height);
         PoorFit::of(network, &network.prepare(&image, None, true, crop))
@@ -132,7 +134,7 @@ mod tests {
 
     #[test]
     fn what_is_far_from_the_input_is_told_from_what_is_not() {
-        // 4:3 is as far from 10:3 as may be; so is a quarter of the size.
+        // The limits: 4:3 is just close enough to 10:3, and so is a quarter of the size.
         for size in [(1242, 375), (640, 480), (80, 24), (1000, 120)] {
             assert_eq!(fit(&NETWORK, size), None, "{size:?}");
         }
@@ -157,8 +159,8 @@ mod tests {
         }
     }
 
-    /// Of a network of one camera: its own images fit, whatever the shape of its input. Another shape is cut to theirs; what is left may be
-    /// tiny.
+    /// For a network trained with one camera: images of that camera fit, whatever the shape of the input. Other shapes are cropped to it,
+    /// and what is left may be tiny.
     #[test]
     fn what_a_network_learned_from_fits() {
         let own = Preparer {
@@ -180,7 +182,7 @@ mod tests {
         let text = prepared(&own, (1280, 192), false).unwrap().to_string();
         for part in [
             "1280x192 pixels, resized to 640x192",
-            "sees and of the 1280x1024 images that it learned from differ by a factor of 5.3",
+            "sees differs by a factor of 5.3 from that of the 1280x1024 images that it learned from",
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }

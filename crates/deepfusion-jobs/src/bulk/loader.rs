@@ -1,4 +1,4 @@
-//! An input as the network takes it: read, without its lens, with its camera.
+//! Loads an input for the network: read, with the lens's distortion removed, and with its camera.
 
 use deepfusion_data::{Error as DataError, RgbImage, load_photo};
 use deepfusion_geometry::Intrinsics;
@@ -9,48 +9,48 @@ use deepfusion_video::LiveFrame;
 use super::{CameraFrom, CameraSource, PinholeImage};
 use crate::{Error, Input, Result};
 
-/// Reads images and makes them a network's input; any thread may.
+/// Reads images and prepares them for a network, on any thread.
 #[derive(Debug)]
 pub struct ImageLoader {
-    /// The camera of inputs that do not say it themselves.
+    /// The camera of inputs without a camera of their own.
     pub camera: CameraSource,
     /// Whether the network's run learned its camera.
     pub camera_learned: bool,
-    /// Makes them the network's input.
+    /// Makes the network's input from an image.
     pub preparer: Preparer,
-    /// Whether metres are corrected for another focal length than the one trained on.
+    /// Whether depth is corrected for a focal length other than the one trained with.
     pub focal_correction: bool,
-    /// Whether images of another aspect ratio are cut, and not stretched.
+    /// Whether images of another aspect ratio are cropped rather than stretched.
     pub crop: bool,
 }
 
 /// An image that was read.
 pub struct LoadedImage {
-    /// Its file as it was before it was read.
+    /// Mark of its file before it was read.
     pub mark: FileMark,
-    /// Without the lens's distortion.
+    /// The pixels, after the lens's distortion was removed.
     pub image: RgbImage,
-    /// At the image's size, where it is known.
+    /// The camera at the image's size, if it is known.
     pub camera: Option<Intrinsics>,
-    /// Where that comes from.
+    /// The camera's source.
     pub camera_from: CameraFrom,
-    /// Whether a distortion was undone: then the pixels are not those of the file.
+    /// Whether a distortion was removed, so that the pixels are not those of the file.
     pub undistorted: bool,
-    /// Of a live source's frame.
+    /// Set for a live source's frame.
     pub live: Option<LiveMark>,
 }
 
 impl ImageLoader {
-    /// Reads an image of a file or a recording.
+    /// Reads an image from a file or a recording.
     ///
     /// # Errors
-    /// [`Error::NotText`]; a file that cannot be read; [`Error::CameraOf`] for a camera that cannot be its own.
+    /// [`Error::NotText`]; a file that cannot be read; [`Error::CameraOf`] for a camera that does not fit the image.
     pub fn load(&self, input: &Input) -> Result<(LoadedImage, PreparedImage)> {
         if input.path.to_str().is_none() {
             let path = input.path.clone();
             return Err(Error::NotText { path });
         }
-        // Before it is read: a change in between is then noticed by the next run.
+        // Taken before the file is read: if it changes in between, the next run notices.
         let mark = FileMark::of(&input.path).map_err(|e| DataError::file(&input.path, e))?;
         let taken = match &input.frame {
             Some((dataset, index)) => PinholeImage {
@@ -75,10 +75,10 @@ impl ImageLoader {
         Ok(self.prepare(mark, taken))
     }
 
-    /// Takes a live source's frame.
+    /// Prepares a live source's frame.
     ///
     /// # Errors
-    /// [`Error::Camera`] for a camera that cannot be its own.
+    /// [`Error::Camera`] for a camera that does not fit the image.
     pub fn load_live(&self, frame: LiveFrame) -> Result<(LoadedImage, PreparedImage)> {
         let mark = FileMark::of_arrival(frame.image.as_raw().len() as u64, frame.arrived_at);
         let taken = self.camera.see(frame.image, None)?;

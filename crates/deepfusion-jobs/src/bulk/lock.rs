@@ -1,4 +1,4 @@
-//! That only one run at a time works on a shard, or on a whole folder.
+//! Ensures that only one run at a time works on a shard, or on a whole folder.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -7,20 +7,20 @@ use std::time::Duration;
 use super::Shard;
 use crate::{Error, Result};
 
-/// What the name of a lock's file is made of: `.predict-I-of-N.lock`.
+/// Start of the name of a lock file, `.predict-I-of-N.lock`.
 const BEGIN: &str = ".predict-";
 /// Between a shard and the number of shards.
 const OF: &str = "-of-";
-/// At the end.
+/// End of the name.
 const END: &str = ".lock";
 
-/// How often a lock is tried that is held, and how long is waited in between.
+/// Number of attempts to take a lock that is held.
 const TRIES: usize = 3;
-/// See [`TRIES`].
+/// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Held while a shard is worked on, so that nobody else does. The system frees it with the process, however that ends; its
-/// empty file stays: who removed it could take it from under another run that has it open and is about to hold it.
+/// Held while a shard is worked on, so that no other run does. The system releases it when the process ends, however that happens. Its
+/// empty file stays: removing it could pull it from under a run that has opened it and is about to lock it.
 #[derive(Debug)]
 pub struct Lock {
     _file: File,
@@ -30,7 +30,7 @@ impl Lock {
     /// Takes the lock of a shard.
     ///
     /// # Errors
-    /// [`Error::Busy`] where another process has it; a folder that cannot be written to.
+    /// [`Error::Busy`] if another process holds it; a folder that cannot be written to.
     pub fn take(folder: &Path, shard: Shard) -> Result<Self> {
         let Shard { index, count } = shard;
         let path = folder.join(format!("{BEGIN}{index}{OF}{count}{END}"));
@@ -38,7 +38,7 @@ impl Lock {
         let mut tries = 1;
         let taken = loop {
             match file.try_lock() {
-                // One that only looks whether it is held lets go at once.
+                // A process that only checks whether the lock is held releases it at once.
                 Err(TryLockError::WouldBlock) if tries < TRIES => {
                     tries += 1;
                     std::thread::sleep(PAUSE);
@@ -52,11 +52,10 @@ impl Lock {
                 let folder = folder.to_owned();
                 return Err(Error::Busy { folder, shard });
             }
-            // Some network file systems have no locks; two runs of one shard then write the same files twice,
-            // each whole.
+            // Some network file systems have no locks. Two runs of one shard then both write the same files, each of them complete.
             Err(TryLockError::Error(error)) => {
                 tracing::warn!(
-                    "{}: cannot be locked ({error}): start each shard once",
+                    "{}: cannot be locked ({error}); start each shard only once",
                     path.display()
                 );
             }
@@ -64,10 +63,10 @@ impl Lock {
         Ok(Self { _file: file })
     }
 
-    /// Takes the lock of all that is done in a folder, for work that has no shards: it is that of the only shard, while no other is worked on.
+    /// Takes the lock for work on the whole folder, without shards: the lock of the only shard, if no other lock is held.
     ///
     /// # Errors
-    /// [`Error::FolderBusy`] where another process has it, or a shard's; a folder that cannot be written to.
+    /// [`Error::FolderBusy`] if another process holds that lock or one of a shard; a folder that cannot be written to.
     pub fn take_whole(folder: &Path) -> Result<Self> {
         let lock = Self::take(folder, Shard::WHOLE).map_err(|error| match error {
             Error::Busy { folder, .. } => Error::FolderBusy { folder },
@@ -80,14 +79,14 @@ impl Lock {
         Ok(lock)
     }
 
-    /// Whether a run is at work in the folder that shares the images among another number of shards than `count`: it may be writing of any of
-    /// them. True, too, where nobody can tell.
+    /// Whether a run in the folder divides the images into a number of shards other than `count`, so that it may be writing any of them.
+    /// Also true if this cannot be found out.
     pub(super) fn is_held_by_others(folder: &Path, count: usize) -> bool {
         any_of_others(folder, count, is_held)
     }
 }
 
-/// Whether this holds of a lock of another number of shards than `count`, or the folder cannot be listed.
+/// Whether `holds` is true for a lock of a number of shards other than `count`, or the folder cannot be listed.
 fn any_of_others(folder: &Path, count: usize, holds: impl Fn(&Path) -> bool) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return true;
@@ -99,7 +98,7 @@ fn any_of_others(folder: &Path, count: usize, holds: impl Fn(&Path) -> bool) -> 
     })
 }
 
-/// Of how many shards one has this lock.
+/// The number of shards in a lock file's name.
 fn shards_of_lock(name: &str) -> Option<usize> {
     let shard = name.strip_prefix(BEGIN)?.strip_suffix(END)?;
     let (index, count) = shard.split_once(OF)?;
@@ -111,7 +110,7 @@ fn is_held(lock: &Path) -> bool {
     File::open(lock).is_ok_and(|file| file.try_lock_shared().is_err())
 }
 
-/// The same, but not where the file system has no locks: nothing would ever free a folder then.
+/// As `is_held`, but false on a file system without locks: nothing would ever free a folder there.
 fn is_surely_held(lock: &Path) -> bool {
     let held = |file: File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
     File::open(lock).is_ok_and(held)
@@ -121,19 +120,19 @@ fn is_surely_held(lock: &Path) -> bool {
 mod tests {
     use super::*;
 
-    /// A run that opened the file while another held it, and gets it after that: a third one must see it held.
+    /// A run opens the file while another holds the lock, and gets the lock afterwards: a third run must see it held.
     #[test]
     fn a_lock_that_was_waited_for_is_seen_by_others() {
         let folder = tempfile::tempdir().unwrap();
         let first = Lock::take(folder.path(), Shard::WHOLE).unwrap();
         let busy = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
-        assert!(busy.to_string().contains("at work on shard 1/1"), "{busy}");
+        assert!(busy.to_string().contains("working on shard 1/1"), "{busy}");
         let file = folder.path().join(".predict-1-of-1.lock");
         let second = File::open(&file).unwrap();
         drop(first);
         second.try_lock().unwrap();
         let third = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
-        assert!(third.to_string().contains("at work"), "{third}");
+        assert!(third.to_string().contains("working on shard"), "{third}");
         // Work without shards waits for it, too.
         let whole = Lock::take_whole(folder.path()).unwrap_err();
         assert!(matches!(whole, Error::FolderBusy { .. }), "{whole}");
@@ -154,10 +153,10 @@ mod tests {
         assert!(held(1) && held(3));
         let whole = Lock::take_whole(at).unwrap_err();
         assert!(matches!(whole, Error::FolderBusy { .. }), "{whole}");
-        // Its siblings have images of their own.
+        // Shards of the same number have other images.
         assert!(!held(2));
         drop(lock);
-        assert!(!held(1), "the file stays, and nobody holds it");
+        assert!(!held(1), "the file stays, but the lock is free");
         assert!(Lock::is_held_by_others(&at.join("none"), 1));
     }
 }

@@ -1,4 +1,4 @@
-//! What a shard has to do and has done, in the output folder: `predict-I-of-N.manifest.json`.
+//! What a shard has to do and has done: `predict-I-of-N.manifest.json` in the output folder.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -14,11 +14,11 @@ use crate::{Error, Input, OtherJob, Result};
 /// The manifest of one shard.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Which shard, counted from 1, of how many.
+    /// The shard, counted from 1, and the number of shards.
     pub shard: [usize; 2],
-    /// Images of all shards.
+    /// Number of images of all shards.
     pub inputs: usize,
-    /// SHA-256 of all inputs' paths and names: equal for all shards of a job.
+    /// SHA-256 of all inputs' paths and names; equal for all shards of a job.
     pub inputs_sha256: String,
     /// Program, weights and options.
     pub made_with: MadeWith,
@@ -29,37 +29,37 @@ pub struct Manifest {
 /// One image of a manifest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// The input.
+    /// Path of the input.
     #[serde(serialize_with = "as_text")]
     pub image: PathBuf,
     /// What its outputs' names begin with.
     pub name: String,
-    /// How far it is. A run that was killed may have done more than this says: the sidecars tell.
+    /// Its state. A run that was killed may have done more: the sidecars are decisive.
     pub state: State,
     /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
 }
 
-/// A path as text: of one that is none, the image fails, and the manifest is to say so.
+/// Writes a path as text. If it is not UTF-8, the image fails, and the manifest must be able to report that.
 fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&path.display())
 }
 
-/// How far an image is.
+/// The state of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
     /// Not begun, or not finished.
     Waiting,
-    /// All outputs are there.
+    /// All outputs are written.
     Done,
-    /// Could not be read or predicted.
+    /// It could not be read or predicted.
     Failed,
 }
 
 impl Manifest {
-    /// Nothing done yet; `mine` are the shard's own of `all` inputs.
+    /// A manifest with nothing done; `mine` are this shard's images of `all` inputs.
     #[must_use]
     pub fn new(shard: Shard, all: &[Input], mine: &[&Input], made_with: MadeWith) -> Self {
         let mut hash = Sha256::new();
@@ -84,29 +84,29 @@ impl Manifest {
         }
     }
 
-    /// Where it lies.
+    /// The manifest's path.
     #[must_use]
     pub fn path(&self, folder: &Path) -> PathBuf {
         let [index, count] = self.shard;
         folder.join(format!("predict-{index}-of-{count}.manifest.json"))
     }
 
-    /// Images that are done.
+    /// Number of images that are done.
     #[must_use]
     pub fn done(&self) -> usize {
         let is_done = |e: &&Entry| e.state == State::Done;
         self.images.iter().filter(is_done).count()
     }
 
-    /// Writes it, atomically.
+    /// Writes the manifest atomically.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         write_json(self, &self.path(folder))
     }
 
-    /// The manifests of the folder. A file of such a name that is no manifest is left alone.
+    /// All manifests in the folder. A file with such a name that is not a manifest is ignored.
     ///
     /// # Errors
     /// A folder that cannot be listed.
@@ -124,13 +124,12 @@ impl Manifest {
         Ok(found)
     }
 
-    /// Refuses to work beside shards (of the same number) of another job: their parts of the inputs and this
-    /// one's would overlap or leave some out.
+    /// Refuses to work beside shards (of the same number) of another job: together they would process some inputs twice or not at all.
     ///
     /// # Errors
     /// [`Error::OtherJob`].
     pub fn check_against(&self, others: &[Self], folder: &Path) -> Result<()> {
-        // A job of one shard has nothing to agree with: a folder may be filled by several commands.
+        // A job of one shard need not agree with others: several commands may fill a folder.
         let same = |other: &&Self| self.shard[1] > 1 && other.shard[1] == self.shard[1];
         for other in others.iter().filter(same) {
             let why = if other.inputs_sha256 != self.inputs_sha256 {
@@ -146,7 +145,7 @@ impl Manifest {
         Ok(())
     }
 
-    /// Names of the images whose outputs a run of the same job had begun.
+    /// The images that a run of the same job had begun.
     #[must_use]
     pub fn begun<'a>(&self, others: &'a [Self]) -> HashSet<(&'a Path, &'a str)> {
         let same = others

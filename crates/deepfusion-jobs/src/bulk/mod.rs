@@ -1,9 +1,9 @@
-//! Many images in, their outputs exactly once: what is there is looked at, what is missing is made, on any number of machines.
+//! Predicts many images, each exactly once: existing outputs are checked, missing ones are made, on any number of machines.
 //!
-//! An image's sidecar is written last, when its outputs are on the disk, and is the mark of its being done. [`BulkJob::begin`] decides
-//! by it and the outputs' checksums alone; the [`Manifest`]s are for people and for telling jobs apart. A [`DepthJob`] is what all images have in
-//! common. [`predict`] makes their depth, [`perceive`] their targets, in order and anew each time: [`pipeline::run`] overlaps reading, the
-//! network and writing; [`commit`] writes the sidecars; [`BulkProgress`] counts.
+//! An image's sidecar is written last, when its outputs are on the disk: it marks the image as done. [`BulkJob::begin`] decides by the
+//! sidecar and the outputs' checksums alone; [`Manifest`]s are for people and tell jobs apart. A [`DepthJob`] holds what all images share.
+//! [`predict`] makes their depth; [`perceive`] makes their targets, always all of them and in order. [`pipeline::run`] overlaps reading,
+//! the network and writing; [`commit`] writes the sidecars; [`BulkProgress`] counts.
 
 mod camera;
 mod committer;

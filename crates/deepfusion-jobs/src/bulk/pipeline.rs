@@ -1,30 +1,30 @@
-//! Three stages at once, on threads of their own, with bounded queues between them: what comes before the
-//! network, the network, what comes after it.
+//! Three stages at the same time, on their own threads, with bounded queues between them: before the network, the network, after the
+//! network.
 
 use crossbeam_channel::bounded;
 
-/// How many items may wait for the next stage, for every thread that makes or takes them: enough to even out
-/// slow ones, few enough that memory does not grow with the work.
+/// How many items may wait for the next stage, per thread of that stage: enough to even out slow items, few enough that memory does not
+/// grow with the number of items.
 const WAITING_PER_THREAD: usize = 2;
 
-/// Threads before and after the middle stage.
+/// Number of threads before and after the middle stage.
 #[derive(Debug, Clone, Copy)]
 pub struct Threads {
-    /// Threads that prepare.
+    /// Threads of the first stage.
     pub before: usize,
-    /// Threads that finish.
+    /// Threads of the last stage.
     pub after: usize,
 }
 
 impl Threads {
-    /// For this machine. Writing pictures costs several times what reading one does; the system's scheduler
-    /// shares the cores with the network's own threads.
+    /// The numbers for this machine. Writing pictures takes several times as long as reading one; the system's scheduler shares the cores
+    /// with the network's own threads.
     #[must_use]
     pub fn for_this_machine() -> Self {
         Self::for_cores(std::thread::available_parallelism().map_or(1, usize::from))
     }
 
-    /// For so many cores.
+    /// The numbers for this many cores.
     #[must_use]
     pub fn for_cores(cores: usize) -> Self {
         Self {
@@ -34,10 +34,9 @@ impl Threads {
     }
 }
 
-/// Runs `before`, `middle` and `after` for the items 0 to `items` − 1, the stages at the same time; `middle` on
-/// the calling thread. An item of which `before` makes nothing goes no further. Once `stop` says so, nothing new is
-/// begun; what has left the middle is still finished. `middle` takes the items in their order; behind it they may overtake
-/// each other.
+/// Runs `before`, `middle` and `after` for the items 0 to `items` − 1, all stages at the same time; `middle` runs on the calling thread. If
+/// `before` returns `None`, the item is dropped. Once `stop` returns true, no new item is begun; those that have passed the middle are
+/// finished. `middle` takes the items in order; after it they may overtake each other.
 pub fn run<P: Send, O: Send>(
     items: usize,
     threads: Threads,
@@ -49,7 +48,7 @@ pub fn run<P: Send, O: Send>(
     let makers = threads.before.max(1);
     let (to_after, computed) = bounded(threads.after * WAITING_PER_THREAD);
     std::thread::scope(|scope| {
-        // In turn, each from a queue of its own: so they come in order whoever is done first.
+        // Each thread takes every n-th item and has its own queue, so that items arrive in order whichever thread is fastest.
         let prepared: Vec<_> = (0..makers)
             .map(|first| {
                 let (to_middle, prepared) = bounded(WAITING_PER_THREAD);
@@ -71,10 +70,10 @@ pub fn run<P: Send, O: Send>(
                 }
             });
         }
-        // The threads hold the other ends: the loops end when those do.
+        // The threads hold clones: their loops end when the senders are dropped.
         drop(computed);
         for item in 0..items {
-            // A maker that ends early was asked to stop.
+            // A thread that ends early was told to stop.
             let Ok(made) = prepared[item % makers].recv() else {
                 break;
             };
@@ -117,7 +116,7 @@ mod tests {
     #[test]
     fn the_middle_takes_items_in_their_order() {
         let before = |i: usize| {
-            // The even ones are late.
+            // Even items are slow.
             std::thread::sleep(Duration::from_micros(if i.is_multiple_of(2) {
                 300
             } else {
@@ -171,7 +170,7 @@ mod tests {
         run(20, one_each, &|| false, &before, |()| pause(), &|_, ()| {
             pause();
         });
-        // One after another it would be 600 ms.
+        // One after another would take 600 ms.
         assert!(start.elapsed() < Duration::from_millis(500));
     }
 }

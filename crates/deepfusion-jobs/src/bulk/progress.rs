@@ -1,4 +1,4 @@
-//! How far a run is: which images are done and which failed, for the manifest and for who waits.
+//! The progress of a run: which images are done and which failed, for the manifest and for callbacks.
 
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -9,54 +9,55 @@ use deepfusion_records::Sidecar;
 use super::manifest::{Manifest, State};
 use crate::{Error, Result};
 
-/// How long after one writing of the manifest the next is due, at least. After a kill the sidecars tell what it does not.
+/// Shortest time between two writes of the manifest. After a kill, the sidecars contain what it misses.
 const WRITE_EVERY: Duration = Duration::from_secs(5);
-/// How many times as long as the last writing took: that of a hundred thousand images takes a while, and a slow disk has other things to write.
+/// The pause is also at least this many times the last write: the manifest of a hundred thousand images takes a while, and a slow disk has
+/// other files to write.
 const TIMES_AS_LONG: u32 = 20;
 
-/// Sees how many images are done or failed, and how many there are.
+/// Receives the number of images done or failed, and of all.
 type Watcher<'a> = Box<dyn FnMut(usize, usize) + Send + 'a>;
 
-/// What is known of a run's images. Threads share it. `E` is what fails.
+/// The progress of a run's images, shared by its threads. `E` is the error type.
 pub struct BulkProgress<'a, E> {
     folder: &'a Path,
-    /// An error in a line.
+    /// Formats an error as one line.
     why: fn(&E) -> String,
     state: Mutex<Shared<'a, E>>,
 }
 
 struct Shared<'a, E> {
     manifest: Manifest,
-    /// By place in the manifest; empty where nobody wants them.
+    /// By index in the manifest; empty if they are not wanted.
     sidecars: Vec<Option<Sidecar>>,
     failures: Vec<(usize, E)>,
-    /// What ended the run: no later image would fare better.
+    /// The error that ended the run: any later image would fail in the same way.
     stop: Option<E>,
     done: usize,
-    /// When the manifest is to be written next; `None` while a thread does.
+    /// When the manifest is written next; `None` while a thread writes it.
     due: Option<Instant>,
     watcher: Watcher<'a>,
 }
 
-/// How a run ended.
+/// The result of a run.
 pub struct Summary<E> {
-    /// Images that are done, earlier runs' included.
+    /// Number of images that are done, including those of earlier runs.
     pub done: usize,
-    /// Images of the shard.
+    /// Number of images of the shard.
     pub total: usize,
-    /// Sidecars of those that are done, where they were asked for.
+    /// Sidecars of the images that are done, if requested.
     pub sidecars: Vec<Sidecar>,
-    /// Images that failed, by their place in the shard.
+    /// Images that failed, by their index in the shard.
     pub failures: Vec<(usize, E)>,
-    /// What ended the run before its end.
+    /// The error that ended the run early.
     pub stopped_by: Option<E>,
-    /// Whether the manifest could be written a last time.
+    /// Whether the last write of the manifest succeeded.
     pub manifest: Result<()>,
 }
 
 impl<'a, E: From<Error>> BulkProgress<'a, E> {
-    /// For a manifest that may have images done already; `why` puts an error into a line of the manifest, `watcher` sees the images done or
-    /// failed, and all.
+    /// The progress of a manifest that may contain finished images. `why` formats an error for the manifest; `watcher` receives the number
+    /// of images done or failed, and of all.
     #[must_use]
     pub fn new(
         folder: &'a Path,
@@ -81,13 +82,13 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         }
     }
 
-    /// Where the outputs lie.
+    /// The folder of the outputs.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder
     }
 
-    /// An image's outputs and sidecar are on the disk.
+    /// Records that an image's outputs and sidecar are on the disk.
     pub fn done(&self, image: usize, sidecar: Sidecar) {
         let mut state = self.lock();
         state.done += 1;
@@ -98,7 +99,7 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         self.report(state);
     }
 
-    /// An image cannot be predicted; the others can. The manifest keeps why.
+    /// Records that an image cannot be predicted, with the reason in the manifest. The others can.
     pub fn failed(&self, image: usize, error: E) {
         let why = (self.why)(&error);
         let mut state = self.lock();
@@ -109,18 +110,18 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         self.report(state);
     }
 
-    /// Outputs cannot be written: the run ends.
+    /// Records that outputs cannot be written, which ends the run.
     pub fn stop(&self, error: E) {
         self.lock().stop.get_or_insert(error);
     }
 
-    /// Whether the run is to end.
+    /// Whether the run has to end.
     #[must_use]
     pub fn stopped(&self) -> bool {
         self.lock().stop.is_some()
     }
 
-    /// Writes the manifest a last time.
+    /// Writes the manifest a last time and returns the result.
     #[must_use]
     pub fn finish(self) -> Summary<E> {
         let mut state = self
@@ -138,7 +139,7 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
         }
     }
 
-    /// Says how far it is, and now and then writes the manifest, as it was: while the disk takes its time, others may go on.
+    /// Reports the progress, and from time to time writes a copy of the manifest, so that other threads can continue meanwhile.
     fn report(&self, mut state: MutexGuard<'_, Shared<'a, E>>) {
         let (done, total) = (
             state.done + state.failures.len(),
@@ -162,12 +163,12 @@ impl<'a, E: From<Error>> BulkProgress<'a, E> {
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared<'a, E>> {
-        // Whoever panicked while holding it changed single fields only.
+        // A thread that panicked while holding the lock changed only single fields.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// How long nothing is written after a writing that took so long.
+/// The pause after a write of the manifest that took this long.
 fn pause_after(writing: Duration) -> Duration {
     WRITE_EVERY.max(writing.saturating_mul(TIMES_AS_LONG))
 }

@@ -1,4 +1,4 @@
-//! Targets on the disk: a JSON object a frame, and a line of all of them.
+//! Targets on the disk: a JSON file for each frame, and one file with a line for each frame.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -10,13 +10,13 @@ use deepfusion_records::FrameRecord;
 
 use crate::Result;
 
-/// Where a frame's record lies.
+/// Path of a frame's record.
 #[must_use]
 pub fn record_path(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}_targets.json"))
 }
 
-/// Where the records of all frames lie, a line each.
+/// Path of the file with all frames' records, one per line.
 #[must_use]
 pub fn record_lines_path(folder: &Path) -> PathBuf {
     folder.join("targets.jsonl")
@@ -25,15 +25,15 @@ pub fn record_lines_path(folder: &Path) -> PathBuf {
 /// A frame's record as one line.
 ///
 /// # Errors
-/// A number that JSON has no form for.
+/// A number that JSON cannot represent.
 pub fn record_line(record: &FrameRecord) -> Result<String> {
     Ok(serde_json::to_string(record)? + "\n")
 }
 
-/// A frame's record as a file of its own.
+/// Writes a frame's record as its own file.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// A file that cannot be written.
 pub fn write_record(record: &FrameRecord, path: &Path) -> Result<()> {
     let text = serde_json::to_string_pretty(record)? + "\n";
     let failed = |e| DataError::file(path, e);
@@ -43,20 +43,20 @@ pub fn write_record(record: &FrameRecord, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// All frames, a line each, growing beside their final place under a name that readers can watch. Where it is not finished, its lines stay there;
-/// without a line it is gone.
+/// A file with one line per frame, which grows beside its final path under a name that readers can watch. If it is not finished, its lines
+/// stay there; without any line, it is removed.
 pub struct RecordLines {
     path: PathBuf,
-    /// Closed before its name changes or goes: it stands above `partial`.
+    /// Declared above `partial`, so that the file is closed before it is renamed or removed.
     file: BufWriter<File>,
     partial: Partial,
 }
 
 impl RecordLines {
-    /// Begins the file that will be at `path`; it grows as the same name with `.partial` behind it.
+    /// Begins the file for `path`; until it is finished, its name has `.partial` appended.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// A file that cannot be written.
     pub fn begin(path: &Path) -> Result<Self> {
         let partial = Partial::watched(path);
         let file = partial
@@ -72,26 +72,26 @@ impl RecordLines {
     /// Adds a line.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// A file that cannot be written.
     pub fn add(&mut self, line: &str) -> Result<()> {
         let failed = |e| DataError::file(self.partial.path(), e);
-        // Line by line: who watches the file sees whole frames.
+        // Flushed line by line, so that readers of the growing file see complete frames.
         self.file.write_all(line.as_bytes()).map_err(failed)?;
         self.file.flush().map_err(failed)?;
         self.partial.keep();
         Ok(())
     }
 
-    /// Takes it away, with its lines.
+    /// Removes the file with its lines.
     pub fn discard(self) {
-        // What cannot be removed is taken over by the next run.
+        // If it cannot be removed, the next run replaces it.
         let _ = std::fs::remove_file(self.partial.path());
     }
 
-    /// Puts it in its place.
+    /// Gives the file its final name.
     ///
     /// # Errors
-    /// Where it cannot be written; its lines are then still under the other name.
+    /// A file that cannot be written; its lines are then still under the temporary name.
     pub fn finish(self) -> Result<()> {
         let Self {
             path,
@@ -129,7 +129,7 @@ mod tests {
         RecordLines::begin(&path).unwrap().discard();
         drop(RecordLines::begin(&path).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        // Lines are worth keeping whatever ends the run, until it is said that they are of nothing.
+        // Lines are kept however the run ends, unless they are discarded.
         let begun = || {
             let mut lines = RecordLines::begin(&path).unwrap();
             lines.add("{}\n").unwrap();

@@ -1,4 +1,4 @@
-//! What of a job is there already, and whether it may stay.
+//! Finds out which images of a job are already done, and whether their outputs may stay.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -15,47 +15,47 @@ use super::sidecars::{is_complete, sidecar_path};
 use super::{CameraFrom, Lock, Shard, video};
 use crate::{Error, Input, Result, StaleReason};
 
-/// For how long a file is not written to that nobody writes any more: outputs take seconds.
+/// Temporary files not written to for this long are abandoned: writing an output takes seconds.
 const ABANDONED: Duration = Duration::from_secs(3600);
 
-/// What is made of images, and where.
+/// What is made from images, and where.
 #[derive(Debug, Clone)]
 pub struct BulkJob<'a> {
-    /// Where the outputs lie.
+    /// The folder of the outputs.
     pub folder: &'a Path,
-    /// What the names of an image's outputs end with, after the image's name.
+    /// The endings of an image's outputs, after the image's name.
     pub endings: Vec<&'static str>,
     /// What else the outputs depend on.
     pub made_with: &'a MadeWith,
-    /// Whether what was made in another way, or of an image that has changed, is made again.
+    /// Whether outputs are made again if they were made in another way, or if their image has changed.
     pub overwrite: bool,
-    /// Which part of the images is this run's.
+    /// The shard of the images that this run processes.
     pub shard: Shard,
-    /// Whether videos are made of the pictures in the end.
+    /// Whether videos are made from the pictures at the end.
     pub videos: bool,
 }
 
 /// An image that is done.
 struct Done {
-    /// Where sidecars are asked for: of a hundred thousand images they take much memory.
+    /// Only if sidecars are requested: those of a hundred thousand images take much memory.
     sidecar: Option<Box<Sidecar>>,
 }
 
 /// A job that has begun.
 pub struct StartedJob {
-    /// What there is to do and what is done, written into the folder.
+    /// The manifest, as written into the folder: what is done and what is left.
     pub manifest: Manifest,
-    /// Sidecars of what is done, by place, where they were asked for.
+    /// Sidecars of finished images by index, if requested.
     pub sidecars: Vec<Option<Sidecar>>,
-    /// What is left to do, by place.
+    /// Indices of the images left to do.
     pub todo: Vec<usize>,
 }
 
 impl BulkJob<'_> {
-    /// Looks at what is there of the images (`mine` of `all`), and writes the manifest.
+    /// Checks the existing outputs of the images (`mine` of `all`), and writes the manifest.
     ///
     /// # Errors
-    /// [`Error::OtherJob`], [`Error::Stale`], [`Error::Exists`], and what cannot be read or written.
+    /// [`Error::OtherJob`], [`Error::Stale`], [`Error::Exists`]; files that cannot be read or written.
     pub fn begin(&self, all: &[Input], mine: &[&Input], keep_sidecars: bool) -> Result<StartedJob> {
         let mut manifest = Manifest::new(self.shard, all, mine, self.made_with.clone());
         let before = Manifest::all(self.folder)?;
@@ -69,7 +69,7 @@ impl BulkJob<'_> {
         let begun = manifest.begun(&before);
         let mut todo = Vec::new();
         let mut sidecars = vec![None; if keep_sidecars { mine.len() } else { 0 }];
-        // Whatever is there is read, to see that it still is what was written.
+        // All existing outputs are read, to check that they are unchanged.
         let done = |sidecar| Done {
             sidecar: keep_sidecars.then(|| Box::new(sidecar)),
         };
@@ -96,7 +96,7 @@ impl BulkJob<'_> {
             }
         }
         manifest.write(self.folder)?;
-        // Again, now that ours can be seen: of two shards of different jobs started at once, one notices.
+        // Checks again, now that other shards can see our manifest: if shards of two jobs start at the same time, one of them notices.
         let path = manifest.path(self.folder);
         let others = Manifest::all(self.folder)?;
         if !self.overwrite
@@ -112,11 +112,11 @@ impl BulkJob<'_> {
         })
     }
 
-    /// The sidecar of an image that is done; `None` where there is work to do.
+    /// The sidecar of an image that is done; `None` if there is work to do.
     ///
-    /// Files that this job did not make, or made of an image that has changed since, are an error, or work to do
-    /// where they may be overwritten. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
-    /// when it was killed. Done means that every output's length and checksum are those in the sidecar.
+    /// Files that another job made, or that were made before the image changed, are an error, or work to do if they may be overwritten.
+    /// `begun` means that a run of this job had the image in its manifest: files without a sidecar are then what it left when it was
+    /// killed. An image is done if every output's length and checksum match its sidecar.
     fn finished(&self, input: &Input, begun: bool) -> Result<Option<Sidecar>> {
         let path = sidecar_path(self.folder, &input.name);
         let text = match std::fs::read(&path) {
@@ -130,11 +130,11 @@ impl BulkJob<'_> {
             Err(e) => return Err(deepfusion_data::Error::file(&path, e).into()),
         };
         if text.iter().all(|byte| *byte == 0) {
-            // What a power cut leaves of a file: nothing of anybody's is lost with it.
+            // What a power cut leaves of a file: there is nothing in it to lose.
             return Ok(None);
         }
         let why = match serde_json::from_slice::<Sidecar>(&text) {
-            // Cut off or overwritten by other bytes, and ours.
+            // Ours, but truncated or overwritten.
             Err(_) if begun && serde_json::from_slice::<IgnoredAny>(&text).is_err() => {
                 return Ok(None);
             }
@@ -147,7 +147,7 @@ impl BulkJob<'_> {
                 None if recalibrated(input, &sidecar) => StaleReason::Calibration,
                 None if changed(input, &sidecar) => StaleReason::ImageChanged(input.path.clone()),
                 None if is_complete(&sidecar, self.folder) => return Ok(Some(sidecar)),
-                // Ours, but a file of it is gone or is not what was written.
+                // Ours, but an output is missing or has changed.
                 None => return Ok(None),
             },
         };
@@ -157,7 +157,7 @@ impl BulkJob<'_> {
         Err(Error::Stale { path, why })
     }
 
-    /// Without a sidecar, nothing of the image's names may be there.
+    /// Refuses to replace files without a sidecar.
     fn refuse_files(&self, input: &Input) -> Result<()> {
         for ending in &self.endings {
             let path = self.folder.join(format!("{}{ending}", input.name));
@@ -168,8 +168,8 @@ impl BulkJob<'_> {
         Ok(())
     }
 
-    /// Removes the half-written files that a killed run left of these images. A run that shares the images among another number of shards may be
-    /// writing of the same ones: while one is at work, only files that nobody has touched for long go.
+    /// Removes the unfinished files that a killed run left of these images. A run with another number of shards may be writing the same
+    /// images: while one is working, only files that have long been untouched are removed.
     fn remove_partial_files(&self, mine: &[&Input]) -> Result<()> {
         let out = self.folder;
         let files_of = |input: &&Input| {
@@ -204,14 +204,15 @@ impl BulkJob<'_> {
     }
 }
 
-/// Whether nobody has written to a file for so long that nobody will.
+/// Whether a file has not been written to for so long that no process will continue it.
 fn is_abandoned(file: &Path) -> bool {
     let written = std::fs::metadata(file).and_then(|about| about.modified());
     let age = written.ok().and_then(|written| written.elapsed().ok());
     age.is_some_and(|age| age > ABANDONED)
 }
 
-/// Takes what is done of a recording for not done where some of it is not: a scale that is watched is followed from the recording's first frame on.
+/// Marks a recording's finished images as not done if some of its images are not done: a monitored scale has to be followed from the
+/// recording's first frame.
 fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Done>]) {
     let recording = |input: &Input| {
         input
@@ -231,7 +232,7 @@ fn begin_recordings_anew(mine: &[&Input], found: &mut [Option<Done>]) {
     }
 }
 
-/// Whether the recording of an image has another calibration than the one that its depth was made by.
+/// Whether the calibration of an image's recording has changed since its depth was made.
 fn recalibrated(input: &Input, sidecar: &Sidecar) -> bool {
     let Some((dataset, frame)) = &input.frame else {
         return false;
@@ -247,7 +248,7 @@ fn recalibrated(input: &Input, sidecar: &Sidecar) -> bool {
     by_its_own && then.intrinsics.is_some_and(differs)
 }
 
-/// Whether an image is another one than its outputs were made of.
+/// Whether an image has changed since its outputs were made.
 fn changed(input: &Input, sidecar: &Sidecar) -> bool {
     FileMark::of(&input.path).is_ok_and(|mark| Some(mark) != sidecar.prediction.image_file)
 }

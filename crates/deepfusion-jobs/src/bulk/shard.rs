@@ -1,25 +1,25 @@
-//! A shard of the images, for several runs that share them.
+//! A shard of the images, for several runs that divide them.
 
 use std::fmt;
 use std::str::FromStr;
 
 use deepfusion_hint::Hint;
 
-/// One shard of a work that several runs share, written `2/8`.
+/// One of several shards of a job, written `2/8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// Which shard, counted from 1.
+    /// Number of this shard, counted from 1.
     pub index: usize,
-    /// Of how many.
+    /// Number of shards.
     pub count: usize,
 }
 
 impl Shard {
-    /// All of it.
+    /// The only shard, with all images.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// This shard of `all`: every `count`-th, so that shards are as large as each other to one item, and long
-    /// images in one folder are shared too.
+    /// This shard's items of `all`: every `count`-th. So shards differ in size by at most one item, and long images in one folder are
+    /// divided, too.
     pub fn select<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
         all.iter().skip(self.index - 1).step_by(self.count)
     }
@@ -31,25 +31,25 @@ impl fmt::Display for Shard {
     }
 }
 
-/// Why a text names no shard.
+/// Why a text is not a shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoShard {
-    /// It is not written as one.
+    /// It is not written as I/N.
     #[error("expected I/N, the I-th of N shards, such as 2/8")]
     Shape,
-    /// It is counted from 0.
+    /// Its number is 0.
     #[error("shards are counted from 1: the first of {count} is 1/{count}")]
     Zero {
-        /// How many there are.
+        /// Number of shards.
         count: usize,
     },
-    /// There are fewer.
+    /// Its number is larger than the number of shards.
     #[error("there is no shard {index} of {count}")]
     Beyond {
-        /// Which was named.
+        /// Number of the shard.
         index: usize,
-        /// How many there are.
+        /// Number of shards.
         count: usize,
     },
 }
@@ -59,7 +59,7 @@ impl Hint for NoShard {
         match self {
             // These messages say what is expected.
             Self::Shape | Self::Zero { .. } => None,
-            Self::Beyond { count: 0, .. } => Some("N is at least 1".into()),
+            Self::Beyond { count: 0, .. } => Some("set N to at least 1".into()),
             Self::Beyond { count, .. } => Some(format!("the last shard is {count}/{count}")),
         }
     }

@@ -1,4 +1,4 @@
-//! Sidecars on the disk. One is written last, so that it also says that its outputs are there.
+//! Sidecars on the disk. A sidecar is written last, so its presence means that the outputs are complete.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,13 +11,13 @@ use serde::Serialize;
 use crate::Result;
 use crate::files::write;
 
-/// Where the sidecar of a name lies.
+/// Path of the sidecar for a name.
 #[must_use]
 pub fn sidecar_path(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}.json"))
 }
 
-/// Adds an output that is there, as it is now.
+/// Adds an existing output with its current content.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -30,11 +30,11 @@ pub fn add_output(sidecar: &mut Sidecar, folder: &Path, file: String) -> Result<
     Ok(())
 }
 
-/// Writes sidecars into the folder, by their names, once all their outputs are on the disk: where one is, there are its
-/// outputs, whatever happens to the power. Returns when the sidecars are on the disk, too.
+/// Writes sidecars into the folder, by their names, once all their outputs are on the disk: if a sidecar exists, so do its outputs, even
+/// after a power cut. Returns when the sidecars are on the disk, too.
 ///
 /// # Errors
-/// Where something cannot be written.
+/// A file that cannot be written.
 pub(super) fn write_all<'a>(
     folder: &Path,
     group: impl Iterator<Item = (&'a str, &'a Sidecar)>,
@@ -55,10 +55,10 @@ pub(super) fn write_all<'a>(
     Ok(deepfusion_fs::publish_all(aside).map_err(failed)?)
 }
 
-/// Writes it into the folder, whole or not at all, without waiting for the disk: where nothing goes on from it.
+/// Writes a sidecar into the folder, completely or not at all, without waiting for the disk: for runs that are not resumed.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// A file that cannot be written.
 pub fn write_unsynced(sidecar: &Sidecar, folder: &Path, name: &str) -> Result<()> {
     let path = sidecar_path(folder, name);
     let text = as_json(sidecar)?;
@@ -68,7 +68,7 @@ pub fn write_unsynced(sidecar: &Sidecar, folder: &Path, name: &str) -> Result<()
     })?)
 }
 
-/// The outputs that a sidecar names, each with the content that was written; none of a sidecar of an older version, which has no checksums.
+/// The outputs that a sidecar lists, each with the content that was written; empty for a sidecar of an older version without checksums.
 pub(crate) fn outputs_of(sidecar: &Sidecar) -> impl Iterator<Item = (&str, Content)> {
     let contents = sidecar.file_bytes.iter().zip(&sidecar.file_crc32);
     let outputs = sidecar.files.iter().zip(contents);
@@ -79,7 +79,7 @@ pub(crate) fn outputs_of(sidecar: &Sidecar) -> impl Iterator<Item = (&str, Conte
     })
 }
 
-/// Whether every output is there with the content that was written.
+/// Whether every output exists with the content that was written.
 #[must_use]
 pub(super) fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
     let files = sidecar.files.len();
@@ -96,7 +96,7 @@ pub(super) fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
 /// Writes a value as indented JSON, atomically.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// A file that cannot be written.
 pub fn write_json<T: Serialize>(value: &T, path: &Path) -> Result<()> {
     let text = as_json(value)?;
     Ok(write(path, text)?)

@@ -1,4 +1,4 @@
-//! Targets of many images, in their order: while the network runs on one, the next is read and the last is written.
+//! Targets of many images, in order: while the network runs on one, the next is read and the previous one is written.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -9,29 +9,29 @@ use crate::outputs::TargetWriter;
 use crate::scene::MotionTracker;
 use crate::{Error, Input, PerceivedFrame, Result, StartedFrame, TargetFinder};
 
-/// A frame whose targets are written.
+/// A frame whose targets have been written.
 #[derive(Debug, Clone, Copy)]
 pub struct WrittenTargets<'a> {
-    /// Its line in the file of all targets.
+    /// Its line in the file with all targets.
     pub line: &'a str,
-    /// Frames that are done or could not be read, this one among them.
+    /// Number of frames that are done or could not be read, including this one.
     pub done: usize,
-    /// Frames in all.
+    /// Number of all frames.
     pub total: usize,
 }
 
-/// What became of the frames of a run. `E` is what fails.
+/// The result of a run. `E` is the error type.
 #[derive(Debug)]
 pub struct TargetSummary<E> {
-    /// Frames whose targets are written.
+    /// Number of frames whose targets were written.
     pub done: usize,
-    /// Frames in all.
+    /// Number of all frames.
     pub total: usize,
-    /// Targets that were found in them.
+    /// Number of targets found in them.
     pub targets: usize,
-    /// Of the frames that could not be read.
+    /// The errors of frames that could not be read.
     pub unreadable: Vec<E>,
-    /// What ended the run before its end.
+    /// The error that ended the run early.
     pub stopped_by: Option<E>,
     latency_ms: Vec<f64>,
 }
@@ -48,7 +48,7 @@ impl<E> TargetSummary<E> {
         }
     }
 
-    /// Milliseconds from opening a file to having its targets; `None` where no frame is done.
+    /// Median time from opening a file to its targets, in milliseconds; `None` if no frame is done.
     #[must_use]
     pub fn median_latency_ms(&self) -> Option<f64> {
         let mut sorted = self.latency_ms.clone();
@@ -57,15 +57,15 @@ impl<E> TargetSummary<E> {
     }
 }
 
-/// Finds the targets of frame after frame and writes them; `written` sees each frame whose files are there. A frame that cannot be read is
-/// left out. The run ends where nothing can be found, written or reported any more, and with what is at work where `stop` says so. The file
-/// of all targets is then in its place, of the frames that are done.
+/// Finds and writes the targets of one frame after another; `written` is called for each frame whose files exist. A frame that cannot be
+/// read is left out. The run ends if finding, writing or reporting fails, and when `stop` returns true, after the frames in progress. The
+/// file with all targets then gets its final name, with the frames that are done.
 ///
 /// # Errors
-/// Where the file of all targets cannot be begun, or put in its place.
+/// If the file with all targets cannot be created or renamed.
 ///
 /// # Panics
-/// Where a thread of it panics.
+/// If one of its threads panics.
 pub fn perceive<E, W>(
     job: &DepthJob<'_>,
     mut finder: TargetFinder<'_>,
@@ -94,7 +94,7 @@ where
     };
     let write = |_: usize, found: Result<PerceivedFrame>| run.finish_frame(found);
     let stop = || stop() || run.summary().stopped_by.is_some();
-    // One thread reads and one writes: frames stay in their order.
+    // One thread reads and one writes, so that frames stay in order.
     let threads = Threads {
         before: 1,
         after: 1,
@@ -151,7 +151,7 @@ where
         Ok(())
     }
 
-    /// Without the summary's lock: `written` may take its time.
+    /// Called without the summary's lock, since `written` may take long.
     fn report(&self, line: &str) -> Result<(), E> {
         let summary = self.summary();
         let done = summary.done + 1 + summary.unreadable.len();
@@ -165,7 +165,7 @@ where
     }
 
     fn summary(&self) -> MutexGuard<'_, TargetSummary<E>> {
-        // A thread that panicked ends the program with its own message.
+        // If a thread panicked, the program ends with that thread's message.
         self.summary.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -48,7 +48,7 @@ fn outputs() -> DepthOutputs {
     DepthOutputs::of([DepthOutput::Npy], true, limits)
 }
 
-/// Inputs of these names in a folder with two pictures, `a` and `b`.
+/// Inputs of these names, in a folder with two pictures, `a` and `b`.
 fn inputs(folder: &Path, names: &[&str]) -> Vec<Input> {
     let path = |name: &str| folder.join(format!("{name}.png"));
     for name in ["a", "b"] {
@@ -70,7 +70,7 @@ fn folder_for_outputs(folder: &Path) -> PathBuf {
     out
 }
 
-/// Depth of images of a folder, and what was warned of.
+/// Predicts images of a folder; returns the summary and the warnings.
 fn depth_of(folder: &Path, names: &[&str]) -> (Summary<Error>, Vec<ImageWarning>) {
     depth_of_all(folder, &inputs(folder, names))
 }
@@ -113,14 +113,14 @@ fn depth_is_made_once_and_warned_of_once() {
         made.modified().unwrap()
     };
     let before = made_at();
-    // What is done is not looked at again.
+    // Finished images are not processed again.
     let (again, warned) = depth_of(at, &["a", "b"]);
     assert_eq!((again.done, again.sidecars.len()), (2, 2));
     assert!(warned.is_empty(), "{warned:?}");
     assert_eq!(made_at(), before);
 }
 
-/// Depth of a picture of depth means nothing, but an image that was kept is one.
+/// Depth of a picture of depth is meaningless, but a saved copy of the image is a valid input.
 #[test]
 fn outputs_are_no_inputs_wherever_they_lie() {
     let folder = tempfile::tempdir().unwrap();
@@ -155,14 +155,14 @@ fn outputs_are_no_inputs_wherever_they_lie() {
     assert!(left(&out).is_empty());
 }
 
-/// Another camera's depth beside a new sidecar would pass for that of the new one.
+/// The depth of another camera beside a new sidecar would be taken for that of the new camera.
 #[test]
 fn what_is_overwritten_leaves_nothing_of_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     depth_of(at, &["a", "b"]);
     let out = at.join("out");
-    // Targets found in that depth, and files of somebody else.
+    // Targets found in that depth, and files of another program.
     std::fs::write(out.join("a_targets.json"), r#"{"frame": "a"}"#).unwrap();
     for file in ["a_overlay.png", "a_depth.txt", "c_depth.npy"] {
         std::fs::write(out.join(file), "x").unwrap();
@@ -171,7 +171,7 @@ fn what_is_overwritten_leaves_nothing_of_its_own() {
     let save = DepthOutputs::of([DepthOutput::DepthPng], true, outputs().limits);
     let settings = settings(Some(GivenCamera::Numbers(CAMERA)));
     let job = DepthJob::new(settings, &out, save, &model, &estimator, None, &|_| ()).unwrap();
-    // Of `b` the earlier run's stays: it is not made again.
+    // The earlier run's output of `b` stays: it is not made again.
     let all = inputs(at, &["a"]);
     let mine: Vec<&Input> = all.iter().collect();
     let begun = job.bulk(Shard::WHOLE, true, false).begin(&all, &mine, true);
@@ -188,7 +188,7 @@ fn what_is_overwritten_leaves_nothing_of_its_own() {
         ("a_depth.png", true),
         ("a_depth.npy", false),
         ("a_targets.json", false),
-        // No sidecar says that a run of this program drew it.
+        // No sidecar records that this program drew it.
         ("a_overlay.png", true),
         ("a_depth.txt", true),
         ("c_depth.npy", true),
@@ -198,7 +198,7 @@ fn what_is_overwritten_leaves_nothing_of_its_own() {
     }
 }
 
-/// Names of files are bytes there, and JSON is text.
+/// File names are bytes on Unix, but JSON is text.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_image_whose_name_is_no_text_fails_alone() {
@@ -235,7 +235,7 @@ fn frames(folder: &Path, focal_px: f64) -> Vec<Input> {
     (0..dataset.frames().len()).map(frame).collect()
 }
 
-/// A recording that was calibrated anew has other metres, and a scale that is followed is followed from the first frame on.
+/// A newly calibrated recording has other metres, and the scale monitor starts at the first frame.
 #[test]
 fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -274,13 +274,13 @@ fn what_is_there_of_a_recording_stays_only_where_it_would_be_made_so_again() {
         let again: &[usize] = if correct_scale { &[0, 1] } else { &[1] };
         assert_eq!(begun(&all, false).unwrap().todo, again);
         let Err(error) = begun(&frames(&drive, 61.0), false) else {
-            panic!("another calibration is no reason to begin anew");
+            panic!("another calibration must be an error");
         };
         assert!(error.to_string().contains("another calibration"), "{error}");
     }
 }
 
-/// A run that shares the same images among another number of shards is writing them.
+/// A run with another number of shards is writing the same images.
 #[test]
 fn what_another_run_is_writing_stays() {
     let folder = tempfile::tempdir().unwrap();
@@ -336,7 +336,7 @@ fn each_recording_begins_once() {
     assert_eq!(begins, [true, false, true, false]);
 }
 
-/// Neither a job nor a frame keeps a picture of layers that nothing shows.
+/// Neither a job nor a frame saves pictures of layers if nothing shows the layers.
 #[test]
 fn pictures_of_layers_need_what_shows_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -359,7 +359,7 @@ fn pictures_of_layers_need_what_shows_them() {
     assert!(!out.join("a_features.png").exists());
 }
 
-/// Targets of two images and one that is not there; `report` is called with each frame that is written.
+/// Finds targets in two images and a missing one; `report` is called for each frame that is written.
 fn targets_of(
     folder: &Path,
     report: impl FnMut(WrittenTargets<'_>) -> Result<()> + Send,
@@ -402,7 +402,7 @@ fn targets_are_written_and_reported_in_order() {
     assert_eq!((summary.done, summary.total), (2, 3));
     assert_eq!(summary.unreadable.len(), 1);
     assert!(summary.stopped_by.is_none() && summary.median_latency_ms().is_some());
-    // The one that is missing was found so at some time before the last.
+    // The missing one was reported before the last.
     assert_eq!(reported.last(), Some(&(3, 3)));
     let names: Vec<bool> = lines.lines().map(|line| line.contains("\"a\"")).collect();
     assert_eq!(names, [true, false]);
@@ -414,7 +414,7 @@ fn targets_are_written_and_reported_in_order() {
     }
 }
 
-/// Pictures of another run's targets would pass for those of the new ones.
+/// Pictures of another run's targets would be taken for those of the new ones.
 #[test]
 fn targets_that_are_overwritten_leave_no_pictures() {
     let folder = tempfile::tempdir().unwrap();
@@ -423,13 +423,13 @@ fn targets_that_are_overwritten_leave_no_pictures() {
     let draw = [TargetOutput::Overlay, TargetOutput::Ply];
     drawn_targets_of(at, &draw, |_| Ok(()));
     assert!(out.join("a_overlay.png").exists() && out.join("a.ply").exists());
-    // A mask that somebody keeps beside the outputs.
+    // A mask that the user keeps beside the outputs.
     std::fs::write(out.join("a_segments.png"), "x").unwrap();
     drawn_targets_of(at, &[TargetOutput::Ply], |_| Ok(()));
     for (file, stays) in [
         ("a_targets.json", true),
         ("a_overlay.png", false),
-        // The old cloud is removed, and the new one is not.
+        // The old cloud is removed, the new one stays.
         ("a.ply", true),
         ("a_segments.png", true),
     ] {

@@ -1,4 +1,4 @@
-//! The pictures of a run as videos, one of each recording.
+//! Makes videos from the pictures of a run, one for each recording.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,14 +9,14 @@ use super::manifest::Manifest;
 use crate::files::UniqueNames;
 use crate::{Error, Input, Result};
 
-/// What the name of a video ends with.
+/// The ending of a video's name.
 pub const VIDEO_ENDING: &str = "_video.mp4";
 
-/// What the video of images that are of no recording is called.
+/// The name of the video of images that belong to no recording.
 const IMAGES: &str = "images";
 
-/// Whether the videos of the inputs may be written: they replace no file but those that runs of the same inputs, as a
-/// manifest tells, left there.
+/// Checks that the videos of the inputs may be written: they may only replace files left by runs of the same inputs, as recorded in a
+/// manifest.
 ///
 /// # Errors
 /// [`Error::Exists`].
@@ -38,11 +38,11 @@ pub(super) fn make_room(
     Ok(())
 }
 
-/// One video of each recording among the inputs, and one of the images that are of none, in the folder of their pictures, whose names
-/// end with `pictures`. Gives the videos, each with its frames.
+/// Writes one video for each recording among the inputs, and one for the images that belong to none, from the pictures in `folder` whose
+/// names end with `pictures`. Returns the videos, each with its number of frames.
 ///
 /// # Errors
-/// What ffmpeg says.
+/// ffmpeg's error.
 pub fn write_videos(
     folder: &Path,
     inputs: &[Input],
@@ -58,10 +58,10 @@ pub fn write_videos(
     Ok(written)
 }
 
-/// The video of pictures, by the names of their images, each with the seconds that it is shown; none of no picture.
+/// Writes the video of the pictures of images, each given by its name and the seconds that it is shown; `None` if there is no picture.
 ///
 /// # Errors
-/// What ffmpeg says.
+/// ffmpeg's error.
 pub fn write_one_video<'a>(
     folder: &Path,
     shown: impl Iterator<Item = (&'a str, f64)>,
@@ -80,7 +80,7 @@ pub fn write_one_video<'a>(
     Ok(Some((folder.join(name), pictures.len())))
 }
 
-/// The inputs of each video and its name, numbered where two recordings share one.
+/// The name and the inputs of each video; names are numbered if two recordings share one.
 fn videos(inputs: &[Input]) -> Vec<(String, &[Input])> {
     let same = |a: &Input, b: &Input| match (&a.frame, &b.frame) {
         (Some((a, _)), Some((b, _))) => Arc::ptr_eq(a, b),

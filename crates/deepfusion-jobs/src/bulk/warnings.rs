@@ -1,4 +1,4 @@
-//! What may be wrong with the metres of a run's images.
+//! Warnings about the metres of a run's images.
 
 use std::path::{Path, PathBuf};
 use std::sync::Once;
@@ -10,44 +10,44 @@ use deepfusion_runtime::{PreparedImage, Preparer};
 use super::{CameraFrom, LoadedImage, PoorFit, looks_of_another_size};
 use crate::Input;
 
-/// By what the metres of an image may be wrong. A run gives the first of each kind alone, for its images are much alike. Whoever prints them
-/// matches every kind, so that none is forgotten.
+/// Why the metres of an image may be wrong. A run reports only the first warning of each kind, since its images are much alike. Not
+/// `non_exhaustive`, so that callers who print them handle every kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ImageWarning {
-    /// Nobody gave the camera: the one that the network was trained with is assumed.
+    /// No camera was given: the one that the network was trained with is assumed.
     AssumedCamera {
-        /// A calibration file near the image, which may be its own.
+        /// A calibration file near the image, which may belong to it.
         calibration: Option<PathBuf>,
     },
-    /// Nobody gave the camera: the one that the network's run learned is taken.
+    /// No camera was given: the one that the network's run learned is used.
     LearnedCamera,
-    /// The camera that was given, or that the recording says, looks like that of images of another size.
+    /// The camera that was given, or that is part of the recording, looks like that of images of another size.
     OtherSize {
-        /// The image.
+        /// Path of the image.
         image: PathBuf,
         /// The camera, at the image's size.
         camera: Intrinsics,
     },
-    /// The image is far from what the network takes.
+    /// The image is far from what the network was trained on.
     PoorFit {
-        /// The image.
+        /// Path of the image.
         image: PathBuf,
-        /// How far.
+        /// How it differs.
         fit: PoorFit,
     },
-    /// By the road, metres are not what they were.
+    /// The scale has drifted, measured by the road.
     Drift {
         /// The frame's name.
         frame: String,
-        /// How many times their first size they are.
+        /// The current scale divided by its first value.
         ratio: f64,
     },
 }
 
-/// Takes the warnings of a run; any of its threads may have one.
+/// Receives the warnings of a run, from any of its threads.
 pub type Warn<'a> = &'a (dyn Fn(ImageWarning) + Sync);
 
-/// Gives the first warning of each kind.
+/// Passes on the first warning of each kind.
 pub(super) struct Warnings<'a> {
     warn: Warn<'a>,
     camera: Once,
@@ -65,7 +65,7 @@ impl<'a> Warnings<'a> {
         }
     }
 
-    /// Of a camera that may not be the image's own.
+    /// Warns of a camera that may not be the image's own.
     pub(super) fn of_camera(&self, input: &Input, loaded: &LoadedImage) {
         match loaded.camera_from {
             CameraFrom::Assumed => self.camera.call_once(|| (self.warn)(assumed(input))),
@@ -89,7 +89,7 @@ impl<'a> Warnings<'a> {
         }
     }
 
-    /// Of an image that is far from what the network takes.
+    /// Warns of an image that is far from what the network was trained on.
     pub(super) fn of_fit(&self, image: &Path, network: &Preparer, prepared: &PreparedImage) {
         if let Some(fit) = PoorFit::of(network, prepared) {
             self.fit.call_once(|| {
@@ -99,7 +99,7 @@ impl<'a> Warnings<'a> {
         }
     }
 
-    /// Of metres that have changed. Who watches them finds that once.
+    /// Warns of a scale that has drifted. The monitor reports that only once.
     pub(super) fn of_drift(&self, frame: &str, ratio: f64) {
         let frame = frame.to_owned();
         (self.warn)(ImageWarning::Drift { frame, ratio });
@@ -107,7 +107,7 @@ impl<'a> Warnings<'a> {
 }
 
 fn assumed(input: &Input) -> ImageWarning {
-    // Recordings know where theirs would lie.
+    // Recordings read their own calibration.
     let near = input.frame.is_none().then(|| calibration_near(&input.path));
     ImageWarning::AssumedCamera {
         calibration: near.flatten(),

@@ -1,4 +1,4 @@
-//! From scratch: six simulated streets, a small network that knows nothing, and a seventh street to be measured on.
+//! Trains a small network from scratch on six simulated streets, and evaluates it on a seventh.
 
 use std::path::{Path, PathBuf};
 
@@ -12,30 +12,29 @@ use crate::duration::duration_text;
 use crate::evaluation::Evaluated;
 use crate::{Result, RunHistory};
 
-/// Far from any seed a user is likely to choose for training.
+/// Added to the demo's seed: far from any seed a user is likely to choose for training.
 const TEST_SEED: u64 = 1_000_003;
-/// Streets that are trained on, each filmed at its own rate: one street alone is learned by heart. At few
-/// frames a second far things move enough to be measured; at many, cars parked beside the lane move
-/// little enough to be found.
+/// Frame rates of the training streets: a network memorises a single street. At few frames per second, far objects move enough to be
+/// measured; at many, cars parked beside the lane move little enough to be matched.
 const FRAMES_PER_SECOND: [f64; 6] = [5.0, 8.0, 12.0, 18.0, 26.0, 36.0];
-/// Frames of each.
+/// Number of frames of each.
 const STREET_FRAMES: usize = 260;
-/// Their pictures: larger than what the network sees, small enough to draw quickly.
+/// Size of their pictures: larger than the network's input, small enough to draw quickly.
 const STREET_SIZE: (u32, u32) = (320, 96);
-/// Every n-th of their frames has a scan, for the mean-depth baseline alone.
+/// Every n-th frame has a scan, used only for the mean-depth baseline.
 const STREET_SCAN_EVERY: usize = 20;
-/// Frames of the street that is measured on, and how many of them have a scan.
+/// Number of frames of the test street; every `TEST_SCAN_EVERY`-th has a scan.
 const TEST_FRAMES: usize = 200;
 const TEST_SCAN_EVERY: usize = 8;
-/// Steps of training: a few minutes on two cores.
+/// Number of training steps: a few minutes on two cores.
 const STEPS: usize = 1500;
-/// Small images: many steps in few minutes, and image motion within a network's reach.
+/// Small images: many steps in a few minutes, and image motion within the network's reach.
 const SIZE: InputSize = InputSize {
     width: 192,
     height: 64,
 };
 
-/// The streets that are trained on.
+/// The training streets.
 #[must_use]
 pub fn training_streets(settings: &DemoSettings) -> Vec<SimConfig> {
     let (width, height) = settings.size(STREET_SIZE);
@@ -52,7 +51,7 @@ pub fn training_streets(settings: &DemoSettings) -> Vec<SimConfig> {
     rates.map(street).collect()
 }
 
-/// The street that is measured on.
+/// The test street.
 #[must_use]
 pub fn test_street(settings: &DemoSettings) -> SimConfig {
     let usual = SimConfig::default();
@@ -67,11 +66,11 @@ pub fn test_street(settings: &DemoSettings) -> SimConfig {
     }
 }
 
-/// How the network learns on these drives, from the images and the vehicle's motion.
+/// The configuration that trains on these drives, from images and the vehicle's motion.
 #[must_use]
 pub fn recipe(settings: &DemoSettings, drives: &[PathBuf]) -> TrainConfig {
     let mut preset = Preset::Tiny.config();
-    // Two frames of a pair show nearly the same: in one direction a step sees twice as many places.
+    // The two frames of a pair are nearly alike: with one direction only, a step sees twice as many places.
     (preset.reprojection, preset.batch) = (Reprojection::Minimum, 2 * preset.batch);
     preset.loss.compare_at = CompareAt::Own;
     preset.data.paths = drives.to_vec();
@@ -86,37 +85,37 @@ pub fn recipe(settings: &DemoSettings, drives: &[PathBuf]) -> TrainConfig {
     }
 }
 
-/// The frames to be shown, of a drive with so many.
+/// The three frames to show, of a drive with this many.
 #[must_use]
 pub fn shown_frames(frames: usize) -> [usize; 3] {
     [frames / 10, frames * 2 / 5, frames * 7 / 10]
 }
 
-/// What the page shows.
+/// The contents of the page.
 pub struct FromScratchPage<'a> {
-    /// How it measures on the street never seen.
+    /// Its metrics on the test street.
     pub evaluated: &'a Evaluated,
-    /// What it sees there; the first frame with its truth and its cloud.
+    /// Its predictions there; the first frame with its ground truth and its cloud.
     pub shown: &'a [ShownPrediction],
-    /// Of the whole demo.
+    /// Duration of the whole demo, in seconds.
     pub seconds: f64,
-    /// The folder of the run that learned.
+    /// The folder of the training run.
     pub run: &'a Path,
     /// The command that makes the page again.
     pub command: &'a str,
 }
 
 impl FromScratchPage<'_> {
-    /// The page; the pictures of the truth on it are files, too.
+    /// Makes the page; the pictures of the ground truth on it are also saved as files.
     ///
     /// # Errors
-    /// A picture that cannot be encoded or written; a run's log that is another program's.
+    /// A picture that cannot be encoded or written; a log in the run's folder that another program wrote.
     pub fn compose(&self) -> Result<HtmlReport> {
         let mut page = self
             .facts()
-            .section("Accuracy on the street never seen")
+            .section("Accuracy on a street never seen in training")
             .paragraph(PROTOCOL);
-        page = self.evaluated.add_to(page).section("What it sees");
+        page = self.evaluated.add_to(page).section("Predictions");
         for (i, shown) in self.shown.iter().enumerate() {
             page = shown.add_to(page, "predicted depth in metres")?;
             if i == 0 {
@@ -125,14 +124,14 @@ impl FromScratchPage<'_> {
             }
         }
         page = RunHistory::read(self.run)?.add_to(page);
-        Ok(page.section("Again").command(self.command))
+        Ok(page.section("Reproduce").command(self.command))
     }
 
     /// Title and key figures.
     fn facts(&self) -> HtmlReport {
         let page = HtmlReport::new(
             "DeepFusion: metric depth from one camera and a speed signal",
-            "Learned from scratch on six simulated streets from images, speed and yaw rate, without any depth label; measured on another",
+            "Trained from scratch on six simulated streets from images, speed and yaw rate, without depth labels; evaluated on a seventh",
         );
         let time = duration_text(self.seconds);
         self.evaluated.add_key_figures(page, ("time", &time))

@@ -1,4 +1,4 @@
-//! How a demo measures.
+//! How a demo evaluates a network.
 
 use deepfusion_data::{Dataset, GtKind};
 use deepfusion_eval::{Crop, GroundTruth, Protocol};
@@ -7,16 +7,16 @@ use deepfusion_runtime::DepthEstimator;
 use crate::evaluation::{Evaluated, Truth, baseline_from_datasets, evaluate_datasets, predict};
 use crate::{Error, Result};
 
-/// The same for people.
+/// The protocol as a sentence for the page.
 pub(super) const PROTOCOL: &str = "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in metres. \
     Median-scaled: each image multiplied by median(truth) / median(prediction), as methods without a metric scale need. The \
     mean-depth baseline predicts each pixel's mean depth over the training streets.";
 
-/// Measures on the scans of `test`, beside the mean depth of the scans of `train`. `go_on` is asked before every frame; `progress` takes the
-/// frames done and in all.
+/// Evaluates on the scans of `test`, beside the mean depth of the scans of `train`. `go_on` is called before every frame; `progress`
+/// receives the number of frames done, and of all.
 ///
 /// # Errors
-/// What `go_on` says; an image or a scan that cannot be read, and what the network's engine says.
+/// The error of `go_on`; an image or a scan that cannot be read; the error of the network's engine.
 pub fn measure<E: From<Error>>(
     estimator: &mut DepthEstimator,
     train: &[Dataset],

@@ -1,7 +1,7 @@
-//! The whole way with no data at all: what is simulated, what is learned there and how, what is measured, and the page of it.
+//! The whole workflow without any data: simulating, training, evaluating, and the page with the results.
 //!
-//! [`new_street`] shows a network that is there zero-shot on a street it has never seen, and what learning there from images and motion adds.
-//! [`from_scratch`] trains a small network on simulated streets and measures it on another. The caller simulates the drives, runs the
+//! [`new_street`] shows a given network zero-shot on a street it has never seen, and what fine-tuning there from images and motion adds.
+//! [`from_scratch`] trains a small network on simulated streets and evaluates it on another. The caller simulates the drives, runs the
 //! trainer and the network, and can stop between two frames.
 
 pub mod from_scratch;

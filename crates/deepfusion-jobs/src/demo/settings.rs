@@ -1,31 +1,31 @@
-//! Settings of a demo, and where it puts things.
+//! Settings of a demo, and the paths of its files.
 
 use std::path::{Path, PathBuf};
 
 use deepfusion_model::{Compute, InputSize};
 
-/// How a demo is made. What is `None` is as is usual; the others make it short enough to be tested.
+/// How a demo is made. `None` stands for the usual value; other values make it short enough for tests.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DemoSettings {
-    /// Chooses the streets.
+    /// Seed of the streets.
     pub seed: u64,
-    /// Frames of each drive; fewer than 12 may leave no scan to measure on.
+    /// Number of frames of each drive; fewer than 12 may leave no scan to evaluate on.
     pub frames: Option<usize>,
-    /// Steps of training.
+    /// Number of training steps.
     pub steps: Option<usize>,
-    /// Width and height of the pictures, and of what the network learns from.
+    /// Width and height of the pictures and of the training images.
     pub size: Option<(u32, u32)>,
-    /// What it learns on.
+    /// The kind of device that it trains on.
     pub compute: Compute,
 }
 
 impl DemoSettings {
-    /// Frames of a drive.
+    /// Number of frames of a drive.
     pub(super) fn frames(&self, usual: usize) -> usize {
         self.frames.unwrap_or(usual)
     }
 
-    /// Steps of training.
+    /// Number of training steps.
     pub(super) fn steps(&self, usual: usize) -> usize {
         self.steps.unwrap_or(usual)
     }
@@ -35,7 +35,7 @@ impl DemoSettings {
         self.size.unwrap_or(usual)
     }
 
-    /// The size of what the network learns from.
+    /// Size of the network's input in training.
     pub(super) fn input_size(&self, usual: InputSize) -> InputSize {
         self.size.map_or(usual, |(width, height)| InputSize {
             width: width as usize,
@@ -44,42 +44,42 @@ impl DemoSettings {
     }
 }
 
-/// The folder of everything that a demo makes.
+/// The folder of all files that a demo makes.
 #[derive(Debug, Clone)]
 pub struct DemoFolder(PathBuf);
 
 impl DemoFolder {
-    /// Everything goes into this one.
+    /// A demo in this folder.
     #[must_use]
     pub fn new(folder: PathBuf) -> Self {
         Self(folder)
     }
 
-    /// Something in it, by its name.
+    /// Path of a file or folder in it.
     #[must_use]
     pub fn join(&self, name: impl AsRef<Path>) -> PathBuf {
         self.0.join(name)
     }
 
-    /// The run that learned.
+    /// Path of the training run.
     #[must_use]
     pub fn model(&self) -> PathBuf {
         self.join("model")
     }
 
-    /// The point cloud.
+    /// Path of the point cloud.
     #[must_use]
     pub fn cloud(&self) -> PathBuf {
         self.join("cloud.ply")
     }
 
-    /// The folder of the pictures.
+    /// Path of the pictures' folder.
     #[must_use]
     pub fn pictures(&self) -> PathBuf {
         self.join("pictures")
     }
 
-    /// The page.
+    /// Path of the page.
     #[must_use]
     pub fn page(&self) -> PathBuf {
         self.join("report.html")

@@ -1,4 +1,4 @@
-//! Pictures of a frame for a demo's page, each also a file of its own.
+//! Pictures of a frame for a demo's page, each also saved as a file.
 
 use std::path::{Path, PathBuf};
 
@@ -14,28 +14,28 @@ use deepfusion_runtime::DepthEstimator;
 
 use crate::{Result, files, intervals};
 
-/// Points of the cloud reach so far, metres.
+/// Largest depth of the cloud's points, in metres.
 const CLOUD_REACH_M: f32 = 60.0;
 
-/// A frame and the depth that a network sees in it.
+/// A frame and the depth that a network predicts for it.
 pub struct ShownPrediction {
     number: u64,
     image: RgbImage,
     camera: Intrinsics,
     depth: DepthMap,
-    /// How sure the network is, in metres, where it says so.
+    /// Standard deviation in metres, if the network predicts it.
     sigma: Option<DepthMap>,
     truth: DepthMap,
     scale: DepthScale,
-    /// Folder of the pictures.
+    /// Folder for the pictures.
     folder: PathBuf,
 }
 
 impl ShownPrediction {
-    /// Predicts a frame of a simulated drive; `factors` are those of the network's intervals. The folder, of the pictures, is made.
+    /// Predicts a frame of a simulated drive; `factors` are the network's interval factors. The pictures' folder is created.
     ///
     /// # Errors
-    /// A folder that cannot be made, an image or its exact depth that cannot be read, and what the network's engine says.
+    /// A folder that cannot be created; an image or exact depth that cannot be read; the error of the network's engine.
     pub fn of(
         (estimator, factors): (&mut DepthEstimator, &IntervalFactors),
         drive: &Dataset,
@@ -63,7 +63,7 @@ impl ShownPrediction {
         self.folder.join(format!("{:010}_{what}.png", self.number))
     }
 
-    /// Writes the image beside its depth, and the depth; `mark` is added to the files' names. Returns the first.
+    /// Writes the image beside its depth, and the depth; `mark` is added to the files' names. Returns the first file's path.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -75,7 +75,7 @@ impl ShownPrediction {
         Ok(path)
     }
 
-    /// Writes the point cloud, with how sure the network is of each point.
+    /// Writes the point cloud, with the standard deviation of each point.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -89,7 +89,7 @@ impl ShownPrediction {
         Ok(files::write(path, bytes)?)
     }
 
-    /// The picture of the frame with its targets, in the folder of a run that finds those; `None` where there is none.
+    /// The picture of the frame with its targets, from the output folder of a run that found them; `None` if it is missing.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -115,14 +115,14 @@ impl ShownPrediction {
         )?)
     }
 
-    /// The image beside its depth.
+    /// Adds the image beside its depth.
     pub(super) fn add_to(&self, page: HtmlReport, what: &str) -> Result<HtmlReport> {
         let side = side_by_side(&self.image, &self.depth, &self.scale)?;
         let caption = format!("Frame {}: the image, and {what}", self.number);
         Ok(page.picture(&caption, &side, PictureFormat::Jpeg)?)
     }
 
-    /// The exact depth, and where the prediction is wrong; both are files, too.
+    /// Adds the exact depth and the error of the prediction, and saves both as files.
     pub(super) fn add_truth_to(&self, page: HtmlReport) -> Result<HtmlReport> {
         let exact = with_depth_legend(&depth_picture(&self.truth, &self.scale), &self.scale);
         save_png(&exact, &self.path("truth"))?;
@@ -130,7 +130,7 @@ impl ShownPrediction {
         self.add_error_to(page, "error", "Relative error of the prediction")
     }
 
-    /// Where the prediction is wrong; `mark` is the file's name.
+    /// Adds a picture of the prediction's error; `mark` is the file's name.
     pub(super) fn add_error_to(
         &self,
         page: HtmlReport,
@@ -142,7 +142,7 @@ impl ShownPrediction {
         Ok(page.picture(caption, &errors, PictureFormat::Png)?)
     }
 
-    /// The point cloud from two sides.
+    /// Adds the point cloud, seen from two directions.
     pub(super) fn add_cloud_to(&self, mut page: HtmlReport) -> Result<HtmlReport> {
         let cloud = self.cloud()?;
         for (view, caption) in [
@@ -162,7 +162,7 @@ impl ShownPrediction {
     }
 }
 
-/// Where the simulator keeps the exact depth of a frame.
+/// Reads the exact depth that the simulator wrote for a frame.
 fn exact_depth(drive: &Dataset, frame: usize) -> Result<DepthMap> {
     let name = format!("{:010}.png", drive.frames()[frame].number);
     let folder = drive.folder().join("proj_depth/groundtruth/image_02");

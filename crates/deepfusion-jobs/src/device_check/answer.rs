@@ -1,4 +1,4 @@
-//! What a process that checks a device says of each operation, as a line of JSON.
+//! The results that a process which checks a device prints, as lines of JSON.
 
 use deepfusion_train::Device;
 use deepfusion_train::device_check::{
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Result;
 
-/// One operation as another process prints it.
+/// The result of one operation, as another process prints it.
 #[derive(Debug, Serialize, Deserialize)]
 struct OperationAnswer {
     operation: String,
@@ -17,8 +17,8 @@ struct OperationAnswer {
     failure: Option<String>,
 }
 
-/// Operations from the one of this name on, each computed when it is asked for. One that fails is the last, since it may have left the
-/// device unusable.
+/// Checks operations, starting at `first`, each when the iterator reaches it. One that fails is the last, since it may have left the device
+/// unusable.
 pub fn checks_from(device: &Device, first: &str) -> impl Iterator<Item = OperationCheck> {
     let mut rest = operations().skip_while(move |(operation, _)| *operation != first);
     let mut failed = false;
@@ -32,12 +32,12 @@ pub fn checks_from(device: &Device, first: &str) -> impl Iterator<Item = Operati
     })
 }
 
-/// An operation in a line for the process that asked.
+/// The result of an operation, as a line for the calling process.
 ///
 /// # Errors
 /// [`crate::Error::Json`].
 pub fn answer_line(check: &OperationCheck) -> Result<String> {
-    // JSON knows no infinity.
+    // JSON has no infinity.
     let answer = OperationAnswer {
         operation: check.operation.into(),
         forward: check.forward.min(f64::MAX),
@@ -47,8 +47,8 @@ pub fn answer_line(check: &OperationCheck) -> Result<String> {
     Ok(serde_json::to_string(&answer)?)
 }
 
-/// Passes on what a process answered of these operations, one after the other, and gives those of which it said nothing. What a driver
-/// prints is no answer.
+/// Passes on a process's results for these operations, one after another, and returns those without a result. Other lines, such as a
+/// driver's messages, are skipped.
 pub(super) fn answered<'a, E>(
     printed: impl Iterator<Item = String>,
     asked: &'a [(&'static str, NeededBy)],
@@ -104,10 +104,10 @@ mod tests {
         };
         assert_eq!(read(lines(&["a", "b", "c"])), (vec!["a", "b", "c"], 0));
         assert_eq!(read(lines(&["a"])), (vec!["a"], 2));
-        // More than was asked for, and another order.
+        // More results than requested, and results in another order.
         assert_eq!(read(lines(&["a", "b", "c", "d"])), (vec!["a", "b", "c"], 0));
         assert_eq!(read(lines(&["a", "c"])), (vec!["a"], 2));
-        // A driver's words between them and before one.
+        // A driver's messages between the results and before one.
         let among = format!("driver 1\n{}\nloading… {}", answer("a"), answer("b"));
         assert_eq!(read(among), (vec!["a", "b"], 1));
         assert_eq!(read(answer("a")[..20].to_string()), (vec![], 3));

@@ -1,11 +1,11 @@
-//! The lines of a process that may hang.
+//! Reads the lines of a process that may hang.
 
 use std::io::{BufRead, BufReader, Read};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-/// Lines, until there are no more or the next one is not there in time.
+/// An iterator over lines, which ends with the source, or when the next line takes too long.
 pub(super) struct PatientLines {
     received: Receiver<String>,
     limit: Duration,
@@ -13,7 +13,7 @@ pub(super) struct PatientLines {
 }
 
 impl PatientLines {
-    /// The lines of `source`, which a thread of their own reads; each may take as long as `limit`.
+    /// The lines of `source`, read by a thread of their own; each may take as long as `limit`.
     pub(super) fn of(source: impl Read + Send + 'static, limit: Duration) -> Self {
         let (send, received) = channel();
         thread::spawn(move || {
@@ -31,7 +31,7 @@ impl PatientLines {
         }
     }
 
-    /// Whether a line was not there in time.
+    /// Whether a line took too long.
     pub(super) fn gave_up(&self) -> bool {
         self.gave_up
     }
@@ -56,7 +56,7 @@ mod tests {
     use std::io;
     use std::sync::mpsc::Sender;
 
-    /// Bytes that come in pieces.
+    /// Bytes that arrive in pieces.
     struct Pieces(Receiver<&'static [u8]>);
 
     impl Read for Pieces {
@@ -89,7 +89,7 @@ mod tests {
         let (send, mut lines) = lines(Duration::from_millis(50));
         assert_eq!(lines.next(), None);
         assert!(lines.gave_up());
-        // What comes too late belongs to nothing any more.
+        // A line that comes too late is ignored.
         send.send(b"late\n").unwrap();
         assert_eq!(lines.next(), None);
     }

@@ -1,42 +1,42 @@
-//! What was found of a device, as a document for scripts.
+//! The result of a device check, as JSON for scripts.
 
 use deepfusion_train::device_check::{DeviceCheck, TOLERANCE};
 use serde::Serialize;
 
 use crate::devices::ComputeDevice;
 
-/// What was found of a device.
+/// The result of a device check.
 #[derive(Debug, Serialize)]
 pub struct DeviceCheckRecord {
-    /// The device.
+    /// Name of the device.
     pub device: String,
-    /// How far it may be from the processor, over the largest value.
+    /// Largest accepted error relative to the processor, over the largest value.
     pub tolerance: f64,
-    /// Whether the ResNet presets' depth is the processor's.
+    /// Whether the ResNet presets predict the same depth as on the processor.
     pub predict: bool,
-    /// Whether they learn from video as on the processor.
+    /// Whether they can be trained on video as on the processor.
     pub train: bool,
-    /// Operation by operation.
+    /// The result of each operation.
     pub operations: Vec<OperationRecord>,
 }
 
-/// An operation; errors over the largest value, `null` where that is infinite or NaN.
+/// The result of an operation. Errors are relative to the largest value; `null` if that is infinite or NaN.
 #[derive(Debug, Serialize)]
 pub struct OperationRecord {
-    /// What was computed.
+    /// Name of the operation.
     pub operation: &'static str,
-    /// Whether it is the processor's, forward and backward.
+    /// Whether result and gradients match the processor's.
     pub right: bool,
-    /// How far its result is off.
+    /// Error of its result.
     pub forward: Option<f64>,
-    /// How far its gradients are off.
+    /// Error of its gradients.
     pub backward: Option<f64>,
-    /// Why it did not run to its end.
+    /// Why it did not finish.
     pub failure: Option<String>,
 }
 
 impl DeviceCheckRecord {
-    /// Of a device and what was found of it.
+    /// The record of a device's check.
     #[must_use]
     pub fn of(device: ComputeDevice, found: &DeviceCheck) -> Self {
         let operations = found.operations.iter().map(|check| OperationRecord {

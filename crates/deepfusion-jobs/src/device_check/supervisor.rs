@@ -1,4 +1,4 @@
-//! Processes that check a device, one after the other.
+//! Runs processes that check a device, one after another.
 
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -13,15 +13,15 @@ use super::patient_lines::PatientLines;
 use crate::devices::{Backend, ComputeDevice};
 use crate::{Error, Result};
 
-/// The longest that an operation may take, its kernels' compilation included. An H100 took less than a minute for all of them.
+/// The longest time for an operation, including the compilation of its kernels. An H100 took less than a minute for all of them.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// Computes every operation on a device, which is open, and on the processor; `report` sees each as soon as it is done. The processor is
-/// compared with itself in this process. For another device `program` is called with an operation's name and gives the command of a process
-/// that prints each of [`checks_from`](super::checks_from) that one on, as its [`answer_line`](super::answer_line).
+/// Computes every operation on an open device and on the processor; `report` receives each as soon as it is done. The processor is compared
+/// with itself in this process. For any other device, `program` is called with an operation's name. It returns the command of a process
+/// that prints each of [`checks_from`](super::checks_from) from that operation on, as its [`answer_line`](super::answer_line).
 ///
 /// # Errors
-/// [`Error::CheckNotStarted`] and [`Error::CheckNotEnded`], and those of the callbacks. A process that runs then is ended.
+/// [`Error::CheckNotStarted`] and [`Error::CheckNotEnded`], and the callbacks' errors. A running process is then ended.
 pub fn check_device<E: From<Error>>(
     chosen: ComputeDevice,
     device: &Device,
@@ -47,8 +47,8 @@ pub fn check_device<E: From<Error>>(
     Ok(found)
 }
 
-/// Has processes check these operations, so that a driver which ends its process, or hangs, does not take along what was found; another
-/// process continues with the next operation.
+/// Lets processes check these operations, so that results survive a driver that crashes its process or hangs; another process continues
+/// with the next operation.
 fn supervise<E: From<Error>>(
     asked: &[(&'static str, NeededBy)],
     limit: Duration,
@@ -87,13 +87,13 @@ fn supervise<E: From<Error>>(
     Ok(())
 }
 
-/// A process that is ended when this is dropped.
+/// A process that is killed when this is dropped.
 struct Process {
     child: Child,
 }
 
 impl Process {
-    /// Starts a command, of which what it prints on stdout is read.
+    /// Starts a command, to read its stdout.
     fn start(mut command: Command) -> Result<Self> {
         command
             .stdin(Stdio::null())
@@ -113,15 +113,15 @@ impl Process {
         }
     }
 
-    /// Ends it.
+    /// Kills it.
     fn kill(&mut self) -> Result<()> {
-        // It may have ended by itself just now.
+        // It may have just ended by itself.
         let _ = self.child.kill();
         self.ended().map(drop)
     }
 }
 
-/// One that was waited for is not killed.
+/// Killing a process that has already ended has no effect.
 impl Drop for Process {
     fn drop(&mut self) {
         let _ = self.kill();
@@ -140,7 +140,7 @@ mod tests {
         ("c", NeededBy::Learning),
     ];
 
-    /// A shell's command that answers an operation.
+    /// A shell command that prints an operation's result.
     fn answer(operation: &'static str, failure: Option<&str>) -> String {
         let check = OperationCheck {
             operation,
@@ -158,10 +158,10 @@ mod tests {
         shell
     }
 
-    /// Where processes began, and what came of each operation.
+    /// The operations that processes started with, and the result of each operation.
     type Seen = (Vec<String>, Vec<(&'static str, Option<OperationFailure>)>);
 
-    /// What is seen of processes that run a shell's script, by the operation that they begin with.
+    /// What happens with processes that run a shell script, given the operation that they start with.
     fn seen(
         asked: &[(&'static str, NeededBy)],
         limit: Duration,

@@ -1,9 +1,9 @@
-//! Settings that are asked for, and what a run that goes on has instead.
+//! Requested settings that contradict a resumed run.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// A setting that something asked for.
+/// A setting that can be requested.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Setting {
@@ -13,46 +13,46 @@ pub enum Setting {
     Preset,
     /// The size of the network's input.
     Size,
-    /// Samples of a batch.
+    /// Number of samples in a batch.
     Batch,
     /// The seed.
     Seed,
-    /// What is learned from.
+    /// What the network learns from.
     Learn,
-    /// Cameras.
+    /// The camera.
     Camera,
-    /// Whether the other camera's image is a view, too.
+    /// Whether the other camera's image is used as a view, too.
     Stereo,
-    /// Whether the camera is learned.
+    /// Whether the camera's intrinsics are learned.
     LearnedCamera,
     /// The pose used for warping.
     ViewMotion,
-    /// Loss terms and parts of the network that are on.
+    /// Loss terms and parts of the network that are switched on.
     With,
-    /// Those that are off.
+    /// Loss terms and parts of the network that are switched off.
     Without,
-    /// Any key, as `batch=4` sets it.
+    /// Any key, set as in `batch=4`.
     Assignment,
-    /// What a run starts from.
+    /// The network that a run starts from.
     Init,
     /// How far the camera's clock is ahead.
     Clock,
-    /// Topics of bags.
+    /// The topics of bags.
     Topic,
-    /// The recordings that are learned from.
+    /// The training recordings.
     Data,
-    /// Those of the validation.
+    /// The validation recordings.
     Validation,
-    /// The split of the first.
+    /// The split of the training recordings.
     Split,
-    /// The split of the validation.
+    /// The split of the validation recordings.
     ValidationSplit,
     /// A data set's own recordings and splits.
     DataSet,
 }
 
 impl fmt::Display for Setting {
-    /// The key of a configuration, or the file.
+    /// The key in the configuration, or the file.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::File(path) => return write!(f, "{}", path.display()),
@@ -79,21 +79,21 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Something that is asked of a run and is not what it has.
+/// A requested setting that contradicts a resumed run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 #[error("{setting}: {asked} contradicts the run, which {run}")]
 pub struct Contradiction {
-    /// What was to be set.
+    /// The setting.
     pub setting: Setting,
-    /// To what.
+    /// The requested value.
     pub asked: RequestedValue,
-    /// What the run has.
+    /// The run's value.
     pub run: RunHas,
 }
 
 impl Contradiction {
-    /// What is asked of a run, and what it has.
+    /// A contradiction of `setting`: `asked` is the requested value, `run` the run's.
     #[must_use]
     pub fn new(setting: Setting, asked: impl Into<RequestedValue>, run: RunHas) -> Self {
         Self {
@@ -104,21 +104,21 @@ impl Contradiction {
     }
 }
 
-/// The value that is asked for.
+/// The requested value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RequestedValue {
-    /// This.
+    /// A value, as text.
     #[error("{0}")]
     Value(String),
-    /// The other camera's view.
+    /// Using the other camera's view.
     #[error("on")]
     OtherCamera,
-    /// That the camera is learned.
-    #[error("to be learned")]
+    /// Learning the camera.
+    #[error("learning it")]
     Learned,
-    /// That the clocks are compared.
-    #[error("to be measured")]
+    /// Measuring the clocks' offset.
+    #[error("measuring it")]
     Measured,
 }
 
@@ -128,35 +128,35 @@ impl From<String> for RequestedValue {
     }
 }
 
-/// What a run has instead of what is asked for, in words that follow on "which".
+/// What the run has instead. The text follows "which".
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunHas {
-    /// This.
+    /// A value, as text.
     #[error("has {0}")]
     Value(String),
-    /// Nothing of the kind.
+    /// The setting is not set.
     #[error("has none")]
     Nothing,
-    /// It is switched off.
+    /// The setting is switched off.
     #[error("has it off")]
     Off,
-    /// The term is not among its own.
-    #[error("is learned without it")]
+    /// The loss term is not used.
+    #[error("is trained without it")]
     WithoutIt,
-    /// The term is among its own.
-    #[error("is learned with it")]
+    /// The loss term is used.
+    #[error("is trained with it")]
     WithIt,
     /// The key has another value.
     #[error("has another value in its config.toml")]
     AnotherValue,
-    /// It names no topic.
+    /// No topics are named.
     #[error("names none")]
     NoTopics,
     /// It is validated on frames of its own drives.
     #[error("is validated on the held-out end of each drive")]
     HeldOutEnd,
-    /// Each of its data sets has its own.
+    /// Each of its data sets has its own value.
     #[error("has the data.sets of its config.toml, each with its own")]
     OwnOfEachSet,
 }

@@ -1,4 +1,4 @@
-//! In what something differs from what it has to be.
+//! Why existing outputs, networks or cameras do not match what is needed.
 
 use std::path::{Path, PathBuf};
 
@@ -6,19 +6,19 @@ use deepfusion_geometry::ImplausibleCamera;
 use deepfusion_hint::count_of;
 use deepfusion_records::Difference;
 
-/// Why what stands beside an image is not this job's.
+/// Why an existing output is not this job's.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StaleReason {
-    /// It is no sidecar.
+    /// It is not a sidecar.
     NoSidecar,
-    /// It is of another image.
+    /// It was made from another image.
     OtherImage(PathBuf),
-    /// It was made in another way.
+    /// It was made with other settings.
     MadeWith(Difference),
-    /// The image is another one now.
+    /// The image has changed since.
     ImageChanged(PathBuf),
-    /// Its recording has another calibration now.
+    /// The calibration of its recording has changed since.
     Calibration,
 }
 
@@ -34,13 +34,13 @@ impl std::fmt::Display for StaleReason {
     }
 }
 
-/// In what another job differs.
+/// How another job differs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OtherJob {
-    /// It has other images: so many, and this one so many.
+    /// It has other images; their number, and the number of this job's images.
     Inputs(usize, usize),
-    /// It makes them in another way.
+    /// It has other settings.
     MadeWith(Difference),
 }
 
@@ -55,28 +55,28 @@ impl std::fmt::Display for OtherJob {
     }
 }
 
-/// Why there is no mean of weights.
+/// Why weights cannot be averaged.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoMean {
-    /// There is no run to put the mean into.
+    /// The first network is not a run, so there is nothing to take settings from.
     Packed,
-    /// Its depth network never learned.
+    /// Its depth network was never trained.
     EncodersOnly,
-    /// It learned its camera, which belongs to its weights.
+    /// It learned its camera together with its weights.
     LearnedCamera,
-    /// A tensor that one network lacks, or that has another shape.
+    /// A tensor that one network lacks, or whose shape differs.
     Layers {
         /// The tensor's name.
         name: String,
     },
-    /// A setting by which the same weights mean something else.
+    /// A setting that gives the weights another meaning.
     Setting {
-        /// The key, or what it is.
+        /// The setting's key or description.
         key: String,
-        /// Of this network.
+        /// The value in this network.
         found: String,
-        /// Of the first one.
+        /// The value in the first network.
         first: String,
     },
 }
@@ -84,38 +84,38 @@ pub enum NoMean {
 impl std::fmt::Display for NoMean {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Packed => write!(f, "is packed, and the first network must be a run's"),
-            Self::EncodersOnly => write!(f, "only its encoders were ever trained"),
+            Self::Packed => write!(f, "is packed, expected a run as the first network"),
+            Self::EncodersOnly => write!(f, "only its encoders were trained"),
             Self::LearnedCamera => write!(
                 f,
-                "learned its camera with its weights, so that they have no mean with others"
+                "learned its camera together with its weights, so they cannot be averaged with others"
             ),
             Self::Layers { name } => write!(
                 f,
-                "has other layers than the first network: {name} is not the same in both"
+                "its layers differ from those of the first network: {name} is not the same in both"
             ),
             Self::Setting { key, found, first } => {
-                write!(f, "{key} is {found}, and {first} in the first network")
+                write!(f, "{key} is {found}, but {first} in the first network")
             }
         }
     }
 }
 
-/// Why a camera cannot be an image's.
+/// Why a camera does not fit an image.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnfitCamera {
-    /// No camera is like that.
+    /// The intrinsics are implausible for any camera.
     #[error(transparent)]
     Implausible(ImplausibleCamera),
-    /// It is that of images of another size.
+    /// The camera is calibrated for images of another size.
     #[error("{}", other_size(file.as_deref(), *made_for, *image))]
     OtherSize {
-        /// The calibration's file, where it is one for a lens.
+        /// Path of the calibration's file, if it contains a lens.
         file: Option<PathBuf>,
-        /// Width and height of its images.
+        /// Width and height of the calibration's images.
         made_for: (u32, u32),
-        /// Those of this one.
+        /// Width and height of this image.
         image: (u32, u32),
     },
 }

@@ -1,29 +1,29 @@
-//! The images of an evaluation that are worth looking at.
+//! Chooses the images of an evaluation to look at.
 
 use std::fmt;
 
 use deepfusion_eval::ImageScore;
 
-/// How many of the best and of the worst are chosen.
+/// How many of the best and of the worst images are chosen.
 const BEST: usize = 2;
 const WORST: usize = 3;
 
-/// An image of an evaluation, and why it is worth looking at.
+/// A chosen image of an evaluation, and its rank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChosenImage {
-    /// Its place in [`super::Evaluated::images`].
+    /// Its index in [`super::Evaluated::images`].
     pub image: usize,
-    /// Where it stands among the others.
+    /// Its rank among all images.
     pub standing: Standing,
 }
 
-/// Where an image stands among the others, by unscaled Abs Rel.
+/// The rank of an image among all, by unscaled Abs Rel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Standing {
     /// Among the best.
     Best,
-    /// In the middle.
+    /// The median.
     Median,
     /// Among the worst.
     Worst,
@@ -39,7 +39,7 @@ impl fmt::Display for Standing {
     }
 }
 
-/// The best images, the one in the middle and the worst, in this order, by unscaled Abs Rel; none twice.
+/// The best images, the median one and the worst, in this order, by unscaled Abs Rel; each only once.
 #[must_use]
 pub fn chosen_images(images: &[ImageScore]) -> Vec<ChosenImage> {
     let error = |i: &usize| images[*i].unscaled.abs_rel;

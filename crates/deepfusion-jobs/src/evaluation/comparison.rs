@@ -1,4 +1,4 @@
-//! A method beside the mean-depth baseline, on the same images.
+//! Compares a method with the mean-depth baseline on the same images.
 
 use std::collections::BTreeMap;
 
@@ -9,20 +9,20 @@ use deepfusion_eval::{
 use super::{Evaluated, ImageRef};
 use crate::Result;
 
-/// Evaluates a method and, beside it, the mean-depth baseline on the same images.
+/// Evaluates a method and the mean-depth baseline on the same images.
 pub struct Comparison {
     method: Evaluator,
     mean_depth_baseline: Option<(Evaluator, MeanDepthBaseline)>,
-    /// By kind of drive, where the recordings say theirs.
+    /// By kind of drive, for recordings that have one.
     scenarios: BTreeMap<String, Evaluator>,
     protocol: Protocol,
 }
 
 impl Comparison {
-    /// Without any image yet; a baseline without scans gives no mean-depth baseline.
+    /// A comparison without images yet. A baseline without scans gives no mean-depth baseline.
     ///
     /// # Errors
-    /// A protocol that nothing can be measured with.
+    /// A protocol that cannot measure anything.
     pub fn new(protocol: &Protocol, baseline: Option<MeanDepthBaseline>) -> Result<Self> {
         let baseline = baseline.filter(|b| b.scans() > 0);
         Ok(Self {
@@ -36,16 +36,16 @@ impl Comparison {
         })
     }
 
-    /// Compares one image; whether it had a pixel to compare.
+    /// Adds one image; returns whether it had a pixel to compare.
     ///
     /// # Errors
-    /// A prediction that cannot be one, or is of another shape than the truth.
+    /// An invalid prediction, or one whose shape differs from the ground truth's.
     pub fn add(&mut self, image: &Sample<'_>) -> Result<bool> {
         let counted = self.method.add_sample(image)?.is_some();
         if let Some((evaluator, baseline)) = &mut self.mean_depth_baseline
             && counted
         {
-            // A baseline of this one scan alone has nothing else to say than "80 m": that is its score.
+            // A baseline from this scan alone predicts 80 m, which is then its score.
             let depth = baseline.depth_for(Some(image.ground_truth))?;
             evaluator.add(image.name, &Prediction::Depth(depth), image.ground_truth)?;
         }
@@ -67,10 +67,10 @@ impl Comparison {
         Ok(())
     }
 
-    /// All that was found; `places` says where the images that counted are.
+    /// The results; `places` are the places of the images that counted.
     ///
     /// # Errors
-    /// Where no image had a pixel to compare.
+    /// No image had a pixel to compare.
     pub fn evaluated(&self, places: Vec<ImageRef>) -> Result<Evaluated> {
         Ok(Evaluated {
             report: self.report()?,
@@ -80,11 +80,11 @@ impl Comparison {
         })
     }
 
-    /// The method's report with the mean-depth baseline, and a row for each kind of drive where there are several.
+    /// The report on the method and the mean-depth baseline, with a row for each kind of drive if there are several.
     fn report(&self) -> Result<Report> {
         let mut report = self.method.report()?;
         if self.scenarios.len() > 1 {
-            // A kind of drive may have no depth within the range.
+            // A kind of drive may have no ground truth within the range.
             let measured = self.scenarios.iter();
             for (name, evaluator) in measured.filter(|(_, e)| !e.images().is_empty()) {
                 let row = ScenarioRow::new(name, &evaluator.report()?);

@@ -1,4 +1,4 @@
-//! What a run's depth is worth, pixel by pixel: learned from frames with ground truth, kept beside the run.
+//! The confidence of each pixel of a run's depth: learned from frames with ground truth, saved beside the run.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -14,43 +14,43 @@ use super::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::files::write;
 use crate::{Error, Result, StaleCalibration};
 
-/// The file in a run's folder.
+/// Name of the file in a run's folder.
 const FILE: &str = "confidence.toml";
-/// Depths that are compared, metres.
+/// Range of the depths that are compared, in metres.
 const RANGE_M: std::ops::Range<f64> = 1e-3..80.0;
-/// Dots of the reliability plot.
+/// Number of dots in the reliability plot.
 const BINS: usize = 10;
 
-/// What is kept.
+/// The confidence models of a network, as saved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Confidence {
-    /// From a single prediction of an image.
+    /// For a single prediction of an image.
     pub single: ConfidenceModel,
-    /// From the image and its mirror image.
+    /// For the mean of the predictions of an image and its mirror image.
     pub mirrored: ConfidenceModel,
-    /// Steps of the network that it was learned for.
+    /// The step of the network that it was learned for.
     #[serde(default)]
     pub step: Option<usize>,
-    /// Frames it was learned from.
+    /// Number of frames that it was learned from.
     pub frames: usize,
-    /// Frames it was judged by: of other drives, or of another part of the one drive, none of them learned from.
+    /// Number of frames that it was tested on: of other drives, or of another part of the same drive; none was learned from.
     #[serde(default)]
     pub held_out: usize,
-    /// Pixels of them.
+    /// Number of pixels in them.
     pub pixels: usize,
 }
 
 impl Confidence {
-    /// That of a run's network at this step. That of another step is not its own: [`Self::stale`].
+    /// The confidence of a run's network at this step. One learned at another step does not apply: [`Self::stale`].
     ///
     /// # Errors
-    /// A file that cannot be one.
+    /// An invalid file.
     pub fn read(run: &Path, step: usize) -> Result<Option<Self>> {
         Ok(Self::kept(run)?.filter(|kept| kept.step == Some(step)))
     }
 
-    /// What is kept beside a run and is not its network's at this step, where there is such.
+    /// The confidence beside a run, if it was learned at another step of the network.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -79,7 +79,7 @@ impl Confidence {
         let path = run.join(FILE);
         let text = format!(
             "# Expected relative error of a depth = constant + gradient * (local gradient of disparity) + flip * (disagreement\n\
-             # with the mirrored image); confidence = exp(-error). Found by an evaluation.\n{}",
+             # with the mirrored image); confidence = exp(-error). Measured by an evaluation.\n{}",
             toml::to_string(self)?
         );
         write(&path, text)?;
@@ -87,43 +87,43 @@ impl Confidence {
     }
 }
 
-/// What [`calibrate`] found.
+/// The result of [`calibrate`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibrated {
-    /// What was learned.
+    /// The learned confidence.
     pub confidence: Confidence,
-    /// Where it is kept.
+    /// Path of the file that it was saved as.
     pub path: PathBuf,
-    /// Whether it was judged by frames of other drives, and not of another part of the one drive.
+    /// Whether it was tested on other drives, not on another part of the same drive.
     pub by_drive: bool,
-    /// How it holds on the frames that it was judged by.
+    /// How reliable it is on the frames that it was tested on.
     pub reliability: Vec<Reliability>,
 }
 
-/// By what a confidence was judged.
+/// The frames that a confidence was tested on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum JudgedBy {
-    /// No frame was left.
+    /// No frames were left.
     Nothing,
-    /// So many frames of other drives.
+    /// This many frames of other drives.
     OtherDrives(usize),
-    /// So many frames of another part of the one drive.
+    /// This many frames of another part of the same drive.
     AnotherPart(usize),
 }
 
 impl fmt::Display for JudgedBy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Nothing => f.write_str("none left to judge it by"),
-            Self::OtherDrives(n) => write!(f, "judged by {n} of other drives"),
-            Self::AnotherPart(n) => write!(f, "judged by {n} of another part"),
+            Self::Nothing => f.write_str("no frames left to test it on"),
+            Self::OtherDrives(n) => write!(f, "tested on {n} of other drives"),
+            Self::AnotherPart(n) => write!(f, "tested on {n} of another part of the drive"),
         }
     }
 }
 
 impl Calibrated {
-    /// By what it was judged.
+    /// The frames that it was tested on.
     #[must_use]
     pub fn judged_by(&self) -> JudgedBy {
         match (self.confidence.held_out, self.by_drive) {
@@ -138,7 +138,7 @@ impl fmt::Display for Calibrated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "confidence learned from {}, {}, kept as {}",
+            "confidence learned from {}, {}, saved as {}",
             count_of(self.confidence.frames, "frame"),
             self.judged_by(),
             self.path.display()
@@ -146,11 +146,11 @@ impl fmt::Display for Calibrated {
     }
 }
 
-/// Learns from one part of the evaluated frames, keeps the result beside the run, and finds how it holds on the other, which
-/// is of other drives or of another part of the drive. `None` where there is too little to learn from.
+/// Learns a confidence from one part of the evaluated frames, saves it beside the run, and tests it on the other part: other drives, or
+/// another part of the same drive. `None` if there are too few frames to learn from.
 ///
 /// # Errors
-/// What cannot be read, predicted or written.
+/// A file or image that cannot be read, predicted or written.
 pub fn calibrate(
     estimator: &mut DepthEstimator,
     datasets: &[Dataset],
@@ -188,7 +188,7 @@ pub fn calibrate(
         pixels: learned.len(),
     };
     let path = confidence.write(run)?;
-    // One frame has no other half: it is judged by itself.
+    // A single frame cannot be divided: the confidence is tested on the frame that it was learned from.
     let judged = if held_out.is_empty() {
         &learned
     } else {
@@ -203,8 +203,8 @@ pub fn calibrate(
     }))
 }
 
-/// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder, and two
-/// videos' names may differ in their endings alone.
+/// The drive of an image, and its frame's number. The drives of a folder of bags share the folder, and names of two videos may differ only
+/// in their extensions.
 fn image(datasets: &[Dataset], ImageRef(set, frame): ImageRef) -> ((&Path, &str), u64) {
     let dataset = &datasets[set];
     let drive = (dataset.place(), dataset.split_name());

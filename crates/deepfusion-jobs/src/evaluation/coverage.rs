@@ -1,4 +1,4 @@
-//! How much of a split could be used.
+//! How many frames of a split could be used.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -9,16 +9,16 @@ use deepfusion_hint::count_of;
 
 use crate::{Error, Result};
 
-/// Frames of a split that are not there, or cannot be used; for people.
+/// Frames of a split that are missing or cannot be used, as a message for people.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shortfall {
-    /// The split file.
+    /// Path of the split file.
     pub split: PathBuf,
-    /// Frames that could be used.
+    /// Number of frames that could be used.
     pub used: usize,
-    /// Frames that the file lists.
+    /// Number of frames that the file lists.
     pub expected: usize,
-    /// Why not all.
+    /// Why the others could not be used.
     pub why: MissingReason,
 }
 
@@ -26,11 +26,11 @@ pub struct Shortfall {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MissingReason {
-    /// The recordings do not hold them; the first that is missing.
+    /// The recordings do not contain them; the name of the first missing frame.
     NotThere(String),
-    /// So many are of a camera that was not opened, as in the field's lists of both; others may be missing as well.
+    /// This many belong to a camera that was not opened, as in the usual lists for both cameras. More may be missing.
     OtherCamera(usize),
-    /// So many are there without ground truth.
+    /// This many exist, but without ground truth.
     NoTruth(usize),
 }
 
@@ -42,26 +42,24 @@ impl fmt::Display for Shortfall {
         match &self.why {
             MissingReason::NotThere(first) => write!(
                 f,
-                "{split}: {used} of its {frames} {} there ({percent:.1} %), the first that is not: {first}",
-                if *used == 1 { "is" } else { "are" }
+                "{split}: found {used} of {frames} ({percent:.1} %); the first missing one is {first}"
             ),
             MissingReason::OtherCamera(others) => write!(
                 f,
-                "{split}: {used} of its {frames} {} there ({percent:.1} %), {others} more {} of the other camera",
-                if *used == 1 { "is" } else { "are" },
-                if *others == 1 { "is" } else { "are" }
+                "{split}: found {used} of {frames} ({percent:.1} %); {others} {} to the other camera",
+                if *others == 1 { "belongs" } else { "belong" }
             ),
             MissingReason::NoTruth(without) => write!(
                 f,
-                "{split}: {used} of its {frames} {} ground truth ({percent:.1} %), {without} more {} there without",
+                "{split}: {used} of {frames} {} ground truth ({percent:.1} %); {without} {} found without",
                 if *used == 1 { "has" } else { "have" },
-                if *without == 1 { "is" } else { "are" }
+                if *without == 1 { "was" } else { "were" }
             ),
         }
     }
 }
 
-/// The frames of a split, where there is one, that the recordings do not hold.
+/// The frames of a split that the recordings do not contain; `None` without a split, or if none is missing.
 #[must_use]
 pub fn missing_frames(options: &OpenOptions, datasets: &[Dataset]) -> Option<Shortfall> {
     let split = options.split.as_ref()?;
@@ -78,7 +76,7 @@ pub fn missing_frames(options: &OpenOptions, datasets: &[Dataset]) -> Option<Sho
     })
 }
 
-/// How many of a split's frames are of a camera that the options do not open.
+/// The number of a split's frames that belong to a camera which the options do not open.
 fn of_other_camera(split: &Split, options: &OpenOptions) -> usize {
     let opened = options.camera.cameras();
     let entries = split.entries.iter();
@@ -86,10 +84,10 @@ fn of_other_camera(split: &Split, options: &OpenOptions) -> usize {
     others.len()
 }
 
-/// How many frames a split asked for, where there was one.
+/// The number of frames in the split, if there is one.
 ///
 /// # Errors
-/// [`Error::Incomplete`] where not all are there and they must be (`strict`).
+/// [`Error::Incomplete`] if frames are missing and `strict` is set.
 pub fn expected_frames(
     options: &OpenOptions,
     datasets: &[Dataset],
@@ -105,9 +103,9 @@ pub fn expected_frames(
             found: coverage.found,
             expected: coverage.expected,
             what: if coverage.found == 1 {
-                "is in the recordings given"
+                "is in the given recordings"
             } else {
-                "are in the recordings given"
+                "are in the given recordings"
             },
             of_other_camera: of_other_camera(split, options),
         })
@@ -116,10 +114,10 @@ pub fn expected_frames(
     }
 }
 
-/// Fewer frames used than the split asked for and the recordings hold: some have no ground truth.
+/// Frames of the split that are in the recordings but were not used: they have no ground truth.
 ///
 /// # Errors
-/// [`Error::Incomplete`] where all must be used (`strict`).
+/// [`Error::Incomplete`] if some were not used and `strict` is set.
 pub fn check_used(
     options: &OpenOptions,
     datasets: &[Dataset],
@@ -169,7 +167,7 @@ mod tests {
     use std::fmt::Write as _;
     use std::ops::ControlFlow;
 
-    /// A list of both cameras, of which one is opened, is not taken for one whose data are missing.
+    /// If a split lists both cameras and only one is opened, the message says so instead of reporting missing data.
     #[test]
     fn frames_of_the_other_camera_are_said_to_be_its() {
         let at = tempfile::tempdir().unwrap();
@@ -200,8 +198,7 @@ mod tests {
         let shortfall = missing_frames(&left, &datasets).unwrap();
         assert_eq!(shortfall.why, MissingReason::OtherCamera(2));
         let said = shortfall.to_string();
-        let expected =
-            "split.txt: 1 of its 3 frames is there (33.3 %), 2 more are of the other camera";
+        let expected = "split.txt: found 1 of 3 frames (33.3 %); 2 belong to the other camera";
         assert!(said.ends_with(expected), "{said}");
         let error = expected_frames(&left, &datasets, true).unwrap_err();
         assert!(error.hint().unwrap().contains("both cameras"), "{error}");

@@ -1,25 +1,25 @@
-//! Which images are learned from and which are judged, so that none of the judged looks like one that was learned.
+//! Divides images into those to learn from and those to test on, so that none of the latter resembles one of the former.
 
-/// Least share of the images on either side of a division by drives.
+/// Smallest share of the images on either side when dividing by drives.
 const LEAST_SHARE: f64 = 0.2;
-/// Share of the images between the two parts of a drive that are in neither: what is seen from the end of one part is not
-/// seen from the beginning of the other.
+/// Share of the images between the two parts of a drive that belong to neither: the end of one part must not show what the beginning of the
+/// other shows.
 const GAP: f64 = 0.1;
 
-/// Images by index, in two parts.
+/// Indices of images, in two parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Division {
-    /// Those to learn from.
+    /// Images to learn from.
     pub(super) learned: Vec<usize>,
-    /// Those to judge by.
+    /// Images to test on.
     pub(super) held_out: Vec<usize>,
-    /// Whether the parts are of different drives, and not two parts of one.
+    /// Whether the parts are different drives rather than two parts of one.
     pub(super) by_drive: bool,
 }
 
-/// Divides images, each with its drive and its frame's number: by drives where there are several and neither side comes out
-/// small, else into the first and the last part of all, with a gap between them. Neighbouring frames are near copies of each
-/// other: with every second frame held out, what is judged would have been learned. A single image is learned from.
+/// Divides images, each given with its drive and its frame's number. If there are several drives and neither side becomes too small, the
+/// images are divided by drives; otherwise into the first and the last part of all, with a gap between them. Neighbouring frames are nearly
+/// copies of each other: if every second frame were held out, the test images would have been learned. A single image is learned from.
 pub(super) fn divide<D: PartialEq>(images: &[(D, u64)]) -> Division {
     by_drives(images).unwrap_or_else(|| by_parts(images))
 }
@@ -32,7 +32,7 @@ fn by_drives<D: PartialEq>(images: &[(D, u64)]) -> Option<Division> {
             None => drives.push((drive, vec![index])),
         }
     }
-    // The largest first, each to the smaller side: as even as it gets, and the same each time.
+    // Largest drive first, each to the smaller side: as even as possible, and always the same.
     drives.sort_by_key(|(_, of_drive)| std::cmp::Reverse(of_drive.len()));
     let (mut learned, mut held_out) = (Vec::new(), Vec::new());
     for (_, of_drive) in drives {
@@ -53,7 +53,7 @@ fn by_drives<D: PartialEq>(images: &[(D, u64)]) -> Option<Division> {
     })
 }
 
-/// By place along the recording: both cameras' images of one moment are on one side.
+/// Divides by the order along the recording: images of both cameras at one moment are on the same side.
 fn by_parts<D: PartialEq>(images: &[(D, u64)]) -> Division {
     let mut drives: Vec<&D> = Vec::new();
     let mut at = Vec::with_capacity(images.len());
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn of_one_drive_a_part_is_held_out_that_no_learned_frame_is_next_to() {
-        // Both cameras, camera 3 after camera 2.
+        // Both cameras: camera 3 after camera 2.
         let images = images(&[("a", 0..40), ("a", 0..40)]);
         let Division {
             learned,

@@ -1,4 +1,4 @@
-//! A network's depth against ground truth, on recordings that are open.
+//! Compares a network's depth with ground truth, on open recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -16,39 +16,41 @@ use crate::{Result, intervals};
 /// What depth is compared with, and how.
 #[derive(Debug, Clone)]
 pub struct MeasurementRequest<'a> {
-    /// A file of arrays with the truth; `None`: the recordings' own, of the protocol's kind.
+    /// A file of arrays with ground truth; `None`: the recordings' own, of the protocol's kind.
     pub truth: Option<&'a Path>,
-    /// A file of scans for the mean-depth baseline; `None`: those of the recordings that the network was trained on, where they are still
-    /// there.
+    /// A file of scans for the mean-depth baseline; `None`: the scans of the recordings that the network was trained on, if they still
+    /// exist.
     pub baseline: Option<&'a Path>,
-    /// How it is compared.
+    /// The protocol of the comparison.
     pub protocol: Protocol,
-    /// Whether depth is corrected for another focal length than the one trained on.
+    /// Whether depth is corrected for a focal length other than the one trained with.
     pub focal_correction: bool,
     /// Of which predictions of an image the mean is taken (test-time augmentation).
     pub post_process: Option<PostProcess>,
-    /// Whether every frame of the split has to be there, with ground truth.
+    /// Whether every frame of the split must exist and have ground truth.
     pub strict: bool,
 }
 
-/// What was measured, and against what.
+/// The results, and what they were measured against.
 pub struct Measurement<'a> {
-    /// How it was asked for.
+    /// The request.
     pub request: MeasurementRequest<'a>,
-    /// Where the truth comes from.
+    /// The ground truth.
     pub truth: Truth,
-    /// What was found.
+    /// The results.
     pub evaluated: Evaluated,
-    /// That not all frames of the split could be used.
+    /// Set if not all frames of the split could be used.
     pub shortfall: Option<Shortfall>,
 }
 
 impl<'a> MeasurementRequest<'a> {
-    /// Predicts every frame that has ground truth, and compares, beside the mean-depth baseline. An image of another aspect ratio is
-    /// stretched, so that all of its ground truth counts. `options` opened the recordings; `progress` takes the frames done and in all.
+    /// Predicts every frame that has ground truth, and compares it and the mean-depth baseline with the ground truth. An image of another
+    /// aspect ratio is stretched, so that all of its ground truth counts. `options` are those the recordings were opened with; `progress`
+    /// receives the number of frames done, and of all.
     ///
     /// # Errors
-    /// [`crate::Error::Incomplete`] where a split has to be whole and is not; what cannot be read, predicted or compared.
+    /// [`crate::Error::Incomplete`] if the whole split is required but not available; files that cannot be read; images that cannot be
+    /// predicted or compared.
     pub fn measure(
         self,
         estimator: &mut DepthEstimator,
@@ -88,7 +90,7 @@ impl<'a> MeasurementRequest<'a> {
         })
     }
 
-    /// An image and its prediction, as they are asked for.
+    /// An image and its prediction, as requested.
     fn see(
         &self,
         estimator: &mut DepthEstimator,
@@ -101,11 +103,11 @@ impl<'a> MeasurementRequest<'a> {
 }
 
 impl Measurement<'_> {
-    /// Adds whether the network's intervals hold, which are those of its own prediction alone: nothing against a file of arrays, of what is
-    /// post-processed, or of a network that does not say how sure it is. With `calibrate` as [`intervals::measure`].
+    /// Adds whether the network's intervals hold. They belong to a single prediction: nothing is added for ground truth from a file of
+    /// arrays, for test-time augmentation, or for a network that does not predict uncertainty. `calibrate` is as in [`intervals::measure`].
     ///
     /// # Errors
-    /// What cannot be read, predicted or written.
+    /// A file or image that cannot be read, predicted or written.
     pub fn measure_intervals(
         &mut self,
         (model, estimator): (&ModelSource, &mut DepthEstimator),

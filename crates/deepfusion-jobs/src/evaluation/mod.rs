@@ -1,4 +1,4 @@
-//! Evaluating predictions on recordings with ground truth, or on files of arrays.
+//! Evaluates predictions on recordings with ground truth, or from files of arrays.
 
 mod chosen_images;
 mod comparison;
@@ -42,7 +42,7 @@ pub use self::truth::{
 };
 pub use self::used_checkpoint::UsedCheckpoint;
 
-/// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
+/// The usual crop for the recordings: Garg's if all are KITTI raw, as in its published results; otherwise the whole image.
 #[must_use]
 pub fn default_crop(datasets: &[Dataset]) -> Crop {
     let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
@@ -53,24 +53,24 @@ pub fn default_crop(datasets: &[Dataset]) -> Crop {
     }
 }
 
-/// Where an evaluated image is: the data set and its frame, or the place of its prediction and truth in array files.
+/// The place of an evaluated image: the index of its data set and frame, or of its prediction and ground truth in array files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageRef(pub usize, pub usize);
 
-/// What an evaluation found.
+/// The results of an evaluation.
 pub struct Evaluated {
-    /// The result.
+    /// The metrics.
     pub report: Report,
     /// Each image's scores.
     pub images: Vec<ImageScore>,
-    /// The points that were drawn.
+    /// The points that were sampled for drawing.
     pub points: Vec<DrawnPoint>,
-    /// Where each image is.
+    /// The place of each image.
     pub places: Vec<ImageRef>,
 }
 
 impl Evaluated {
-    /// Writes the drawn points as a table, a line each.
+    /// Writes the sampled points as a table, one per line.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -81,7 +81,7 @@ impl Evaluated {
     }
 }
 
-/// The test-time augmentation that a way of post-processing is.
+/// The test-time augmentation for a kind of post-processing.
 #[must_use]
 pub fn augmentation(how: Option<PostProcess>) -> Augmentation {
     match how {
@@ -92,11 +92,11 @@ pub fn augmentation(how: Option<PostProcess>) -> Augmentation {
     }
 }
 
-/// The disparity of an image, as the protocol wants it, by one prediction. An image of another aspect ratio is stretched, so that all of its
-/// ground truth counts.
+/// The disparity of an image by a single prediction, as the protocol needs it. An image of another aspect ratio is stretched, so that all
+/// of its ground truth counts.
 ///
 /// # Errors
-/// What the network's engine says.
+/// The error of the network's engine.
 pub fn predict(
     estimator: &mut DepthEstimator,
     image: &RgbImage,
@@ -106,10 +106,10 @@ pub fn predict(
     predict_by(estimator, image, camera, focal_correction, None)
 }
 
-/// As [`predict`], by as many predictions as the post-processing takes.
+/// As [`predict`], with test-time augmentation.
 ///
 /// # Errors
-/// What the network's engine says; several input sizes of a network that takes one.
+/// The error of the network's engine; several input sizes for a network that takes one.
 pub fn predict_by(
     estimator: &mut DepthEstimator,
     image: &RgbImage,
@@ -124,10 +124,10 @@ pub fn predict_by(
     Ok(Prediction::Disparity(grid))
 }
 
-/// An image of a recording, and its disparity as [`predict_by`] gives it.
+/// An image of a recording, and its disparity by [`predict_by`].
 ///
 /// # Errors
-/// An image that cannot be read, and what [`predict_by`] says.
+/// An image that cannot be read; an error of [`predict_by`].
 pub fn predict_frame(
     estimator: &mut DepthEstimator,
     dataset: &Dataset,
@@ -141,11 +141,11 @@ pub fn predict_frame(
     Ok((image, prediction))
 }
 
-/// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth; `progress` takes the frames done
-/// and in all.
+/// Evaluates `predict`, which returns the prediction for an image given by data set and frame, on every selected frame that has ground
+/// truth; `progress` receives the number of frames done, and of all.
 ///
 /// # Errors
-/// What `predict` says, and what cannot be read or compared.
+/// An error of `predict`; an image that cannot be read or compared.
 pub fn evaluate_datasets<E: From<Error>>(
     datasets: &[Dataset],
     truth: &mut Truth,
@@ -204,7 +204,7 @@ pub fn evaluate_datasets<E: From<Error>>(
     Ok(comparison.evaluated(places)?)
 }
 
-/// Which depth the ground truth holds, in the recordings' words.
+/// The recordings' kind of ground truth that the protocol asks for.
 fn gt_kind(protocol: &Protocol) -> GtKind {
     match protocol.gt {
         GroundTruth::Z => GtKind::Z,
@@ -213,10 +213,10 @@ fn gt_kind(protocol: &Protocol) -> GtKind {
     }
 }
 
-/// Evaluates the arrays of one file against those of another; `of_kind` says what the first file's are.
+/// Compares the arrays of one file with those of another; `of_kind` is the kind of the first file's arrays.
 ///
 /// # Errors
-/// Files that hold no arrays, arrays without counterpart, and what cannot be compared.
+/// Files without arrays; arrays without counterpart; arrays that cannot be compared.
 pub fn evaluate_arrays(
     (predicted, of_kind): (&mut ArraySet, &dyn Fn(Grid) -> Prediction),
     known: &mut ArraySet,

@@ -1,4 +1,4 @@
-//! Several models side by side: the same images by each, and the page of them.
+//! Several models side by side: a sheet with the same images predicted by each, and the page with it.
 
 use std::path::{Path, PathBuf};
 
@@ -15,21 +15,21 @@ use crate::{Result, name_of};
 
 /// Width of each picture.
 const TILE_WIDTH: u32 = 420;
-/// Width of the legend.
+/// Width of the colour legend.
 const LEGEND_WIDTH: u32 = 700;
 
-/// A row an image, a column a model, with the scans at the end where there are any.
+/// A sheet with a row for each image and a column for each model; scans are in the last column, if there are any.
 pub struct ModelSheet<'a> {
     datasets: &'a [Dataset],
-    /// Of each row: its recording and its frame.
+    /// For each row, the index of its recording and of its frame.
     frames: Vec<(usize, usize)>,
     rows: Vec<Vec<Tile>>,
     truths: Vec<Option<RgbImage>>,
 }
 
 impl<'a> ModelSheet<'a> {
-    /// Of `count` images at most, evenly spread over the recordings, those with ground truth first of all where there are enough; `None` where
-    /// there is no image.
+    /// A sheet of at most `count` images, evenly spread over the recordings; frames with ground truth are preferred if there are enough.
+    /// `None` if there is no image.
     ///
     /// # Errors
     /// An image or a scan that cannot be read.
@@ -65,7 +65,7 @@ impl<'a> ModelSheet<'a> {
     /// Adds a model's column.
     ///
     /// # Errors
-    /// An image that cannot be read, and what the network's engine says.
+    /// An image that cannot be read; the error of the network's engine.
     pub fn add(&mut self, name: &str, estimator: &mut DepthEstimator) -> Result<()> {
         for (row, (number, frame)) in self.rows.iter_mut().zip(&self.frames) {
             let dataset = &self.datasets[*number];
@@ -82,7 +82,7 @@ impl<'a> ModelSheet<'a> {
         Ok(())
     }
 
-    /// All rows.
+    /// The finished rows.
     #[must_use]
     pub fn into_rows(mut self) -> Vec<Vec<Tile>> {
         if self.truths.iter().any(Option::is_some) {
@@ -96,7 +96,7 @@ impl<'a> ModelSheet<'a> {
     }
 }
 
-/// Frames that are evenly spread over all recordings: a recording's number, and a frame's.
+/// Frames evenly spread over all recordings: indices of recording and frame.
 fn spread(datasets: &[Dataset], count: usize) -> Vec<(usize, usize)> {
     let all = |wanted: &dyn Fn(&Dataset, usize) -> bool| -> Vec<(usize, usize)> {
         let each = datasets.iter().enumerate();
@@ -114,13 +114,13 @@ fn spread(datasets: &[Dataset], count: usize) -> Vec<(usize, usize)> {
         all(&|_, _| true)
     };
     let count = count.min(frames.len());
-    // The middles of equal stretches.
+    // The middles of equal sections.
     (0..count)
         .map(|i| frames[(2 * i + 1) * frames.len() / (2 * count)])
         .collect()
 }
 
-/// The page of these tables of runs, with pictures of a recording where there are any ([`ModelSheet`]); `command` makes it again.
+/// The page with tables that compare runs, and with pictures of a recording if there are any ([`ModelSheet`]); `command` makes it again.
 ///
 /// # Errors
 /// A picture that cannot be encoded.
@@ -143,5 +143,5 @@ pub fn comparison_page(
                 PictureFormat::Png,
             )?;
     }
-    Ok(page.section("Again").command(command))
+    Ok(page.section("Reproduce").command(command))
 }

@@ -1,4 +1,4 @@
-//! All that an evaluation found, in words and as JSON.
+//! All results of an evaluation, as text and as JSON.
 
 use std::fmt;
 
@@ -8,26 +8,26 @@ use serde::{Serialize, Serializer};
 
 use super::UsedCheckpoint;
 
-/// What an evaluation came to, as far as the data show it: its words for people, and its JSON for scripts.
+/// All results of an evaluation, as far as the data allow: text for people, JSON for scripts.
 #[derive(Debug, Clone, Default)]
 pub struct EvaluationOutcome {
-    /// The checkpoint that was measured, of a network.
+    /// The network's checkpoint that was evaluated.
     pub checkpoint: Option<UsedCheckpoint>,
-    /// With ground truth.
+    /// The metrics, if there is ground truth.
     pub report: Option<Report>,
-    /// Without it.
+    /// The verdict without ground truth.
     pub verdict: Option<Verdict>,
 }
 
-/// Its JSON.
+/// The JSON of the results.
 #[derive(Serialize)]
 struct OutcomeRecord<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     checkpoint: Option<&'a UsedCheckpoint>,
     #[serde(flatten)]
     report: Option<&'a Report>,
-    /// The certificate where there is nothing else to go by, `null` where no part of the drives served for one; it is always in
-    /// `scale_certificate`.
+    /// The scale certificate, if there is no ground truth; `null` if no part of the drives was suitable. It is always in
+    /// `scale_certificate`, too.
     #[serde(skip_serializing_if = "Option::is_none")]
     certificate: Option<Option<&'a ScaleCertificate>>,
     #[serde(flatten)]

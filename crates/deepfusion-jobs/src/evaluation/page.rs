@@ -1,4 +1,4 @@
-//! The page of an evaluation: what was found, on which frames best and worst, how it was measured.
+//! The page of an evaluation: the results, the best and the worst frames, and how they were measured.
 
 use std::path::Path;
 
@@ -12,50 +12,50 @@ use deepfusion_runtime::ModelSource;
 use super::{ChosenImage, Evaluated, EvaluationRequest, MeasurementRequest, Standing};
 use crate::{ModelFacts, Result, RunHistory, name_of};
 
-/// What a page of an evaluation shows.
+/// The contents of the page of an evaluation.
 pub struct EvaluationPage<'a> {
-    /// Whose depth was measured.
+    /// The depth that was evaluated.
     pub source: MeasuredDepth<'a>,
-    /// What was found.
+    /// The results.
     pub evaluated: &'a Evaluated,
-    /// The images that are shown, as [`super::shown_of_datasets`] and [`super::shown_of_arrays`] give them.
+    /// The images to show, from [`super::shown_of_datasets`] or [`super::shown_of_arrays`].
     pub shown: &'a [(ChosenImage, ShownFrame)],
-    /// How a confidence holds that was learned from these images.
+    /// How reliable the confidence is that was learned from these images.
     pub reliability: Option<&'a [Reliability]>,
-    /// What is said of the depth without ground truth.
+    /// The verdict on the depth without ground truth.
     pub verdict: Option<&'a Verdict>,
 }
 
-/// Whose depth was measured.
+/// The depth that was evaluated.
 #[derive(Clone, Copy)]
 pub enum MeasuredDepth<'a> {
-    /// That of a file of arrays.
+    /// Depth from a file of arrays.
     Arrays {
-        /// The file.
+        /// Path of the predictions.
         predictions: &'a Path,
-        /// The file that it was compared with.
+        /// Path of the ground truth.
         truth: &'a Path,
-        /// How it was compared.
+        /// The protocol of the comparison.
         protocol: &'a Protocol,
         /// The command that makes the page again.
         command: &'a str,
     },
-    /// A network's.
+    /// Depth by a network.
     Network {
         /// The network.
         model: &'a ModelSource,
-        /// How the evaluation was asked for.
+        /// The request for the evaluation.
         request: &'a EvaluationRequest<'a>,
-        /// The evaluation as it is kept.
+        /// The evaluation as saved.
         saved: &'a SavedEvaluation,
     },
 }
 
 impl EvaluationPage<'_> {
-    /// The page.
+    /// Makes the page.
     ///
     /// # Errors
-    /// A picture that cannot be encoded; a run's log that is another program's.
+    /// A picture that cannot be encoded; a log in the run's folder that another program wrote.
     pub fn compose(&self) -> Result<HtmlReport> {
         let mut page = self.facts().section("Accuracy");
         page = self.evaluated.add_to(page);
@@ -109,7 +109,7 @@ impl EvaluationPage<'_> {
         }
     }
 
-    /// How it was measured, row by row.
+    /// How it was measured, as rows of a table.
     fn how(&self) -> Vec<(String, String)> {
         let (mut rows, protocol, digest) = match self.source {
             MeasuredDepth::Arrays {
@@ -139,7 +139,7 @@ impl EvaluationPage<'_> {
 }
 
 impl Evaluated {
-    /// Adds its key figures to a page, and one more that is named.
+    /// Adds the key figures to a page, and another one with its name.
     pub(crate) fn add_key_figures(&self, page: HtmlReport, more: (&str, &str)) -> HtmlReport {
         let report = &self.report;
         let number = |v: f64| format!("{v:.3}");
@@ -148,7 +148,7 @@ impl Evaluated {
         let baseline = report.mean_depth_baseline.as_ref();
         let baseline = baseline.map(|b| number(b.unscaled.abs_rel));
         let mut facts = vec![("Abs Rel, unscaled", own.as_str())];
-        // Without the scans of training there is none.
+        // There is none if the training scans are missing.
         if let Some(baseline) = &baseline {
             facts.push(("Abs Rel, mean-depth baseline", baseline.as_str()));
         }
@@ -160,7 +160,7 @@ impl Evaluated {
         page.facts(&facts)
     }
 
-    /// Adds its tables and charts to a page.
+    /// Adds the tables and charts to a page.
     #[must_use]
     pub fn add_to(&self, page: HtmlReport) -> HtmlReport {
         let report = &self.report;
@@ -175,7 +175,7 @@ impl Evaluated {
     }
 }
 
-/// The best frames, a typical one, with its clouds, and the worst.
+/// Adds the best frames, a typical one with its clouds, and the worst.
 fn add_frames(page: HtmlReport, shown: &[(ChosenImage, ShownFrame)]) -> Result<HtmlReport> {
     let mut page = page.section("Best and worst frames").note(
         "By unscaled Abs Rel. Depth is coloured by the logarithm of metres, warm near and cold far; errors are blue where the \
@@ -190,7 +190,7 @@ fn add_frames(page: HtmlReport, shown: &[(ChosenImage, ShownFrame)]) -> Result<H
     Ok(page)
 }
 
-/// Whether the depth's confidence keeps its promise, on frames that it was not learned from.
+/// Adds how reliable the confidence is on frames that it was not learned from.
 fn add_reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
     let bins: Vec<ReliabilityBin> = bins
         .iter()
@@ -204,7 +204,7 @@ fn add_reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
     page.section("How far to trust a pixel").reliability(&bins)
 }
 
-/// How a network was measured.
+/// How a network was evaluated.
 fn network_rows(
     request: &EvaluationRequest<'_>,
     saved: &SavedEvaluation,
@@ -234,7 +234,7 @@ fn network_rows(
             match m.held_out {
                 Some(true) => "no",
                 Some(false) => "yes",
-                None => "not known",
+                None => "unknown",
             }
             .into(),
         ),
@@ -251,7 +251,7 @@ fn network_rows(
     rows
 }
 
-/// What the protocol compares.
+/// The pixels and depths that the protocol compares.
 fn protocol_rows(protocol: &Protocol) -> [(&'static str, String); 2] {
     let crop = match protocol.crop {
         Crop::None => "the whole image",

@@ -1,4 +1,4 @@
-//! An evaluation as it is kept beside a run.
+//! An evaluation as it is saved beside a run.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::held_out::learned_from_none;
 use crate::recordings::camera_word;
 use crate::{ModelFacts, Result, dates, name_of};
 
-/// How an evaluation of a network was asked for.
+/// The request for a network's evaluation.
 #[derive(Debug, Clone)]
 pub struct EvaluationRequest<'a> {
     /// The recordings.
@@ -22,20 +22,20 @@ pub struct EvaluationRequest<'a> {
     pub split: Option<&'a Path>,
     /// What depth is compared with, and how.
     pub measurement: MeasurementRequest<'a>,
-    /// How the recordings were opened.
+    /// The options that the recordings were opened with.
     pub options: OpenOptions,
-    /// The numbers that the network is computed in.
+    /// The precision in which the network is computed.
     pub precision: Precision,
-    /// Which of the data sets that the run learned its metres are of.
+    /// The training data set whose metres are meant, if there were several.
     pub set: Option<&'a str>,
     /// The program that evaluates, with its version.
     pub program: String,
-    /// What was typed.
+    /// The command as typed.
     pub command: String,
 }
 
 impl EvaluationRequest<'_> {
-    /// What was found of a network, as it is kept beside its run.
+    /// The results for a network, as they are saved beside its run.
     ///
     /// # Errors
     /// A checkpoint, or a run's findings, that cannot be read.

@@ -1,4 +1,4 @@
-//! The chosen images of an evaluation, looked at again.
+//! Reads the chosen images of an evaluation again, to show them.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use deepfusion_render::ShownFrame;
 use super::{ChosenImage, Evaluated, ImageRef, Truth, array_places, chosen_images, depth_map};
 use crate::Result;
 
-/// What there is to show of an image.
+/// What to show of an image.
 struct ImageToShow {
     image: Option<RgbImage>,
     prediction: Prediction,
@@ -18,10 +18,10 @@ struct ImageToShow {
     camera: Option<Intrinsics>,
 }
 
-/// The chosen images of recordings, with their pictures; `see` gives an image of a data set and its prediction.
+/// The chosen images of recordings, with their pictures; `see` returns an image of a data set and its prediction.
 ///
 /// # Errors
-/// What `see` says, and truth that cannot be read.
+/// An error of `see`; ground truth that cannot be read.
 pub fn shown_of_datasets(
     datasets: &[Dataset],
     truth: &mut Truth,
@@ -49,7 +49,7 @@ pub fn shown_of_datasets(
     })
 }
 
-/// The chosen images of array files, without pictures; `of_kind` says what the first file's arrays are.
+/// The chosen images of array files, without pictures; `of_kind` is the kind of the first file's arrays.
 ///
 /// # Errors
 /// An array that cannot be read.

@@ -1,4 +1,4 @@
-//! Where the true depth comes from, of which pixels of a prediction it is known, and the mean depth of scans as a baseline.
+//! The sources of ground truth, the pixels of a prediction for which it is known, and the mean depth of scans as a baseline.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -13,19 +13,19 @@ use deepfusion_runtime::Prediction;
 use crate::recordings::plain_training_recordings;
 use crate::{Error, Result};
 
-/// Pixels taken of each frame by [`known_pixels`], at most.
+/// The most pixels that [`known_pixels`] takes of a frame.
 const PIXELS: usize = 4_000;
 
-/// Where the truth comes from.
+/// The source of the ground truth.
 pub enum Truth {
     /// The recordings' scans.
     Scans(GtKind),
-    /// A file of arrays that are named as `data export-gt` names them.
+    /// A file of arrays, named as `data export-gt` names them.
     Arrays(Box<ArraySet>),
 }
 
 impl Truth {
-    /// Of a frame; `place` is where an array file has it. `None` where nothing is known of the frame.
+    /// The ground truth of a frame; `place` is its index in an array file. `None` if the frame has none.
     ///
     /// # Errors
     /// A scan or an array that cannot be read.
@@ -45,7 +45,7 @@ impl Truth {
     }
 }
 
-/// Whether recordings have ground truth of a kind, of any of their selected frames.
+/// Whether any selected frame of the recordings has ground truth of a kind.
 #[must_use]
 pub fn has_truth(datasets: &[Dataset], kind: GtKind) -> bool {
     datasets.iter().any(|dataset| {
@@ -54,7 +54,7 @@ pub fn has_truth(datasets: &[Dataset], kind: GtKind) -> bool {
     })
 }
 
-/// The mean-depth baseline's scans: all of the given (training) recordings'.
+/// The mean-depth baseline, from all scans of the given (training) recordings.
 ///
 /// # Errors
 /// A scan that cannot be read.
@@ -70,10 +70,10 @@ pub fn baseline_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<Mean
     Ok(baseline)
 }
 
-/// The mean-depth baseline's scans, from an array file.
+/// The mean-depth baseline, from the scans in an array file.
 ///
 /// # Errors
-/// A file that holds no arrays.
+/// A file without arrays.
 pub fn baseline_from_arrays(path: &Path) -> Result<MeanDepthBaseline> {
     let mut scans = ArraySet::open(path)?;
     let mut baseline = MeanDepthBaseline::new();
@@ -83,7 +83,7 @@ pub fn baseline_from_arrays(path: &Path) -> Result<MeanDepthBaseline> {
     Ok(baseline)
 }
 
-/// The mean-depth baseline from the recordings a model was trained on, where they are still there.
+/// The mean-depth baseline, from the recordings that a model was trained on; `None` if they no longer exist.
 #[must_use]
 pub fn baseline_from_training(config: &TrainConfig, kind: GtKind) -> Option<MeanDepthBaseline> {
     let recordings = plain_training_recordings(config).ok()?;
@@ -91,7 +91,7 @@ pub fn baseline_from_training(config: &TrainConfig, kind: GtKind) -> Option<Mean
     baseline_from_datasets(&datasets, kind).ok()
 }
 
-/// Ground truth as the recordings take it.
+/// Ground truth as a depth map.
 #[must_use]
 pub fn depth_map(truth: &Grid) -> DepthMap {
     DepthMap {
@@ -101,11 +101,11 @@ pub fn depth_map(truth: &Grid) -> DepthMap {
     }
 }
 
-/// Frame names to places in the file: by name, or, for a stack without names, in the order of the split's lines; without a split in that of
-/// the recordings and their frames.
+/// The index in the file for each frame's name: by name or, for a stack without names, in the order of the split file; without a split, in
+/// the order of the recordings and their frames.
 ///
 /// # Errors
-/// [`Error::StackLength`] for a stack of more or fewer arrays than frames: which is whose would be a guess.
+/// [`Error::StackLength`] if a stack does not have one array for each frame: the assignment would be a guess.
 pub fn array_places(arrays: &ArraySet, datasets: &[Dataset]) -> Result<HashMap<String, usize>> {
     if let Some(names) = arrays.names() {
         return Ok(names.iter().cloned().zip(0..).collect());
@@ -121,8 +121,8 @@ pub fn array_places(arrays: &ArraySet, datasets: &[Dataset]) -> Result<HashMap<S
     Ok(frames.into_iter().map(|(_, name)| name).zip(0..).collect())
 }
 
-/// The network's pixels, by their place in [`Prediction::disparity`], with the true depth in metres: evenly among those of the
-/// truth that are within the range, some thousands. The truth is of the whole image, and so is the prediction.
+/// Pixels of the network's output, by their index in [`Prediction::disparity`], with their true depth in metres: up to [`PIXELS`], evenly
+/// chosen among the pixels of the ground truth within the range. Both the ground truth and the prediction cover the whole image.
 #[must_use]
 pub fn known_pixels(truth: &Grid, seen: &Prediction, range_m: &Range<f64>) -> Vec<(usize, f64)> {
     let known: Vec<(usize, f64)> = truth
@@ -135,7 +135,7 @@ pub fn known_pixels(truth: &Grid, seen: &Prediction, range_m: &Range<f64>) -> Ve
     let step = known.len().div_ceil(PIXELS).max(1);
     let (width, height) = (truth.width(), truth.height());
     let place = |(i, z): (usize, f64)| {
-        // The network's pixel at the truth's.
+        // The network's pixel at the position of the pixel of the ground truth.
         let u = (2 * (i % width) + 1) * seen.width / (2 * width);
         let v = (2 * (i / width) + 1) * seen.height / (2 * height);
         (v * seen.width + u, z)
@@ -150,7 +150,7 @@ mod tests {
     use deepfusion_sim::{SimConfig, Simulation, write_kitti};
     use std::ops::ControlFlow;
 
-    /// The field's lists are not in the order of their frames, and arrays without names are in the lists'.
+    /// The usual split files are not in the order of the frames, and arrays without names are in the order of the split file.
     #[test]
     fn a_stack_is_in_the_order_of_the_split() {
         let at = tempfile::tempdir().unwrap();
@@ -192,7 +192,7 @@ mod tests {
                 expected: 3
             }
         ));
-        // Without a split in that of the frames.
+        // Without a split, in the order of the frames.
         let all = array_places(&stack(5), &[drive]).unwrap();
         assert!((0..5_usize).all(|frame| all.get(&format!("{frame:010}")) == Some(&frame)));
     }

@@ -1,4 +1,4 @@
-//! Which checkpoint was measured.
+//! The checkpoint that was evaluated.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -7,29 +7,29 @@ use deepfusion_model::LearnedCamera;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 use serde::Serialize;
 
-/// The checkpoint that was measured: a run's folder alone does not say which of its two.
+/// The checkpoint that was evaluated: a run's folder has two, so its path does not say which.
 #[derive(Debug, Clone, Serialize)]
 pub struct UsedCheckpoint {
-    /// `best` or `last` of a run; a packed network's own name.
+    /// `best` or `last` for a run; a packed network's own name.
     pub name: String,
-    /// Of a run.
+    /// The path, for a run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
-    /// Of a packed network.
+    /// The SHA-256, for a packed network.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// Steps that were trained.
+    /// Number of training steps.
     pub step: usize,
-    /// The camera that a run learned, and how well.
+    /// The camera that a run learned, with its accuracy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned_camera: Option<LearnedCamera>,
-    /// Whether a run's folder was given, and the choice is the program's.
+    /// Whether a run's folder was given, so that the program chose the checkpoint.
     #[serde(skip)]
     pub chosen: bool,
 }
 
 impl UsedCheckpoint {
-    /// That of an estimator's network.
+    /// The checkpoint of an estimator's network.
     #[must_use]
     pub fn of(estimator: &DepthEstimator, model: &ModelSource) -> Self {
         let step = estimator.step;
@@ -47,7 +47,7 @@ impl UsedCheckpoint {
                     .read_findings()
                     .ok()
                     .and_then(|found| found.learned_camera)
-                    // Another checkpoint has another camera.
+                    // Another checkpoint has learned another camera.
                     .filter(|learned| learned.step == step),
                 chosen: given == folder.path(),
             },
@@ -72,7 +72,7 @@ impl fmt::Display for UsedCheckpoint {
         }
         match (self.chosen, name.as_str()) {
             (true, "best") => write!(f, " (the lowest held-out loss; last is beside it)"),
-            (true, _) => write!(f, " (there is no best)"),
+            (true, _) => write!(f, " (best does not exist)"),
             (false, _) => Ok(()),
         }
     }
@@ -101,7 +101,7 @@ mod tests {
         );
         assert_eq!(
             of_run("last", true),
-            "checkpoint  runs/a/last.safetensors, step 400 (there is no best)"
+            "checkpoint  runs/a/last.safetensors, step 400 (best does not exist)"
         );
         assert_eq!(
             of_run("last", false),

@@ -1,4 +1,4 @@
-//! What a run saw, and those it began from.
+//! Finds out what a run and its ancestors have seen.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -14,12 +14,12 @@ use crate::evaluation::ImageRef;
 use crate::recordings::{training_recordings, validates};
 use crate::verdict::Unseen;
 
-/// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
+/// Identifies a frame across copies of its drive: the drive's name, the frame's number and the size of its image's file.
 type FrameKey = (String, u64, u64);
 
-/// Whether none of the frames measured was a target or a source in training, of this run, of those it began from and of those that it is
-/// the mean of (`averaged`, of its findings). `None` where that cannot be known: recordings that are not there any more, or a network that
-/// was learned elsewhere.
+/// Whether none of the evaluated frames was a target or a source in the training of this run, of those it started from, and of those that
+/// it is the mean of (`averaged`, from its findings). `None` if that is unknown: recordings no longer exist, or a network was trained
+/// elsewhere.
 #[must_use]
 pub fn held_out(
     config: &TrainConfig,
@@ -34,7 +34,7 @@ pub fn held_out(
     Some(measured.all(|frame| !seen.contains(&key(frame))))
 }
 
-/// Which of the recordings' frames training did not see; of whom as in [`held_out`].
+/// The frames of the recordings that training did not see; training as in [`held_out`].
 #[must_use]
 pub fn unseen_frames(
     config: &TrainConfig,
@@ -57,7 +57,7 @@ pub fn unseen_frames(
     }
 }
 
-/// What a run saw, those it began from and those that it is the mean of; `datasets` are what is measured on.
+/// The frames seen by a run, those it started from, and those that it is the mean of. `datasets` are the evaluated recordings.
 fn seen_by(
     config: &TrainConfig,
     averaged: &[AveragedNetwork],
@@ -66,7 +66,7 @@ fn seen_by(
 ) -> Option<HashSet<FrameKey>> {
     let mut config = config.clone();
     if validates(&config) {
-        // Nothing of the training recordings was left out.
+        // With separate validation recordings, all training recordings were used.
         config.validation_share = 0.0;
     }
     let recordings = training_recordings(&config).ok()?;
@@ -91,7 +91,8 @@ fn seen_by(
     Some(seen)
 }
 
-/// What weights have seen that a run began from or is the mean of; those that are no run's are of other pictures (ImageNet's).
+/// The frames seen by weights that a run started from or is the mean of. Weights that are not a run's were trained on other images
+/// (ImageNet).
 fn seen_before(
     init: &Path,
     sha256: Option<&str>,
@@ -101,7 +102,7 @@ fn seen_before(
     let packed = match sha256 {
         Some(sha256) => {
             let network = embedded(init).ok()??;
-            // Another one of the name tells nothing of the one it began from.
+            // An embedded network with the same name but other weights says nothing about the ancestor.
             (network.card.sha256 == sha256).then_some(())?;
             Some(*network)
         }
@@ -134,14 +135,14 @@ fn key_of(frame: &Frame, image: &Path) -> FrameKey {
     (frame.drive.clone(), frame.number, size)
 }
 
-/// The keys of a frame that was seen: its own, and that of the stereo pair's other camera, which shows the same street at the same time.
+/// The keys of a frame that was seen: its own, and that of the stereo pair's other image, which shows the same street at the same time.
 fn keys(frame: &Frame) -> impl Iterator<Item = FrameKey> {
     let other = other_camera(frame.image.path()).filter(|image| image.is_file());
     let other = other.map(|image| key_of(frame, &image));
     std::iter::once(key(frame)).chain(other)
 }
 
-/// Where KITTI's layouts keep the other colour camera's image.
+/// The path of the other colour camera's image in KITTI's layouts.
 fn other_camera(image: &Path) -> Option<PathBuf> {
     const PAIRS: [[&str; 2]; 2] = [["image_02", "image_03"], ["image_2", "image_3"]];
     let swapped = |name: &std::ffi::OsStr| {
@@ -154,7 +155,7 @@ fn other_camera(image: &Path) -> Option<PathBuf> {
         Some(other) if !std::mem::replace(&mut found, true) => std::ffi::OsStr::new(other),
         _ => part,
     });
-    // The innermost folder of that name is the camera's.
+    // The innermost folder with that name is the camera's.
     let parts: Vec<_> = parts.collect();
     found.then(|| parts.into_iter().rev().collect())
 }

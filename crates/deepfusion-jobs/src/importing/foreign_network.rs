@@ -12,17 +12,17 @@ use deepfusion_train::{Checkpoint, CheckpointKind, Checkpoints, Device, Model};
 
 use crate::Result;
 
-/// Other projects' weights, as a run has them.
+/// Other projects' weights, converted for a run.
 #[derive(Debug)]
 pub struct ForeignNetwork {
     config: TrainConfig,
     model: Model,
-    /// A ResNet's alone: the depth network has never learned.
+    /// Set for a ResNet: the depth network was never trained.
     encoders_only: bool,
 }
 
 impl ForeignNetwork {
-    /// Reads one file of a ResNet or of SfMLearner's DispNet, the folder of another network's files, or those files.
+    /// Reads one file of a ResNet or of SfMLearner's DispNet, or the files of another network, given by their folder or one by one.
     ///
     /// # Errors
     /// Weights that cannot be read, or that fit no known network.
@@ -46,7 +46,8 @@ impl ForeignNetwork {
         })
     }
 
-    /// Writes it as a run into an empty folder, and gives its checkpoint. Its scale is not metric until it is trained with speeds.
+    /// Writes the network as a run into an empty folder, and returns the path of its checkpoint. Its scale is not metric until it is
+    /// trained with speeds.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -64,7 +65,7 @@ impl ForeignNetwork {
     }
 }
 
-/// Files in Monodepth2's layout, which Lite-Mono and R-MSFM share, among those given, by their names.
+/// The files in Monodepth2's layout, which Lite-Mono and R-MSFM share, found among `files` by name.
 fn named(files: &[PathBuf]) -> Monodepth2Files {
     let find = |name: &str| {
         let is = |p: &&PathBuf| p.file_stem().is_some_and(|stem| stem == name);
@@ -77,7 +78,7 @@ fn named(files: &[PathBuf]) -> Monodepth2Files {
     }
 }
 
-/// The preset whose settings a network goes on with: of those that learn as Monodepth2 does the one with its layers.
+/// The preset whose settings further training uses: the one with the network's layers, among the presets that train as Monodepth2 does.
 fn preset_of(net: &DepthNetConfig) -> Preset {
     let layers = |net: &DepthNetConfig| {
         let lite_mono = net.lite_mono.as_ref();
@@ -96,7 +97,7 @@ fn from_files(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, 
     of_networks(load_networks(files, device)?, device)
 }
 
-/// A run of networks as files held them.
+/// A run's configuration and model for networks read from files.
 fn of_networks(imported: Imported, device: &Device) -> Result<(TrainConfig, Model)> {
     let mut config = preset_of(&imported.depth_config).config();
     config.depth_net = imported.depth_config;
@@ -108,7 +109,7 @@ fn of_networks(imported: Imported, device: &Device) -> Result<(TrainConfig, Mode
             config.pose_net = pose_config;
             Some(pose_net)
         }
-        // The checkpoint has none, so that a run which starts from it has a new one, in a unit of its own data.
+        // The checkpoint has no PoseNet, so a run that starts from it gets a new one, whose unit is determined by its own data.
         None => {
             config.pose_net = PoseNetConfig {
                 explainability: config.pose_net.explainability,
@@ -142,7 +143,8 @@ mod tests {
     use deepfusion_model::{CheckpointLacks, Error as ModelError};
     use deepfusion_train::{Error as TrainError, PosePredictor};
 
-    /// Who starts from a depth network alone has a new PoseNet, in the unit of its own data; from both, the unit that theirs speaks of.
+    /// A run that starts from a depth network alone gets a new PoseNet, whose unit is determined by its data; a run that starts from both
+    /// keeps the imported unit.
     #[test]
     fn a_pose_net_that_the_files_lack_is_in_no_checkpoint() {
         let device = Device::flex();

@@ -1,21 +1,21 @@
-//! What can be imported, for people.
+//! The weights that can be imported, for people.
 
 use serde::Serialize;
 
 /// Another project's weights that can be imported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct KnownWeights {
-    /// The networks.
+    /// Names of the networks.
     pub name: &'static str,
-    /// Their files.
+    /// Names of their files.
     pub files: &'static str,
-    /// What a run has of them.
+    /// What a run gets from them.
     pub gives: &'static str,
-    /// Their licence, and who gives it.
+    /// Their licence, and the licensor.
     pub terms: &'static str,
 }
 
-/// All of them.
+/// All weights that can be imported.
 pub const KNOWN: &[KnownWeights] = &[
     KnownWeights {
         name: "torchvision ResNet-18, 34, 50, 101",

@@ -1,18 +1,18 @@
-//! A scan as an image without holes.
+//! Turns a scan into an image without holes.
 
 use deepfusion_geometry::{DepthMap, Intrinsics};
 
-/// Points that a cell holds on average: so that hardly one is empty.
+/// Average number of points in a cell: enough that hardly any cell is empty.
 const POINTS_A_CELL: f64 = 2.0;
-/// A cell's height over its width: a spinning scanner's lines are farther apart than the points on them.
+/// A cell's height divided by its width: a spinning scanner's lines are farther apart than the points on them.
 const ASPECT: f64 = 1.7;
 
-/// Gathers a scan's points (at the image's size) into cells large enough to hold some each, the nearest point of each,
-/// with the camera of that coarser image.
+/// Collects a scan's points (at the image's size) in cells large enough to contain some each. Keeps the nearest point of each cell, and
+/// returns the camera of that coarser image.
 pub(super) fn gathered(scan: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics) {
     let rows = scan.data.chunks_exact(scan.width.max(1));
     let first = rows.clone().position(|row| row.iter().any(|d| *d > 0.0));
-    // The sky, where no scanner looks, does not count.
+    // The sky, which the scanner does not cover, does not count.
     let looked_at = scan.height - first.unwrap_or(0);
     let points = scan.count().max(1) as f64;
     let area = POINTS_A_CELL * (looked_at * scan.width) as f64 / points;

@@ -1,4 +1,4 @@
-//! 3D targets against labelled boxes: drives with tracklets, and KITTI's object frames.
+//! Compares 3D targets with labelled boxes: in drives with tracklets, and in KITTI's object frames.
 
 mod lidar;
 mod object_frames;
@@ -26,31 +26,31 @@ use crate::files::UniqueNames;
 use crate::scene::MotionTracker;
 use crate::{Error, Result};
 
-/// Looks at labelled frames, and scores the targets that it finds.
+/// Finds targets in labelled frames, and scores them.
 pub struct TargetEvaluation {
     source: DepthSource,
     perception: Perception,
     scorer: Scorer,
-    /// Of drives, and of frames that are of none.
+    /// Names for drives, and for frames that belong to none.
     names: UniqueNames,
 }
 
-/// A frame that was looked at.
+/// A frame that was evaluated.
 pub struct EvaluatedFrame<'a> {
-    /// What a picture of it is called.
+    /// Name of a picture of it.
     pub name: String,
-    /// What was found.
+    /// The targets found.
     pub targets: &'a [Target],
-    /// Of the image.
+    /// The image's camera.
     pub camera: Intrinsics,
     /// Loads the image.
     pub image: &'a dyn Fn() -> deepfusion_data::Result<RgbImage>,
-    /// Frames of the recording that were looked at before it, and all of them.
+    /// Number of the recording's frames evaluated before it, and of all.
     pub progress: (usize, usize),
 }
 
 impl TargetEvaluation {
-    /// Nothing looked at yet.
+    /// An evaluation without frames yet.
     #[must_use]
     pub fn new(source: DepthSource, config: PerceptionConfig) -> Self {
         Self {
@@ -61,7 +61,7 @@ impl TargetEvaluation {
         }
     }
 
-    /// Where the depth comes from.
+    /// The source of depth.
     #[must_use]
     pub fn source(&self) -> &DepthSource {
         &self.source
@@ -73,10 +73,10 @@ impl TargetEvaluation {
         self.scorer.score()
     }
 
-    /// Looks at a labelled drive; `each` sees every frame that was measured.
+    /// Evaluates a labelled drive; `each` is called for every measured frame.
     ///
     /// # Errors
-    /// [`Error::NothingToMeasure`], what cannot be read or predicted, and what `each` says.
+    /// [`Error::NothingToMeasure`]; files that cannot be read; images that cannot be predicted; an error of `each`.
     pub fn drive<E: From<Error>>(
         &mut self,
         dataset: &Arc<Dataset>,
@@ -99,11 +99,11 @@ impl TargetEvaluation {
                 self.perception.reset();
             }
             if motion.stamp.is_none() {
-                // Nothing follows it: another number is no switch.
+                // No track continues here: a new id is not a switch.
                 self.scorer.begin_drive();
             }
             let targets = measured.targets(&mut self.perception, motion.stamp)?;
-            // Without such depth nothing says which boxes are seen: such a frame is followed, but not scored.
+            // Without this depth it is unknown which boxes are visible: the frame is tracked, but not scored.
             if let Some(visibility) = &visibility {
                 let labels = labels.of(dataset, *index, visibility);
                 let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
@@ -121,7 +121,7 @@ impl TargetEvaluation {
         Ok(self.some_frames_since(before, dataset.folder())?)
     }
 
-    /// Looks at the labelled frames of a folder ([`is_folder_of`]), each for itself; `each` sees every frame.
+    /// Evaluates the labelled frames of a folder ([`is_folder_of`]), each on its own; `each` is called for every frame.
     ///
     /// # Errors
     /// As [`Self::drive`].

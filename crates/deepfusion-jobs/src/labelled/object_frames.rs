@@ -1,4 +1,4 @@
-//! KITTI's object frames: `image_2`, `velodyne`, `calib`, `label_2`, a number each.
+//! KITTI's object frames: `image_2`, `velodyne`, `calib`, `label_2`, with one number for each frame.
 
 use std::path::{Path, PathBuf};
 
@@ -12,24 +12,24 @@ use super::tracklets::pixels_within;
 use super::visibility::{VisibilityDepth, counts};
 use crate::{Error, Result};
 
-/// Points of the scan from which on a label counts.
+/// A label counts if its box contains at least this many points of the scan.
 const LEAST_POINTS: usize = 15;
 
 /// One labelled frame.
 pub(super) struct ObjectFrame {
-    /// The image.
+    /// Path of the image.
     pub(super) image: PathBuf,
-    /// Of the image.
+    /// The image's camera.
     pub(super) camera: Intrinsics,
-    /// The scan in the image, metres.
+    /// The scan as a depth map at the image's size, in metres.
     pub(super) scan: DepthMap,
-    /// Its boxes.
+    /// Its labels.
     pub(super) labels: Vec<Label>,
-    /// Left, top, right and bottom of the regions in which nobody labelled anything, in pixels.
+    /// Left, top, right and bottom of the regions without labels, in pixels.
     pub(super) unlabelled: Vec<[f64; 4]>,
 }
 
-/// Whether a folder is laid out so.
+/// Whether a folder has this layout.
 #[must_use]
 pub fn is_folder_of(path: &Path) -> bool {
     ["label_2", "velodyne", "calib"]
@@ -37,7 +37,7 @@ pub fn is_folder_of(path: &Path) -> bool {
         .all(|folder| path.join(folder).is_dir())
 }
 
-/// The files of labels, one a frame, in the order of their numbers.
+/// The label files, one for each frame, in the order of their numbers.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -51,10 +51,10 @@ pub(super) fn labels_of(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 impl ObjectFrame {
-    /// The frame of a file of labels.
+    /// Reads the frame of a label file.
     ///
     /// # Errors
-    /// A file that is missing or is not what its name says.
+    /// A file that is missing or invalid.
     pub(super) fn read(folder: &Path, labels: &Path) -> Result<Self> {
         let name = labels.file_stem().unwrap_or_default().to_string_lossy();
         let image = ["png", "jpg"]
@@ -70,7 +70,7 @@ impl ObjectFrame {
         let p2 = calib.p2;
         let pinhole = [(0, 0), (1, 1), (0, 2), (1, 2)].map(|place| p2[place]);
         let camera = Intrinsics::from_numbers(pinhole, (width, height));
-        // P2 = K·[I | t]: t is what camera 2 lies off the labels' camera 0.
+        // P2 = K·[I | t]: t is the offset of camera 2 from camera 0, which the labels refer to.
         let offset = camera.inverse_matrix() * p2.column(3);
         let cloud = PointCloud::read_kitti_bin(&folder.join(format!("velodyne/{name}.bin")))?;
         let mut scan = DepthMap::empty(width as usize, height as usize);
@@ -117,7 +117,7 @@ impl ObjectFrame {
         })
     }
 
-    /// Whether a target's centre is seen where nobody labelled anything.
+    /// Whether a target's centre is in a region without labels.
     pub(super) fn is_unlabelled(&self, target: &Target) -> bool {
         let pixel = self.camera.project(&Vector3::from(target.center_m));
         pixel.is_some_and(|p| {
@@ -129,15 +129,15 @@ impl ObjectFrame {
     }
 }
 
-/// Left, top, right and bottom of a line's rectangle.
+/// Left, top, right and bottom of a label's rectangle.
 fn rectangle(line: &str) -> Option<[f64; 4]> {
     let numbers = line.split_whitespace().skip(4).take(4);
     let numbers: Vec<f64> = numbers.map(str::parse).collect::<Result<_, _>>().ok()?;
     numbers.try_into().ok()
 }
 
-/// A line: type, truncated, occluded, alpha, four of the rectangle, height, width, length, x, y, z of the bottom in camera
-/// 0, rotation_y.
+/// Parses a label: type, truncated, occluded, alpha, the rectangle's four sides, height, width, length, x, y, z of the bottom in camera 0,
+/// rotation_y.
 fn parse<'a>(line: &'a str, object: u64, offset: &Vector3<f64>) -> Option<(&'a str, Label)> {
     let mut words = line.split_whitespace();
     let class = words.next()?;
@@ -161,18 +161,18 @@ fn parse<'a>(line: &'a str, object: u64, offset: &Vector3<f64>) -> Option<(&'a s
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ObjectFrameProblem {
-    /// A line that is no label.
+    /// A line that is not a label.
     #[error("line {line}: not a label of 15 fields")]
     Label {
-        /// The line, counted from 1.
+        /// Number of the line, counted from 1.
         line: usize,
     },
-    /// A calibration without the numbers of a field.
+    /// A calibration's field with a wrong number of values.
     #[error("{field}: expected {count} numbers")]
     Calibration {
-        /// The field, such as `P2`.
+        /// Name of the field, such as `P2`.
         field: &'static str,
-        /// How many numbers it has.
+        /// Expected number of values.
         count: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! How well targets agree with labels, in words and as JSON.
+//! How well targets agree with labels, as text and as JSON.
 
 use std::fmt;
 
@@ -9,15 +9,15 @@ use serde::Serialize;
 
 use super::TargetEvaluation;
 
-/// The score, and of what: its lines for people, and its JSON for scripts.
+/// The score, with its conditions: text for people, JSON for scripts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TargetReport {
-    /// `truth`, `lidar` or `predicted`.
+    /// The source of depth: `truth`, `lidar` or `predicted`.
     pub depth: &'static str,
-    /// How the predictions of each image were combined, where there were several.
+    /// How several predictions of each image were combined; `None` for single predictions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub post_process: Option<&'static str>,
-    /// What counted as found.
+    /// The rules by which targets match labels.
     pub rules: ScoringRules,
     /// The score.
     #[serde(flatten)]
@@ -25,7 +25,7 @@ pub struct TargetReport {
 }
 
 impl TargetEvaluation {
-    /// What was found so far; `post_process` is how the predictions of each image were combined.
+    /// The report so far; `post_process` is how the predictions of each image were combined.
     #[must_use]
     pub fn report(&self, post_process: Option<PostProcess>) -> TargetReport {
         TargetReport {

@@ -1,4 +1,4 @@
-//! Where the depth comes from that targets are found in.
+//! The sources of the depth in which targets are found.
 
 use deepfusion_data::{Dataset, RgbImage, kitti::GtKind};
 use deepfusion_eval::IntervalFactors;
@@ -11,28 +11,28 @@ use super::object_frames::ObjectFrame;
 use super::visibility::VisibilityDepth;
 use crate::{Result, intervals};
 
-/// Where the measured depth comes from.
+/// A source of depth.
 pub enum DepthSource {
     /// The simulator's exact depth.
     Truth,
     /// The scans.
     Lidar,
-    /// A network, of every frame: targets need more than one to be confirmed.
+    /// A network, which predicts every frame: a target needs several frames to be confirmed.
     Network(Box<PredictedDepth>),
 }
 
-/// A network, and what is made of what it says.
+/// A network with its settings.
 pub struct PredictedDepth {
     /// The network.
     pub estimator: DepthEstimator,
-    /// How its input is made: of [`DepthEstimator::preparer`], or of [`DepthEstimator::augmented`] for several predictions.
+    /// Prepares its input: [`DepthEstimator::preparer`], or [`DepthEstimator::augmented`] for several predictions.
     pub preparer: Preparer,
-    /// What its intervals are stretched by.
+    /// The factors of its intervals.
     pub intervals: IntervalFactors,
 }
 
 impl DepthSource {
-    /// One word for a report: `truth`, `lidar` or `predicted`.
+    /// The word for it in a report: `truth`, `lidar` or `predicted`.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
@@ -42,7 +42,7 @@ impl DepthSource {
         }
     }
 
-    /// How depth of this kind is looked at.
+    /// The perception settings for depth of this kind.
     #[must_use]
     pub fn settings(&self) -> PerceptionConfig {
         match self {
@@ -51,7 +51,7 @@ impl DepthSource {
         }
     }
 
-    /// What is seen of a recording's frame; `None` where it is not measured.
+    /// The depth of a recording's frame; `None` if it has none.
     pub(super) fn of_frame(
         &mut self,
         dataset: &Dataset,
@@ -70,7 +70,7 @@ impl DepthSource {
         })
     }
 
-    /// What is seen of a labelled frame; it has no exact depth.
+    /// The depth of a labelled frame; it has no exact depth.
     pub(super) fn of_object_frame(&mut self, frame: &ObjectFrame) -> Result<Option<FrameDepth>> {
         Ok(match self {
             Self::Truth => None,
@@ -98,7 +98,7 @@ impl PredictedDepth {
     }
 }
 
-/// Depth of a frame, and what it is worth where its source says so.
+/// Depth of a frame, with its uncertainty if the source has it.
 pub(super) struct FrameDepth {
     depth: DepthMap,
     sigma: Option<DepthMap>,
@@ -114,7 +114,7 @@ impl FrameDepth {
         }
     }
 
-    /// What stands there.
+    /// The targets in the frame.
     pub(super) fn targets(
         &self,
         perception: &mut Perception,

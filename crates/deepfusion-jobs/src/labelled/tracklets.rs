@@ -1,4 +1,4 @@
-//! The boxes of a drive's `tracklet_labels.xml`, as the camera of each frame sees them.
+//! The boxes of a drive's `tracklet_labels.xml`, in the camera of each frame.
 
 use deepfusion_data::kitti::{Calibration, Tracklet};
 use deepfusion_data::{Dataset, Error, MissingPart};
@@ -9,11 +9,11 @@ use nalgebra::Vector3;
 use super::visibility::{VisibilityDepth, counts};
 use crate::Result;
 
-/// Pixels of a box in an image of 640×192 from which on it counts, where every pixel's depth is known.
+/// With dense depth, a box counts if it has at least this many pixels, scaled to an image of 640×192.
 const LEAST_PIXELS: f64 = 50.0;
-/// Points of a scan from which on it counts.
+/// With scans, a box counts if it contains at least this many points.
 const LEAST_POINTS: usize = 15;
-/// Frames before and after over which a label's velocity is measured.
+/// Number of frames before and after over which a label's velocity is measured.
 const REACH: u64 = 2;
 
 /// The boxes of a drive.
@@ -23,10 +23,10 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// Reads a drive's boxes and the calibration that brings them into the camera.
+    /// Reads a drive's boxes, and the calibration that transforms them into the camera.
     ///
     /// # Errors
-    /// Where there are none of either.
+    /// One of them is missing.
     pub(super) fn read(dataset: &Dataset) -> Result<Self> {
         let folder = dataset.folder();
         let tracklets = Tracklet::read(&folder.join(Tracklet::FILE))?;
@@ -88,7 +88,7 @@ impl Labels {
         Some((center, (-along.z).atan2(along.x)))
     }
 
-    /// Its velocity over ground about a frame, in that frame's camera.
+    /// The tracklet's velocity over ground around a frame, in that frame's camera.
     fn velocity(&self, dataset: &Dataset, index: usize, tracklet: &Tracklet) -> Option<[f64; 3]> {
         let number = dataset.frames()[index].number;
         let last = tracklet.first_frame + (tracklet.poses.len() as u64).checked_sub(1)?;
@@ -109,7 +109,7 @@ impl Labels {
     }
 }
 
-/// How many pixels with depth lie in a box, up to `enough`. The box's lowest 2 cm are the road.
+/// The number of pixels whose depth lies in a box, up to `enough`. The box's lowest 2 cm are the road.
 pub(super) fn pixels_within(
     label: &Label,
     visibility: &VisibilityDepth,

@@ -1,4 +1,4 @@
-//! Which boxes are seen well enough to be found.
+//! Decides which boxes are visible enough to be found.
 
 use deepfusion_data::{Dataset, kitti::GtKind, read_depth_png};
 use deepfusion_geometry::DepthMap;
@@ -6,18 +6,18 @@ use deepfusion_perception::Label;
 
 use crate::Result;
 
-/// Exact depth of simulated drives.
+/// Folder with the exact depth of simulated drives.
 const EXACT_DEPTH: &str = "proj_depth/groundtruth/image_02";
 
-/// Depth that says how much of a box is seen.
+/// Depth that shows how much of a box is visible.
 pub(super) struct VisibilityDepth {
-    /// At the image's size.
+    /// The depth, at the image's size.
     pub(super) depth: DepthMap,
-    /// Every pixel, or a scan's points only.
+    /// Whether every pixel has a depth; otherwise only a scan's points.
     pub(super) dense: bool,
 }
 
-/// The exact depth of a simulated frame, else its scan; `None` where there is neither.
+/// The exact depth of a simulated frame, otherwise its scan; `None` if it has neither.
 pub(super) fn visibility(dataset: &Dataset, index: usize) -> Result<Option<VisibilityDepth>> {
     let frame = &dataset.frames()[index];
     let exact = dataset
@@ -35,9 +35,9 @@ pub(super) fn visibility(dataset: &Dataset, index: usize) -> Result<Option<Visib
     }))
 }
 
-/// Whether a label is to be found: a free-standing thing of a target's size of which enough is seen.
+/// Whether a label should be found: a free-standing object of a target's size, visible enough.
 pub(super) fn counts(label: &Label, class: &str, points: usize, least: usize) -> bool {
-    /// The simulator's things that are no targets, and KITTI's regions without labels.
+    /// Objects of the simulator that are not targets, and KITTI's regions without labels.
     const NEITHER: [&str; 5] = ["Pole", "Tree", "Building", "Fence", "DontCare"];
     let [length, width, height] = label.size_m;
     !NEITHER.contains(&class)

@@ -1,4 +1,4 @@
-//! Depth of a live source.
+//! Depth from a live source.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -12,13 +12,13 @@ use crate::bulk::{DepthJob, LoadedImage, write_one_video};
 use crate::outputs::{DepthOutput, SeenDepth};
 use crate::{Error, Input, Result};
 
-/// What came of a live source's depth. `E` is what fails.
+/// The result of depth from a live source. `E` is the error type.
 pub struct LiveDepth<E> {
-    /// How many frames were written.
+    /// Number of frames written.
     frames: usize,
-    /// Name and time of arrival, seconds since 1970, of each of them, where a video is made of them.
+    /// Their names and times of arrival, in seconds since 1970, if a video is made of them.
     filmed: Vec<(String, Option<f64>)>,
-    /// Why the source was left, or what failed.
+    /// Why the run ended, or what failed.
     pub ending: Result<LiveEnd, E>,
 }
 
@@ -29,11 +29,12 @@ struct SeenFrame {
     seen: SeenDepth,
 }
 
-/// Predicts the newest frame of a source again and again, and writes what is kept of each; `written` sees the sidecars. `video` says whether
-/// [a video](LiveDepth::write_video) will be made: the frames are remembered for it. What was written stays, also where the source is lost. As [`run`].
+/// Predicts the newest frame of a source again and again, and writes its outputs; `written` is called with each sidecar. `video` says
+/// whether [a video](LiveDepth::write_video) will be made: the frames' names are then remembered. Written files stay, even if the source is
+/// lost. Otherwise as [`run`].
 ///
 /// # Panics
-/// Where the thread that writes panics.
+/// If the writing thread panics.
 pub fn predict<E: From<Error> + Send>(
     job: &DepthJob<'_>,
     estimator: &mut DepthEstimator,
@@ -72,7 +73,7 @@ pub fn predict<E: From<Error> + Send>(
     }
 }
 
-/// What the network says of a frame, and the milliseconds from its arrival to that.
+/// Predicts a frame; also returns the time since its arrival, in milliseconds.
 fn predict_frame(
     job: &DepthJob<'_>,
     estimator: &mut DepthEstimator,
@@ -95,17 +96,17 @@ fn predict_frame(
 }
 
 impl<E> LiveDepth<E> {
-    /// Frames that were written.
+    /// Number of frames written.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.frames
     }
 
-    /// The video of the frames beside their depth, each shown for as long as until the next came: [`VIDEO`] in the folder of their pictures.
-    /// Gives its path and its frames; `None` where there are none.
+    /// Makes a video of the frames beside their depth, each shown until the next one arrived: [`VIDEO`] in the folder of their pictures.
+    /// Returns its path and its number of frames; `None` if there are no frames.
     ///
     /// # Errors
-    /// What ffmpeg says.
+    /// ffmpeg's error.
     pub fn write_video(&self, folder: &Path) -> Result<Option<(PathBuf, usize)>> {
         let times: Vec<Option<f64>> = self.filmed.iter().map(|(_, time)| *time).collect();
         let names = self.filmed.iter().map(|(name, _)| name.as_str());

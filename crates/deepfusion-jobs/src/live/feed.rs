@@ -1,4 +1,4 @@
-//! The loop over a live source: take the newest, process it, hand over, until it is enough.
+//! The loop over a live source: take the newest frame, process it, pass it on, until the end.
 
 use std::time::{Duration, Instant};
 
@@ -8,36 +8,36 @@ use deepfusion_video::{Address, LiveFrame, LiveSource, NextFrame};
 use super::figures::Figures;
 use crate::Result;
 
-/// Whether it is to stop is asked this often while nothing comes.
+/// How often `stop` is called while no frame arrives.
 const ASK_EVERY: Duration = Duration::from_millis(100);
 
-/// Why a run over a live source came to its end.
+/// Why a run over a live source ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LiveEnd {
-    /// The stream was over.
+    /// The stream has ended.
     Stream,
-    /// The other side closed the connection in good order: whether the stream was over or is lost cannot be seen.
+    /// The other side closed the connection properly: the stream has ended, or it was lost.
     Closed,
-    /// As many frames, or as long, as were asked for.
+    /// The limit of frames or time was reached.
     Enough,
-    /// It was asked to stop.
+    /// `stop` returned true.
     Stopped,
 }
 
 impl LiveEnd {
-    /// In words.
+    /// The reason as text.
     #[must_use]
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Stream | Self::Closed => "the stream ended",
-            Self::Enough => "as many as were asked for",
+            Self::Enough => "limit reached",
             Self::Stopped => "stopped",
         }
     }
 }
 
-/// The frames of a source until it ends, is lost, or enough of them were seen.
+/// The frames of a source, until it ends, is lost, or a limit is reached.
 pub struct Feed {
     source: LiveSource,
     frames: u64,
@@ -47,21 +47,21 @@ pub struct Feed {
     figures: Figures,
 }
 
-/// When a live source is left.
+/// When to stop reading a live source.
 #[derive(Debug, Clone, Copy)]
 pub struct LiveLimits {
-    /// After so many frames; skipped ones do not count.
+    /// After this many frames; skipped ones do not count.
     pub frames: Option<u64>,
-    /// So many seconds after the first frame.
+    /// This many seconds after the first frame.
     pub duration_s: Option<f64>,
-    /// After so many seconds of silence, which are an error.
+    /// After this many seconds without a frame, which is an error.
     pub timeout_s: f64,
-    /// Where this says so.
+    /// When this returns true.
     pub stop: fn() -> bool,
 }
 
 impl Feed {
-    /// Begins to read.
+    /// Opens the source.
     ///
     /// # Errors
     /// A source that cannot be opened.
@@ -76,13 +76,13 @@ impl Feed {
         })
     }
 
-    /// The whole run's figures; `None` where nothing came.
+    /// Figures of the whole run; `None` if no frame arrived.
     #[must_use]
     pub fn summary(&self) -> Option<String> {
         self.figures.summary()
     }
 
-    /// The next frame: the newest there is, or why there is none.
+    /// The newest frame, or why there is none.
     fn next(&mut self) -> Result<Result<LiveFrame, LiveEnd>> {
         loop {
             let late = |first: Instant| self.duration.is_some_and(|d| first.elapsed() >= d);
@@ -111,20 +111,20 @@ impl Feed {
     }
 }
 
-/// Any time that can be waited.
+/// A duration; any that is too long or invalid becomes the longest possible.
 fn seconds(s: f64) -> Duration {
     Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX)
 }
 
-/// Processes frame after frame, always the newest, and writes what comes of it on a thread of its own. `process` also returns the
-/// latency, in milliseconds; `say` gets a line on how it goes, now and then. One result may wait for the writer: beyond that the network
-/// waits, the source's frames are skipped, and none is late.
+/// Processes one frame after another, always the newest, and writes results on another thread. `process` also returns the latency in
+/// milliseconds; `say` receives a status line from time to time. One result may wait for the writer. If another one follows, the network
+/// waits and the source's frames are skipped, so that results are never old.
 ///
-/// What was processed is written, also where the source is lost: its error comes after that. Where the other side closed the connection
-/// ([`LiveEnd::Closed`]), that may be a loss, too.
+/// Processed frames are written even if the source is lost; its error is returned afterwards. If the other side closed the connection
+/// ([`LiveEnd::Closed`]), the source may also have been lost.
 ///
 /// # Errors
-/// Those of the source, of `process` and of `write`.
+/// Errors of the source, of `process` and of `write`.
 pub fn run<O: Send, E: From<crate::Error> + Send>(
     feed: &mut Feed,
     mut process: impl FnMut(LiveFrame) -> Result<(O, f64), E>,
@@ -148,7 +148,7 @@ pub fn run<O: Send, E: From<crate::Error> + Send>(
                         say(&line);
                     }
                     if to_writer.send(result).is_err() {
-                        // The writer has failed, and says why below.
+                        // The writer has failed; its error is returned below.
                         break Ok(LiveEnd::Stopped);
                     }
                 }

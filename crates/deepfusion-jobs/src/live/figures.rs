@@ -1,11 +1,11 @@
-//! How a live source keeps up, in constant memory however long it runs.
+//! Figures on how a live source keeps up, in constant memory.
 
 use std::time::{Duration, Instant};
 
-/// Figures of late are given no more often than this.
+/// Shortest time between two status lines.
 const EVERY: Duration = Duration::from_secs(5);
 
-/// Latencies counted by the millisecond.
+/// A histogram of latencies, with bins of one millisecond.
 #[derive(Debug, Clone)]
 struct Latencies {
     counts: Vec<u64>,
@@ -13,7 +13,7 @@ struct Latencies {
 }
 
 impl Latencies {
-    /// Milliseconds that are told apart.
+    /// Number of bins; longer latencies share the last one.
     const BINS: usize = 10_000;
 
     fn new() -> Self {
@@ -32,7 +32,7 @@ impl Latencies {
         self.counts.iter().sum()
     }
 
-    /// To the millisecond.
+    /// The median, rounded to the millisecond.
     fn median_ms(&self) -> usize {
         let half = self.count() / 2;
         let mut below = 0;
@@ -52,19 +52,19 @@ impl Latencies {
     }
 }
 
-/// Frames a second, latency and skipped frames: lately, and of the whole run.
+/// Frames per second, latency and skipped frames: since the last line, and over the whole run.
 #[derive(Debug)]
 pub(super) struct Figures {
     lately: Latencies,
     since: Instant,
     all: Latencies,
-    /// When the first and the last frame were done.
+    /// When the first and the last frame were finished.
     span: Option<(Instant, Instant)>,
     dropped: u64,
 }
 
 impl Figures {
-    /// Of nothing yet.
+    /// Figures without frames yet.
     pub(super) fn new() -> Self {
         Self {
             lately: Latencies::new(),
@@ -75,7 +75,7 @@ impl Figures {
         }
     }
 
-    /// Counts a frame that was done, and now and then gives a line on how it goes.
+    /// Counts a finished frame; from time to time returns a status line.
     pub(super) fn add(&mut self, latency_ms: f64, dropped: u64) -> Option<String> {
         let now = Instant::now();
         let first = self.span.map_or(now, |(first, _)| first);
@@ -100,13 +100,13 @@ impl Figures {
         Some(line)
     }
 
-    /// The whole run in a few words; `None` where nothing came.
+    /// Summary of the whole run; `None` if no frame arrived.
     pub(super) fn summary(&self) -> Option<String> {
         let (first, last) = self.span?;
         let took = last.duration_since(first).as_secs_f64();
         let rate = match self.all.count() {
             0..=1 => String::new(),
-            // The first is where the time begins.
+            // The time begins with the first frame, which therefore does not count.
             n => format!("{:.1} frames/s, ", (n - 1) as f64 / took.max(1e-9)),
         };
         Some(format!(

@@ -1,4 +1,4 @@
-//! The names of live frames, and room for them.
+//! Names of live frames, and making room for them.
 
 use std::path::Path;
 
@@ -6,18 +6,18 @@ use crate::{Error, Result};
 
 /// What the names of frames begin with.
 const PREFIX: &str = "live-";
-/// Digits of a frame's number, at least.
+/// Smallest number of digits in a frame's number.
 const DIGITS: usize = 10;
 
-/// The name of a frame by its place in the stream.
+/// The name of the frame with this number in the stream.
 pub(super) fn frame_name(number: u64) -> String {
     format!("{PREFIX}{number:0DIGITS$}")
 }
 
-/// The video of all frames.
+/// Name of the video of all frames.
 pub const VIDEO: &str = "live_video.mp4";
 
-/// Whether a file is an output of a live frame, or of all.
+/// Whether a file is an output of a live frame, or the video of all.
 fn is_of_a_frame(file: &str) -> bool {
     if file == VIDEO {
         return true;
@@ -29,11 +29,10 @@ fn is_of_a_frame(file: &str) -> bool {
     digits >= DIGITS && rest[digits..].starts_with(['.', '_'])
 }
 
-/// Makes the folder. Frames of an earlier run would stand between those of this one: they are an error, or with
-/// `overwrite` removed.
+/// Creates the folder. Frames of an earlier run would be mixed with those of this one: they are an error, or removed with `overwrite`.
 ///
 /// # Errors
-/// [`Error::LiveFrameExists`]; a folder that cannot be made or read.
+/// [`Error::LiveFrameExists`]; a folder that cannot be created or read.
 pub fn make_room(folder: &Path, overwrite: bool) -> Result<()> {
     let failed = |e| deepfusion_data::Error::file(folder, e);
     std::fs::create_dir_all(folder).map_err(failed)?;
@@ -79,7 +78,7 @@ mod tests {
         assert!(make_room(folder.path(), false).is_err());
         assert!(
             frames.iter().all(|f| at(f).exists()),
-            "nothing is touched unasked"
+            "no other file is removed"
         );
         make_room(folder.path(), true).unwrap();
         assert!(frames.iter().all(|f| !at(f).exists()));

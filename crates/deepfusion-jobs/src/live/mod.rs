@@ -1,5 +1,4 @@
-//! A camera or a stream: always the newest frame, how late it is, and room for what comes of it: depth ([`predict`]) or targets
-//! ([`perceive`]).
+//! Cameras and streams: always takes the newest frame, measures its latency, and makes depth ([`predict`]) or targets ([`perceive`]).
 
 mod depth;
 mod feed;
@@ -16,7 +15,7 @@ use deepfusion_video::{Address, LiveFrame};
 
 use crate::Input;
 
-/// A frame as an input among others: named by its place in the stream.
+/// A frame as an input, named by its number in the stream.
 #[must_use]
 pub fn input(address: &Address, frame: &LiveFrame) -> Input {
     Input {

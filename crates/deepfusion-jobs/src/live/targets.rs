@@ -1,4 +1,4 @@
-//! Targets of a live source.
+//! Targets from a live source.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -11,25 +11,25 @@ use crate::outputs::TargetWriter;
 use crate::scene::StraightWay;
 use crate::{Error, PerceivedFrame, Result, StartedFrame, TargetFinder};
 
-/// What came of a live source's targets. `E` is what fails.
+/// The result of targets from a live source. `E` is the error type.
 #[derive(Debug)]
 pub struct LiveTargets<E> {
-    /// Frames that were written.
+    /// Number of frames written.
     pub frames: usize,
-    /// Targets that were found in them.
+    /// Number of targets found in them.
     pub targets: usize,
-    /// Why the source was left, or what failed.
+    /// Why the run ended, or what failed.
     pub ending: Result<LiveEnd, E>,
 }
 
-/// Finds the targets of the newest frame of a source again and again, and writes them; `found` sees each frame's before its files are written:
-/// who acts on them need not wait for pictures. What was written stays, also where the source is lost. As [`run`].
+/// Finds the targets of the newest frame of a source again and again, and writes them. `found` is called with each frame's targets before
+/// its files are written, so that it need not wait for pictures. Written files stay, even if the source is lost. Otherwise as [`run`].
 ///
 /// # Errors
-/// Where the file of all targets cannot be begun, or put in its place.
+/// If the file with all targets cannot be created or renamed.
 ///
 /// # Panics
-/// Where the thread that writes panics.
+/// If the writing thread panics.
 pub fn perceive<E: From<Error> + Send>(
     job: &DepthJob<'_>,
     mut finder: TargetFinder<'_>,
@@ -63,7 +63,7 @@ pub fn perceive<E: From<Error> + Send>(
     })
 }
 
-/// What was found in a frame.
+/// Finds the targets in a frame.
 fn find_targets(
     job: &DepthJob<'_>,
     finder: &mut TargetFinder<'_>,

@@ -1,37 +1,37 @@
-//! All that this machine has for the program.
+//! An overview of what this machine has.
 
 use serde::Serialize;
 
 use super::{InstructionSet, Memory, Tool, free_disk_mb, instruction_sets};
 use crate::devices::Backend;
 
-/// All that this machine has for the program.
+/// An overview of what this machine has.
 #[derive(Debug, Serialize)]
 pub struct Machine {
     /// The program's version.
     pub version: &'static str,
-    /// How many threads the processor runs at once.
+    /// Number of threads that the processor runs at the same time.
     pub cores: usize,
-    /// Instruction sets that the kernels make use of.
+    /// Instruction sets that the kernels use.
     pub simd: Vec<InstructionSet>,
-    /// What can compute in this build.
+    /// The backends of this build.
     pub devices: Vec<Backend>,
-    /// All of its memory, MB, where that is known.
+    /// Total memory in MB, if known.
     pub memory_total_mb: Option<u64>,
-    /// What of it programs can still have, MB.
+    /// Memory still available to programs, in MB, if known.
     pub memory_free_mb: Option<u64>,
-    /// What decodes videos.
+    /// The program that decodes videos.
     pub ffmpeg: Tool,
-    /// What looks into videos.
+    /// The program that reads properties of videos.
     pub ffprobe: Tool,
-    /// What runs networks as ONNX files.
+    /// The library that runs ONNX files.
     pub onnx_runtime: Tool,
-    /// Free space of the current folder's disk, MB.
+    /// Free space on the current folder's disk, in MB.
     pub disk_free_mb: Option<u64>,
 }
 
 impl Machine {
-    /// Looks at this machine as it is now.
+    /// Inspects this machine.
     #[must_use]
     pub fn inspect() -> Self {
         let memory = Memory::now();

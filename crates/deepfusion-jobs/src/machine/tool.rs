@@ -1,4 +1,4 @@
-//! Programs and libraries from outside that this program uses where they are there.
+//! External programs and libraries that are used if available.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -8,34 +8,34 @@ use serde::{Serialize, Serializer};
 
 use super::{NoProgram, version_of};
 
-/// A program or library from outside. As text it is what was found, or why it cannot be used.
+/// An external program or library. Its text form is what was found, or why it cannot be used.
 #[derive(Debug)]
 pub enum Tool {
     /// It can be used.
     Found {
-        /// Its version, in its own words.
+        /// Its version, as it reports it.
         version: String,
-        /// The file of a library.
+        /// Path of a library's file.
         file: Option<PathBuf>,
     },
-    /// It cannot.
+    /// It cannot be used.
     Unusable(NoTool),
 }
 
-/// Why a program or library from outside cannot be used.
+/// Why an external program or library cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoTool {
-    /// Of a program.
+    /// The error of a program.
     #[error(transparent)]
     Program(#[from] NoProgram),
-    /// Of ONNX Runtime.
+    /// The error of ONNX Runtime.
     #[error(transparent)]
     OnnxRuntime(#[from] deepfusion_onnx::Error),
 }
 
 impl Tool {
-    /// A program of ffmpeg's family.
+    /// Looks for one of ffmpeg's programs.
     pub(super) fn program(name: &str) -> Self {
         match version_of(name) {
             Ok(version) => Self::Found {
@@ -46,7 +46,7 @@ impl Tool {
         }
     }
 
-    /// The library that runs networks as ONNX files, where none is named.
+    /// Looks for ONNX Runtime's library in the usual places.
     pub(super) fn onnx_runtime() -> Self {
         match deepfusion_onnx::runtime::find(None) {
             Ok(library) => Self::Found {
@@ -79,7 +79,7 @@ impl fmt::Display for Tool {
     }
 }
 
-/// Whether it was found, and its text.
+/// The fields `found` and `what`, the text form.
 impl Serialize for Tool {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut fields = serializer.serialize_struct("Tool", 2)?;

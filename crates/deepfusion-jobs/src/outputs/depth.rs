@@ -11,7 +11,7 @@ use super::features;
 use crate::bulk::VIDEO_ENDING;
 use crate::{Error, Result, intervals};
 
-/// A form in which the depth of an image is written, beside its JSON sidecar.
+/// A form in which an image's depth is written, beside its JSON sidecar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DepthOutput {
@@ -19,9 +19,9 @@ pub enum DepthOutput {
     DepthPng,
     /// H×W f32 metres, for NumPy.
     Npy,
-    /// The standard deviation of depth in metres, H×W f32, for NumPy; of networks that learned it.
+    /// The standard deviation of depth in metres, H×W f32, for NumPy; only for networks that predict uncertainty.
     Sigma,
-    /// How far each pixel can be trusted, H×W f32 from 0 to 1, for NumPy; of networks that say how sure they are.
+    /// The confidence of each pixel, H×W f32 from 0 to 1, for NumPy; only for networks that predict uncertainty.
     Confidence,
     /// Depth in colours with a legend in metres.
     Color,
@@ -31,16 +31,16 @@ pub enum DepthOutput {
     SideBySide,
     /// Coloured point cloud in the camera's axes, as PLY.
     Ply,
-    /// The same as PCD.
+    /// Coloured point cloud in the camera's axes, as PCD.
     Pcd,
     /// The encoder's features and attention masks on the image.
     Features,
-    /// A video of each recording, of the pictures of [`Self::SideBySide`]; made when they are all there.
+    /// A video of each recording, from the pictures of [`Self::SideBySide`]; made once all of them exist.
     Video,
 }
 
 impl DepthOutput {
-    /// All of them.
+    /// All outputs.
     pub const ALL: [Self; 11] = [
         Self::DepthPng,
         Self::Npy,
@@ -55,7 +55,7 @@ impl DepthOutput {
         Self::Video,
     ];
 
-    /// The name that sidecars and people use.
+    /// The name in sidecars and for people.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -73,7 +73,7 @@ impl DepthOutput {
         }
     }
 
-    /// What the name of its file ends with, after the image's.
+    /// The ending of its file's name, after the image's name.
     #[must_use]
     pub fn ending(self) -> &'static str {
         match self {
@@ -91,13 +91,13 @@ impl DepthOutput {
         }
     }
 
-    /// Whether it is a cloud, which needs the camera.
+    /// Whether it is a point cloud, which needs the camera.
     #[must_use]
     pub fn is_cloud(self) -> bool {
         matches!(self, Self::Ply | Self::Pcd)
     }
 
-    /// Whether it is made of what the network says of its own error.
+    /// Whether it needs a network that predicts uncertainty.
     #[must_use]
     pub fn needs_uncertainty(self) -> bool {
         matches!(self, Self::Sigma | Self::Confidence)
@@ -107,25 +107,25 @@ impl DepthOutput {
 /// Which points of a cloud are left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudLimits {
-    /// Those beyond this depth, metres.
+    /// Points beyond this depth, in metres.
     pub max_depth_m: f64,
-    /// Those whose standard deviation is above this share of their depth.
+    /// Points whose standard deviation is above this share of their depth.
     pub max_sigma: Option<f64>,
 }
 
-/// What is kept of every image of a run.
+/// The outputs that are written for every image of a run.
 #[derive(Debug, Clone)]
 pub struct DepthOutputs {
-    /// The forms, beside the sidecar; never a video, which is none of one image.
+    /// The outputs besides the sidecar; never a video, which does not belong to a single image.
     save: Vec<DepthOutput>,
-    /// The images of videos, bags and live sources, too, which are no files of their own.
+    /// Whether the images of videos, bags and live sources are saved, too, since they are not files.
     pub frames: bool,
-    /// Of clouds.
+    /// Limits of clouds.
     pub limits: CloudLimits,
 }
 
 impl DepthOutputs {
-    /// What is asked for, each once; for a video the pictures that it is made of. `frames`: see [`Self::frames`].
+    /// The requested outputs, each once; for a video, the pictures that it is made of. `frames` is [`Self::frames`].
     #[must_use]
     pub fn of(
         asked: impl IntoIterator<Item = DepthOutput>,
@@ -149,13 +149,13 @@ impl DepthOutputs {
         }
     }
 
-    /// The forms, beside the sidecar.
+    /// The outputs besides the sidecar.
     #[must_use]
     pub fn save(&self) -> &[DepthOutput] {
         &self.save
     }
 
-    /// What is kept of one image. `is_file`: it is a file of its own, which whoever looks at its depth can open.
+    /// The outputs for one image. `is_file` says whether it is a file that a viewer of its depth can open.
     #[must_use]
     pub fn of_image(&self, is_file: bool) -> Vec<DepthOutput> {
         let mut save = self.save.clone();
@@ -165,37 +165,37 @@ impl DepthOutputs {
         save
     }
 
-    /// Whether something of it is made of what the network says of its own error.
+    /// Whether any output needs a network that predicts uncertainty.
     #[must_use]
     pub fn need_uncertainty(&self) -> bool {
         self.limits.max_sigma.is_some() || self.save.iter().any(|save| save.needs_uncertainty())
     }
 
-    /// Whether something of it shows what the network's layers do.
+    /// Whether any output shows the network's layers.
     #[must_use]
     pub fn need_layers(&self) -> bool {
         self.save.contains(&DepthOutput::Features)
     }
 
-    /// Whether something of it has the standard deviation where the network says it.
+    /// Whether any output contains the standard deviation, if the network predicts it.
     pub(super) fn have_sigma(&self) -> bool {
         let has = |save: &DepthOutput| save.needs_uncertainty() || save.is_cloud();
         self.save.iter().any(has)
     }
 }
 
-/// What the network says of an image.
+/// The network's results for an image.
 pub(super) struct Maps<'a> {
     pub prediction: &'a Prediction,
-    /// At the image's own size.
+    /// The depth at the image's own size.
     pub depth: &'a DepthMap,
-    /// Where [`DepthOutput::Features`] was asked for.
+    /// The layers' pictures, if [`DepthOutput::Features`] was requested.
     pub layers: &'a [LayerMaps],
-    /// The standard deviation of `depth`, where the network says it and an output has it.
+    /// The standard deviation of `depth`, if the network predicts it and an output contains it.
     pub sigma: Option<&'a DepthMap>,
 }
 
-/// Writes one output, whole or not at all, without waiting for the disk.
+/// Writes one output atomically, without waiting for the disk.
 pub(super) fn write(
     save: DepthOutput,
     limits: CloudLimits,
@@ -224,7 +224,7 @@ pub(super) fn write(
             save_png(&picture, path)?;
         }
         DepthOutput::Image => save_jpeg(image, path)?,
-        // Of all images, by `bulk::write_videos`.
+        // Made from all images, by `bulk::write_videos`.
         DepthOutput::Video => {}
         DepthOutput::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
         DepthOutput::Features => {
@@ -254,7 +254,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Writes a cloud as PCD or PLY, whole or not at all, without waiting for the disk.
+/// Writes a cloud as PCD or PLY atomically, without waiting for the disk.
 pub(super) fn write_cloud(cloud: &PointCloud, pcd: bool, path: &Path) -> Result<()> {
     let failed = |e| deepfusion_data::Error::file(path, e).into();
     deepfusion_fs::write_unsynced::<Error>(path, failed, |out| {

@@ -1,4 +1,4 @@
-//! What an earlier run left of an image whose outputs are made again, in another way.
+//! Removes what an earlier run left of an image whose outputs are made again in another way.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -9,23 +9,23 @@ use super::{DepthOutput, TargetOutput};
 use crate::bulk::{outputs_of, record_path, sidecar_path};
 use crate::{Input, Result};
 
-/// The depth of an image that is about to be written.
+/// The depth of an image, about to be written.
 pub(super) struct NewDepth<'a> {
     /// The image.
     pub(super) input: &'a Input,
-    /// Its file.
+    /// Mark of its file.
     pub(super) mark: FileMark,
-    /// fx, fy, cx, cy.
+    /// fx, fy, cx, cy in pixels.
     pub(super) intrinsics: Option<[f64; 4]>,
     /// What else it depends on.
     pub(super) made_with: &'a MadeWith,
-    /// The files that it will have.
+    /// Names of the files that will be written.
     pub(super) files: &'a [String],
 }
 
-/// Removes the outputs of the image that its sidecar names and that are not made again, and targets that were found in another depth: beside the new sidecar
-/// they would pass for its own. It comes before the new outputs: if the run is stopped then, the old sidecar still names everything that is left,
-/// and the image is not done.
+/// Removes the outputs that the image's sidecar lists and that are not made again, and targets found in another depth: beside the new
+/// sidecar they would be taken for its own. This comes before the new outputs are written. If the run is stopped in between, the old
+/// sidecar still lists everything that is left, and the image is not done.
 pub(super) fn remove_earlier(folder: &Path, new: &NewDepth<'_>) -> Result<()> {
     let Some(earlier) = earlier_sidecar(folder, &new.input.name) else {
         return Ok(());
@@ -39,7 +39,7 @@ pub(super) fn remove_earlier(folder: &Path, new: &NewDepth<'_>) -> Result<()> {
     })
 }
 
-/// Removes the targets of an image that were found by this program, and the pictures of them that its sidecar names.
+/// Removes the targets that this program found in an image, and the pictures of them that its sidecar lists.
 pub(super) fn remove_targets(folder: &Path, input: &Input) -> Result<()> {
     if let Some(earlier) = earlier_sidecar(folder, &input.name) {
         remove_named(folder, input, &earlier, |ending| {
@@ -60,13 +60,14 @@ pub(super) fn has_targets(folder: &Path, name: &str) -> bool {
     serde_json::from_slice::<FrameRecord>(&text).is_ok_and(|record| record.frame == name)
 }
 
-/// The sidecar of an earlier run; without one of ours nothing says that a file is.
+/// The sidecar of an earlier run. Without a sidecar of ours, a file cannot be recognised as an output.
 fn earlier_sidecar(folder: &Path, name: &str) -> Option<Sidecar> {
     let text = std::fs::read(sidecar_path(folder, name)).ok()?;
     serde_json::from_slice(&text).ok()
 }
 
-/// Removes what a sidecar names and `goes` says by its ending. What is not as it was written is somebody else's by now, and the image itself is no output.
+/// Removes the files that a sidecar lists, if `goes` is true for their ending. A file that has changed since belongs to another program by
+/// now, and the image itself is not an output.
 fn remove_named(
     folder: &Path,
     input: &Input,
@@ -88,7 +89,7 @@ fn remove_named(
 impl NewDepth<'_> {
     fn is_of_other_depth(&self, earlier: &Sidecar) -> bool {
         let now = self.made_with;
-        // In which files depth is kept is no matter.
+        // The kinds of outputs do not matter.
         let made_with = MadeWith {
             save: now.save.clone(),
             max_depth_m: now.max_depth_m,
@@ -130,7 +131,7 @@ mod tests {
         }
     }
 
-    /// A sidecar of `a` that names these files, which are there.
+    /// A sidecar of `a` that lists these files; creates them.
     fn sidecar_of(folder: &Path, files: &[&str]) -> Sidecar {
         let mut sidecar = Sidecar {
             prediction: PredictionRecord::default(),
@@ -170,7 +171,7 @@ mod tests {
         let root = folder.path();
         let at = root.join("out");
         std::fs::create_dir(&at).unwrap();
-        // The last three are no outputs of `a` in that folder, whatever the sidecar says.
+        // The last three are not outputs of `a` in that folder, whatever the sidecar lists.
         let outside = root.join("a_depth.npy").display().to_string();
         let files = [
             "a_depth.npy",
@@ -182,7 +183,7 @@ mod tests {
         ];
         let sidecar = sidecar_of(&at, &files);
         std::fs::write(at.join("a_depth.png"), "somebody else's").unwrap();
-        // Who makes a recording of kept images, and lets its outputs go to the same folder.
+        // A recording was made of saved images, and its outputs go to the same folder.
         remove_named(&at, &input(&at, "a_image.jpg"), &sidecar, ALL).unwrap();
         for file in files {
             let goes = file == "a_depth.npy";
@@ -197,7 +198,7 @@ mod tests {
         let image = input(folder.path(), "a.png");
         let sidecar = sidecar_of(folder.path(), &["a_overlay.png", "a_depth.npy"]);
         write_unsynced(&sidecar, folder.path(), "a").unwrap();
-        // A mask of the user's beside it, which no run wrote.
+        // The user's mask beside it, which no run wrote.
         std::fs::write(at("a_segments.png"), "").unwrap();
         for (record, goes) in [
             ("[1, 2]", false),

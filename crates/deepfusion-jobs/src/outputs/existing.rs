@@ -1,4 +1,4 @@
-//! Outputs that are there already: they are no images to look at, and nothing is written over them unasked.
+//! Existing outputs: they are not inputs, and are not overwritten unless requested.
 
 use std::path::Path;
 
@@ -9,8 +9,9 @@ use super::{DepthOutput, DepthWriter, TargetOutput};
 use crate::bulk::{record_lines_path, record_path, sidecar_path};
 use crate::{Error, Input, Result};
 
-/// The inputs without the pictures that are outputs themselves: the sidecar of an image beside them lists them, or targets were written beside them. Depth of a
-/// picture of depth means nothing. Images that were kept ([`DepthOutput::Image`]) are left out in the folder of the outputs alone.
+/// The inputs without pictures that are outputs themselves: the sidecar of an image beside them lists them, or targets were written beside
+/// them. Depth of a picture of depth is meaningless. Saved images ([`DepthOutput::Image`]) are only left out if they are in the output
+/// folder.
 #[must_use]
 pub fn without_outputs(mut inputs: Vec<Input>, folder: &Path) -> Vec<Input> {
     let folder = folder.canonicalize().ok();
@@ -18,11 +19,11 @@ pub fn without_outputs(mut inputs: Vec<Input>, folder: &Path) -> Vec<Input> {
     inputs
 }
 
-/// That no file is there yet that is written of these images and their targets, whoever wrote it: what `writer` writes of each image, its
-/// targets in these forms and as JSON, and the file of all targets.
+/// Checks that no file exists yet that would be written for these images and their targets: the outputs of `writer`, the targets in these
+/// forms and as JSON, and the file with all targets.
 ///
 /// # Errors
-/// [`Error::Exists`] naming the first file that is there.
+/// [`Error::Exists`] with the first existing file.
 pub fn require_unwritten(
     writer: &DepthWriter<'_>,
     forms: &[TargetOutput],
@@ -46,10 +47,10 @@ pub fn require_unwritten(
     }
 }
 
-/// Whether a picture is an output; `folder` is that of the outputs to come, without links.
+/// Whether a picture is an output; `folder` is the folder of the new outputs, with links resolved.
 fn is_output(picture: &Path, folder: Option<&Path>) -> bool {
     let parent = match picture.parent() {
-        // A bare name lies in the current folder.
+        // A name without a folder is in the current folder.
         Some(parent) if parent == Path::new("") => Path::new("."),
         Some(parent) => parent,
         None => return false,
@@ -88,7 +89,8 @@ mod tests {
             name: file.to_owned(),
             frame: None,
         };
-        // Of the second image nothing was written: its name ends like a picture's by chance. Beside the third somebody keeps targets of his own.
+        // Nothing was written for the second image: its name ends like a picture's by chance. Beside the third, the user keeps their own
+        // targets.
         let images = ["a.png", "b_overlay.png", "c_segments.png", "a_overlay.png"].map(input);
         for file in ["a.png", "b_overlay.png", "c_segments.png", "a_overlay.png"] {
             std::fs::write(at(file), []).unwrap();
@@ -97,7 +99,7 @@ mod tests {
         std::fs::write(at("c_targets.json"), r#"[{"class": "car"}]"#).unwrap();
         let left = without_outputs(images.to_vec(), folder.path());
         assert_eq!(left, images[..3]);
-        // Whatever folder the next outputs go to.
+        // Whatever folder the new outputs go to.
         assert_eq!(without_outputs(images.to_vec(), &at("none")), images[..3]);
     }
 }

@@ -1,4 +1,4 @@
-//! The picture of what a network sees: its encoder's features and attention on the image (the paper's Fig. 5).
+//! Draws what a network's layers compute: the encoder's features and attention, over the image (the paper's Fig. 5).
 
 use deepfusion_data::{RgbImage, resize_rgb};
 use deepfusion_geometry::DepthMap;
@@ -8,14 +8,14 @@ use image::imageops::crop_imm;
 
 use crate::Result;
 
-/// Width of each picture of the sheet, in pixels: captions need some.
+/// Width of each picture of the sheet, in pixels: enough for the captions.
 const WIDTH: u32 = 480;
 
-/// The encoder's layers under the names that people know.
+/// The usual names of the encoder's layers.
 const LAYERS: [&str; 5] = ["conv1", "layer1", "layer2", "layer3", "layer4"];
 
-/// Image and depth, then for each layer its feature, what the decoder reads of it, and the spatial mask; without
-/// context and attention the features alone.
+/// Image and depth, then for each layer its feature, the feature that the decoder reads, and the spatial mask; without context and
+/// attention, only the features.
 pub(super) fn picture(
     image: &RgbImage,
     depth: &DepthMap,
@@ -61,7 +61,7 @@ pub(super) fn picture(
     Ok(sheet(&tiles, columns.max(2)))
 }
 
-/// The width of the network's image: the first feature has half of it.
+/// The width of the network's input: the first feature has half of it.
 fn image_side(layers: &[LayerMaps]) -> usize {
     layers.first().map_or(1, |layer| 2 * layer.feature.width)
 }

@@ -1,7 +1,8 @@
-//! What is written of an image: its depth in the forms asked for, 3D targets drawn, and the sidecar that says how it was made.
+//! What is written for an image: its depth in the requested forms, drawings of 3D targets, and the sidecar that records how they were made.
 //!
-//! [`DepthOutput`] and [`TargetOutput`] are the forms; [`DepthWriter`] writes those of one image with its sidecar, without waiting for
-//! the disk ([`crate::bulk`] does, many at a time); [`draw`] makes the pictures and clouds of a frame's targets, [`TargetWriter`] writes them.
+//! [`DepthOutput`] and [`TargetOutput`] are the forms. [`DepthWriter`] writes those of one image with its sidecar, without waiting for the
+//! disk ([`crate::bulk`] waits for many at a time). [`draw`] makes the pictures and clouds of a frame's targets; [`TargetWriter`] writes
+//! them.
 
 mod depth;
 mod earlier;

@@ -8,17 +8,17 @@ use crate::bulk::{
 };
 use crate::{PerceivedFrame, Result};
 
-/// Writes what was found in frame after frame: pictures, depth, targets, and the file of all targets.
+/// Writes what was found in one frame after another: pictures, depth, targets, and the file with all targets.
 pub struct TargetWriter<'a> {
     depth: &'a DepthWriter<'a>,
     lines: Mutex<RecordLines>,
 }
 
 impl<'a> TargetWriter<'a> {
-    /// Begins the file of all targets, where the depth is written.
+    /// Begins the file with all targets, in the folder of the depth outputs.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// A file that cannot be written.
     pub fn begin(depth: &'a DepthWriter<'a>) -> Result<Self> {
         let lines = RecordLines::begin(&record_lines_path(depth.folder))?;
         Ok(Self {
@@ -27,35 +27,36 @@ impl<'a> TargetWriter<'a> {
         })
     }
 
-    /// Writes a frame, its line last, and gives that line. Nothing is waited for until it is on the disk.
+    /// Writes a frame, its line last, and returns that line. Does not wait for the disk.
     ///
     /// # Errors
     /// As [`DepthWriter::write`].
     pub fn write(&self, found: &PerceivedFrame) -> Result<String> {
         let (folder, input) = (self.depth.folder, &found.input);
-        // Of an earlier run, which may have drawn others. What it left of depth goes with the depth that is written: clouds of the same name come after it.
+        // Removes those of an earlier run, which may have drawn other forms. Writing depth removes the earlier depth outputs, so clouds of
+        // the same name are written after it.
         remove_targets(folder, input)?;
         let mut sidecar = self
             .depth
             .write_outputs(input, &found.loaded, &found.seen)?;
         for (form, picture) in &found.pictures {
             picture.save(&form.path(folder, &input.name))?;
-            // Whose they are says the sidecar: other pictures may have such names.
+            // The sidecar lists them as ours: other programs' pictures may have such names.
             add_output(&mut sidecar, folder, form.file(&input.name))?;
         }
         write_unsynced(&sidecar, folder, &input.name)?;
         write_record(&found.record, &record_path(folder, &input.name))?;
         let line = record_line(&found.record)?;
-        // Who panicked added whole lines only.
+        // A thread that panicked added only complete lines.
         let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         lines.add(&line)?;
         Ok(line)
     }
 
-    /// Puts the file of all targets in its place; where no frame is done, it is taken away, and an earlier one stays.
+    /// Gives the file with all targets its final name. If no frame is done, it is removed, and an earlier one stays.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// A file that cannot be written.
     pub fn finish(self, done: usize) -> Result<()> {
         let lines = self.lines.into_inner();
         let lines = lines.unwrap_or_else(PoisonError::into_inner);

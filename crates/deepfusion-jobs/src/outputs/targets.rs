@@ -17,24 +17,24 @@ use crate::Result;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TargetOutput {
-    /// Depth as 16-bit PNG, metres × 256: what the viewer shows. Written with the prediction ([`super::DepthWriter`]).
+    /// Depth as 16-bit PNG, metres × 256, as the viewer shows it. Written with the prediction ([`super::DepthWriter`]).
     DepthPng,
-    /// How sure the network is; written with the prediction, too.
+    /// The standard deviation of depth; also written with the prediction.
     Sigma,
     /// The image with boxes.
     Overlay,
     /// The road from above: free space, boxes, velocities.
     BirdsEye,
-    /// Disparity with each target in its colour.
+    /// Disparity, with each target in its own colour.
     Segments,
-    /// Coloured point cloud in the camera's axes, without the points that hang between near and far, as PLY.
+    /// Coloured point cloud in the camera's axes as PLY, without the points that float between near and far surfaces.
     Ply,
-    /// The same as PCD.
+    /// The same cloud as PCD.
     Pcd,
 }
 
 impl TargetOutput {
-    /// All of them.
+    /// All forms.
     pub const ALL: [Self; 7] = [
         Self::DepthPng,
         Self::Sigma,
@@ -45,7 +45,7 @@ impl TargetOutput {
         Self::Pcd,
     ];
 
-    /// The name that people use.
+    /// The name for people.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -59,7 +59,7 @@ impl TargetOutput {
         }
     }
 
-    /// What the name of its file ends with, after the frame's.
+    /// The ending of its file's name, after the frame's name.
     #[must_use]
     pub fn ending(self) -> &'static str {
         match self {
@@ -73,7 +73,7 @@ impl TargetOutput {
         }
     }
 
-    /// Where a frame's file goes.
+    /// Path of a frame's file.
     #[must_use]
     pub fn path(self, folder: &Path, name: &str) -> PathBuf {
         folder.join(self.file(name))
@@ -84,7 +84,7 @@ impl TargetOutput {
         format!("{name}{}", self.ending())
     }
 
-    /// The form of the prediction that it is, where it is one.
+    /// The output of the prediction that it stands for, if any.
     #[must_use]
     pub fn of_prediction(self) -> Option<DepthOutput> {
         match self {
@@ -94,42 +94,42 @@ impl TargetOutput {
         }
     }
 
-    /// Pictures that are written of targets alone, never of a prediction.
+    /// Pictures that are only made of targets, never of a prediction.
     pub(super) const PICTURES: [Self; 3] = [Self::Overlay, Self::BirdsEye, Self::Segments];
 }
 
-/// Cells of the free space and how far it reaches, metres.
+/// Size of the cells of free space, and its range, in metres.
 const GRID: (f32, f32) = (0.25, 50.0);
-/// Size of the bird's-eye view, pixels.
+/// Size of the bird's-eye view, in pixels.
 const BIRDS_EYE: (u32, u32) = (480, 600);
 
-/// A picture or a cloud to be written.
+/// A picture or a cloud to write.
 #[derive(Debug)]
 pub enum Drawing {
     /// A picture, as PNG.
     Image(RgbImage),
-    /// A cloud, as PLY or PCD by its file's ending.
+    /// A cloud, written as PLY or PCD according to its file's extension.
     Cloud(PointCloud),
 }
 
-/// A frame at the size that perception works at, and what it found there.
+/// A frame at the working size of the perception, and what was found in it.
 #[derive(Clone, Copy)]
 pub struct TargetScene<'a> {
     /// The image at its own size, and its camera.
     pub image: (&'a RgbImage, &'a Intrinsics),
-    /// Depth at the working size, metres, and the camera at that size.
+    /// Depth at the working size in metres, and the camera at that size.
     pub depth: (&'a DepthMap, &'a Intrinsics),
-    /// The standard deviation of that depth, metres, where the network says it.
+    /// The standard deviation of that depth in metres, if the network predicts it.
     pub sigma: Option<&'a DepthMap>,
     /// What was found.
     pub surroundings: &'a Surroundings,
-    /// What found it.
+    /// The perception that found it.
     pub perception: &'a Perception,
-    /// How far a pixel of the prediction can be trusted, where that was calibrated.
+    /// The confidence of each pixel of the prediction, if it was calibrated.
     pub confidence: Option<(&'a ConfidenceModel, &'a Prediction)>,
 }
 
-/// Draws what was asked for and can be: without ground there is no bird's-eye view.
+/// Draws what was requested, if possible: without ground there is no bird's-eye view.
 #[must_use]
 pub fn draw(save: &[TargetOutput], scene: &TargetScene) -> Vec<(TargetOutput, Drawing)> {
     let (surroundings, perception) = (scene.surroundings, scene.perception);
@@ -179,12 +179,12 @@ fn cloud(scene: &TargetScene) -> Option<PointCloud> {
     });
     let sigma = scene.sigma;
     cloud.sigma = sigma.map(|sigma| PointCloud::column(&sigma.data, &clean, far));
-    // One a point: the same pixels were kept.
+    // One value for each point: the same pixels were kept.
     cloud.check().is_ok().then_some(cloud)
 }
 
-/// The confidence of each pixel of a `width` × `height` image: that of the network's pixel there, for a gradient means
-/// what it meant when it was learned only at the network's own size.
+/// The confidence of each pixel of a `width` × `height` image, taken from the network's pixel there: the model was learned from gradients
+/// at the network's own size, and applies only to those.
 fn confidences(
     model: &ConfidenceModel,
     prediction: &Prediction,
@@ -214,10 +214,10 @@ fn confidences(
 }
 
 impl Drawing {
-    /// Writes it, whole or not at all, without waiting for the disk.
+    /// Writes the drawing atomically, without waiting for the disk.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// A file that cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         match self {
             Self::Image(picture) => Ok(save_png(picture, path)?),

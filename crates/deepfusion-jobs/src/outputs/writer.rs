@@ -11,36 +11,36 @@ use super::{DepthOutput, DepthOutputs};
 use crate::bulk::{LoadedImage, add_output, sidecar_path, write_unsynced};
 use crate::{Input, Result, intervals};
 
-/// What a network says about an image.
+/// A network's results for an image.
 pub struct SeenDepth {
     /// Its depth.
     pub prediction: Prediction,
-    /// What its layers do; empty where nobody asked for [`DepthOutput::Features`].
+    /// What its layers compute; empty unless [`DepthOutput::Features`] was requested.
     pub layers: Vec<LayerMaps>,
-    /// Whether the metres hold, where that is watched.
+    /// Whether the scale has changed, if it is monitored.
     pub scale: Option<ScaleRecord>,
 }
 
-/// Writes what is kept of every image of a run.
+/// Writes the outputs of every image of a run.
 pub struct DepthWriter<'a> {
-    /// Where to.
+    /// The output folder.
     pub folder: &'a Path,
-    /// What is kept.
+    /// The outputs to write.
     pub outputs: DepthOutputs,
-    /// How the intervals are stretched that the network says.
+    /// The factors of the network's intervals.
     pub intervals: IntervalFactors,
     /// The network.
     pub model: &'a ModelSource,
-    /// Steps that it was trained for.
+    /// Number of its training steps.
     pub step: usize,
-    /// What was measured of its metres.
+    /// The measured scale of its depth.
     pub scale: MetricScale,
-    /// What the outputs depend on, beside the image.
+    /// What the outputs depend on besides the image.
     pub made_with: MadeWith,
 }
 
 impl DepthWriter<'_> {
-    /// Everything that is written of an image of a file or a recording.
+    /// The paths of all outputs of an image from a file or a recording.
     #[must_use]
     pub fn paths(&self, input: &Input) -> Vec<PathBuf> {
         let saves = self
@@ -63,12 +63,12 @@ impl DepthWriter<'_> {
         Ok(sidecar)
     }
 
-    /// Writes an image's outputs without waiting for the disk, and gives the sidecar that is to be written once they are on it. Outputs that the
-    /// sidecar of an earlier run names, and that are not written again, are removed first.
+    /// Writes an image's outputs without waiting for the disk, and returns the sidecar to write once they are on it. Outputs that the
+    /// sidecar of an earlier run lists, and that are not written again, are removed first.
     ///
     /// # Errors
-    /// A file that cannot be written or removed; [`crate::Error::NoCamera`], [`crate::Error::NoUncertainty`] and [`crate::Error::NoLayers`] where an
-    /// output needs what is not known.
+    /// A file that cannot be written or removed; [`crate::Error::NoCamera`], [`crate::Error::NoUncertainty`] and [`crate::Error::NoLayers`]
+    /// if an output needs what is not available.
     pub fn write_outputs(
         &self,
         input: &Input,
@@ -117,7 +117,7 @@ impl DepthWriter<'_> {
         Ok(sidecar)
     }
 
-    /// Whether a distortion may be undone, before the image is read: only a lens knows whether it distorts.
+    /// Whether a distortion may be removed; whether the lens distorts is only known once the image is read.
     fn may_undistort(&self, input: &Input) -> bool {
         match &input.frame {
             Some((dataset, _)) => dataset.corrects_lens(),
@@ -125,7 +125,7 @@ impl DepthWriter<'_> {
         }
     }
 
-    /// What the sidecar says of the prediction; `depth_m`: its metres.
+    /// The sidecar's record of the prediction; `depth_m` is its range of depths.
     fn record(
         &self,
         input: &Input,
@@ -162,7 +162,7 @@ fn file_of(input: &Input, save: DepthOutput) -> String {
     format!("{}{}", input.name, save.ending())
 }
 
-/// Whether an image is a file of its own, which whoever looks at its depth can open.
+/// Whether an image is a file that a viewer of its depth can open.
 fn has_file(input: &Input) -> bool {
     let frame = input.frame.as_ref();
     frame.is_none_or(|(dataset, index)| dataset.frames()[*index].image.file().is_some())

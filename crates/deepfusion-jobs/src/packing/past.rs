@@ -1,4 +1,4 @@
-//! Whether a network saw real images, as far as its run, those it began from and those that it is the mean of can tell.
+//! Finds out whether a network saw real images, as far as its run and its ancestors record it.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -11,8 +11,8 @@ use deepfusion_weights::Shipped;
 
 use crate::{Error, Result};
 
-/// Recordings and networks of a run's past of which nothing shows that their images were simulated: what bears no mark of it
-/// ([`Dataset::is_simulated`]), what is not there any more, weights of other projects, packed networks whose cards do not say so.
+/// The recordings and networks in a run's past for which it cannot be shown that their images were simulated: recordings without the mark
+/// ([`Dataset::is_simulated`]) or no longer existing, weights of other projects, packed networks whose cards do not claim it.
 ///
 /// # Errors
 /// [`Error::SawReal`] for a recording that is known to be real.
@@ -28,9 +28,9 @@ pub(super) fn not_known_as_simulated(
 
 #[derive(Default)]
 struct Ancestry {
-    /// Runs that were looked at.
+    /// Runs that were visited.
     seen: HashSet<PathBuf>,
-    /// Recordings that were, each with the split that selected its frames.
+    /// Recordings that were visited, each with the split that selected its frames.
     recordings: HashSet<(PathBuf, Option<PathBuf>)>,
     not_known: Vec<PathBuf>,
 }
@@ -53,7 +53,7 @@ impl Ancestry {
             }
         }
         if data.paths.is_empty() && data.sets.is_empty() && findings.averaged.is_empty() {
-            // Imported: it learned elsewhere.
+            // Imported: it was trained elsewhere.
             self.add_not_known(run);
         }
         if let Some(init) = &config.init {
@@ -84,10 +84,11 @@ impl Ancestry {
         Ok(())
     }
 
-    /// A network that a run began from or is the mean of: an embedded one by its name and `sha256`, else a packed file or a run.
+    /// Adds a network that a run started from or is the mean of: an embedded one by its name and `sha256`, otherwise a packed file or a
+    /// run.
     fn add_network(&mut self, path: &Path, sha256: Option<&str>) -> Result<()> {
         let packed = match sha256 {
-            // Another one of the name tells nothing of it.
+            // An embedded network with the same name but other weights says nothing about it.
             Some(sha256) => {
                 let network = embedded(path).ok().flatten();
                 network.filter(|network| network.card.sha256 == sha256)
@@ -102,7 +103,7 @@ impl Ancestry {
         Ok(())
     }
 
-    /// Once, however often it is in the run's past.
+    /// Adds a path once, however often it is in the run's past.
     fn add_not_known(&mut self, path: &Path) {
         if !self.not_known.iter().any(|known| known == path) {
             self.not_known.push(path.to_owned());
@@ -123,18 +124,18 @@ impl Ancestry {
     }
 }
 
-/// What is known of a recording's images.
+/// What is known about a recording's images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Images {
-    /// Of cameras, in a layout that is its authors' drives alone, or on a day of KITTI raw.
+    /// Real: the layout is used only by its authors' drives, or the drive was recorded on a day of KITTI raw.
     Real(DatasetKind),
-    /// Of a simulator.
+    /// Simulated.
     Simulated,
-    /// Of either: anybody may have written them.
+    /// Unknown: any program may have written them.
     NotKnown,
 }
 
-/// What is known of the images that a split selects at a path: by names and folders, none is opened.
+/// What is known about the images that a split selects at a path, according to names and folders; no image is opened.
 fn images_of(path: &Path, split: Option<&Path>) -> Images {
     match Dataset::kind_at(path) {
         Ok(
@@ -146,12 +147,12 @@ fn images_of(path: &Path, split: Option<&Path>) -> Images {
     }
 }
 
-/// As [`images_of`], of drives in KITTI raw's layout: other programs write it, too, and `data convert` does of any recording.
+/// As [`images_of`], for drives in KITTI raw's layout, which other programs write, too; `data convert` writes it for any recording.
 fn images_of_drives(path: &Path, split: Option<&Path>) -> Images {
     let Ok(mut drives) = find_drives(path) else {
         return Images::NotKnown;
     };
-    // One that cannot be read any more may have selected any.
+    // A split that can no longer be read may have selected any drive.
     if let Some(split) = split.and_then(|split| Split::read(split).ok()) {
         let named: HashSet<&str> = split.entries.iter().map(|e| e.folder.as_str()).collect();
         drives.retain(|drive| named.contains(drive.split_name().as_str()));
@@ -165,7 +166,7 @@ fn images_of_drives(path: &Path, split: Option<&Path>) -> Images {
     }
 }
 
-/// Whether a drive has the name of a day on which KITTI was recorded.
+/// Whether a drive is named after a day on which KITTI was recorded.
 fn is_kittis_own(drive: &Drive) -> bool {
     const DAYS: [&str; 5] = [
         "2011_09_26_",
@@ -186,7 +187,7 @@ mod tests {
     use std::fs;
     use std::ops::ControlFlow;
 
-    /// A simulated drive's folder.
+    /// Writes a simulated drive; returns its folder.
     fn drive(at: &Path) -> PathBuf {
         let config = SimConfig {
             frames: 2,
@@ -201,7 +202,7 @@ mod tests {
         drive.folder().to_owned()
     }
 
-    /// A folder that looks like a sequence of KITTI odometry.
+    /// Makes a folder that looks like a sequence of KITTI odometry.
     fn sequence(at: &Path) -> PathBuf {
         let folder = at.join("sequences/00");
         fs::create_dir_all(folder.join("image_2")).unwrap();
@@ -221,7 +222,7 @@ mod tests {
         folder.to_owned()
     }
 
-    /// What [`not_known_as_simulated`] says of a mean of these, of whose first the settings are.
+    /// The result of [`not_known_as_simulated`] for a mean of these networks, with the settings of the first.
     fn of_mean(networks: &[PathBuf]) -> Result<Vec<PathBuf>> {
         let (first, _) = RunFolder::open(&networks[0]).unwrap();
         let part = |path: &PathBuf| AveragedNetwork {
@@ -258,7 +259,7 @@ mod tests {
             panic!("{refused}");
         };
         assert_eq!((run, recording), (&third, &real));
-        // One that went on from the one with the real drive.
+        // Fine-tuned from the one with the real drive.
         let (folder, _) = RunFolder::open(&second).unwrap();
         let mut config = folder.read_settings().unwrap();
         config.init = Some(third);
@@ -268,7 +269,7 @@ mod tests {
         let refused = of_mean(&[first.clone(), second]).unwrap_err();
         assert!(matches!(refused, Error::SawReal { .. }), "{refused}");
 
-        // A run and a recording that are gone, weights of nobody knows what.
+        // A run and a recording that no longer exist, and weights of unknown origin.
         let gone = at.join("gone");
         let of_gone = trained_on(&at.join("fourth"), &gone.join("drive"));
         let networks = [first, gone.clone(), gone.clone(), of_gone];
@@ -279,7 +280,7 @@ mod tests {
         assert_eq!(imported.unwrap(), [gone]);
     }
 
-    /// Images alone say nothing: what another simulator rendered has no exact poses either. The mark of `data convert` does.
+    /// Images alone prove nothing: another simulator's have no exact poses either. The mark of `data convert` does.
     #[test]
     fn what_anybody_may_have_written_is_not_known() {
         let at = tempfile::tempdir().unwrap();
@@ -308,7 +309,7 @@ mod tests {
         assert!(of_mean(&run).unwrap().is_empty());
     }
 
-    /// A root of KITTI raw with a drive of its own, whose exact poses somebody added, and a simulated one.
+    /// A root of KITTI raw with one of its own drives, to which exact poses were added, and a simulated drive.
     #[test]
     fn a_split_says_which_drives_were_learned_from() {
         let at = tempfile::tempdir().unwrap();
@@ -360,7 +361,7 @@ mod tests {
                 ("ab".repeat(32), false),
             ] {
                 (config.init, config.init_sha256) = (Some(name.clone()), Some(sha256.clone()));
-                // It is the mean of networks that began from the same one, and named once.
+                // A mean of networks that were fine-tuned from the same one, which is named only once.
                 let part = AveragedNetwork {
                     path: name.clone(),
                     sha256: Some(sha256),

@@ -1,7 +1,7 @@
-//! The turns that images show, kept in the user's cache folder: all images are read for them, which takes minutes of a long drive.
+//! Keeps the turns measured in images in the user's cache folder: all images are read for them, which takes minutes for a long drive.
 //!
-//! What is kept is good for the very values that they were found from: files that are as large and as old, the same camera, mount and speeds,
-//! the same pixels of some images. Of anything else they are found anew.
+//! Kept turns apply only to the values they were measured from: files of the same size and age, the same camera, mount and speeds, and the
+//! same pixels in some images. If anything differs, they are measured again.
 
 use std::fmt::Write as _;
 use std::io;
@@ -14,15 +14,16 @@ use sha2::{Digest, Sha256};
 
 /// What a file begins with.
 const MARK: &[u8] = b"deepfusion turns of images 1\n";
-/// What takes less is found anew.
+/// Turns measured in less time than this are not kept.
 const WORTH_KEEPING: Duration = Duration::from_secs(10);
-/// Images whose pixels are compared: they change with the lens as well, whose file may be anywhere.
+/// Number of images whose pixels are compared: pixels also change with the lens, whose file may be anywhere.
 const COMPARED: usize = 3;
 
-/// A checksum of something.
+/// A SHA-256 checksum.
 type Sum = [u8; 32];
 
-/// The turns that a recording's images show ([`deepfusion_doctor::seen_turns`]), from a file in the cache folder where they were found before.
+/// The turns that a recording's images show ([`deepfusion_doctor::seen_turns`]), from a file in the cache folder if they were measured
+/// before.
 pub(super) fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
     match dirs::cache_dir() {
         Some(cache) => found_or_kept(dataset, &cache.join("deepfusion/turns"), WORTH_KEEPING),
@@ -30,10 +31,10 @@ pub(super) fn seen_turns(dataset: &Dataset) -> Vec<SeenTurn> {
     }
 }
 
-/// The same; those that took as long as this are kept in the folder, where it can be written into and all images were read.
+/// As [`seen_turns`]. Turns that took at least `worth_keeping` are kept in the folder, if it can be written to and all images were read.
 fn found_or_kept(dataset: &Dataset, folder: &Path, worth_keeping: Duration) -> Vec<SeenTurn> {
     let file = file_of(dataset, folder);
-    // Of the files as they are before their images are read.
+    // Taken before the images are read.
     let origin = origin_of(dataset);
     if let Some(turns) = origin.and_then(|origin| read(&file, &origin)) {
         return turns;
@@ -57,8 +58,8 @@ fn keep(file: &Path, turns: &[SeenTurn], origin: &Sum) -> io::Result<()> {
     deepfusion_fs::write(file, written(turns, origin))
 }
 
-/// Where a recording's turns are kept: a file for each of its cameras, one before the camera is aimed and one after it. Two topics of a bag
-/// are told apart by their intrinsics: else the turns of either would take the place of the other's.
+/// The file for a recording's turns: one for each camera, before and after the camera is aimed. Two topics of a bag differ in their
+/// intrinsics: otherwise the turns of one would replace the other's.
 fn file_of(dataset: &Dataset, folder: &Path) -> PathBuf {
     let recording = format!(
         "{:?} {} {:?} {:?} {}",
@@ -71,7 +72,7 @@ fn file_of(dataset: &Dataset, folder: &Path) -> PathBuf {
     folder.join(format!("{:x}", Sha256::digest(recording)))
 }
 
-/// A checksum of all that the turns follow from; `None` where some of it cannot be read.
+/// A checksum of everything that the turns depend on; `None` if some of it cannot be read.
 fn origin_of(dataset: &Dataset) -> Option<Sum> {
     let ego = dataset.ego().ok()?.level();
     let frames = dataset.frames();
@@ -103,7 +104,7 @@ fn origin_of(dataset: &Dataset) -> Option<Sum> {
     Some(hash.finalize().into())
 }
 
-/// Adds how large a file is and when it was written; of a folder that is one recording, of each file in it but hidden ones.
+/// Adds a file's size and modification time; for a folder that is one recording, those of each file in it except hidden ones.
 fn add_state(values: &mut String, path: &Path) -> io::Result<()> {
     let about = std::fs::metadata(path)?;
     if !about.is_dir() {
@@ -123,7 +124,7 @@ fn add_state(values: &mut String, path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// What a file of these turns holds: the mark, the origin, a checksum of the numbers, the numbers.
+/// The contents of a file with these turns: the mark, the origin, a checksum of the numbers, the numbers.
 fn written(turns: &[SeenTurn], origin: &Sum) -> Vec<u8> {
     let numbers = |turn: &SeenTurn| {
         let [roll_rad, pitch_rad] = turn.tilt_rad;
@@ -135,7 +136,7 @@ fn written(turns: &[SeenTurn], origin: &Sum) -> Vec<u8> {
     [MARK, origin.as_slice(), sum.as_slice(), numbers.as_slice()].concat()
 }
 
-/// The turns in a file, where they are whole and of this origin.
+/// The turns in a file, if it is complete and has this origin.
 fn read(file: &Path, origin: &Sum) -> Option<Vec<SeenTurn>> {
     let bytes = std::fs::read(file).ok()?;
     let rest = bytes.strip_prefix(MARK)?.strip_prefix(origin.as_slice())?;
@@ -168,7 +169,7 @@ mod tests {
     use std::ops::ControlFlow;
     use std::sync::Arc;
 
-    /// A drive of nine images whose roll and pitch nobody measured.
+    /// A drive of nine images without measured roll and pitch.
     fn drive(at: &Path) -> PathBuf {
         let config = SimConfig {
             seed: 5,
@@ -191,7 +192,7 @@ mod tests {
         Dataset::open(root, &options).unwrap().remove(0)
     }
 
-    /// Turns that no image shows, in the place of those that were kept.
+    /// Replaces the kept turns by others, which no image shows.
     fn put_others(dataset: &Dataset, cache: &Path) -> Vec<SeenTurn> {
         let other = SeenTurn {
             from_s: 0.1,
@@ -213,7 +214,7 @@ mod tests {
         let found = found_or_kept(&dataset, &cache, Duration::from_hours(1));
         assert!(!found.is_empty());
         let file = file_of(&dataset, &cache);
-        assert!(!file.exists(), "it took no time");
+        assert!(!file.exists(), "turns that took no time are not kept");
         let kept = |dataset: &Dataset| found_or_kept(dataset, &cache, Duration::ZERO);
         assert_eq!(kept(&dataset), found);
         assert_eq!(
@@ -221,10 +222,14 @@ mod tests {
             Some(found.clone())
         );
         let others = put_others(&dataset, &cache);
-        assert_eq!(kept(&dataset), others, "they are not read");
-        assert_eq!(kept(&opened(&root)), others, "nor by another start");
+        assert_eq!(kept(&dataset), others, "the images are not read again");
+        assert_eq!(
+            kept(&opened(&root)),
+            others,
+            "nor after opening the drive again"
+        );
 
-        // An image is written anew; another speed, as of a scale; another mount; a file that is cut off.
+        // An image is written again; another speed, by its scale; another mount; a file that is truncated.
         let image = dataset.frames()[4].image.path();
         let bytes = fs::read(image).unwrap();
         fs::remove_file(image).unwrap();
@@ -282,7 +287,7 @@ mod tests {
         assert_ne!(topic(60.0), topic(61.0));
     }
 
-    /// What a disk did not give once it may give the next time.
+    /// An image that could not be read once may be readable the next time.
     #[test]
     fn turns_of_a_part_of_the_images_are_not_kept() {
         let at = tempfile::tempdir().unwrap();

@@ -1,14 +1,14 @@
-//! What may not be meant of recordings, for people: one line for what several of them have in common.
+//! Warnings about recordings, for people: a warning that several recordings share is one line.
 
 use deepfusion_data::{DataWarning, Dataset, OpenOptions};
 
 use crate::evaluation::missing_frames;
 
-/// Each warning with the places that it is about.
+/// Each warning with the places that it concerns.
 pub type PlacedWarning = (String, Vec<String>);
 
-/// The warnings of recordings that were opened so, a line each: what was taken for granted, looks odd or cannot be read, and frames of the
-/// split that are missing.
+/// The warnings about recordings opened with these options, one per line: what was assumed, what looks odd or cannot be read, and missing
+/// frames of the split.
 #[must_use]
 pub fn warnings_of(options: &OpenOptions, recordings: &[Dataset]) -> Vec<String> {
     let passed_over = recordings.iter().filter_map(Dataset::passed_over);
@@ -28,7 +28,7 @@ pub fn warnings_of(options: &OpenOptions, recordings: &[Dataset]) -> Vec<String>
     lines
 }
 
-/// A warning of one or several places as a line; `None` without any.
+/// A warning about one or more places as a line; `None` without places.
 #[must_use]
 pub fn warning_line(warning: &str, places: &[String]) -> Option<String> {
     match places {
@@ -38,14 +38,14 @@ pub fn warning_line(warning: &str, places: &[String]) -> Option<String> {
     }
 }
 
-/// The warnings on recordings, each once; a place is a file, or a folder where every image is a file. Not what was passed over
-/// ([`Dataset::passed_over`]), which names the folder that it is about.
+/// The warnings about recordings, each once. A place is a file, or a folder if every image is a file. Files that were passed over
+/// ([`Dataset::passed_over`]) are not included, since those messages name their folder.
 #[must_use]
 pub fn placed_warnings(recordings: &[Dataset]) -> Vec<PlacedWarning> {
     by_warning(recordings.iter().flat_map(warnings))
 }
 
-/// Each warning with the places it is about, each place once, in the order in which they come.
+/// Each warning with the places that it concerns, each place once, in order of appearance.
 fn by_warning(warnings: impl Iterator<Item = (String, String)>) -> Vec<PlacedWarning> {
     let mut found: Vec<PlacedWarning> = Vec::new();
     for (place, warning) in warnings {
@@ -58,7 +58,7 @@ fn by_warning(warnings: impl Iterator<Item = (String, String)>) -> Vec<PlacedWar
     found
 }
 
-/// The warnings on a recording, each with its place.
+/// The warnings about a recording, each with its place.
 fn warnings(dataset: &Dataset) -> impl Iterator<Item = (String, String)> {
     let place = dataset.place().display();
     let about_it = move |warning: &&DataWarning| dataset.passed_over() != Some(*warning);

@@ -1,4 +1,4 @@
-//! What is wrong with drives that are to be trained on: the doctor's checks that take a second or so of each.
+//! Finds faults of training drives, by those of the doctor's checks that take about a second per drive.
 
 use std::fmt;
 
@@ -8,15 +8,16 @@ use deepfusion_model::TrainConfig;
 
 use crate::recordings::{reads_turns, warning_line};
 
-/// Most drives whose images are compared with their turns. Of more it is an even sample: what is wrong there is mostly the rig's.
+/// The most drives whose images are compared with their turns. If there are more, they are sampled evenly: such faults mostly concern the
+/// whole rig.
 const MOST_TURNING: usize = 16;
 
-/// Something that is wrong with drives.
+/// A fault of one or more drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// The drives, by name.
     pub drives: Vec<String>,
-    /// What the doctor finds.
+    /// The doctor's finding.
     pub finding: Box<Finding>,
 }
 
@@ -24,7 +25,7 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Finding { what, hint, .. } = &*self.finding;
         let senseless = match self.finding.severity {
-            Severity::Error => "training on it makes no sense: ",
+            Severity::Error => "not usable for training: ",
             Severity::Note | Severity::Warning => "",
         };
         let text = format!("{senseless}{what}; hint: {hint}");
@@ -32,13 +33,13 @@ impl fmt::Display for Fault {
     }
 }
 
-/// What is wrong with drives, each with the place of its set: their cameras' numbers, and their turns where they are learned from.
+/// The faults of drives, each given with the index of its set: their cameras' intrinsics, and their turns if they are used.
 pub(super) fn faults(config: &TrainConfig, drives: &[&(usize, Dataset)]) -> Vec<Fault> {
     let mut found = Vec::new();
     let mut turning = Vec::new();
     for (set, drive) in drives {
         let camera = camera_finding(drive);
-        // The turns in the images follow from the camera's numbers.
+        // Turns in the images depend on the camera's intrinsics.
         let usable = camera.as_ref().is_none_or(|f| f.severity < Severity::Error);
         if usable && reads_turns(config, *set) {
             turning.push(drive);
@@ -52,7 +53,7 @@ pub(super) fn faults(config: &TrainConfig, drives: &[&(usize, Dataset)]) -> Vec<
     found
 }
 
-/// Drives of one rig have the same fault.
+/// Adds a finding; drives of one rig share it.
 fn add(faults: &mut Vec<Fault>, drive: &Dataset, finding: Option<Finding>) {
     let Some(finding) = finding.filter(|finding| finding.severity > Severity::Note) else {
         return;

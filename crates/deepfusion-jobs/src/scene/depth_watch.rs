@@ -1,4 +1,4 @@
-//! The watch over a recording's metres while it is predicted.
+//! Monitors the scale of a recording's depth while it is predicted.
 
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::Intrinsics;
@@ -10,7 +10,7 @@ use deepfusion_runtime::Prediction;
 use super::{MotionTracker, ScaleWatch};
 use crate::Input;
 
-/// Follows the frames in their order, with the ground that their depth shows.
+/// Monitors the scale over the frames in order, with the ground found in their depth.
 pub struct DepthWatch {
     motions: MotionTracker,
     watch: ScaleWatch,
@@ -20,7 +20,7 @@ pub struct DepthWatch {
 }
 
 impl DepthWatch {
-    /// From the first frame on; with `correct` depth is brought back to the metres that were learned.
+    /// Starts at the first frame; with `correct`, depth is corrected to the learned scale.
     #[must_use]
     pub fn new(config: ScaleMonitorConfig, correct: bool) -> Self {
         Self {
@@ -32,8 +32,8 @@ impl DepthWatch {
         }
     }
 
-    /// Brings the frame's depth back to the metres that were learned, where that was asked for, and says whether they
-    /// hold; `None` where nothing is known of how the camera moved.
+    /// Corrects the frame's depth to the learned scale, if requested, and returns the scale's reading; `None` if the camera's motion is
+    /// unknown.
     pub fn observe(
         &mut self,
         input: &Input,
@@ -56,7 +56,7 @@ impl DepthWatch {
             self.ground = None;
         }
         let (_, rays) = self.rays.as_ref()?;
-        // The last ground is a guess for this one only while the camera goes on.
+        // The last ground is only a guess for this frame if the camera's motion continues.
         let before = self.ground.take().filter(|_| motion.goes_on);
         self.ground = Ground::find(&depth.data, rays, before.as_ref(), &self.config);
         let ground = self.ground.as_ref();

@@ -1,4 +1,4 @@
-//! What is known of a frame beside its image: how the camera moved, and whether its metres hold.
+//! What is known of a frame besides its image: the camera's motion, and whether the scale has changed.
 
 mod depth_watch;
 mod motion;

@@ -1,4 +1,4 @@
-//! How the camera moved from frame to frame of a recording.
+//! The camera's motion from frame to frame of a recording.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,26 +10,26 @@ use nalgebra::Vector3;
 
 use crate::Input;
 
-/// When and from where a frame was taken, and how the vehicle went then.
+/// When and where a frame was taken, and the vehicle's motion at that time.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Motion {
-    /// `None` for a frame that stands for itself.
+    /// Time and pose; `None` for a frame that stands alone.
     pub stamp: Option<Stamp>,
-    /// m/s.
+    /// The vehicle's speed, in m/s.
     pub speed_mps: Option<f64>,
-    /// rad/s, positive to the left.
+    /// The vehicle's yaw rate, in rad/s, positive to the left.
     pub yaw_rate: f64,
-    /// Time since the last frame, seconds, where this frame goes on from it.
+    /// Time since the last frame in seconds, if this frame follows it.
     pub seconds: Option<f64>,
-    /// The camera in the last frame's camera, where this frame goes on from it.
+    /// The pose of this frame's camera in the last frame's camera, if this frame follows it.
     pub last_from_this: Option<Se3>,
-    /// Whether the frame goes on from the last one, so that what was followed there still means something.
+    /// Whether this frame follows the last one, so that tracks continue.
     pub goes_on: bool,
-    /// Whether the last frame was of another recording, or there was none: what was learned of that is not this one's.
+    /// Whether this is the first frame, or the last frame belonged to another recording: what was learned from that does not apply.
     pub begins_recording: bool,
-    /// Which way is down in the camera, where its mount is known.
+    /// The downward direction in the camera's axes, if the mount is known.
     pub down_in_cam: Option<Vector3<f64>>,
-    /// Which way is straight ahead of the vehicle in the camera, where its mount is known.
+    /// The vehicle's forward direction in the camera's axes, if the mount is known.
     pub ahead_in_cam: Option<Vector3<f64>>,
 }
 
@@ -37,8 +37,8 @@ pub struct Motion {
 const LOOKS_ASIDE: f64 = 0.5;
 
 impl Motion {
-    /// By how much the camera looks to the left of the way straight ahead, rad; 0 where nothing says its mount, `None` for one that looks to
-    /// the side or back.
+    /// The angle in rad by which the camera looks to the left of straight ahead; 0 if the mount is unknown, `None` if it looks to the side
+    /// or back.
     #[must_use]
     pub fn camera_yaw(&self) -> Option<f64> {
         let ahead = self.ahead_in_cam.unwrap_or(Vector3::z());
@@ -47,25 +47,25 @@ impl Motion {
     }
 }
 
-/// Whether a recording says how its camera moved.
+/// Whether a recording contains its camera's motion.
 #[must_use]
 pub fn motion_known(dataset: &Dataset) -> bool {
     dataset.track().is_some() && dataset.yaw_known()
 }
 
-/// How fast the vehicle turned whose camera moved so in `seconds`, rad/s, positive to the left; `last_from_this` is the camera in the last
-/// frame's.
+/// The vehicle's yaw rate in rad/s, positive to the left, given its camera's motion in `seconds`; `last_from_this` is the camera's pose in
+/// the last frame's camera.
 #[must_use]
 pub fn yaw_rate(last_from_this: &Se3, seconds: f64) -> f64 {
-    // The camera's y points down: a turn to the left is a negative one about it.
+    // The camera's y axis points down, so a turn to the left is negative around it.
     -last_from_this.axis_angle().y / seconds
 }
 
-/// Adds up the camera's way over the frames of a recording.
+/// Accumulates the camera's motion over the frames of a recording.
 #[derive(Debug, Default)]
 pub struct MotionTracker {
     last: Option<(Arc<Dataset>, usize, Se3)>,
-    /// That of the last frame.
+    /// The recording of the last frame.
     recording: Option<Arc<Dataset>>,
 }
 
@@ -79,7 +79,7 @@ impl MotionTracker {
         self.of(dataset, *index)
     }
 
-    /// As [`Self::next`], of a recording's frame.
+    /// As [`Self::next`], for a recording's frame.
     pub fn of(&mut self, dataset: &Arc<Dataset>, index: usize) -> Motion {
         let frame = &dataset.frames()[index];
         let before = self.recording.replace(Arc::clone(dataset));
@@ -90,8 +90,7 @@ impl MotionTracker {
             let dt = frame.time_s? - dataset.frames()[last].time_s?;
             Some((world_from_cam * motion, motion, dt))
         });
-        // The first frame of a recording whose motion is known begins a way, and the first after a gap another one; in the gap each stands
-        // for itself.
+        // A track begins at the first frame of a recording with known motion, and again after a gap; frames within the gap stand alone.
         let begins = motion_known(dataset) && frame.speed_mps.is_some();
         let begun = begins.then(Se3::identity);
         let world_from_cam = step.map(|(pose, ..)| pose).or(begun);
@@ -122,8 +121,8 @@ impl MotionTracker {
     }
 }
 
-/// The way of a camera that looks straight ahead from a vehicle that drives straight on. The scale is not watched: a speed
-/// that is given once for all says nothing of the metres.
+/// The motion of a camera that looks straight ahead from a vehicle driving straight. The scale is not monitored: a constant speed given by
+/// the user carries no information about the scale.
 #[derive(Debug)]
 pub struct StraightWay {
     speed_mps: Option<f64>,
@@ -131,7 +130,7 @@ pub struct StraightWay {
 }
 
 impl StraightWay {
-    /// At one speed in m/s: 0 is a camera that stands. Without it nothing is known of its way.
+    /// At a constant speed in m/s: 0 is a camera at rest. With `None`, the motion is unknown.
     #[must_use]
     pub fn new(speed_mps: Option<f64>) -> Self {
         Self {
@@ -140,7 +139,7 @@ impl StraightWay {
         }
     }
 
-    /// Its motion at a frame's arrival.
+    /// The motion at a frame's arrival.
     pub fn at(&mut self, arrived: Instant) -> Motion {
         let Some(speed) = self.speed_mps else {
             return Motion::default();

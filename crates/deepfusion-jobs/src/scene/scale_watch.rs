@@ -1,4 +1,4 @@
-//! Whether a recording's metres still are what they were.
+//! Monitors whether the scale of a recording's depth changes.
 
 use std::fmt;
 use std::sync::Arc;
@@ -16,29 +16,29 @@ use nalgebra::Vector3;
 use super::{Motion, motion_known};
 use crate::Input;
 
-/// Width of the images that the scale is watched in.
+/// Width of the images in which the scale is monitored.
 const WIDTH: u32 = 320;
 
-/// Why an input's metres cannot be watched.
+/// Why the scale of an input cannot be monitored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unwatched {
-    /// It is a single image.
+    /// The input is a single image.
     SingleImage,
-    /// The recording does not measure speed and yaw rate.
+    /// The recording has no speed or no yaw rate.
     MotionUnknown,
 }
 
 impl fmt::Display for Unwatched {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::SingleImage => "an image stands for itself",
-            Self::MotionUnknown => "its motion is not known",
+            Self::SingleImage => "a single image has no motion",
+            Self::MotionUnknown => "its motion is unknown",
         })
     }
 }
 
-/// The first input whose metres [`ScaleWatch`] cannot watch, by its name, and why not.
+/// The name of the first input whose scale [`ScaleWatch`] cannot monitor, with the reason.
 #[must_use]
 pub fn unwatched(inputs: &[Input]) -> Option<(String, Unwatched)> {
     inputs.iter().find_map(|input| match &input.frame {
@@ -50,22 +50,22 @@ pub fn unwatched(inputs: &[Input]) -> Option<(String, Unwatched)> {
     })
 }
 
-/// Watches the metres of a recording: [`ScaleMonitor`] over its frames, in their order.
+/// Monitors the scale of a recording: [`ScaleMonitor`] over its frames in order.
 pub struct ScaleWatch {
     config: ScaleMonitorConfig,
     correct: bool,
-    /// What was learned of one camera.
+    /// The camera that the monitor has learned from.
     camera: Option<Intrinsics>,
     monitor: ScaleMonitor,
     correction: Option<ScaleCorrection>,
     last: Option<Arc<RoadTexture>>,
     drifted: bool,
-    /// Until somebody asks.
+    /// Set until it is read.
     first_drift: Option<f64>,
 }
 
 impl ScaleWatch {
-    /// From the first frame on; with `correct` it also says what depth is to be multiplied by.
+    /// Starts at the first frame; with `correct`, it also computes a factor for depth.
     #[must_use]
     pub fn new(config: ScaleMonitorConfig, correct: bool) -> Self {
         Self {
@@ -80,9 +80,9 @@ impl ScaleWatch {
         }
     }
 
-    /// Begins anew where another camera or recording begins: nothing that was learned of the last one holds for it, and a run that goes on from a
-    /// recording's beginning gives what one gives that was never stopped. To be said before the [correction](Self::correction) of its first frame
-    /// is asked for.
+    /// Starts again if another camera or recording begins: what was learned from the last one does not apply, and a run resumed at the
+    /// beginning of a recording gives the same results as one that was never stopped. Call it before the [correction](Self::correction) of
+    /// the first frame is read.
     pub fn see_through(&mut self, camera: &Intrinsics, motion: &Motion) {
         let before = self.camera.replace(*camera);
         if motion.begins_recording || before.is_some_and(|before| before != *camera) {
@@ -93,14 +93,13 @@ impl ScaleWatch {
         }
     }
 
-    /// What a frame's depth is to be multiplied by, from what is known before it; `None` where nothing is corrected.
+    /// The factor for a frame's depth, known from the frames before; `None` without correction.
     #[must_use]
     pub fn correction(&self) -> Option<f64> {
         self.correction.as_ref().map(ScaleCorrection::factor)
     }
 
-    /// Takes the next frame in; `None` where it does not go on from the last one. `ground` is that of the corrected
-    /// depth.
+    /// Adds the next frame; `None` if it does not follow the last one. `ground` is the ground found in the corrected depth.
     pub fn add(
         &mut self,
         image: &RgbImage,
@@ -112,14 +111,14 @@ impl ScaleWatch {
             self.monitor.pause();
             self.last = None;
         }
-        // A frame that stands for itself moves by nothing that is known.
+        // The motion of a frame that stands alone is unknown.
         motion.stamp?;
         self.see_through(camera, motion);
         let width = WIDTH.min(camera.width);
         let height = (width * camera.height).div_ceil(camera.width).max(1);
         let later = Arc::new(RoadTexture::from(&grey_image(image, width, height)));
         let earlier = self.last.replace(later.clone());
-        // The mount knows better than a single image's ground where down is.
+        // The mount gives the downward direction better than the ground of a single image.
         let seen = || ground.map(|ground| -Vector3::from(ground.up.map(f64::from)));
         let pair = GroundPair {
             earlier: earlier?,
@@ -142,7 +141,7 @@ impl ScaleWatch {
         })
     }
 
-    /// By how much the road says that the metres have changed, when that is found for the first time; `None` from then on.
+    /// The factor by which the scale has changed, measured by the road, when this is first found; `None` from then on.
     pub fn first_drift(&mut self) -> Option<f64> {
         self.first_drift.take()
     }
@@ -181,7 +180,7 @@ mod tests {
         watch.correction.as_mut().unwrap().follow(&drift);
         let learned = watch.correction().unwrap();
         assert!(learned > 1.0, "{learned}");
-        // Not even a gap in it takes it away.
+        // A gap in the recording does not reset it.
         watch.see_through(&camera, &Motion::default());
         assert_eq!(watch.correction(), Some(learned));
         watch.see_through(&camera, &first);

@@ -1,4 +1,4 @@
-//! The recordings of a new run: those of its configuration, each part of which may be asked for otherwise.
+//! The recordings of a new run: those of its configuration, of which each part may be replaced.
 
 use std::path::PathBuf;
 
@@ -11,34 +11,34 @@ use super::resume::{ClockAhead, Setting};
 use crate::recordings::camera_word;
 use crate::{Error, Result};
 
-/// Recordings that are asked for, and how they are opened. What is not asked for is as a configuration has it.
+/// Requested recordings, and how they are opened. What is not set comes from the configuration.
 #[derive(Debug, Clone, Default)]
 pub struct AskedRecordings {
-    /// Those that are learned from.
+    /// Training recordings.
     pub paths: Vec<PathBuf>,
-    /// Those of the validation.
+    /// Validation recordings.
     pub validation: Vec<PathBuf>,
-    /// The split of the first.
+    /// The split of the training recordings.
     pub split: Option<PathBuf>,
-    /// The split of the validation.
+    /// The split of the validation recordings.
     pub validation_split: Option<PathBuf>,
-    /// Cameras.
+    /// The cameras.
     pub camera: Option<Cameras>,
-    /// Whether the other camera's image is a view, too: both cameras are then opened where none are asked for.
+    /// Whether the other camera's image is used as a view, too; if no cameras are given, both are then opened.
     pub stereo: bool,
-    /// What is learned from.
+    /// What the network learns from.
     pub learn: Option<Learn>,
-    /// How far the camera's clock is ahead; what is to be measured is left to whoever opens the recordings.
+    /// How far the camera's clock is ahead. If it is to be measured, the caller who opens the recordings does that.
     pub clock: Option<ClockAhead>,
-    /// Topics of bags.
+    /// The topics of bags.
     pub topics: Vec<NamedTopic>,
 }
 
 impl AskedRecordings {
-    /// Puts what is asked for in the place of what a configuration has.
+    /// Replaces settings of a configuration by the requested ones.
     ///
     /// # Errors
-    /// [`Error::BesideSets`] for what each data set has by itself; [`ModelError::Config`] where there is nothing to learn from.
+    /// [`Error::BesideSets`] for a setting that each data set has for itself; [`ModelError::Config`] if there is nothing to learn from.
     pub fn replace_in(&self, data: &mut DataConfig) -> Result<()> {
         if let Some(setting) = self.beside_sets(&data.sets) {
             return Err(Error::BesideSets { setting });
@@ -76,7 +76,7 @@ impl AskedRecordings {
         Ok(())
     }
 
-    /// The first setting asked for that data sets have by themselves.
+    /// The first requested setting that data sets have for themselves.
     fn beside_sets(&self, sets: &[DataSetConfig]) -> Option<Setting> {
         if sets.is_empty() {
             return None;
@@ -86,7 +86,7 @@ impl AskedRecordings {
             (Setting::Validation, !self.validation.is_empty()),
             (Setting::Split, self.split.is_some()),
             (Setting::ValidationSplit, self.validation_split.is_some()),
-            // The sets' own where each has one; else it is the camera of those that have none.
+            // A conflict if every set has its own camera; otherwise it is the camera of those that have none.
             (
                 Setting::Camera,
                 self.camera.is_some() && sets.iter().any(|set| !set.camera.is_empty()),

@@ -1,12 +1,12 @@
-//! What a run says while it learns.
+//! The lines that a run reports during training.
 
 use deepfusion_hint::count_of;
 use deepfusion_train::{LossTerms, TrainEvent};
 
 use crate::duration::duration_text;
 
-/// An event in a line, for whoever waits for the run; of a step what stands beside its number. Nothing of a panel and of a checkpoint, and of a
-/// warning, which has words of its own.
+/// An event as a line for people who watch the run; a step's line lacks its number. `None` for a panel, a checkpoint, and a warning, which
+/// has its own text.
 #[must_use]
 pub fn event_line(event: &TrainEvent) -> Option<String> {
     Some(match event {
@@ -20,11 +20,11 @@ pub fn event_line(event: &TrainEvent) -> Option<String> {
             mean_displacement_m,
         } => {
             let going_on = if *from_step > 0 {
-                format!(", going on after step {from_step}")
+                format!(", continuing after step {from_step}")
             } else {
                 String::new()
             };
-            // Images that are learned from by their depth have not moved.
+            // Images with known depth have no motion.
             let moved = if *mean_displacement_m > 0.0 {
                 format!(", mean displacement {mean_displacement_m:.3} m")
             } else {
@@ -79,7 +79,7 @@ pub fn event_line(event: &TrainEvent) -> Option<String> {
     })
 }
 
-/// What samples are, where they are not all of video.
+/// The kinds of samples, unless all are of video.
 fn kinds_of(samples: usize, known_depth: usize, simulated: usize) -> String {
     let of_video = samples - known_depth - simulated;
     let kinds = [
@@ -99,7 +99,7 @@ fn kinds_of(samples: usize, known_depth: usize, simulated: usize) -> String {
     }
 }
 
-/// The terms of what a step learned from.
+/// The loss terms of a step.
 fn terms_of_a_step(losses: &LossTerms) -> String {
     let mut terms = Vec::new();
     if losses.reprojection > 0.0 {
@@ -119,12 +119,12 @@ fn terms_of_a_step(losses: &LossTerms) -> String {
     terms.join(", ")
 }
 
-/// Nothing where the run has no PoseNet.
+/// The speed term; `None` without PoseNet.
 fn speed_text(losses: &LossTerms) -> Option<String> {
     (losses.speed > 0.0).then(|| format!("speed {:.3} m", losses.speed))
 }
 
-/// Nothing where no network says a scale.
+/// The scale ratio; empty if no network predicts a scale.
 fn scale_text(ratio: f64) -> String {
     if ratio.is_finite() {
         format!(", scale ratio {ratio:.3}")
@@ -133,7 +133,7 @@ fn scale_text(ratio: f64) -> String {
     }
 }
 
-/// What was learned from, of the held-out samples.
+/// The terms of the held-out samples.
 fn held_out_terms(losses: &LossTerms) -> String {
     let mut terms = Vec::new();
     if losses.reprojection > 0.0 {

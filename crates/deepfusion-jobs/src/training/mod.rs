@@ -1,5 +1,5 @@
-//! Training runs around the trainer: what they learn from and start from, what they will do, what they leave to be looked at, and the two that
-//! train more than once.
+//! Training runs around the trainer: what they start and learn from, their plan, their logs and pictures, and adaptation and ablation,
+//! which build on them.
 
 pub mod ablation;
 pub mod adaptation;

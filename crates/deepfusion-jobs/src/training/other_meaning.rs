@@ -1,44 +1,44 @@
-//! Weights that mean something else in the network that begins with them.
+//! Warns of weights that have another meaning in the network that starts from them.
 
 use deepfusion_geometry::DepthRange;
 use deepfusion_model::{InputNormalisation, TrainConfig};
 
 use super::pose_unit::mixed_units;
 
-/// How weights fit a network that reads images or says depths in another way than the one that they were learned in.
+/// Why weights do not quite fit a network: it reads images or represents depth in another way than the one they were trained in.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OtherMeaning {
     /// Images are normalised in another way.
     #[error(
-        "the weights to start from were learned on images normalised as {}, this configuration has {}: \
-         set depth_net.encoder.normalisation={} to keep what they know",
+        "the weights to start from were trained on images normalised as {}, but this configuration has {}: \
+         set depth_net.encoder.normalisation={} to keep what they have learned",
         name(*was),
         name(*is),
         name(*was)
     )]
     Normalisation {
-        /// How they were.
+        /// The normalisation for the weights.
         was: InputNormalisation,
-        /// How they are.
+        /// The normalisation in this configuration.
         is: InputNormalisation,
     },
-    /// Depth is refined from another one.
+    /// Depth is refined from another initial depth.
     #[error(
-        "the weights to start from refine {}, this configuration {} (depth_net.initial_depth_m): they have to learn that anew",
+        "the weights to start from refine an initial depth of {}, but it is {} in this configuration (depth_net.initial_depth_m): they have to learn this again",
         initial(*was),
         initial(*is)
     )]
     InitialDepth {
-        /// From which it was, metres; `None`: the middle of the range.
+        /// The initial depth for the weights in metres; `None`: the middle of the range.
         was: Option<f64>,
-        /// From which it is.
+        /// The initial depth in this configuration.
         is: Option<f64>,
     },
-    /// Depths are of another range.
+    /// The range of depths differs.
     #[error(
-        "the weights to start from say depths of {} to {} m, this configuration of {} to {} m: \
-         set depth_net.range.min_m={} and depth_net.range.max_m={} to keep their metres",
+        "the weights to start from predict depths of {} to {} m, but this configuration has {} to {} m: \
+         set depth_net.range.min_m={} and depth_net.range.max_m={} to keep their scale",
         was.min_m,
         was.max_m,
         is.min_m,
@@ -47,26 +47,26 @@ pub enum OtherMeaning {
         was.max_m
     )]
     Range {
-        /// Of which they were.
+        /// The range of the weights.
         was: DepthRange,
-        /// Of which they are.
+        /// The range of this configuration.
         is: DepthRange,
     },
-    /// PoseNet's motions are of several units, by the data sets that it learned from.
+    /// PoseNet's motions have several units, one for each data set that it was trained on.
     #[error(
-        "the PoseNet to start from says motions in units of {least_m} m to {most_m} m, by its data sets, and these recordings are none of those: \
-         it takes their mean and has to learn the length anew (name the set's unit as metres_per_unit to keep it)"
+        "the PoseNet to start from has units of {least_m} m to {most_m} m for its data sets, and these recordings belong to none of them: \
+         it takes their mean and has to learn the scale again (set metres_per_unit to the unit of one set to keep that)"
     )]
     PoseUnits {
-        /// The least of them, metres.
+        /// The smallest unit, in metres.
         least_m: f64,
-        /// The largest.
+        /// The largest unit, in metres.
         most_m: f64,
     },
 }
 
 impl OtherMeaning {
-    /// All that differs. Where the encoders alone have learned, there are no depths yet.
+    /// All differences. If only the encoders were trained, there are no depths yet.
     pub(super) fn all(theirs: &TrainConfig, own: &TrainConfig, depth_learned: bool) -> Vec<Self> {
         let mut all = Vec::new();
         let of = |config: &TrainConfig| config.depth_net.encoder.normalisation;
@@ -83,7 +83,7 @@ impl OtherMeaning {
         {
             all.push(Self::InitialDepth { was, is });
         }
-        // A range that a data set names is meant.
+        // A range given for a data set is intended.
         let own_range = own.data.sets.iter().any(|set| set.range.is_some());
         let one_range = theirs.data.sets.len() <= 1 && !own_range;
         let (was, is) = (theirs.factors(0).0, own.factors(0).0);
@@ -93,7 +93,7 @@ impl OtherMeaning {
         all
     }
 
-    /// The same of a PoseNet that is taken over.
+    /// The difference for a PoseNet that a run starts from.
     pub(super) fn of_pose_net(theirs: &TrainConfig, own: &TrainConfig) -> Option<Self> {
         let [least_m, most_m] = mixed_units(theirs, own)?;
         Some(Self::PoseUnits { least_m, most_m })
@@ -133,7 +133,10 @@ mod tests {
             images.contains("this configuration has centred"),
             "{images}"
         );
-        assert!(initial.contains("this configuration 33 m"), "{initial}");
+        assert!(
+            initial.contains("it is 33 m in this configuration"),
+            "{initial}"
+        );
         assert!(range.contains("to 60 m"), "{range}");
         assert_eq!(said(false), std::slice::from_ref(images));
     }

@@ -1,4 +1,4 @@
-//! What a run will do, to be read before its first step.
+//! What a run will do, for reading before its first step.
 
 use std::fmt;
 
@@ -6,43 +6,43 @@ use deepfusion_hint::count_of;
 use deepfusion_model::{InputSize, Learn, Preset, TrainConfig, ViewMotion};
 use deepfusion_train::Trainer;
 
-/// What a run will do: its network, its images, and how many steps and why.
+/// The plan of a run: its network, its images, and the number of steps with its reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct TrainingPlan {
-    /// The preset that its configuration began from.
+    /// The preset of its configuration.
     pub preset: Preset,
-    /// Width and height of the network's input, pixels.
+    /// Width and height of the network's input, in pixels.
     pub size: InputSize,
-    /// Samples of video in a step; `None` where none is learned from.
+    /// Number of video samples in a step; `None` if it does not learn from video.
     pub video: Option<usize>,
-    /// Images of known depth in a step; `None` where none is learned from.
+    /// Number of images with known depth in a step; `None` if it does not learn from them.
     pub known_depth: Option<usize>,
-    /// How long it learns.
+    /// The length of the run.
     pub length: RunLength,
 }
 
-/// How long a run learns.
+/// The length of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RunLength {
-    /// So many steps.
+    /// A number of steps.
     Steps(usize),
-    /// So many passes over its data.
+    /// A number of epochs.
     Epochs(usize),
-    /// The least that its configuration takes, as its epochs would be fewer.
+    /// The minimum number of steps in the configuration, since its epochs would give fewer.
     Least {
-        /// The steps that it takes.
+        /// The number of steps.
         steps: usize,
-        /// Passes over its data that were wanted.
+        /// The number of epochs requested.
         epochs: usize,
-        /// The steps of those.
+        /// The number of steps in these epochs.
         of_epochs: usize,
     },
 }
 
 impl TrainingPlan {
-    /// That of a trainer.
+    /// The plan of a trainer.
     #[must_use]
     pub fn of(trainer: &Trainer) -> Self {
         Self::new(trainer.config(), trainer.epoch_steps())
@@ -86,7 +86,7 @@ impl fmt::Display for TrainingPlan {
         let samples: Vec<String> = samples.collect();
         write!(
             f,
-            "{}: images of {width}x{height}, {} a step, {}",
+            "{}: images of {width}x{height}, {} per step, {}",
             self.preset,
             samples.join(" and "),
             self.length
@@ -105,15 +105,15 @@ impl fmt::Display for RunLength {
                 of_epochs,
             } => write!(
                 f,
-                "{} (the least: {epochs} epochs of so few images would be {of_epochs})",
+                "{} (the minimum; {epochs} epochs would be only {of_epochs})",
                 count_of(steps, "step")
             ),
         }
     }
 }
 
-/// Whether a run warps by PoseNet's pose although it learns from the vehicle's speed and its recordings know how the vehicle turned, so
-/// that warping by the vehicle's motion would be possible.
+/// Whether a run warps by PoseNet's pose although it could warp by the vehicle's motion: it learns from the vehicle's speed, and its
+/// recordings contain the vehicle's turns.
 #[must_use]
 pub fn leaves_turns_unused(trainer: &Trainer) -> bool {
     let (config, samples) = (trainer.config(), trainer.samples());
@@ -138,17 +138,17 @@ mod tests {
         };
         assert_eq!(
             said(&config, 34),
-            "8 of video a step, 1200 steps (the least: 20 epochs of so few images would be 680)"
+            "8 of video per step, 1200 steps (the minimum; 20 epochs would be only 680)"
         );
-        assert_eq!(said(&config, 340), "8 of video a step, 20 epochs");
+        assert_eq!(said(&config, 340), "8 of video per step, 20 epochs");
         config.steps = Some(1);
         config.data.learn = Learn::Both;
         config.depth_batch = 3;
         assert_eq!(
             said(&config, 340),
-            "8 of video and 6 of known depth a step, 1 step"
+            "8 of video and 6 of known depth per step, 1 step"
         );
         config.data.learn = Learn::Depth;
-        assert_eq!(said(&config, 340), "6 of known depth a step, 1 step");
+        assert_eq!(said(&config, 340), "6 of known depth per step, 1 step");
     }
 }

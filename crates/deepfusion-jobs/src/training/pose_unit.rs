@@ -1,9 +1,10 @@
-//! What a unit of translation means of a PoseNet that a run takes over from another.
+//! The unit of a PoseNet's translations, for a run that starts from another run's PoseNet.
 
 use deepfusion_model::{DataSetConfig, TrainConfig};
 
-/// Fills in the units that a configuration leaves open, of a run that begins with the PoseNet of another; `theirs`: that one's configuration, complete
-/// with its findings. A data set keeps the unit that it had there; any other one has theirs, or the mean of all theirs where those are several.
+/// Fills in the units that a configuration leaves open, for a run that starts from another run's PoseNet; `theirs` is that run's
+/// configuration, complete with its findings. A data set keeps the unit that it had there; any other gets the unit of that run, or the mean
+/// of its units if there are several.
 pub(super) fn inherit(theirs: &TrainConfig, config: &mut TrainConfig) {
     let common = common_unit(theirs).unwrap_or(theirs.pose_net.metres_per_unit);
     let fill = |open: &mut f64, unit: f64| {
@@ -18,8 +19,8 @@ pub(super) fn inherit(theirs: &TrainConfig, config: &mut TrainConfig) {
     }
 }
 
-/// The least and the largest of the units that a PoseNet speaks of, where a run which takes it over has recordings that it speaks none of them of:
-/// they have the mean.
+/// The smallest and the largest of a PoseNet's units, if a run that starts from it has recordings with none of these units, which get the
+/// mean.
 pub(super) fn mixed_units(theirs: &TrainConfig, own: &TrainConfig) -> Option<[f64; 2]> {
     let units: Vec<f64> = moving_sets(theirs).map(|set| set.metres_per_unit).collect();
     if units.is_empty() || common_unit(theirs).is_some() {
@@ -37,7 +38,7 @@ pub(super) fn mixed_units(theirs: &TrainConfig, own: &TrainConfig) -> Option<[f6
     has_mean.then_some([least, most])
 }
 
-/// The unit of all data sets of a run; `None` where they have several, or there are none.
+/// The unit of all data sets of a run; `None` if they have several, or there are none.
 fn common_unit(config: &TrainConfig) -> Option<f64> {
     let mut units = moving_sets(config).map(|set| set.metres_per_unit);
     let first = units.next()?;
@@ -67,7 +68,7 @@ mod tests {
     use super::*;
     use deepfusion_model::{Learn, Preset};
 
-    /// A run in units of `unit`, with these data sets.
+    /// A run with this unit and these data sets.
     fn run(unit: f64, sets: &[(&str, f64)]) -> TrainConfig {
         let mut config = Preset::Tiny.config();
         config.pose_net.metres_per_unit = unit;
@@ -80,7 +81,7 @@ mod tests {
         config
     }
 
-    /// The unit of PoseNet and those of the data sets, as a new run has them.
+    /// The unit of PoseNet and those of the data sets in the new run.
     fn inherited(theirs: &TrainConfig, mut config: TrainConfig) -> (f64, Vec<f64>) {
         inherit(theirs, &mut config);
         let sets = config.data.sets.iter().map(|set| set.metres_per_unit);
@@ -92,7 +93,7 @@ mod tests {
         let theirs = run(0.8, &[]);
         let mut config = run(0.0, &[("road", 0.0), ("garage", 0.1), ("streets", 0.0)]);
         config.data.sets[2].learn = Learn::Depth;
-        // What is said stays, and what has no motion needs none.
+        // Given units stay; a set without motion needs none.
         assert_eq!(inherited(&theirs, config), (0.8, vec![0.8, 0.1, 0.0]));
         assert_eq!(inherited(&theirs, run(0.5, &[])), (0.5, vec![]));
     }
@@ -118,7 +119,7 @@ mod tests {
             inherit(&theirs, &mut own);
             assert_eq!(mixed_units(&theirs, &own), Some([0.1, 1.2]));
         }
-        // Who names a unit means it.
+        // A given unit is intended.
         assert_eq!(mixed_units(&theirs, &run(1.2, &[])), None);
         assert_eq!(mixed_units(&run(0.8, &[]), &run(0.8, &[])), None);
     }

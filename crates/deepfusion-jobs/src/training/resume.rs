@@ -1,4 +1,4 @@
-//! What may be asked of a run that goes on, and what contradicts it.
+//! What may be requested of a resumed run, and what contradicts it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,13 +12,13 @@ use crate::{Error, Result};
 
 pub use crate::error::{Contradiction, RequestedValue, RunHas, Setting};
 
-/// What is asked of a run that goes on. It may be made longer, and its recordings may have moved; all else must be as the run has it, so
-/// that nothing is asked for in vain.
+/// The request for a resumed run. The run may be made longer, and its recordings may have moved; everything else must be as in the run, so
+/// that no request is silently ignored.
 #[derive(Debug, Clone, Default)]
 pub struct ResumeRequest {
     /// A configuration file, read over its preset.
     pub file: Option<(PathBuf, Box<TrainConfig>)>,
-    /// Where the recordings, those of the validation, and the splits of both are now.
+    /// New paths of the training and validation recordings, and of their splits.
     pub moved: MovedRecordings,
     /// Steps of the whole run.
     pub steps: Option<usize>,
@@ -28,62 +28,62 @@ pub struct ResumeRequest {
     pub preset: Option<Preset>,
     /// The size of the network's input.
     pub size: Option<InputSize>,
-    /// Samples of a batch.
+    /// Number of samples in a batch.
     pub batch: Option<usize>,
     /// The seed.
     pub seed: Option<u64>,
-    /// What is learned from.
+    /// What the network learns from.
     pub learn: Option<Learn>,
-    /// Cameras.
+    /// The cameras.
     pub camera: Option<Cameras>,
-    /// Whether the other camera's view is asked for.
+    /// Whether the other camera's view is requested.
     pub stereo: bool,
-    /// Whether the camera is to be learned.
+    /// Whether learning the camera is requested.
     pub learned_camera: bool,
     /// The pose used for warping.
     pub view_motion: Option<ViewMotion>,
-    /// Loss terms and parts of the network that are asked for.
+    /// Loss terms and parts of the network to switch on.
     pub with: Vec<String>,
-    /// Those that are not wanted.
+    /// Loss terms and parts of the network to switch off.
     pub without: Vec<String>,
-    /// Keys with values, as `batch=4`.
+    /// Keys with values, such as `batch=4`.
     pub assignments: Vec<String>,
-    /// What it starts from.
+    /// The network that it starts from.
     pub init: Option<PathBuf>,
     /// How far the camera's clock is ahead.
     pub clock: Option<ClockAhead>,
-    /// Topics of bags, as `imu=/imu`.
+    /// Topics of bags, such as `imu=/imu`.
     pub topics: Vec<String>,
 }
 
-/// Where recordings are now.
+/// New paths of recordings.
 #[derive(Debug, Clone, Default)]
 pub struct MovedRecordings {
-    /// Those that are learned from.
+    /// Training recordings.
     pub data: Vec<PathBuf>,
-    /// Those of the validation.
+    /// Validation recordings.
     pub validation: Vec<PathBuf>,
-    /// The split of the first.
+    /// The split of the training recordings.
     pub split: Option<PathBuf>,
-    /// The split of the validation.
+    /// The split of the validation recordings.
     pub validation_split: Option<PathBuf>,
 }
 
-/// How far a camera's clock is said to be ahead.
+/// How far a camera's clock is ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ClockAhead {
-    /// As it is measured. What was measured when a run began holds.
+    /// To be measured. For a resumed run, the value measured at its start is kept.
     Measured,
-    /// Seconds.
+    /// Given in seconds.
     Seconds(f64),
 }
 
-/// A run's configuration with what is asked of it.
+/// A run's configuration with the requested changes.
 ///
 /// # Errors
-/// [`Error::Contradiction`]; a term or a key that there is not.
+/// [`Error::Contradiction`]; an unknown term or key.
 pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainConfig> {
-    // Every field by name: one that is added says here what becomes of it.
+    // Destructured, so that a new field cannot be forgotten here.
     let ResumeRequest {
         file,
         moved,
@@ -186,8 +186,8 @@ pub fn go_on_with(run: &TrainConfig, request: &ResumeRequest) -> Result<TrainCon
     Ok(config)
 }
 
-/// That a run is not asked for fewer steps than it has made; `config` is `run`'s with what is asked of it, and has `steps` steps. Of a run of which nothing else is
-/// asked it is no error: its epochs may be shorter than they were, and it is done.
+/// Checks that a run is not requested to have fewer steps than it has made. `config` is `run`'s configuration with the request, `steps` its
+/// number of steps. If nothing else was requested, fewer steps are not an error: its epochs may have become shorter, and the run is done.
 ///
 /// # Errors
 /// [`Error::FewerSteps`].
@@ -205,7 +205,7 @@ pub fn require_no_fewer_steps(
     Ok(())
 }
 
-/// Refuses each of these that would change the run.
+/// Refuses each of these settings that would change the run.
 fn changes_nothing(
     run: &TrainConfig,
     asked: &[String],
@@ -224,7 +224,7 @@ fn changes_nothing(
 }
 
 fn same_start(run: &TrainConfig, asked: &Path) -> Result<()> {
-    // `none`, and the names of embedded networks, are no paths.
+    // `none` and the names of embedded networks are not paths.
     let asked = match (Start::is_none(asked), &run.init_sha256) {
         (true, _) | (false, Some(_)) => asked.to_owned(),
         (false, None) => deepfusion_fs::absolute(asked),
@@ -249,7 +249,7 @@ fn same_clock(run: &TrainConfig, asked: ClockAhead) -> Result<()> {
     }
 }
 
-/// The places where the same recordings are now.
+/// Sets new paths of the same recordings.
 fn move_recordings(config: &mut TrainConfig, moved: &MovedRecordings) -> Result<()> {
     let MovedRecordings {
         data,
@@ -299,7 +299,7 @@ fn move_recordings(config: &mut TrainConfig, moved: &MovedRecordings) -> Result<
     Ok(())
 }
 
-/// What a configuration file may change, and that it says nothing else than the run's.
+/// Takes what a configuration file may change, and checks that everything else in it is as in the run.
 fn take_file(
     config: &mut TrainConfig,
     path: &Path,
@@ -309,7 +309,7 @@ fn take_file(
     (config.steps, config.epochs) = (file.steps, file.epochs);
     config.min_steps = file.min_steps;
     config.checkpoint_minutes = file.checkpoint_minutes;
-    // What a run fills in from its data, or is asked for beside the file, is not the file's to say.
+    // Settings that a run fills in from its data, or that are requested separately, are not compared with the file.
     let mut asked = file.clone();
     asked.data.make_absolute();
     asked.init.clone_from(&config.init);
@@ -354,7 +354,7 @@ fn take_file(
     Ok(())
 }
 
-/// Every setting by its dotted key.
+/// All settings by their dotted keys.
 fn settings(config: &TrainConfig) -> Result<BTreeMap<String, String>> {
     fn add(all: &mut BTreeMap<String, String>, prefix: &str, table: &toml::Table) {
         for (key, value) in table {
@@ -370,7 +370,7 @@ fn settings(config: &TrainConfig) -> Result<BTreeMap<String, String>> {
     Ok(all)
 }
 
-/// Which cameras a run learns from; nothing said means 2.
+/// The cameras that a run learns from; the default is 2.
 fn camera_of(config: &TrainConfig) -> String {
     match config.data.camera.as_str() {
         "" => "2".into(),
@@ -400,7 +400,7 @@ fn path_text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Which setting of a run names the recording, or the split, that `missing` is or lies within; `None` where none does.
+/// The setting of a run that names the recording or split which `missing` is, or which contains it; `None` if none does.
 #[must_use]
 pub fn setting_of(missing: &Path, config: &TrainConfig) -> Option<Setting> {
     let within = |given: &PathBuf| missing.starts_with(given);
@@ -435,9 +435,9 @@ mod tests {
         let mut fewer = run.clone();
         fewer.epochs += 1;
         let error = require(&fewer, 50).unwrap_err().to_string();
-        assert!(error.contains("made 100 steps already"), "{error}");
+        assert!(error.contains("already made 100 steps"), "{error}");
         require(&fewer, 100).unwrap();
-        // Images of it may be broken since: it is done, whatever its epochs are by now.
+        // Images of it may have become unreadable since: the run is done, whatever its epochs are by now.
         require(&run, 50).unwrap();
     }
 }

@@ -1,4 +1,4 @@
-//! That one process at a time writes to the folder of a run, or of a table of runs.
+//! Ensures that only one process at a time writes to the folder of a run, or of a table of runs.
 
 use std::fs::TryLockError;
 use std::path::Path;
@@ -7,17 +7,17 @@ use deepfusion_fs::FolderLock;
 
 use crate::{Error, Result};
 
-/// Held while a run's folder is written to; of several workers the first one has it.
+/// Held while a run's folder is written to; of several workers, the first one holds it.
 #[derive(Debug)]
 pub struct RunLock {
     _lock: Option<FolderLock>,
 }
 
 impl RunLock {
-    /// Takes the lock of a folder that is there. Where it cannot be locked, that is a warning ([`tracing::warn`]).
+    /// Takes the lock of an existing folder. If it cannot be locked, that is a warning ([`tracing::warn`]).
     ///
     /// # Errors
-    /// [`Error::AtWork`] where another process has it.
+    /// [`Error::AtWork`] if another process holds it.
     pub fn take(folder: &Path) -> Result<Self> {
         let lock = match FolderLock::take(folder) {
             Ok(lock) => Some(lock),
@@ -27,7 +27,7 @@ impl RunLock {
             }
             Err(TryLockError::Error(error)) => {
                 tracing::warn!(
-                    "{}: cannot be locked ({error}): let one process at a time work there",
+                    "{}: cannot be locked ({error}); let only one process at a time write to it",
                     folder.display()
                 );
                 None
@@ -52,7 +52,7 @@ mod tests {
         let error = RunLock::take(&run).unwrap_err();
         assert!(error.to_string().contains("another process"), "{error}");
         assert!(error.hint().unwrap().contains("wait"));
-        // Nothing of it is in the way of others, and it goes with the folder.
+        // No lock file blocks others, and the lock moves with the folder.
         assert_eq!(fs::read_dir(&run).unwrap().count(), 0);
         fs::rename(&run, &renamed).unwrap();
         let error = RunLock::take(&renamed).unwrap_err();

@@ -1,4 +1,4 @@
-//! What a run leaves to be looked at: its losses, and pictures of what it learned from.
+//! What a run leaves to look at: its losses, and pictures of its training samples.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use deepfusion_train::{SamplePanel, Supervision, TrainEvent};
 
 use crate::Result;
 
-/// The files that a run's events become: `log.csv`, TensorBoard's, and `panels/STEP.png`.
+/// Writes a run's events to files: `log.csv`, TensorBoard's, and `panels/STEP.png`.
 pub struct RunLog {
     csv: CsvLog,
     events: TensorBoardLog,
@@ -17,10 +17,10 @@ pub struct RunLog {
 }
 
 impl RunLog {
-    /// For the run in `folder`, going on after `step`.
+    /// Opens the log of the run in `folder`, which continues after `step`.
     ///
     /// # Errors
-    /// A folder that cannot be written to, or a `log.csv` that is another program's.
+    /// A folder that cannot be written to; a `log.csv` that another program wrote.
     pub fn open(folder: &Path, step: usize) -> Result<Self> {
         let panels = folder.join("panels");
         std::fs::create_dir_all(&panels).map_err(|e| deepfusion_data::Error::file(&panels, e))?;
@@ -31,7 +31,7 @@ impl RunLog {
         })
     }
 
-    /// Writes what an event has to be kept.
+    /// Writes what is logged of an event.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -97,7 +97,7 @@ impl RunLog {
         }
     }
 
-    /// Figures of a step under one heading.
+    /// Logs figures of a step under one heading.
     fn scalars(
         &mut self,
         step: usize,

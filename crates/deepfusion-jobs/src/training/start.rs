@@ -1,4 +1,4 @@
-//! What a new run starts from: what is asked for, its configuration's `init`, or the network that the program carries.
+//! What a new run starts from: the requested network, its configuration's `init`, or an embedded network.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -22,44 +22,44 @@ use crate::{Error, Result};
 /// The weights of a new run before its first step.
 #[derive(Debug)]
 pub enum Start {
-    /// Those of the seed.
+    /// Random weights, by the seed.
     Nothing,
-    /// Those of the seed: an embedded network was wanted, and none is built as the configuration's.
+    /// Random weights, by the seed: an embedded network was wanted, but none matches the configuration.
     NoneFits,
-    /// A run's, or an ImageNet encoder's.
+    /// A run's weights, or an ImageNet encoder's.
     Path(PathBuf),
-    /// A packed network's; `path` where it is no embedded one.
+    /// A packed network's weights; `path` is `None` for an embedded one.
     Packed {
         /// The network.
         network: Box<Shipped>,
-        /// Its file.
+        /// Path of its file.
         path: Option<PathBuf>,
     },
 }
 
-/// What a new run begins from, as it is reported.
+/// What a new run starts from, as it is reported.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum StartReport<'a> {
-    /// An embedded network was wanted, and none is built as the configuration's.
+    /// An embedded network was wanted, but none matches the configuration.
     NoneFits,
     /// A packed network.
     Packed {
         /// The network.
         network: &'a Shipped,
-        /// Its file; an embedded network has none.
+        /// Path of its file; `None` for an embedded network.
         path: Option<&'a Path>,
-        /// Parts that begin with the seed's weights.
+        /// Parts that start with random weights.
         new: Vec<&'static str>,
     },
     /// A run's checkpoint.
     Run {
-        /// Its file.
+        /// Path of its file.
         checkpoint: PathBuf,
-        /// Parts that begin with the seed's weights.
+        /// Parts that start with random weights.
         new: Vec<&'static str>,
     },
-    /// A warning: what may not be meant of the weights that come next.
+    /// A warning about the weights that are reported next.
     OtherMeaning(OtherMeaning),
 }
 
@@ -68,7 +68,7 @@ impl fmt::Display for StartReport<'_> {
         let new = match self {
             Self::NoneFits => {
                 return f.write_str(
-                    "starts from nothing: no embedded network is built as this configuration's",
+                    "starts from nothing: no embedded network has this configuration's layers and depth range",
                 );
             }
             Self::Packed {
@@ -102,22 +102,22 @@ impl fmt::Display for StartReport<'_> {
     }
 }
 
-/// The configuration of a run that was not trained, but is the mean of others' weights: its settings are those of the first, whose training
-/// they repeat.
+/// The configuration of a mean of several networks, which was not trained itself: its settings are those of the first network, so training
+/// with them repeats that network's training.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SettingsOfMean {
     /// The first network.
     pub first: PathBuf,
-    /// Of how many it is the mean.
+    /// Number of averaged networks.
     pub networks: usize,
-    /// The mean's own folder, where the file is its `config.toml` and its weights are there.
+    /// The mean's own folder, if the file is its `config.toml` and its weights exist.
     pub folder: Option<PathBuf>,
 }
 
 impl SettingsOfMean {
-    /// Whether a configuration that was read from a file is one. One that names something else to begin from than the first network's run
-    /// does is not: somebody chose it.
+    /// Finds out whether a configuration read from a file belongs to a mean. It does not if it starts from another network than the first
+    /// network's run did: the user has then chosen the start.
     ///
     /// # Errors
     /// As [`TrainFindings::read`].
@@ -137,14 +137,14 @@ impl SettingsOfMean {
     }
 }
 
-/// What a configuration begins from, by whichever folder it was written in.
+/// What a configuration starts from, independent of the folder that it was written in.
 fn beginning(config: &TrainConfig) -> (Option<PathBuf>, Option<String>) {
     let mut config = config.clone();
     config.make_absolute();
     (config.init, config.init_sha256)
 }
 
-/// The run of which a file is the configuration, if its weights are there.
+/// The run that a file is the configuration of, if the run's weights exist.
 fn run_around(file: &Path) -> Option<PathBuf> {
     let folder = file.parent()?;
     let folder = if folder == Path::new("") {
@@ -162,7 +162,7 @@ impl fmt::Display for SettingsOfMean {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "this configuration is of a mean of {} networks: it has the settings of the first one, {}, and trains that one again",
+            "this configuration belongs to a mean of {} networks: it has the settings of the first, {}, and would repeat its training",
             self.networks,
             self.first.display()
         )
@@ -170,20 +170,19 @@ impl fmt::Display for SettingsOfMean {
 }
 
 impl Start {
-    /// Whether a wanted start is none at all: the word `none`.
+    /// Whether a requested start is the word `none`: no network.
     #[must_use]
     pub fn is_none(init: &Path) -> bool {
         init == Path::new("none")
     }
 
-    /// What is asked for, else what the configuration names, else, `by_default`, the embedded network that is built as the
-    /// configuration's. A configuration read from a file that names nothing means nothing: a run that is repeated by its config.toml starts
-    /// as it did, whatever is embedded. A name that is a run's folder here and an embedded network's elsewhere is a warning
-    /// ([`tracing::warn`]).
+    /// The requested start, or the one named in the configuration, or, with `by_default`, the embedded network that matches the
+    /// configuration. A configuration read from a file without a start means random weights: a run repeated from its config.toml starts as
+    /// it did, whatever is embedded. A name that is both a run's folder and an embedded network's is a warning ([`tracing::warn`]).
     ///
     /// # Errors
-    /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`Error::OtherStart`] where a configuration began from other
-    /// weights of the name; [`Shipped::read`]'s.
+    /// [`RuntimeError::NoSuchModel`] for a network that neither exists nor is embedded; [`Error::OtherStart`] if a configuration started
+    /// from other weights with the same name; an error of [`Shipped::read`].
     pub fn of(asked: Option<&Path>, config: &TrainConfig, by_default: bool) -> Result<Self> {
         if let Some(init) = asked {
             return Self::named(init);
@@ -216,7 +215,7 @@ impl Start {
         Ok(Self::Packed { network, path })
     }
 
-    /// A network that was found.
+    /// A start from a network that was found.
     #[must_use]
     pub fn from_source(source: &ModelSource) -> Self {
         match source {
@@ -254,8 +253,8 @@ impl Start {
         .into())
     }
 
-    /// The embedded network with the same layers, in the same range of depths: [`Self::NoneFits`] where none is so built, and
-    /// [`Self::Nothing`] without any embedded network, as nobody expects one.
+    /// The embedded network with the same layers and range of depths: [`Self::NoneFits`] if none matches, and [`Self::Nothing`] in a build
+    /// without embedded networks, where a message would be pointless.
     ///
     /// # Errors
     /// An embedded network that cannot be read.
@@ -277,11 +276,11 @@ impl Start {
         })
     }
 
-    /// Writes down in a run's configuration what it starts from, so that it can be repeated, and takes the units that a run's PoseNet
-    /// speaks of where they are open.
+    /// Records the start in a run's configuration, so that the run can be repeated, and fills in open units of translation from the PoseNet
+    /// that it starts from.
     ///
     /// # Errors
-    /// As [`RunFolder::read_config`] and [`RunFolder::read_state`] of the run it starts from.
+    /// As [`RunFolder::read_config`] and [`RunFolder::read_state`], for the run that it starts from.
     pub fn record_in(&self, config: &mut TrainConfig) -> Result<()> {
         (config.init, config.init_sha256) = match self {
             Self::Nothing | Self::NoneFits => (None, None),
@@ -308,7 +307,7 @@ impl Start {
         Ok(())
     }
 
-    /// What its depth is of: a network whose metres are those of one focal length keeps that, unless another is asked for.
+    /// Takes over the focal length that a network's metres belong to, unless another one is requested.
     fn take_focal_length(&self, config: &mut TrainConfig) -> Result<()> {
         if config.canonical_focal_px.is_some() {
             return Ok(());
@@ -324,7 +323,7 @@ impl Start {
         Ok(())
     }
 
-    /// The model with the weights to start from; `report` is called with what they are, and before that with what may not be meant of them.
+    /// The model with the weights to start from; `report` is called with warnings about them, then with what they are.
     ///
     /// # Errors
     /// As [`Checkpoints::load_networks`]; [`TrainError::Model`] for weights of another architecture.
@@ -386,7 +385,7 @@ impl Start {
     }
 }
 
-/// The configuration of a packed network's run; its PoseNet's metres are no matter here, of whichever data set.
+/// The configuration of a packed network's run. Its PoseNet's units do not matter here, whatever the data set.
 fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     let origin = || network.card.name.clone().into();
     let read = TrainConfig::from_run_table(network.card.config.clone());
@@ -397,18 +396,18 @@ fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     Ok(config)
 }
 
-/// Its tensors.
+/// A packed network's tensors.
 fn unpacked_weights(network: &Shipped) -> Result<Weights, ModelError> {
     let origin = &network.card.name;
     Ok(read_bytes(origin, &network.bytes)?)
 }
 
-/// Whether one network's weights are the other's, and mean the same depths.
+/// Whether two networks can share weights with the same meaning.
 fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
     a.of_the_weights() == b.of_the_weights()
 }
 
-/// The run that a path is, or is a checkpoint of, and which; `None` of other weights.
+/// The run and checkpoint that a path stands for; `None` for other weights.
 fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, ModelError> {
     if !is_run(path) {
         return Ok(None);
@@ -424,7 +423,8 @@ mod tests {
     use deepfusion_hint::Hint as _;
     use deepfusion_model::{AveragedNetwork, Preset};
 
-    /// Which presets could start from which: `light` is the shipped network's shape, Monodepth2's has the same tensors and other depths.
+    /// Which presets could start from which: `light` has the embedded network's layers; Monodepth2's has the same tensors, but other
+    /// depths.
     #[test]
     fn layers_and_range_decide() {
         let net = |preset: Preset| preset.config().depth_net;
@@ -438,7 +438,7 @@ mod tests {
         assert!(same_layers(&other, &net(Preset::Light)));
         other.range.max_m = 60.0;
         assert!(!same_layers(&other, &net(Preset::Light)));
-        // R-MSFM refines from that depth for good.
+        // R-MSFM always refines from that depth.
         let mut refined = net(Preset::RMsfm3);
         refined.initial_depth_m = Some(33.0);
         assert!(!same_layers(&refined, &net(Preset::RMsfm3)));
@@ -472,7 +472,8 @@ mod tests {
         }
     }
 
-    /// Its own folder is known while its file lies there beside weights; a beginning that the first network had not was chosen.
+    /// The folder of a mean is known while its configuration is beside its weights; a start that the first network did not have was chosen
+    /// by the user.
     #[test]
     fn settings_of_a_mean_say_where_it_is_unless_somebody_chose_a_beginning() {
         let at = tempfile::tempdir().unwrap();
@@ -526,7 +527,7 @@ mod tests {
         ));
     }
 
-    /// A repeated run notices that what it began from is not embedded, or another.
+    /// Repeating a run reports that the network it started from is not embedded, or is another one.
     #[test]
     fn other_weights_than_a_run_began_from_are_refused() {
         let mut config = Preset::Light.config();

@@ -1,4 +1,4 @@
-//! What may be asked of a new run, and the configuration that follows from it.
+//! The request for a new run, and the configuration that follows from it.
 
 use deepfusion_data::Dataset;
 use deepfusion_model::{Compute, InputSize, Preset, Reprojection, TrainConfig, ViewMotion};
@@ -8,14 +8,14 @@ use super::resume::ClockAhead;
 use crate::recordings::training_recordings;
 use crate::{Error, Result};
 
-/// What is asked of a new run. What is not asked for is as its file or its preset has it.
+/// The request for a new run. What is not set comes from the file or the preset.
 #[derive(Debug, Clone, Default)]
 pub struct StartRequest {
     /// A configuration file, read over its preset.
     pub file: Option<Box<TrainConfig>>,
-    /// A preset, where there is no file; none means [`Preset::Tiny`].
+    /// A preset, used without a file; by default [`Preset::Tiny`].
     pub preset: Option<Preset>,
-    /// What it computes on, as a preset's sizes follow it.
+    /// The kind of device, which determines a preset's sizes.
     pub compute: Compute,
     /// Steps of the whole run.
     pub steps: Option<usize>,
@@ -23,41 +23,41 @@ pub struct StartRequest {
     pub epochs: Option<usize>,
     /// The size of the network's input.
     pub size: Option<InputSize>,
-    /// Samples of a batch.
+    /// Number of samples in a batch.
     pub batch: Option<usize>,
     /// The seed.
     pub seed: Option<u64>,
-    /// Whether the camera is to be learned.
+    /// Whether the camera is learned.
     pub learned_camera: bool,
     /// The pose used for warping.
     pub view_motion: Option<ViewMotion>,
-    /// Loss terms and parts of the network that are asked for.
+    /// Loss terms and parts of the network to switch on.
     pub with: Vec<String>,
-    /// Those that are not wanted.
+    /// Loss terms and parts of the network to switch off.
     pub without: Vec<String>,
-    /// Keys with values, as `batch=4`.
+    /// Keys with values, such as `batch=4`.
     pub assignments: Vec<String>,
     /// The recordings, and how they are opened.
     pub recordings: AskedRecordings,
 }
 
 impl StartRequest {
-    /// The run's configuration. Where the camera's clock is to be measured, `measure_clock` finds from the opened recordings how many seconds it
-    /// is ahead.
+    /// The run's configuration. If the camera's clock is to be measured, `measure_clock` returns, from the opened recordings, how many
+    /// seconds it is ahead.
     ///
     /// # Errors
-    /// A term or a key that there is not; as [`AskedRecordings::replace_in`]; where the clock is to be measured as [`training_recordings`], and
-    /// what `measure_clock` says.
+    /// An unknown term or key; as [`AskedRecordings::replace_in`]; if the clock is measured, as [`training_recordings`], and an error of
+    /// `measure_clock`.
     pub fn config<E: From<Error>>(
         &self,
         measure_clock: impl FnOnce(&[Dataset]) -> Result<f64, E>,
     ) -> Result<TrainConfig, E> {
         let mut config = self.settings()?;
         if self.recordings.clock == Some(ClockAhead::Measured) {
-            // Measured against what the recordings' own files say, and kept in the configuration as a number.
+            // Measured relative to the recordings' own files, and saved in the configuration as a number.
             config.data.camera_ahead_s = None;
             let mut measured = config.clone();
-            // Turns of the images would be on the camera's clock.
+            // Turns measured in the images would follow the camera's clock.
             measured.data.measured_turns_only = true;
             let recordings = training_recordings(&measured)?;
             let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
@@ -66,9 +66,9 @@ impl StartRequest {
         Ok(config)
     }
 
-    /// All but a clock that is to be measured.
+    /// The configuration before the clock is measured.
     fn settings(&self) -> Result<TrainConfig> {
-        // Every field by name: one that is added says here what becomes of it.
+        // Destructured, so that a new field cannot be forgotten here.
         let Self {
             file,
             preset,
@@ -105,7 +105,7 @@ impl StartRequest {
         if recordings.stereo {
             (config.stereo, config.reprojection) = (true, Reprojection::Minimum);
         }
-        // Said last: a motion that contradicts a term left out is an error, and not silently another one.
+        // Set last: a motion that contradicts a term left out is then an error, not silently replaced.
         config.view_motion = view_motion.unwrap_or(config.view_motion);
         if *learned_camera {
             let camera = config.assumed_camera.get_or_insert_default();
@@ -203,7 +203,7 @@ mod tests {
         assert!(of(&wrong).unwrap_err().to_string().contains("hope"));
     }
 
-    /// Only then the recordings are opened, and these are nowhere.
+    /// Only then are the recordings opened, and these do not exist.
     #[test]
     fn a_clock_is_measured_where_that_is_asked_for() {
         let request = StartRequest {

@@ -1,4 +1,4 @@
-//! How long a training will take, from its first steps, and what else could be chosen.
+//! Estimates how long a training will take, from its first steps, and lists alternatives.
 
 use std::time::{Duration, Instant};
 
@@ -6,37 +6,37 @@ use deepfusion_model::{Compute, InputSize, Learn, Preset, Reprojection, TrainCon
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_train::Device;
 
-/// Steps that the pace is taken from. The first is left out: it allocates.
+/// Number of steps that the pace is measured over. The first one is left out, since it allocates memory.
 const STEPS: usize = 5;
-/// A pace of fewer steps will do once so much time has gone.
+/// Fewer steps suffice once this much time has passed.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// A run that is over before anyone could choose otherwise needs no estimate.
+/// A run that ends sooner than this needs no estimate.
 const SOON_OVER_S: f64 = 30.0;
 
-/// Watches the first steps of a run, then says once how long it will take.
+/// Watches the first steps of a run, then estimates once how long it will take.
 #[derive(Debug)]
 pub struct Pace {
     config: TrainConfig,
     compute: Compute,
-    /// When the first step was done, and which it was.
+    /// When the first step was done, and its number.
     first: Option<(Instant, usize)>,
     done: bool,
 }
 
-/// How long a run will take from here.
+/// How long a run will still take.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeEstimate {
-    /// Steps that are left.
+    /// Number of steps left.
     pub steps: usize,
-    /// Seconds of a step.
+    /// Seconds per step.
     pub step_s: f64,
-    /// Other settings, and how long as many steps would take with them by their multiply-adds, seconds.
+    /// Other settings, with the seconds that the same number of steps would take with them, estimated from multiply-adds.
     pub choices: Vec<(OtherSetting, f64)>,
-    /// Whether bf16 could be chosen on this processor and is not.
+    /// Whether this processor supports bf16 and it is not used.
     pub bf16: bool,
 }
 
-/// Another setting that a user may want.
+/// Another setting that the user may prefer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OtherSetting {
     /// A larger input.
@@ -46,7 +46,7 @@ pub enum OtherSetting {
 }
 
 impl Pace {
-    /// Of a run with this configuration.
+    /// The pace of a run with this configuration.
     #[must_use]
     pub fn of(config: TrainConfig, compute: Compute) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Pace {
         }
     }
 
-    /// The estimate after a step, once, where now is the time for it.
+    /// The estimate, returned once, after the first step at which it can be made.
     pub fn after_step(&mut self, step: usize, steps: usize) -> Option<TimeEstimate> {
         if self.done {
             return None;
@@ -109,14 +109,14 @@ impl Pace {
 }
 
 impl TimeEstimate {
-    /// Seconds from here to the end.
+    /// Seconds until the end.
     #[must_use]
     pub fn total_s(&self) -> f64 {
         self.step_s * self.steps as f64
     }
 }
 
-/// Multiply-adds of the networks in one step, forward; backward goes along with it.
+/// Multiply-adds of the networks in one forward pass of a step; the backward pass is proportional.
 fn work(config: &TrainConfig) -> u64 {
     let depth = config.depth_net.costs(config.size);
     let depth: u64 = depth.iter().map(|part| part.multiply_adds).sum();
@@ -125,9 +125,9 @@ fn work(config: &TrainConfig) -> u64 {
     } else {
         config.pose_net.cost(config.size).multiply_adds
     };
-    // PoseNet does not look at the other camera's view.
+    // PoseNet does not use the other camera's view.
     let sources = config.frames.len() as u64;
-    // Both ways, the sources have depth, too.
+    // With both directions, the sources have depth, too.
     let depths = match config.reprojection {
         Reprojection::Bidirectional => 1 + sources,
         Reprojection::Minimum | Reprojection::Mean => 1,
@@ -166,7 +166,7 @@ mod tests {
         else {
             panic!("{:?}", estimate.choices);
         };
-        // Four times the pixels are four times the work of every convolution.
+        // Four times the pixels are four times the work in every convolution.
         assert_eq!(size, full);
         assert!((larger / 4800.0 - 1.0).abs() < 0.01, "{larger}");
         assert!(smaller < 600.0, "{smaller}");

@@ -1,4 +1,4 @@
-//! One frame, compared with those before it.
+//! Evidence from one frame, compared with the frames before it.
 
 use deepfusion_data::{Dataset, RgbImage, grey_image};
 use deepfusion_eval::median;
@@ -12,29 +12,29 @@ use nalgebra::Vector3;
 use super::Target;
 use crate::Result;
 
-/// An alignment that turns by more than this from what was measured, radians, has gone astray: bumps are smaller.
+/// An alignment whose rotation differs from the measured one by more than this, in radians, has failed: bumps are smaller.
 const ASTRAY_TURN: f64 = 0.05;
-/// The same of the direction that the camera goes in; a camera's mount is often known only roughly.
+/// The same limit for the direction of the camera's translation; a camera's mount is often only roughly known.
 const ASTRAY_WAY: f64 = 0.45;
-/// Least share of the textured pixels that must be seen in the frame before.
+/// Smallest share of the textured pixels that must be visible in the frame before.
 const SEEN: f64 = 0.4;
 
-/// What a frame says.
+/// The evidence from a frame.
 #[derive(Default)]
 pub(super) struct FrameEvidence {
-    /// Scene points: depth as predicted, and the logarithm of the factor that it wants.
+    /// Scene points: the predicted depth, and the logarithm of the factor that would correct it.
     pub points: Vec<(f64, f64)>,
-    /// ln(way through the depth / way measured).
+    /// ln(translation found with the depth / measured translation).
     pub log_way: Option<f64>,
-    /// Photometric error of the frame before, warped and as it is.
+    /// Photometric errors of the frame before: warped, and unwarped.
     pub reprojection: Option<(f64, f64)>,
-    /// Median of |ln(depth carried over / depth)|.
+    /// Median of |ln(warped depth / depth)|.
     pub consistency: Option<f64>,
     /// Median of |ln(depth / depth of the mirrored image)|.
     pub flip: Option<f64>,
 }
 
-/// A frame and what the network predicts of it.
+/// A frame and the network's prediction for it.
 struct PredictedFrame {
     prepared: PreparedImage,
     grey: GreyPyramid,
@@ -59,7 +59,7 @@ impl PredictedFrame {
     }
 }
 
-/// Measures a frame; `closely`: also what needs further runs of the network.
+/// Measures a frame; with `closely`, also what needs further runs of the network.
 pub(super) fn evidence_of_frame(
     estimator: &mut DepthEstimator,
     dataset: &Dataset,
@@ -71,7 +71,7 @@ pub(super) fn evidence_of_frame(
     let predicted = predict(estimator, dataset, target.frame, &image, focal_correction)?;
     let mut evidence = FrameEvidence::default();
     let mut views: Vec<(GreyPyramid, Se3)> = Vec::new();
-    // How much longer the way is through the depth, from the nearest frame on.
+    // The ratio of the translation found with the depth to the measured one, starting with the nearest frame.
     let mut factor = 1.0;
     for (place, (frame, measured)) in target.sources.iter().enumerate() {
         let before = dataset.load_image(*frame)?;
@@ -91,7 +91,7 @@ pub(super) fn evidence_of_frame(
             measured.translation().norm(),
         );
         factor = way.norm() / measured_way;
-        // The shortest way is the least sure one; a longer one replaces it.
+        // The shortest translation gives the least accurate ratio; a longer one replaces it.
         evidence.log_way = Some(factor.ln());
         let metric = Se3::from_parts(&found.source_from_target.rotation(), way / factor);
         views.push((grey, metric));
@@ -139,7 +139,7 @@ fn predict(
     })
 }
 
-/// Another frame's image, as [`predict`] makes it, without its depth.
+/// Another frame's image, prepared as by [`predict`], but without depth.
 fn grey_like(image: &RgbImage, window: [u32; 4], (width, height): (u32, u32)) -> GreyImage {
     let [x, y, w, h] = window;
     if [0, 0, image.width(), image.height()] == window {
@@ -149,7 +149,7 @@ fn grey_like(image: &RgbImage, window: [u32; 4], (width, height): (u32, u32)) ->
     }
 }
 
-/// The motion to the frame before by the depth, from what was measured on; `None` where it goes astray.
+/// The motion to the frame before, aligned by the depth, starting from the measured motion; `None` if the alignment fails.
 fn aligned(
     predicted: &PredictedFrame,
     before: &GreyPyramid,
@@ -167,7 +167,7 @@ fn aligned(
     good.then_some(found)
 }
 
-/// Photometric errors of the frame before, carried over by depth and measured motion, and as it is, over the pixels that are seen.
+/// Photometric errors of the frame before, warped by depth and measured motion, and unwarped, over the pixels visible in both.
 fn reprojection(
     predicted: &PredictedFrame,
     before: &GreyImage,
@@ -211,7 +211,7 @@ fn reprojection(
     Some((mean(&warped), mean(&unwarped)))
 }
 
-/// Where a pixel is seen in the other frame, and its depth there.
+/// The pixel's position in the other frame, and its depth there.
 fn carried(
     predicted: &PredictedFrame,
     source_from_target: &Se3,
@@ -227,7 +227,7 @@ fn carried(
     Some((pixel.x, pixel.y, there.z))
 }
 
-/// By how much depth carried over to the other frame differs from its own, the median of pixels.
+/// The median over pixels of the difference between warped depth and the other frame's own depth.
 fn consistency(
     predicted: &PredictedFrame,
     other: &DepthMap,
@@ -248,7 +248,7 @@ fn consistency(
     median(&differences)
 }
 
-/// By how much the depth of the mirrored image, mirrored back, differs, the median of pixels.
+/// The median over pixels of the difference between depth and the depth of the mirrored image.
 fn flip(depth: &DepthMap, mirrored: &DepthMap) -> Option<f64> {
     if (depth.width, depth.height) != (mirrored.width, mirrored.height) {
         return None;

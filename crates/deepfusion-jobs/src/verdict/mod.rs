@@ -1,8 +1,8 @@
-//! What a drive with speeds says of a network's depth, without ground truth.
+//! Judges a network's depth on drives with speeds, without ground truth.
 //!
-//! Frames that training did not see are taken in blocks along each drive ([`plan`]). Each is predicted, and compared with frames
-//! before it (`evidence_of_frame`): how the scene moved tells depth in metres, how well one frame explains the other tells whether depth and
-//! motion fit, and what the mirrored image gives tells how much of it is chance. [`verdict`] puts it together.
+//! Frames that training did not see are taken in blocks along each drive ([`plan`]). Each is predicted and compared with frames before it
+//! (`evidence_of_frame`): the motion of the scene determines depth in metres, the error of warping one frame to the other shows whether
+//! depth and motion are consistent, and the mirrored image shows how much of the depth is random. [`verdict`] combines the results.
 
 mod evidence;
 mod page;
@@ -31,25 +31,25 @@ pub use self::warning::VerdictWarning;
 use self::evidence::{FrameEvidence, evidence_of_frame};
 use crate::Result;
 
-/// The standard error of a vehicle's speed where nobody says better, as a share: tyres wear and warm, wheels slip, GPS is smoothed.
+/// The default standard error of a vehicle's speed, as a share of it: tyres wear and warm up, wheels slip, GPS is smoothed.
 pub const SPEED_SD: f64 = 0.03;
-/// Fewest scene points of a block that count.
+/// Smallest number of scene points in a block that counts.
 const LEAST_POINTS: usize = 40;
 
-/// How the verdict is found.
+/// Options of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct VerdictOptions {
     /// Standard error of the vehicle's speed, as a share of it.
     pub speed_sd: f64,
-    /// Whether depth is corrected for another focal length than the one trained with.
+    /// Whether depth is corrected for a focal length other than the one trained with.
     pub focal_correction: bool,
-    /// Blocks at most, over all drives.
+    /// Largest number of blocks, over all drives.
     pub blocks: usize,
 }
 
 impl VerdictOptions {
-    /// With a standard error of the speed as a share of it, and with or without the correction for the focal length; 40 blocks.
+    /// Options with the standard error of the speed as a share of it, with or without the focal correction; 40 blocks.
     #[must_use]
     pub fn new(speed_sd: f64, focal_correction: bool) -> Self {
         Self {
@@ -70,18 +70,19 @@ impl Default for VerdictOptions {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unseen {
-    /// None of them was seen.
+    /// None of the frames was seen.
     All,
-    /// These were seen: data set and frame.
+    /// These were seen, given by data set and frame.
     Except(HashSet<(usize, usize)>),
-    /// Nobody knows.
+    /// Unknown.
     NotKnown,
 }
 
-/// Looks at `datasets` with a network. `progress` takes the frames done and in all.
+/// Judges a network on `datasets`. `progress` receives the number of frames done, and of all.
 ///
 /// # Errors
-/// An image that cannot be read, and what the network's engine says. That nothing can be said is no error: the verdict says why.
+/// An image that cannot be read; the error of the network's engine. If no verdict is possible, that is not an error: the verdict contains
+/// the reason.
 pub fn verdict(
     estimator: &mut DepthEstimator,
     datasets: &[Dataset],
@@ -98,7 +99,7 @@ pub fn verdict(
         let dataset = &datasets[block.dataset];
         let mut points = Vec::new();
         for (i, target) in block.targets.iter().enumerate() {
-            // What costs a further run of the network is looked at once in a block.
+            // Measures that need further runs of the network are made once per block.
             let evidence =
                 evidence_of_frame(estimator, dataset, target, i == 0, options.focal_correction)?;
             gathered.add(&evidence, target.speed_mps);
@@ -113,7 +114,7 @@ pub fn verdict(
     Ok(verdict)
 }
 
-/// What the frames looked at so far say, block by block and all together.
+/// The evidence so far, by block and in total.
 #[derive(Default)]
 struct GatheredEvidence {
     blocks: Vec<BlockScale>,
@@ -133,7 +134,8 @@ impl GatheredEvidence {
         self.flip.extend(evidence.flip);
     }
 
-    /// `points`: depth as predicted, and the logarithm of the factor that it wants; `certifies`: whether the certificate counts the block.
+    /// `points` are predicted depths with the logarithm of the factor that would correct them; `certifies` says whether the block counts
+    /// for the certificate.
     fn close_block(&mut self, points: Vec<(f64, f64)>, certifies: bool) {
         if certifies
             && points.len() >= LEAST_POINTS
@@ -191,7 +193,7 @@ impl GatheredEvidence {
     }
 }
 
-/// The medians of a block's points: all of them, and the nearer half less the farther one.
+/// The medians of a block's points: of all, and the nearer half's minus the farther half's.
 fn block_scale(points: &[(f64, f64)]) -> Option<BlockScale> {
     let logs: Vec<f64> = points.iter().map(|p| p.1).collect();
     let mut by_depth = points.to_vec();

@@ -1,4 +1,4 @@
-//! The page of a verdict alone, where there is no ground truth.
+//! The page of a verdict without ground truth.
 
 use std::path::PathBuf;
 
@@ -8,10 +8,10 @@ use deepfusion_runtime::ModelSource;
 
 use crate::{ModelFacts, Result, RunHistory, name_of};
 
-/// The page of what is said of a network's depth on recordings without ground truth; `command` makes it again.
+/// The page of the verdict on a network's depth on recordings without ground truth; `command` makes it again.
 ///
 /// # Errors
-/// A run's log that is another program's.
+/// A log in the run's folder that another program wrote.
 pub fn verdict_page(
     model: &ModelSource,
     data: &[PathBuf],
@@ -19,7 +19,10 @@ pub fn verdict_page(
     command: &str,
 ) -> Result<HtmlReport> {
     let names: Vec<_> = data.iter().map(|p| name_of(p)).collect();
-    let title = format!("Depth judged without ground truth on {}", names.join(", "));
+    let title = format!(
+        "Depth evaluated without ground truth on {}",
+        names.join(", ")
+    );
     let mut page = HtmlReport::new(model.name(), title).verdict(verdict);
     if let Some(run) = model.folder() {
         page = RunHistory::read(run)?.add_to(page);

@@ -1,4 +1,4 @@
-//! Which frames are looked at, and which ones before them they are compared with.
+//! Chooses the frames to measure, and the earlier frames that they are compared with.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,57 +9,58 @@ use deepfusion_geometry::Se3;
 use super::Unseen;
 use crate::drives::first_of_drive;
 
-/// Ways from a frame to the ones before it that it is compared with, metres: near things move enough by the first, far ones by the last.
+/// Distances in metres from a frame to the earlier ones that it is compared with: near points move enough over the first, far ones over the
+/// last.
 const WAYS_M: [f64; 3] = [0.6, 2.5, 7.0];
-/// A way this many times longer than asked for is too long: frames are too far apart.
+/// A distance this many times longer than wanted is too long: the frames are too far apart.
 const TOO_LONG: f64 = 4.0;
 /// Largest turn between two frames, radians.
 const TURN: f64 = 0.2;
-/// Frames before the one that are tried.
+/// Number of earlier frames that are tried.
 const BEFORE: usize = 60;
-/// Length of a block, metres of way.
+/// Length of a block, in metres travelled.
 const BLOCK_M: f64 = 10.0;
-/// Frames at most of a block.
+/// Largest number of frames in a block.
 const TARGETS: usize = 4;
 
-/// A frame that is looked at.
+/// A frame to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
     /// Its index.
     pub frame: usize,
     /// The vehicle's speed, m/s.
     pub speed_mps: f64,
-    /// The frames before it, nearest first, and the measured motion: a point of this frame's camera in theirs.
+    /// The earlier frames, nearest first, each with the measured motion from this frame's camera to theirs.
     pub sources: Vec<(usize, Se3)>,
 }
 
-/// Frames of some metres of road.
+/// The frames of some metres of road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
-    /// The data set they are of.
+    /// Index of the data set.
     pub dataset: usize,
-    /// In their order.
+    /// The frames in order.
     pub targets: Vec<Target>,
 }
 
-/// What is looked at.
+/// The frames to measure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plan {
-    /// Along each drive.
+    /// The blocks along each drive.
     pub blocks: Vec<Block>,
-    /// Why there are none.
+    /// Why there are no blocks.
     pub nothing: Option<NoCertificate>,
 }
 
 impl Plan {
-    /// Frames that are looked at.
+    /// Number of frames to measure.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.blocks.iter().map(|b| b.targets.len()).sum()
     }
 
-    /// The data sets whose blocks the certificate counts: of each drive the first camera that is looked at. The other one sees the same road at the
-    /// same time, and its blocks would count as independent ones.
+    /// The data sets whose blocks count for the certificate: the first camera used of each drive. Another camera sees the same road at the
+    /// same time, and its blocks would wrongly count as independent.
     pub(super) fn certifying(&self, datasets: &[Dataset]) -> HashSet<usize> {
         let drives = first_of_drive(datasets);
         let mut first = HashMap::new();
@@ -111,7 +112,7 @@ pub fn plan(datasets: &[Dataset], unseen: &Unseen, most: usize) -> Plan {
     }
 }
 
-/// Frames of a stretch that can be looked at, with the way up to each.
+/// Frames of a section that can be measured, with the distance travelled up to each.
 struct Targets(Vec<(f64, Target)>);
 
 impl Targets {
@@ -141,12 +142,12 @@ impl Targets {
     }
 }
 
-/// For each of [`WAYS_M`] the latest frame that is so far behind.
+/// For each distance in [`WAYS_M`], the latest frame that is at least so far behind.
 fn sources(dataset: &Dataset, frame: usize, earlier: &[usize]) -> Vec<(usize, Se3)> {
     let mut found: Vec<(usize, Se3)> = Vec::new();
     let mut wanted = WAYS_M.iter().peekable();
     for &source in earlier.iter().rev() {
-        // A point of the target's camera in the source's.
+        // From the target's camera to the source's.
         let Some(motion) = dataset.camera_motion(source, frame) else {
             break;
         };
@@ -170,7 +171,7 @@ fn sources(dataset: &Dataset, frame: usize, earlier: &[usize]) -> Vec<(usize, Se
     found
 }
 
-/// Targets of ten metres each, thinned.
+/// Divides targets into blocks of ten metres, and thins them.
 fn in_blocks(dataset: usize, targets: Vec<(f64, Target)>) -> Vec<Block> {
     let number = |way: f64| (way / BLOCK_M) as u64;
     let chunks = targets.chunk_by(|a, b| number(a.0) == number(b.0));
@@ -185,7 +186,7 @@ fn in_blocks(dataset: usize, targets: Vec<(f64, Target)>) -> Vec<Block> {
         .collect()
 }
 
-/// At most `most` of the items, from the first to the last.
+/// At most `most` of the items, evenly from the first to the last.
 fn evenly<T>(items: Vec<T>, most: usize) -> Vec<T> {
     let n = items.len();
     if n <= most {

@@ -1,4 +1,4 @@
-//! The way between neighbouring frames as PoseNet sees it.
+//! The distance between neighbouring frames according to PoseNet.
 
 use std::path::Path;
 
@@ -11,13 +11,14 @@ use deepfusion_train::{Device, PosePredictor};
 use super::{Unseen, VerdictOptions, VerdictWarning, plan};
 use crate::Result;
 
-/// Another focal length than the one trained with, at network size, by more than this share: PoseNet sees another motion.
+/// If the focal length differs from the one trained with by more than this share, at the network's size, PoseNet's motion is not
+/// comparable.
 const FOCAL_TOLERANCE: f64 = 0.05;
-/// Shortest way that is compared, metres.
+/// Shortest distance that is compared, in metres.
 const LEAST_WAY_M: f64 = 0.1;
 
-/// Whether a run's PoseNet has learned the metres between neighbouring frames: from video, with the vehicle's speed, and not from frames at a
-/// distance of their own; not of a run that left it out.
+/// Whether a run's PoseNet has learned the metric distance between neighbouring frames: from video with the vehicle's speed, and not from
+/// frames chosen by distance. False for a run that left PoseNet out.
 #[must_use]
 pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
     let mut sets = 0..config.data.sets.len().max(1);
@@ -27,7 +28,8 @@ pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
     from_video && learned && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
 }
 
-/// Where a network has a PoseNet of which [`pose_net_is_metric`] holds, as it is loaded; `config`: its run's. An imported depth network has none.
+/// The path to load a network's PoseNet from, if it has one for which [`pose_net_is_metric`] is true; `config` is its run's. An imported
+/// depth network has none.
 #[must_use]
 pub fn metric_pose_net<'a>(model: &'a ModelSource, config: &TrainConfig) -> Option<&'a Path> {
     match model {
@@ -36,7 +38,7 @@ pub fn metric_pose_net<'a>(model: &'a ModelSource, config: &TrainConfig) -> Opti
             folder,
             kind,
         } => {
-            // A file that cannot be read says so when it is loaded.
+            // A file that cannot be read gives an error when it is loaded.
             let has_one = || folder.has_pose_net(*kind).unwrap_or(true);
             (pose_net_is_metric(config) && has_one()).then_some(given.as_path())
         }
@@ -44,8 +46,8 @@ pub fn metric_pose_net<'a>(model: &'a ModelSource, config: &TrainConfig) -> Opti
     }
 }
 
-/// As [`pose_speeds`], of the PoseNet at a path ([`metric_pose_net`]), with the metres of a data set. One that cannot be loaded is a warning:
-/// depth is judged all the same.
+/// As [`pose_speeds`], for the PoseNet at a path ([`metric_pose_net`]), with the units of a data set. If it cannot be loaded, that is a
+/// warning, and depth is judged nevertheless.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -62,9 +64,9 @@ pub fn pose_speeds_of(
     }
 }
 
-/// PoseNet's way from each frame that [`super::verdict`] looks at to the one before, against the vehicle's, by speed. Nothing of recordings with
-/// another focal length than the one trained with, nor of an imported PoseNet, whose unit is not known; for networks of which
-/// [`pose_net_is_metric`] holds.
+/// PoseNet's distance from each frame that [`super::verdict`] measures to the frame before, compared with the vehicle's, by speed. Empty
+/// for recordings with another focal length than the one trained with, and for an imported PoseNet, whose unit is unknown. For networks for
+/// which [`pose_net_is_metric`] is true.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -105,7 +107,7 @@ pub fn pose_speeds(
     Ok(speed_rows(&logs))
 }
 
-/// Whether a recording's camera is the one that the network learned with, as far as that is known.
+/// Whether a recording's camera is the training camera, as far as that is known.
 fn knows_the_camera(predictor: &PosePredictor, dataset: &Dataset) -> bool {
     let (Some(trained), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
     else {

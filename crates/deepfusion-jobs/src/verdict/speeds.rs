@@ -1,4 +1,4 @@
-//! The vehicle's speed beside what the images say of it, by speed.
+//! Compares the vehicle's speed with the speed measured in the images, by range of speed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,12 +12,12 @@ use rayon::prelude::*;
 use super::{Plan, Target};
 use crate::Result;
 
-/// Width of the images that the road is looked at in.
+/// Width of the images in which the road is measured.
 const WIDTH: u32 = 320;
 
-/// The speed by the road's motion, against the vehicle's. The road tells speed over camera height: at speeds that the signal says too
-/// high the camera seems higher than at the others. Each drive's height is its own, so that a drive has to show the road at two ranges
-/// of speeds or more; pairs that show none do not count.
+/// The speed measured by the road's motion, compared with the vehicle's. The road's motion gives speed divided by camera height: in a range
+/// where the speed signal is too high, the camera seems higher than elsewhere. Each drive has its own height, so a drive has to show the
+/// road in at least two ranges of speed; frame pairs that do not show it are not counted.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -61,7 +61,7 @@ pub(super) fn road_speeds(datasets: &[Dataset], plan: &Plan) -> Result<Vec<Speed
     Ok(speed_rows(&logs))
 }
 
-/// What a frame and the nearest before it show of the road, with the vehicle's speed.
+/// The road's motion between a frame and the nearest one before it, with the vehicle's speed.
 fn road_costs(
     dataset: &Dataset,
     target: &Target,
@@ -81,7 +81,7 @@ fn road_costs(
         earlier: texture(*source)?,
         later: texture(target.frame)?,
         intrinsics: k.resized(width, height),
-        // Pairs stand alone here: no acceleration is known.
+        // Pairs are independent here, so the acceleration is unknown.
         seconds: f64::NAN,
         earlier_from_later: *earlier_from_later,
         down_in_cam,

@@ -1,22 +1,22 @@
-//! What a verdict lacks, and why.
+//! What is missing from a verdict, and why.
 
 use deepfusion_eval::verdict::{NoCertificate, Verdict};
 
-/// What a verdict lacks that one may expect of it.
+/// Something missing from a verdict that the user may expect.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerdictWarning {
-    /// The scale, as training may have seen the frames.
+    /// The scale is missing, since training may have seen the frames.
     #[error("whether training saw these frames is not known, so there is no scale certificate")]
     SeenNotKnown,
-    /// The speed as PoseNet sees it, as that cannot be loaded.
+    /// The comparison with PoseNet's speed is missing, since PoseNet cannot be loaded.
     #[cfg(feature = "train")]
     #[error("PoseNet is not compared with the vehicle's speed: {0}")]
     NoPoseNet(#[source] deepfusion_train::Error),
 }
 
 impl VerdictWarning {
-    /// That of a verdict without a scale for want of knowing what training saw.
+    /// The warning about a verdict without a scale because it is unknown what training saw.
     #[must_use]
     pub fn of(verdict: &Verdict) -> Option<Self> {
         let unknown = verdict.no_certificate == Some(NoCertificate::SeenNotKnown);

@@ -1,4 +1,4 @@
-//! With a network that is there: what it sees zero-shot, on a street it has never seen, and what learning there adds.
+//! Shows a given network zero-shot on a street it has never seen, and what fine-tuning there adds.
 
 mod page;
 mod parts;
@@ -17,20 +17,20 @@ use super::DemoSettings;
 use crate::Result;
 use crate::training::Start;
 
-/// Added to the demo's seed. What learning adds differs from street to street: docs/benchmarks/demo.md.
+/// Added to the demo's seed. What fine-tuning adds differs from street to street: docs/benchmarks/demo.md.
 const STREET_SEED: u64 = 21;
-/// Frames of the drive along the new street, ten a second, and how many of them have a scan.
+/// Number of frames of the drive along the new street (ten per second); every `SCAN_EVERY`-th has a scan.
 const FRAMES: usize = 200;
 const SCAN_EVERY: usize = 5;
-/// Cars that drive there.
+/// Number of cars that drive there.
 const MOVING_CARS: usize = 6;
-/// Steps of learning, and samples of a step: about two minutes on two cores.
+/// Number of fine-tuning steps, and samples per step: about two minutes on two cores.
 const STEPS: usize = 60;
 const BATCH: usize = 2;
-/// A network that knows its trade takes smaller steps than one that begins.
+/// Fine-tuning needs a smaller learning rate than training from scratch.
 const LEARNING_RATE: f64 = 2e-5;
 
-/// The drive along the new street: by a camera and in a light of its own.
+/// The drive along the new street, with its own camera and light.
 #[must_use]
 pub fn street(settings: &DemoSettings) -> SimConfig {
     let usual = SimConfig::default();
@@ -47,8 +47,8 @@ pub fn street(settings: &DemoSettings) -> SimConfig {
     }
 }
 
-/// How the network learns there, from images, speed and yaw rate, on the drive in a folder, of the frames of a split file. `own`: the
-/// configuration of its run, `start`: the network.
+/// The configuration that fine-tunes on the drive in a folder from images, speed and yaw rate, with the frames of a split file. `own` is
+/// the configuration of the network's run, `start` the network.
 ///
 /// # Errors
 /// As [`Start::record_in`].
@@ -66,7 +66,7 @@ pub fn recipe(
     let steps = settings.steps(STEPS);
     let mut config = TrainConfig {
         view_motion: ViewMotion::Vehicle,
-        // The views are warped by the vehicle's motion, and nobody asks for another.
+        // The views are warped by the vehicle's motion, so PoseNet is not used.
         freeze: vec![TrainConfig::POSE_NET.into()],
         precision,
         size: settings.input_size(own.size),
@@ -77,7 +77,7 @@ pub fn recipe(
         validate_every: steps / 2,
         ..own.preset.config_on(settings.compute)
     };
-    // Two pictures of one street say little of how pictures are distributed.
+    // Two pictures of one street give poor batch norm statistics.
     config.depth_net.encoder.frozen_statistics = true;
     config.data.paths = vec![drive.to_owned()];
     config.data.split = Some(split.to_owned());

@@ -1,4 +1,4 @@
-//! The page: what the network sees zero-shot and after learning.
+//! The page: the network's predictions zero-shot and after fine-tuning.
 
 use std::path::Path;
 
@@ -10,38 +10,38 @@ use crate::duration::duration_text;
 use crate::evaluation::Evaluated;
 use crate::{Result, RunHistory};
 
-/// How a network does on the street: what it sees in a frame, and how it measures on all of them.
+/// The results of a network on the street: its prediction for one frame, and its metrics on all.
 #[derive(Clone, Copy)]
 pub struct StreetResult<'a> {
-    /// The frame.
+    /// The prediction for one frame.
     pub shown: &'a ShownPrediction,
-    /// All frames.
+    /// The metrics on all frames.
     pub evaluated: &'a Evaluated,
 }
 
-/// What the page shows.
+/// The contents of the page.
 pub struct NewStreetPage<'a> {
     /// The network as it was given.
     pub zero_shot: StreetResult<'a>,
-    /// What it learned; the same frame.
+    /// The fine-tuned network, with the same frame.
     pub learned: StreetResult<'a>,
     /// The picture of the frame with its targets ([`ShownPrediction::overlay_in`]).
     pub overlay: Option<&'a Path>,
-    /// From the first image to its depth, milliseconds.
+    /// Time from the first image to its depth, in milliseconds.
     pub first_ms: f64,
-    /// Of the whole demo.
+    /// Duration of the whole demo, in seconds.
     pub seconds: f64,
-    /// The folder of the run that learned.
+    /// The folder of the fine-tuning run.
     pub run: &'a Path,
     /// The command that makes the page again.
     pub command: &'a str,
 }
 
 impl NewStreetPage<'_> {
-    /// The page; the pictures on it are files, too.
+    /// Makes the page; the pictures on it are also saved as files.
     ///
     /// # Errors
-    /// A picture that cannot be read, encoded or written; a run's log that is another program's.
+    /// A picture that cannot be read, encoded or written; a log in the run's folder that another program wrote.
     pub fn compose(&self) -> Result<HtmlReport> {
         let mut page = self.facts().section("Zero-shot");
         let first = self.zero_shot.shown;
@@ -54,18 +54,18 @@ impl NewStreetPage<'_> {
             page = page.picture(caption, &picture, PictureFormat::Png)?;
         }
         page = page.section("After learning here").paragraph(
-            "What is learned is the metre. So little video alone may also let the sky come nearer and soften edges; simulated depth beside it, as \
-             `deepfusion adapt` learns, holds edges but needs more steps.",
+            "Fine-tuning corrects the scale. With so little video, the sky may come nearer and edges may soften; with simulated depth added, as \
+             `deepfusion adapt` does, edges stay sharp, but more steps are needed.",
         );
         let second = self.learned.shown;
         page = second.add_to(page, "its depth in metres after learning")?;
         page = second.add_error_to(page, "error_learned", "Relative error after learning")?;
         page = page
-            .section("Accuracy on the part of the street that was not learned from")
+            .section("Accuracy on the held-out part of the street")
             .paragraph(PROTOCOL);
         page = self.learned.evaluated.add_to(page);
         page = RunHistory::read(self.run)?.add_to(page);
-        Ok(page.section("Again").command(self.command))
+        Ok(page.section("Reproduce").command(self.command))
     }
 
     /// Title and key figures.
@@ -81,8 +81,8 @@ impl NewStreetPage<'_> {
             .map(|t| t.unscaled.abs_rel);
         HtmlReport::new(
             "DeepFusion: metric depth from one camera and a speed signal",
-            "A simulated street that the embedded network has never seen, by a camera and in a light of its own: zero-shot, and after learning on \
-             its first part from images, speed and yaw rate, without any depth label",
+            "A simulated street that the embedded network has never seen, with its own camera and light: zero-shot, and after learning on \
+             its first part from images, speed and yaw rate, without depth labels",
         )
         .facts(&[
             ("Abs Rel zero-shot", &number(before.unscaled.abs_rel)),

@@ -1,4 +1,4 @@
-//! A drive's first part, to learn from, and its last, to be measured on.
+//! Divides a drive into a first part to learn from, and a last part to evaluate on.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -10,27 +10,27 @@ use crate::Result;
 use crate::demo::DemoFolder;
 use crate::recordings::write_split;
 
-/// Of the usual drive, frames that are learned from; those after the gap are measured on.
+/// Number of frames to learn from, of the usual drive; the frames after the gap are evaluated.
 const LEARNED: usize = 120;
 const GAP: usize = 5;
 
-/// A drive's first part, to learn from, and its last, to be measured on.
+/// A drive's first part, to learn from, and its last part, to evaluate on.
 pub struct SplitDrive {
     /// The whole drive.
     pub all: Dataset,
     /// Its first part.
     pub learned: Vec<Dataset>,
-    /// Its last.
+    /// Its last part.
     pub measured: Vec<Dataset>,
-    /// Split file of the first.
+    /// Split file of the first part.
     pub learned_split: PathBuf,
 }
 
 impl SplitDrive {
-    /// Divides the drive in a folder; the demo's own gets the split files.
+    /// Divides the drive in `drive`; the split files are written into the demo's folder.
     ///
     /// # Errors
-    /// A drive that cannot be opened, and a split file that cannot be written.
+    /// A drive that cannot be opened; a split file that cannot be written.
     pub fn of(drive: &Path, folder: &DemoFolder) -> Result<Self> {
         let all = open(drive, None)?.swap_remove(0);
         let list = |name: &str, part: Range<usize>| -> Result<PathBuf> {
@@ -49,7 +49,7 @@ impl SplitDrive {
         })
     }
 
-    /// A frame to be shown, of those that are measured on.
+    /// The frame to show, from the evaluated part.
     #[must_use]
     pub fn shown_frame(&self) -> usize {
         let measured = measured_of(self.all.frames().len());
@@ -68,12 +68,12 @@ fn open(drive: &Path, split: Option<&Path>) -> Result<Vec<Dataset>> {
     )?)
 }
 
-/// Which of a drive's frames are learned from: as large a part as of the usual drive.
+/// The frames to learn from: the same share as of the usual drive.
 fn learned_of(frames: usize) -> Range<usize> {
     0..frames * LEARNED / FRAMES
 }
 
-/// Which are measured on.
+/// The frames to evaluate.
 fn measured_of(frames: usize) -> Range<usize> {
     let gap = (frames * GAP).div_ceil(FRAMES);
     learned_of(frames).end + gap..frames
@@ -84,7 +84,7 @@ mod tests {
     use super::super::SCAN_EVERY;
     use super::*;
 
-    /// A short drive, too, has a scan among the frames that are measured on, and none of these is learned from.
+    /// Even a short drive has a scan among the evaluated frames, and none of them is learned from.
     #[test]
     fn every_drive_has_something_to_measure_on() {
         assert_eq!(

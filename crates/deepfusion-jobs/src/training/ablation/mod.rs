@@ -1,7 +1,7 @@
-//! The on/off table of the paper's Table 3: runs of an equal budget that differ in one part each, measured alike.
+//! Tables of ablations, as in the paper's Table 3: runs of equal budget that differ in one part each, evaluated in the same way.
 //!
-//! What is asked of a new table ([`PlanRequest`]) gives a plan. A [`Plan`] is kept beside its table, so that it can be gone on with: [`Plan::run`] says of each row and seed whether it is done, and if not
-//! gives the [`OpenRun`] to train and measure.
+//! The request for a new table ([`PlanRequest`]) gives a [`Plan`]. It is saved beside the table, so that the table can be continued.
+//! [`Plan::run`] returns, for each row and seed, either the result or the [`OpenRun`] to train and evaluate.
 
 mod request;
 mod rows;
@@ -24,23 +24,23 @@ use crate::Result;
 use crate::files::write;
 use crate::recordings::{open_recordings, training_recordings};
 
-/// What a table is made of.
+/// The plan of a table.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Plan {
     /// Optimiser steps of every run.
     pub budget: usize,
-    /// Seeds 0 to this less one.
+    /// Number of seeds, counted from 0.
     pub seeds: u64,
     /// The rows.
     pub rows: Vec<Row>,
-    /// Recordings to measure on; empty: those trained on.
+    /// Recordings to evaluate on; empty: the training recordings.
     pub eval_data: Vec<PathBuf>,
-    /// What all rows share.
+    /// The settings that all rows share.
     #[serde(deserialize_with = "settings")]
     pub config: TrainConfig,
 }
 
-/// A configuration; one that an earlier run wrote may also hold that run's findings.
+/// Reads a configuration; one that an earlier run wrote may also contain that run's findings.
 fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error> {
     let read = TrainConfig::from_run_table(toml::Table::deserialize(from)?);
     Ok(read.map_err(serde::de::Error::custom)?.0)
@@ -49,10 +49,10 @@ fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error>
 const PLAN: &str = "ablate.toml";
 
 impl Plan {
-    /// The plan of a table that was begun.
+    /// Reads the plan of a table that was begun.
     ///
     /// # Errors
-    /// A file that is not there, or cannot be one.
+    /// A file that is missing or invalid.
     pub fn read(out: &Path) -> Result<Self> {
         let path = out.join(PLAN);
         let text = std::fs::read_to_string(&path).map_err(|e| DataError::file(&path, e))?;
@@ -62,8 +62,7 @@ impl Plan {
         })?)
     }
 
-    /// What may be asked of a table that is gone on with: more runs of every row, and where the recordings to train on are now (empty: where
-    /// they were).
+    /// Changes a plan to continue its table: more runs of every row, and new paths of the training recordings (empty: unchanged).
     pub fn go_on_with(&mut self, seeds: u64, data: &[PathBuf]) {
         self.seeds = self.seeds.max(seeds);
         if !data.is_empty() {
@@ -72,7 +71,7 @@ impl Plan {
         }
     }
 
-    /// Keeps it beside the table.
+    /// Saves the plan beside the table.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -80,16 +79,16 @@ impl Plan {
         in_folder(&out.join(PLAN), &toml::to_string_pretty(self)?)
     }
 
-    /// The configuration of each row: all are looked at before the first trains for hours.
+    /// The configuration of each row: all are checked before the first trains for hours.
     ///
     /// # Errors
-    /// [`ModelError::Config`] where the shared settings and a row's cannot be together.
+    /// [`ModelError::Config`] if the shared settings contradict a row's.
     pub fn row_configs(&self) -> Result<Vec<TrainConfig>> {
         let configs = self.rows.iter().map(|row| row.config(&self.config));
         Ok(configs.collect::<Result<_, _>>()?)
     }
 
-    /// The recordings trained on, for the mean-depth baseline, and those measured on.
+    /// The training recordings, for the mean-depth baseline, and the recordings to evaluate on.
     ///
     /// # Errors
     /// As [`open_recordings`].
@@ -111,7 +110,7 @@ impl Plan {
         Ok((trained_on()?, measured_on))
     }
 
-    /// Writes the table so far in four forms: for people, for a spreadsheet, for a README, for a paper.
+    /// Writes the table so far in four forms: for a terminal, a spreadsheet, a README and a paper.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -119,12 +118,12 @@ impl Plan {
         let table = table::table(&self.rows, results);
         let mut text = table::text(&table);
         let place = if self.eval_data.is_empty() {
-            "measured on the recordings trained on"
+            "evaluated on the training recordings"
         } else {
-            "measured on other recordings than those trained on"
+            "evaluated on other recordings than the training recordings"
         };
         text.push_str(&format!(
-            "\n{} a run, {place}; mean ± standard deviation over seeds; \
+            "\n{} per run, {place}; mean ± standard deviation over seeds; \
              the seven metrics unscaled, abs_rel_scaled after median scaling; parameters of the depth network\n",
             count_of(self.budget, "step")
         ));
@@ -144,7 +143,7 @@ impl Plan {
     }
 }
 
-/// Writes a text file, whole or not at all, in a folder that is made.
+/// Writes a text file atomically, in a folder that is created.
 fn in_folder(path: &Path, text: &str) -> Result<()> {
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(|e| DataError::file(parent, e))?;

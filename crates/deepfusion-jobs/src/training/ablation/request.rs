@@ -1,4 +1,4 @@
-//! What may be asked of a new table, and the plan that follows from it.
+//! The request for a new table, and the plan that follows from it.
 
 use std::path::PathBuf;
 
@@ -12,54 +12,54 @@ use super::{Plan, Row};
 use crate::Result;
 use crate::recordings::camera_word;
 
-/// What is asked of a new table. What is not asked for is as its file or its preset has it.
+/// The request for a new table. What is not set comes from the file or the preset.
 #[derive(Debug, Clone, Default)]
 pub struct PlanRequest {
     /// A configuration file, read over its preset.
     pub file: Option<Box<TrainConfig>>,
-    /// A preset, where there is no file; none means [`Preset::Light`].
+    /// A preset, used without a file; by default [`Preset::Light`].
     pub preset: Option<Preset>,
-    /// What the runs compute on, as a preset's sizes follow it.
+    /// The kind of device, which determines a preset's sizes.
     pub compute: Compute,
-    /// Parts that all rows have.
+    /// Parts that are switched on in all rows.
     pub with: Vec<String>,
-    /// Parts that no row has.
+    /// Parts that are switched off in all rows.
     pub without: Vec<String>,
-    /// The pose used for warping; none means the file's, else PoseNet's.
+    /// The pose used for warping; by default the file's, otherwise PoseNet's.
     pub view_motion: Option<ViewMotion>,
     /// The size of the network's input.
     pub size: Option<InputSize>,
-    /// Samples of a batch.
+    /// Number of samples in a batch.
     pub batch: Option<usize>,
-    /// Keys with values, as `batch=4`.
+    /// Keys with values, such as `batch=4`.
     pub assignments: Vec<String>,
     /// Recordings to train on.
     pub data: Vec<PathBuf>,
     /// Their cameras.
     pub camera: Cameras,
-    /// Recordings to measure on; empty: those trained on.
+    /// Recordings to evaluate on; empty: the training recordings.
     pub eval_data: Vec<PathBuf>,
     /// Names of rows; empty: those of the paper's table.
     pub rows: Vec<String>,
     /// Optimiser steps of every run, at least one.
     pub budget: usize,
-    /// Runs of every row, at least one.
+    /// Number of runs of every row, at least one.
     pub seeds: u64,
 }
 
 impl PlanRequest {
-    /// The plan. Its paths are absolute, so that it can be gone on with from any folder.
+    /// The plan. Its paths are absolute, so that the table can be continued from any folder.
     ///
     /// # Errors
-    /// A term or a key that there is not; [`SettingProblem::DecidedElsewhere`] for a key that [`TableDecides`]; as [`Row::named`].
+    /// An unknown term or key; [`SettingProblem::DecidedElsewhere`] for a key that [`TableDecides`]; as [`Row::named`].
     pub fn plan(&self) -> Result<Plan> {
         let mut config = match &self.file {
             Some(file) => (**file).clone(),
             None => {
                 let preset = self.preset.unwrap_or(Preset::Light);
                 let mut config = preset.config_on(self.compute);
-                // A measured motion in the warp would teach the rows without the speed loss, too; and masks of dynamic pixels
-                // are no part of the flow loss.
+                // Warping by the measured motion would also teach the rows without the speed loss; and masks of dynamic pixels are not part
+                // of the flow loss.
                 config.view_motion = ViewMotion::PoseNet;
                 config.loss.moving.enabled = false;
                 config
@@ -86,7 +86,7 @@ impl PlanRequest {
         }
         config.data.paths.clone_from(&self.data);
         config.data.camera = camera_word(self.camera).into();
-        // Every row begins anew.
+        // Every row starts from scratch.
         (config.init, config.init_sha256) = (None, None);
         config.make_absolute();
         Ok(Plan {
@@ -99,15 +99,15 @@ impl PlanRequest {
     }
 }
 
-/// What a table decides of its runs' settings, so that no key sets it for all rows.
+/// Settings of its runs that a table decides, so that no key may set them for all rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TableDecides {
-    /// How long a run learns.
+    /// The length of a run.
     Length,
     /// Its seed.
     Seed,
-    /// What it begins from.
+    /// What it starts from.
     Start,
     /// What it learns from.
     Recordings,
@@ -116,10 +116,10 @@ pub enum TableDecides {
 }
 
 impl TableDecides {
-    /// What it decides of the key of an assignment, as `seed=3`.
+    /// What the table decides about the key of an assignment, such as `seed=3`.
     #[must_use]
     pub fn about(assignment: &str) -> Option<Self> {
-        // Of a list's element, as `data.paths[0]`, what is decided of the list.
+        // For a list's element, such as `data.paths[0]`, what it decides about the list.
         let key = assignment.split(['=', '[']).next().unwrap_or_default();
         match key.trim() {
             "steps" | "epochs" | "min_steps" => Some(Self::Length),
@@ -131,15 +131,17 @@ impl TableDecides {
         }
     }
 
-    /// By what.
+    /// Why the setting is decided by the table.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
-            Self::Length => "the table's budget says how long every run learns",
-            Self::Seed => "the table's seeds say how often a row is run, and with which seeds",
-            Self::Start => "every run begins from nothing",
-            Self::Recordings => "the recordings are those of the table",
-            Self::Cameras => "the cameras are those of the table",
+            Self::Length => "the table's budget determines how long every run is trained",
+            Self::Seed => {
+                "the table's number of seeds determines the runs of a row and their seeds"
+            }
+            Self::Start => "every run starts from scratch",
+            Self::Recordings => "the table determines the recordings",
+            Self::Cameras => "the table determines the cameras",
         }
     }
 }
@@ -155,7 +157,7 @@ mod tests {
         }
     }
 
-    /// What would teach a row more than its own parts is off, unless somebody asks for it.
+    /// Parts that would teach a row more than its own parts are off by default.
     #[test]
     fn a_preset_loses_what_would_blur_the_rows_and_a_file_keeps_it() {
         let plan = request().plan().unwrap();

@@ -1,7 +1,7 @@
 use deepfusion_model::{Error, ExpectedSetting, Reprojection, TrainConfig};
 use serde::{Deserialize, Serialize};
 
-/// One row of the table: what is switched on.
+/// A row of the table: which parts are switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Row {
     /// Hierarchical context encoding.
@@ -15,7 +15,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The rows of the paper's Table 3: everything on first, then what lacks something.
+    /// The rows of the paper's Table 3: everything on first, then those that lack something.
     #[must_use]
     pub fn table_3() -> Vec<Self> {
         let combination = |off: u8| Self {
@@ -27,7 +27,7 @@ impl Row {
         (0..8).map(combination).collect()
     }
 
-    /// Every row that can be asked for: those of Table 3, and everything on with three frames.
+    /// All rows that can be requested: those of Table 3, and everything on with three frames.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let three_frames = Self {
@@ -39,10 +39,10 @@ impl Row {
         Self::table_3().into_iter().chain([three_frames]).collect()
     }
 
-    /// The rows of these names; those of the paper's table where none is named.
+    /// The rows with these names; without names, those of the paper's table.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that no row has.
+    /// [`Error::Config`] for an unknown row.
     pub fn named(names: &[String]) -> Result<Vec<Self>, Error> {
         if names.is_empty() {
             return Ok(Self::table_3());
@@ -58,8 +58,7 @@ impl Row {
         names.iter().map(find).collect()
     }
 
-    /// Its name in file names: what is on, joined by `+`; `none`, or `minimum` for the row with
-    /// three frames.
+    /// Its name in file names: the parts that are on, joined by `+`; `none`, or `minimum` for the row with three frames.
     #[must_use]
     pub fn name(self) -> String {
         if self.minimum {
@@ -82,12 +81,12 @@ impl Row {
         }
     }
 
-    /// The settings of the row, from those that all rows share. It differs from them by its parts alone: the pose used
-    /// for warping is the same in every row, so that what a row without the speed loss lacks is that loss. Only the
-    /// masks of dynamic pixels go with the flow, which they are made of.
+    /// The settings of the row, from those that all rows share. Only the row's parts differ: the pose used for warping is the same in every
+    /// row, so that a row without the speed loss lacks only that loss. Only the masks of dynamic pixels are switched with the flow, since
+    /// they are made from it.
     ///
     /// # Errors
-    /// [`Error::Config`] where the shared settings and the row's cannot be together.
+    /// [`Error::Config`] if the shared settings contradict the row's.
     pub fn config(self, shared: &TrainConfig) -> Result<TrainConfig, Error> {
         let mut config = shared.clone();
         for (on, term) in [
@@ -104,7 +103,7 @@ impl Row {
         config.view_motion = shared.view_motion;
         if self.minimum {
             (config.reprojection, config.frames) = (Reprojection::Minimum, vec![-1, 1]);
-            // It compares the depths of both frames, and three frames have the target's alone.
+            // It compares the depths of both frames, but with three frames only the target has depth.
             config.loss.affine = 0.0;
         }
         config.validate()?;
@@ -147,8 +146,8 @@ mod tests {
         }
     }
 
-    /// A row switches its own part and nothing else: not attention with HCE, not masks with the flow, not the pose
-    /// used for warping with the speed loss.
+    /// A row switches only its own part: not attention with HCE, not masks with the flow, not the pose used for warping with the speed
+    /// loss.
     #[test]
     fn a_row_lacks_its_own_part_alone() {
         for preset in [Preset::Light, Preset::Paper] {
@@ -171,7 +170,7 @@ mod tests {
         }
     }
 
-    /// Masks of dynamic pixels that all rows share are made of the flow: without it they are off.
+    /// Masks of dynamic pixels that all rows share are made from the flow: without it they are off.
     #[test]
     fn masks_go_with_the_flow_that_they_are_made_of() {
         let shared = shared(Preset::Paper);
@@ -182,7 +181,7 @@ mod tests {
         }
     }
 
-    /// With measured motion in the warp a row without the speed loss would still learn from it: it is refused.
+    /// With measured motion for warping, a row without the speed loss would still learn from speed, so it is refused.
     #[test]
     fn a_row_without_the_speed_loss_takes_no_measured_pose() {
         let mut shared = shared(Preset::Light);

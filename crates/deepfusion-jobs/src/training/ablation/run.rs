@@ -1,4 +1,4 @@
-//! One run of a table: done, or to be trained and measured.
+//! One run of a table: done, or still to train and evaluate.
 
 use std::path::{Path, PathBuf};
 
@@ -15,11 +15,11 @@ use crate::{Error, Result};
 
 const RESULT: &str = "result.json";
 
-/// A run of a row with a seed.
+/// The run of a row with a seed.
 pub enum Run {
-    /// It was made.
+    /// It is done.
     Done(Box<RunResult>),
-    /// It is to be made, or gone on with.
+    /// It is still to be made or continued.
     Open(Box<OpenRun>),
 }
 
@@ -31,7 +31,7 @@ pub struct OpenRun {
 }
 
 impl Plan {
-    /// The run of a row, whose configuration is `config`, with a seed, in the table's folder.
+    /// The run of a row with a seed in the table's folder; `config` is the row's configuration.
     ///
     /// # Errors
     /// [`Error::NoResult`] for a result that cannot be read.
@@ -66,10 +66,10 @@ impl OpenRun {
         self.folder.join("run")
     }
 
-    /// What trains it, where its last checkpoint stands or from the beginning.
+    /// Its trainer, starting at the last checkpoint or from the beginning.
     ///
     /// # Errors
-    /// As [`open_samples`], and the trainer's.
+    /// As [`open_samples`]; errors of the trainer.
     pub fn trainer(
         &self,
         device: &Device,
@@ -83,7 +83,7 @@ impl OpenRun {
                 let stored = folder.read_config()?;
                 return Ok(Trainer::resume(stored, folder, sets, device)?);
             }
-            // It ended before its first checkpoint: nothing is lost with it.
+            // The run ended before its first checkpoint: there is nothing to lose.
             std::fs::remove_dir_all(&run).map_err(|e| DataError::file(&run, e))?;
         }
         let folder = RunFolder::create(&run)?;
@@ -96,7 +96,7 @@ impl OpenRun {
         )?)
     }
 
-    /// Adds seconds of training to those of the times before, which are kept beside the run.
+    /// Adds seconds of training to those from before an interruption, which are saved beside the run.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -114,11 +114,11 @@ impl OpenRun {
         self.folder.join("seconds")
     }
 
-    /// Measures the run's last checkpoint, which `estimator` runs, as `eval` does, and keeps what it came to: equal budgets are compared, and
-    /// not choices of a checkpoint.
+    /// Evaluates the run's last checkpoint, run by `estimator`, as `eval` does, and saves the result. The last checkpoint is used so that
+    /// equal budgets are compared, not choices of a checkpoint.
     ///
     /// # Errors
-    /// Recordings that cannot be measured on, and files that cannot be written.
+    /// Recordings that cannot be evaluated on; files that cannot be written.
     pub fn measure(
         self,
         plan: &Plan,

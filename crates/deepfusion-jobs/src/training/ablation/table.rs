@@ -1,26 +1,26 @@
-//! The table: means and spreads over seeds, as text, CSV, Markdown and LaTeX.
+//! The table: means and standard deviations over seeds, as text, CSV, Markdown and LaTeX.
 
 use super::rows::Row;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
-/// What one run came to.
+/// The result of one run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunResult {
     /// Its row.
     pub row: Row,
     /// Its seed.
     pub seed: u64,
-    /// Seconds of training, interruptions left out.
+    /// Seconds of training, without interruptions.
     pub train_seconds: f64,
-    /// Parameters of the depth network, which is what runs after training.
+    /// Number of parameters of the depth network, which is what runs after training.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parameters: Option<u64>,
-    /// What `eval` says of it.
+    /// Its evaluation.
     pub report: deepfusion_eval::Report,
 }
 
-/// A column of figures.
+/// A column of the table.
 struct Column {
     name: &'static str,
     value: fn(&RunResult) -> Option<f64>,
@@ -37,7 +37,7 @@ impl Column {
     }
 }
 
-/// The field's seven metrics as the network gives metres, then what tells scale from shape, then what it cost.
+/// The usual seven metrics on unscaled depth, then those that separate scale from shape, then the cost.
 const COLUMNS: [Column; 13] = [
     Column::new("abs_rel", 3, |r| Some(r.report.unscaled.abs_rel)),
     Column::new("sq_rel", 3, |r| Some(r.report.unscaled.sq_rel)),
@@ -56,12 +56,12 @@ const COLUMNS: [Column; 13] = [
     Column::new("parameters_m", 2, |r| r.parameters.map(|n| n as f64 / 1e6)),
 ];
 
-/// A figure over the seeds of a row.
+/// Mean and standard deviation of a figure over the seeds of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// The mean.
     pub mean: f64,
-    /// The standard deviation between seeds (n − 1); absent for one seed.
+    /// The standard deviation over seeds (n − 1); absent for one seed.
     pub std: Option<f64>,
 }
 
@@ -87,19 +87,19 @@ impl Spread {
 /// A row with its figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TableRow {
-    /// What is on.
+    /// Which parts are on.
     #[serde(flatten)]
     pub row: Row,
     /// The row's name.
     pub name: String,
-    /// Seeds that are done.
+    /// Number of seeds that are done.
     pub seeds: usize,
-    /// The figures by name, in the columns' order; absent where no run has one.
+    /// The figures by name, in the columns' order; absent if no run has the figure.
     #[serde(serialize_with = "by_name")]
     pub figures: Vec<(&'static str, Option<Spread>)>,
 }
 
-/// A map in the columns' order.
+/// Serialises the figures as a map in the columns' order.
 fn by_name<S: serde::Serializer>(
     figures: &[(&'static str, Option<Spread>)],
     serializer: S,
@@ -107,7 +107,7 @@ fn by_name<S: serde::Serializer>(
     serializer.collect_map(figures.iter().map(|(name, figure)| (name, figure)))
 }
 
-/// The rows of `rows` that have a run, with what their runs came to.
+/// The rows that have a run, with their results.
 #[must_use]
 pub fn table(rows: &[Row], results: &[RunResult]) -> Vec<TableRow> {
     let of_row = |row: &Row| {
@@ -126,7 +126,7 @@ pub fn table(rows: &[Row], results: &[RunResult]) -> Vec<TableRow> {
     rows.iter().filter_map(of_row).collect()
 }
 
-/// The columns that some row has a figure for.
+/// The columns for which some row has a figure.
 fn shown(table: &[TableRow]) -> Vec<usize> {
     let has = |i: &usize| table.iter().any(|row| row.figures[*i].1.is_some());
     (0..COLUMNS.len()).filter(has).collect()
@@ -145,7 +145,7 @@ fn views(row: Row) -> &'static str {
     }
 }
 
-/// For people at a terminal.
+/// The table for a terminal.
 #[must_use]
 pub fn text(table: &[TableRow]) -> String {
     let mark = |on: bool| if on { "x" } else { "·" }.to_owned();
@@ -173,7 +173,7 @@ pub fn text(table: &[TableRow]) -> String {
     aligned(&lines, 4)
 }
 
-/// Cells as columns two spaces apart, the first `left` of them flush left, the others flush right.
+/// Aligns cells in columns two spaces apart: the first `left` columns to the left, the others to the right.
 fn aligned(lines: &[Vec<String>], left: usize) -> String {
     let width = |i: usize| lines.iter().map(|cells| cells[i].chars().count()).max();
     let mut out = String::new();
@@ -193,7 +193,7 @@ fn aligned(lines: &[Vec<String>], left: usize) -> String {
     out
 }
 
-/// For a spreadsheet: mean and standard deviation in columns of their own, every digit.
+/// The table for a spreadsheet: mean and standard deviation in separate columns, with all digits.
 pub(super) fn csv(table: &[TableRow]) -> String {
     let mut out = String::from("row,hce,speed,flow,minimum,seeds");
     for column in &COLUMNS {
@@ -217,7 +217,7 @@ pub(super) fn csv(table: &[TableRow]) -> String {
     out
 }
 
-/// For a README.
+/// The table for a README.
 pub(super) fn markdown(table: &[TableRow]) -> String {
     let columns = shown(table);
     let mut out = String::from("| HCE | speed | flow | frames | seeds |");
@@ -247,7 +247,7 @@ pub(super) fn markdown(table: &[TableRow]) -> String {
     out
 }
 
-/// For a paper: a `tabular` that needs amssymb's check mark.
+/// The table for a paper: a `tabular` that needs amssymb's check mark.
 pub(super) fn latex(table: &[TableRow]) -> String {
     let columns = shown(table);
     let mut out = format!(
@@ -314,7 +314,7 @@ mod tests {
         }
     }
 
-    /// What the paper's Table 3 has: seven metrics, hours and parameters.
+    /// As in the paper's Table 3: seven metrics, hours and parameters.
     #[test]
     fn a_row_has_every_metric_with_its_cost() {
         let table = table(&Row::table_3(), &[result(0, 0.25), result(1, 0.27)]);
@@ -352,11 +352,7 @@ mod tests {
         );
         assert_eq!(lines[1][5..7], ["0.260 ± 0.014", "1.500 ± 0.000"], "{text}");
         assert_eq!(lines[1][14..], ["0.50 ± 0.00", "14.33 ± 0.00"], "{text}");
-        assert_eq!(
-            lines.len(),
-            2,
-            "rows that have no run are not there: {text}"
-        );
+        assert_eq!(lines.len(), 2, "rows without a run are left out: {text}");
         for name in [
             "sq_rel",
             "rmse_log",

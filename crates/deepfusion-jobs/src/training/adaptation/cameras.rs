@@ -1,4 +1,4 @@
-//! The drives' own cameras, through which simulated views are then seen.
+//! The drives' own cameras, which simulated views are rendered through.
 
 use deepfusion_data::{Dataset, PLAUSIBLE_HEIGHT_M, road_camera_height};
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -7,15 +7,15 @@ use nalgebra::Vector3;
 
 use crate::Result;
 
-/// Cameras whose numbers differ by less, as a share of the focal length, are one.
+/// Cameras whose intrinsics differ by less than this, as a share of the focal length, count as one.
 const SAME: f64 = 0.01;
-/// Most drives that a camera's height is measured on.
+/// The most drives on which a camera's height is measured.
 const MEASURED_ON: usize = 3;
-/// Most cameras: a fleet has few kinds of them.
+/// The most cameras: a fleet has few kinds of them.
 const MOST: usize = 16;
 
-/// The cameras of the drives, each once: the lens as recorded, pitch and roll by the mounting's calibration where there is one. The
-/// height is by the motion of the road in the images ([`road_camera_height`]; the middle one of up to three drives), where they show it.
+/// The cameras of the drives, each once: the lens as recorded; pitch and roll from the mount's calibration, if there is one; the height
+/// measured by the motion of the road in the images ([`road_camera_height`]; the median of up to three drives), if they show it.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -61,7 +61,7 @@ fn camera(k: &Intrinsics, (pitch, roll): (f64, f64), height_m: Option<f64>) -> S
     }
 }
 
-/// Height above the road, metres; `None` where the images do not show it or it is no vehicle's.
+/// Height above the road in metres; `None` if the images do not show it, or the camera is not on a vehicle.
 fn height(drives: &[&Dataset]) -> Result<Option<f64>> {
     let mut heights = Vec::new();
     for drive in drives.iter().take(MEASURED_ON) {
@@ -72,13 +72,13 @@ fn height(drives: &[&Dataset]) -> Result<Option<f64>> {
     Ok(heights.get(heights.len() / 2).copied())
 }
 
-/// Pitch and roll of the first mounting that is known, else level.
+/// Pitch and roll of the first known mount, otherwise zero.
 fn tilt(drives: &[&Dataset]) -> (f64, f64) {
     let known = drives.iter().find_map(|drive| drive.cam_from_vehicle());
     known.map_or((0.0, 0.0), |mounting| tilt_of(&mounting))
 }
 
-/// How far a camera looks down, and is turned clockwise as it looks, radians.
+/// The camera's downward pitch and its clockwise roll, in radians.
 fn tilt_of(cam_from_vehicle: &Se3) -> (f64, f64) {
     let vehicle_from_cam = cam_from_vehicle.inverse();
     let up = |axis| vehicle_from_cam.rotate(&axis).z;
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn a_mountings_tilt_is_found() {
-        // Right, down and ahead of a level camera in the vehicle (forward, left, up).
+        // Right, down and forward of a level camera, in the vehicle's axes (forward, left, up).
         let level = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
         for (pitch, roll) in [(0.0, 0.0), (0.1, 0.0), (-0.2, 0.05), (0.05, -0.3)] {
             let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.02)

@@ -1,4 +1,4 @@
-//! Where an adapted network lies: while it is learned, when it is kept, refused, undone.
+//! The folders of an adapted network: while it is trained, when it is kept, refused or undone.
 
 use std::ffi::OsString;
 use std::fs;
@@ -14,20 +14,20 @@ use super::super::RunLock;
 use crate::files::write;
 use crate::{Error, Result};
 
-/// The given network, beside the one that was learned: its checkpoint and its configuration.
+/// Files of the given network, beside the adapted one: its checkpoint and its configuration.
 const START: [&str; 2] = ["start.safetensors", "start.toml"];
-/// What becomes of the learned one where it is undone.
+/// Prefix for the adapted network's files after it was undone.
 const ADAPTED: &str = "adapted-";
 
 /// The folders of one adaptation.
 pub(super) struct Folders {
     out: PathBuf,
-    /// Not a [`deepfusion_fs::PartialFolder`]: its name is known, and what an interrupted process left there is gone on with.
+    /// Not a [`deepfusion_fs::PartialFolder`]: its name is fixed, so that an interrupted adaptation can be continued.
     work: PathBuf,
 }
 
 impl Folders {
-    /// Those of `out`, which must be new.
+    /// The folders for the output `out`, which must be new.
     pub(super) fn of(given: &Path) -> Result<Self> {
         let out = resolved(given)?;
         let path = || given.to_owned();
@@ -47,15 +47,15 @@ impl Folders {
         })
     }
 
-    /// Where is learned.
+    /// The folder of the training.
     pub(super) fn work(&self) -> &Path {
         &self.work
     }
 
-    /// The lock of what is there; none where nothing is.
+    /// The lock of the training's folder; `None` if it does not exist.
     ///
     /// # Errors
-    /// [`Error::AtWork`] where another process learns there.
+    /// [`Error::AtWork`] if another process is training there.
     pub(super) fn lock(&self) -> Result<Option<RunLock>> {
         if self.work.is_dir() {
             RunLock::take(&self.work).map(Some)
@@ -64,7 +64,7 @@ impl Folders {
         }
     }
 
-    /// The run that was interrupted with the same settings; what it left before its first checkpoint is removed.
+    /// The run that was interrupted with the same settings. If it has no checkpoint yet, it is removed.
     pub(super) fn begun(&self, config: &TrainConfig) -> Result<Option<RunFolder>> {
         if !self.work.exists() {
             return Ok(None);
@@ -94,7 +94,7 @@ impl Folders {
         Ok(fs::remove_dir_all(&self.work).map_err(|e| DataError::file(&self.work, e))?)
     }
 
-    /// Copies the given network, so that it can be gone back to wherever it came from.
+    /// Copies the given network, so that it can be restored even if its own folder is gone.
     pub(super) fn keep_start(&self, given: &ModelSource) -> Result<()> {
         let [weights, config] = START.map(|name| self.work.join(name));
         match given {
@@ -123,27 +123,27 @@ impl Folders {
         }
     }
 
-    /// The work becomes the result.
+    /// Renames the training's folder to the output.
     pub(super) fn keep(&self) -> Result<PathBuf> {
         self.rename_work(self.out.clone())
     }
 
-    /// The work is laid aside, under a name that says so.
+    /// Renames the training's folder, marking it as refused.
     pub(super) fn refuse(&self) -> Result<PathBuf> {
         self.rename_work(unused(&beside(&self.out, ".refused")))
     }
 
-    /// Gives the work another name, under which all of it is on the disk.
+    /// Renames the training's folder; its content is synced first.
     fn rename_work(&self, to: PathBuf) -> Result<PathBuf> {
         publish_folder(&self.work, &to).map_err(|e| DataError::file(&to, e))?;
         Ok(to)
     }
 }
 
-/// Makes an adapted run the network it began from; what was learned stays in it under other names.
+/// Turns an adapted run back into the network that it started from; the adapted network's files stay in it under other names.
 ///
 /// # Errors
-/// [`Error::NotAdapted`] where there is nothing to go back to; a folder that cannot be written.
+/// [`Error::NotAdapted`] if there is nothing to restore; a folder that cannot be written.
 pub fn undo(out: &Path) -> Result<()> {
     let [weights, config] = START.map(|name| out.join(name));
     if !weights.is_file() {
@@ -156,7 +156,7 @@ pub fn undo(out: &Path) -> Result<()> {
         name.push(path.file_name().unwrap_or_default());
         out.join(name)
     };
-    // In this order, so that an undoing that was cut off is finished by another.
+    // In this order, so that an interrupted undo can be completed by another one.
     for kind in [CheckpointKind::Best, CheckpointKind::Last] {
         let path = folder.checkpoint_path(kind);
         if path.is_file() {
@@ -170,7 +170,7 @@ pub fn undo(out: &Path) -> Result<()> {
     publish(&weights, &folder.checkpoint_path(CheckpointKind::Best))
 }
 
-/// The folder itself: without a slash behind its name, and of a link, on which no folder is renamed, what it points at.
+/// The folder without a slash at the end; a link is resolved, since a folder cannot be renamed to it.
 fn resolved(given: &Path) -> Result<PathBuf> {
     let out: PathBuf = given.components().collect();
     if out.is_symlink() || out.file_name().is_none() {
@@ -179,7 +179,7 @@ fn resolved(given: &Path) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// Whether a folder is there and is another file system's than the one around it: nothing is renamed to it.
+/// Whether a folder exists and is on another file system than its parent, so that nothing can be renamed to it.
 #[cfg(unix)]
 fn is_mount_point(folder: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -193,14 +193,14 @@ fn is_mount_point(_: &Path) -> bool {
     false
 }
 
-/// `out` with an ending to its name.
+/// `out` with a suffix appended to its name.
 fn beside(out: &Path, end: &str) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_owned();
     name.push(end);
     out.with_file_name(name)
 }
 
-/// Renames a file; its content and its new name are on the disk once this returns.
+/// Renames a file; its content and its new name are synced once this returns.
 fn publish(from: &Path, to: &Path) -> Result<()> {
     Ok(deepfusion_fs::publish(from, to).map_err(|e| DataError::file(from, e))?)
 }
@@ -229,7 +229,7 @@ mod tests {
             beside(Path::new("mine/"), ".refused"),
             Path::new("mine.refused")
         );
-        // An empty folder is new; one with something in it is not.
+        // An empty folder counts as new; one with content does not.
         fs::create_dir(at.join("mine")).unwrap();
         Folders::of(&at.join("mine/")).unwrap();
         fs::write(at.join("mine/file"), "x").unwrap();
@@ -245,7 +245,7 @@ mod tests {
         let (link, target) = (at.join("link"), at.join("disk/mine"));
         std::os::unix::fs::symlink(&target, &link).unwrap();
         let error = Folders::of(&link).err().unwrap().to_string();
-        assert!(error.contains("link"), "what is not there: {error}");
+        assert!(error.contains("link"), "a link to nothing: {error}");
         fs::create_dir_all(&target).unwrap();
         let folders = Folders::of(&link).unwrap();
         assert_eq!(folders.work(), at.join("disk/mine.adapting"));

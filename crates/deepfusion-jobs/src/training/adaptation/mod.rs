@@ -1,8 +1,8 @@
-//! Learning on new drives from a network that is there, kept only if what can be known without ground truth gets no worse.
+//! Adapts a network to new drives, and keeps the result only if no measure without ground truth gets worse.
 //!
-//! [`Adaptation::begin`] judges the given network on the end of each drive, which is held out. The caller runs the
-//! [`Adaptation::trainer`], and [`Adaptation::end`] judges what was learned on the same frames: it becomes the run `out`, or is laid
-//! aside. [`undo`] takes a kept one back.
+//! [`Adaptation::begin`] judges the given network on the end of each drive, which is held out. The caller runs the [`Adaptation::trainer`],
+//! and [`Adaptation::end`] judges the adapted network on the same frames: it becomes the run `out`, or is set aside. [`undo`] restores the
+//! network from before.
 
 mod cameras;
 mod folders;
@@ -31,48 +31,48 @@ use crate::samples::{SampleWarning, open_samples};
 use crate::verdict::{SPEED_SD, Unseen, VerdictOptions, plan, verdict};
 use crate::{Error, Result};
 
-/// Fewest held-out frames that a network is judged by.
+/// Smallest number of held-out frames for judging a network.
 const LEAST_FRAMES: usize = 4;
 
-/// What to learn on, and how.
+/// What to adapt to, and how.
 #[derive(Debug, Clone)]
 pub struct AdaptSettings {
     /// Drives with a speed.
     pub data: Vec<PathBuf>,
     /// Folder of the adapted network's run, which must be new.
     pub out: PathBuf,
-    /// Which cameras of the drives. Of both, where they are rectified, each is by default a second view of the same moment, unless the given
-    /// network learned from drives without that.
+    /// The cameras to use. If both are used and rectified, each is by default a second view of the same moment, unless the given network
+    /// was trained on drives without that.
     pub camera: Cameras,
-    /// For bags: topics that are named.
+    /// The topics chosen for bags.
     pub topics: Vec<NamedTopic>,
     /// How far the camera's clock is ahead of the vehicle's, in seconds; `None`: as the recordings say.
     pub camera_ahead_s: Option<f64>,
-    /// Steps of learning.
+    /// Number of training steps.
     pub steps: usize,
-    /// Samples of the drives a step.
+    /// Number of the drives' samples in a step.
     pub batch: usize,
-    /// Samples of simulated depth a step, which keep what the network knows already; 0: none, and no head for uncertainty.
+    /// Number of samples with simulated depth in a step, which preserve what the network already knows; 0: none, and no uncertainty head.
     pub simulated: usize,
-    /// Whether the simulated views are seen through the drives' own cameras, at the height of the road in their images; else through
-    /// any camera.
+    /// Whether the simulated views are rendered through the drives' own cameras, at their height above the road as measured in the images;
+    /// otherwise through random cameras.
     pub own_camera: bool,
     /// The largest learning rate.
     pub learning_rate: f64,
-    /// Share of each drive's end to judge on.
+    /// The share at the end of each drive to judge on.
     pub held_out: f64,
-    /// One standard error of the vehicle's speed, as a share of it.
+    /// Standard error of the vehicle's speed, as a share of it.
     pub speed_sd: f64,
-    /// Fixes everything that is random.
+    /// Seed of everything random.
     pub seed: u64,
-    /// Any key of the configuration over these, as `loss.smoothness=0.01` ([`TrainConfig::set`]).
+    /// Assignments to any key of the configuration, such as `loss.smoothness=0.01`, which take precedence ([`TrainConfig::set`]).
     pub set: Vec<String>,
-    /// What it learns on.
+    /// The kind of device.
     pub compute: Compute,
 }
 
 impl AdaptSettings {
-    /// 240 steps of three samples of these drives and two simulated ones, the last quarter of each drive held out.
+    /// 240 steps of three samples of these drives and two simulated ones; the last quarter of each drive is held out.
     #[must_use]
     pub fn new(data: Vec<PathBuf>, out: PathBuf) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl AdaptSettings {
         }
     }
 
-    /// How the drives are opened for a network with this assumed camera.
+    /// The options for opening the drives, for a network with this assumed camera.
     #[must_use]
     pub fn open_options(&self, assumed: Option<&AssumedCamera>) -> OpenOptions {
         OpenOptions {
@@ -107,7 +107,7 @@ impl AdaptSettings {
     }
 }
 
-/// Fails where a folder for an adapted network is not new: an error before long work, not after it.
+/// Checks that the folder for an adapted network is new, before the long work rather than after it.
 ///
 /// # Errors
 /// [`Error::AdaptedBefore`], [`Error::MountPoint`]; a link to nothing.
@@ -115,10 +115,10 @@ pub fn require_new(out: &Path) -> Result<()> {
     Folders::of(out).map(|_| ())
 }
 
-/// Called with the recordings of a set when they are open, and with how they were opened, as by [`open_samples`].
+/// Called with the options and the open recordings of a set, as by [`open_samples`].
 pub type OpenedCallback<'a> = &'a mut dyn FnMut(&OpenOptions, &[Dataset]);
 
-/// An adaptation that was begun: the given network is judged.
+/// An adaptation whose given network has been judged.
 pub struct Adaptation {
     settings: AdaptSettings,
     folders: Folders,
@@ -128,16 +128,17 @@ pub struct Adaptation {
     device: Device,
     held_out: HeldOut,
     before: Verdict,
-    /// Of the folder where is learned, once that has begun.
+    /// The lock on the training's folder, once training has begun.
     lock: Mutex<Option<RunLock>>,
 }
 
 impl Adaptation {
-    /// Judges the given network, which `estimator` runs. `opened` sees the recordings, `progress` the frames done and in all.
+    /// Judges the given network, run by `estimator`. `opened` is called with the recordings; `progress` receives the number of frames done,
+    /// and of all.
     ///
     /// # Errors
-    /// [`Error::AdaptedBefore`] where `out` is not new; [`Error::NotJudged`] where the held-out frames say too little; drives that cannot
-    /// be opened, and settings that contradict each other.
+    /// [`Error::AdaptedBefore`] if `out` is not new; [`Error::NotJudged`] if there are too few usable held-out frames; drives that cannot
+    /// be opened; settings that contradict each other.
     pub fn begin(
         given: ModelSource,
         settings: AdaptSettings,
@@ -180,7 +181,7 @@ impl Adaptation {
         })
     }
 
-    /// The cameras that simulated views are seen through; none: any.
+    /// The cameras that simulated views are rendered through; empty: random ones.
     #[must_use]
     pub fn simulated_cameras(&self) -> &[SimulatedCamera] {
         let sets = self.config.data.sets.iter();
@@ -188,17 +189,17 @@ impl Adaptation {
         simulated.next().map_or(&[], |views| &views.cameras)
     }
 
-    /// Whether the given network may have learned from the frames that are held out: the figures before may then be optimistic.
+    /// Whether the given network may have been trained on the held-out frames, so that its figures may be too optimistic.
     #[must_use]
     pub fn may_have_seen_held_out(&self) -> bool {
         self.held_out.maybe_seen
     }
 
-    /// What learns; it goes on where an adaptation with the same settings was interrupted.
+    /// The trainer; it continues an interrupted adaptation with the same settings.
     ///
     /// # Errors
-    /// [`Error::OtherSettings`] where one with other settings was; [`Error::AtWork`] where another process learns there; as [`open_samples`],
-    /// and the trainer's.
+    /// [`Error::OtherSettings`] if an interrupted adaptation had other settings; [`Error::AtWork`] if another process is training there; as
+    /// [`open_samples`]; errors of the trainer.
     pub fn trainer(
         &self,
         opened: OpenedCallback,
@@ -208,7 +209,7 @@ impl Adaptation {
         let sets = open_samples(&self.config, opened, warn)?;
         let config = self.config.clone();
         self.hold(None);
-        // Before anything of it is removed.
+        // Before any of its files is removed.
         let lock = self.folders.lock()?;
         Ok(match self.folders.begun(&config)? {
             Some(folder) => {
@@ -226,22 +227,22 @@ impl Adaptation {
         })
     }
 
-    /// Keeps other processes out of the folder where is learned.
+    /// Keeps other processes out of the training's folder.
     fn hold(&self, lock: Option<RunLock>) {
         let mut held = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
         *held = lock;
     }
 
-    /// The run that the trainer writes, until it is judged.
+    /// The folder of the training run, until it is judged.
     #[must_use]
     pub fn work(&self) -> &Path {
         self.folders.work()
     }
 
-    /// Judges what was learned in so many steps, which `learned` runs, and keeps it or lays it aside.
+    /// Judges the network after this many steps, run by `learned`, and keeps it or sets it aside.
     ///
     /// # Errors
-    /// An image that cannot be read, and folders that cannot be written.
+    /// An image that cannot be read; folders that cannot be written.
     pub fn end(
         self,
         steps: usize,
@@ -261,7 +262,7 @@ impl Adaptation {
     }
 }
 
-/// What the network is judged on.
+/// The frames that a network is judged on.
 struct HeldOut {
     datasets: Vec<Dataset>,
     unseen: Unseen,
@@ -269,8 +270,8 @@ struct HeldOut {
 }
 
 impl HeldOut {
-    /// The frames that neither the given network nor the new one learns from; where that leaves none or is not known, those that
-    /// the new one does not.
+    /// The frames that neither the given nor the adapted network learns from. If there are none, or if that is unknown, the frames that the
+    /// adapted one does not learn from.
     fn of(datasets: Vec<Dataset>, config: &TrainConfig) -> Self {
         let mut unseen = unseen_frames(config, &[], &datasets);
         let most = VerdictOptions::default().blocks;

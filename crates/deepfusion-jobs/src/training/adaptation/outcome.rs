@@ -1,4 +1,4 @@
-//! What an adaptation came to.
+//! The outcome of an adaptation.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,23 +10,23 @@ use serde::Serialize;
 use crate::Result;
 use crate::files::write;
 
-/// Before, after, and what follows from it; `adapt.json` in the run's folder.
+/// The verdicts before and after, and the decision; written as `adapt.json` into the run's folder.
 #[derive(Debug, Serialize)]
 pub struct Outcome {
-    /// The given network.
+    /// Name of the given network.
     pub from: String,
-    /// Where the adapted one lies.
+    /// Path of the adapted network's run.
     #[serde(skip_serializing_if = "is_nowhere")]
     pub run: PathBuf,
-    /// Steps of learning.
+    /// Number of training steps.
     pub steps: usize,
-    /// Whether it may take the given one's place.
+    /// Whether the adapted network replaces the given one.
     pub kept: bool,
     /// The checks that became worse.
     pub worse: Vec<WorsenedCheck>,
-    /// The given network on the held-out frames.
+    /// The verdict on the given network, on the held-out frames.
     pub before: Verdict,
-    /// The adapted one on the same.
+    /// The verdict on the adapted network, on the same frames.
     pub after: Verdict,
 }
 
@@ -35,7 +35,7 @@ fn is_nowhere(path: &Path) -> bool {
 }
 
 impl Outcome {
-    /// Compares; where it lies is not known yet.
+    /// Compares the verdicts; the run's path is not yet known.
     pub(super) fn of(from: String, steps: usize, (before, after): (Verdict, Verdict)) -> Self {
         let worse = before.worse(&after);
         Self {
@@ -49,7 +49,7 @@ impl Outcome {
         }
     }
 
-    /// Why it may not take the given one's place; `None` where it may.
+    /// Why it does not replace the given network; `None` if it does.
     #[must_use]
     pub fn refusal(&self) -> Option<Refusal<'_>> {
         if self.kept {
@@ -61,14 +61,14 @@ impl Outcome {
         }
     }
 
-    /// Keeps it in the run's folder, wherever that is moved.
+    /// Writes the outcome into the run's folder, so that it moves with it.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)?;
         Ok(write(&folder.join("adapt.json"), text + "\n")?)
     }
 }
 
-/// Why an adapted network may not take the given one's place.
+/// Why an adapted network does not replace the given one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Refusal<'a> {
@@ -85,12 +85,12 @@ impl fmt::Display for Refusal<'_> {
                 let checks: Vec<String> = checks.iter().map(ToString::to_string).collect();
                 f.write_str(&checks.join(", "))
             }
-            Self::NotJudged => f.write_str("the held-out frames can no longer judge it"),
+            Self::NotJudged => f.write_str("the held-out frames can no longer be used to judge it"),
         }
     }
 }
 
-/// Before and after, a check a line, with the most that does not count as worse.
+/// Before and after, one check per line, with the largest value that does not count as worse.
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -140,7 +140,7 @@ impl fmt::Display for Outcome {
 mod tests {
     use super::*;
 
-    /// 4.6 to 4.8 % is kept, and the table says why.
+    /// 4.6 to 4.8 % is kept, and the table shows why.
     #[test]
     fn what_does_not_count_as_worse_is_in_the_table() {
         let verdict = |flip| {
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(refusal, Some(Refusal::NotJudged));
         assert_eq!(
             refusal.map(|refusal| refusal.to_string()).as_deref(),
-            Some("the held-out frames can no longer judge it")
+            Some("the held-out frames can no longer be used to judge it")
         );
     }
 }

@@ -1,4 +1,4 @@
-//! With what settings a network learns on a new drive.
+//! The settings with which a network is adapted to new drives.
 
 use deepfusion_data::{Cameras, Dataset};
 use deepfusion_model::{
@@ -13,18 +13,18 @@ use super::{AdaptSettings, cameras};
 use crate::Result;
 use crate::recordings::camera_word;
 
-/// Steps over which the learning rate rises: the optimiser knows nothing of the gradients' sizes yet.
+/// Number of steps over which the learning rate rises: at first the optimiser has no estimate of the gradients' magnitude.
 const WARMUP: usize = 30;
-/// Simulated worlds that no recipe has used.
+/// Seed of simulated worlds that no other recipe uses.
 const SEED: u64 = 91;
-/// Share of them in clear weather and through a plain camera.
+/// Share of them in clear weather and through an undistorted camera.
 const PLAIN: f64 = 0.2;
 
-/// How far the aspect ratio of another size may be from the network's own, as a share: what is squeezed looks otherwise.
+/// Largest relative difference between the aspect ratios of another size and of the network's own: squeezed images look different.
 const SQUEEZE: f64 = 0.05;
 
-/// The configuration: the network as it is, the loss of its own run where that learned from drives, else Monodepth2's with the
-/// vehicle's motion, in small steps.
+/// The configuration: the network as it is, with the loss of its own run if that learned from drives, otherwise Monodepth2's with the
+/// vehicle's motion; with a small learning rate.
 pub(super) fn config(
     settings: &AdaptSettings,
     estimator: &DepthEstimator,
@@ -45,21 +45,21 @@ pub(super) fn config(
             ..monodepth2
         }
     };
-    // A few drives say little of how pictures are distributed.
+    // A few drives give poor batch norm statistics.
     config.depth_net.encoder.frozen_statistics = true;
-    // The lens it learned with is the one that others are brought to: a new camera is another matter than a new place.
+    // Other cameras are converted to the focal length that it was trained with: only the place should be new to it.
     config.canonical_focal_px = own.canonical_focal_px.or_else(|| {
         let camera = estimator.training_camera()?;
         let (width, height) = (own.size.width as u32, own.size.height as u32);
         Some(camera.resized(width, height).fy)
     });
     config.assumed_camera = assumed_camera(estimator);
-    // Of two cameras each is a view of the other: their baseline is known better than any speed.
+    // Each of two cameras is a view for the other: their baseline is known more accurately than any speed.
     let both = settings.camera == Cameras::Both;
     config.stereo = both && (config.stereo || (!learned_from_drives && has_pairs(opened)));
     let new_pose_net = !learned_from_drives || own.leaves_pose_net_out();
     if new_pose_net {
-        // A new PoseNet's unit is found from these drives.
+        // A new PoseNet's unit is determined from these drives.
         config.pose_net.metres_per_unit = 0.0;
     }
     config.batch = settings.batch;
@@ -83,7 +83,7 @@ pub(super) fn config(
     config.data.topics = settings.topics.iter().map(ToString::to_string).collect();
     if settings.simulated == 0 {
         config.data.paths.clone_from(&settings.data);
-        // The head has nothing to learn from; what it knows would no longer fit.
+        // The head has no ground truth to learn from, and what it has learned would no longer fit.
         config.depth_net.uncertainty = false;
     } else {
         let cameras = if settings.own_camera {
@@ -99,7 +99,7 @@ pub(super) fn config(
     if new_pose_net {
         leave_pose_net_out(&mut config, &settings.set);
     }
-    // Around the size as it is now; a setting of the sizes themselves, or of one of them, has the last word.
+    // Sizes around the current size; explicit settings of the sizes, or of single ones, take precedence.
     if own.canonical_focal_px.is_some() {
         learn_at_several_sizes(&mut config, settings.simulated > 0);
     }
@@ -107,8 +107,8 @@ pub(super) fn config(
     Ok(config)
 }
 
-/// Whether the network's own run learned from drives. Imported weights, which know no camera, have the settings of a preset that does, and
-/// no metres: the vehicle's motion gives them some.
+/// Whether the network's own run learned from drives. Imported weights have no camera and no metric scale, but the settings of a preset
+/// that learns from drives; they are trained with the vehicle's motion instead.
 fn learned_from_drives(own: &TrainConfig, knows_camera: bool) -> bool {
     let from_motion = if own.data.sets.is_empty() {
         own.data.learn.from_motion()
@@ -118,7 +118,7 @@ fn learned_from_drives(own: &TrainConfig, knows_camera: bool) -> bool {
     from_motion && knows_camera
 }
 
-/// The settings but for those of single elements of lists, which may not be there yet.
+/// The settings except those of single elements of lists, which may not exist yet.
 fn of_no_element(set: &[String]) -> Vec<String> {
     let of_none = |assignment: &&String| {
         let key = assignment.split('=').next();
@@ -134,8 +134,8 @@ fn assign(config: &mut TrainConfig, settings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// A new PoseNet would learn beside depth what depth does not need. It is there, and learns, where the views are warped by its poses or its masks
-/// are wanted; where the settings say what is frozen, that holds.
+/// Leaves PoseNet out: depth does not need it. It is used and trained only if the views are warped by its poses, or if its masks are
+/// requested; an explicit setting of what is frozen takes precedence.
 fn leave_pose_net_out(config: &mut TrainConfig, set: &[String]) {
     let says_frozen = set.iter().any(|key| key.trim_start().starts_with("freeze"));
     if says_frozen {
@@ -153,7 +153,8 @@ fn leave_pose_net_out(config: &mut TrainConfig, set: &[String]) {
     }
 }
 
-/// A network of many cameras stays as good by several predictions as it was. One that learned at several sizes already keeps those.
+/// Keeps a network of many cameras as good with test-time augmentation at several scales as it was. One that was trained at several sizes
+/// already keeps those.
 fn learn_at_several_sizes(config: &mut TrainConfig, simulated: bool) {
     let sizes = sizes_around(config.size);
     let augmentation = &mut config.augmentation;
@@ -165,7 +166,7 @@ fn learn_at_several_sizes(config: &mut TrainConfig, simulated: bool) {
     }
 }
 
-/// Sizes near those at which an image is predicted at several scales, that the encoder takes and that hardly squeeze the image.
+/// Sizes near those used for predicting an image at several scales, which the encoder supports and which hardly squeeze the image.
 fn sizes_around(own: InputSize) -> Vec<InputSize> {
     let aspect = |size: &InputSize| size.width as f64 / size.height as f64;
     let side = |side: usize, scale: f64| 32 * (side as f64 * scale / 32.0).round() as usize;
@@ -182,7 +183,7 @@ fn sizes_around(own: InputSize) -> Vec<InputSize> {
         .collect()
 }
 
-/// Whether the settings leave turns alone that no sensor measured, as [`config`] will say.
+/// Whether the settings use only measured turns, as [`config`] will decide.
 pub(super) fn takes_measured_turns_only(
     settings: &AdaptSettings,
     estimator: &DepthEstimator,
@@ -193,12 +194,12 @@ pub(super) fn takes_measured_turns_only(
     Ok(config.data.measured_turns_only)
 }
 
-/// Whether a recording has a rectified other camera among them, and none has one that is no view of it.
+/// Whether the recordings contain rectified pairs of cameras, and every second camera can serve as a view of the first.
 fn has_pairs(opened: &[Dataset]) -> bool {
     recordings_with_stereo(opened).is_ok_and(|count| count > 0)
 }
 
-/// Of a network whose run had recordings without a camera, the one that it learned or assumed for them, held as it is.
+/// The camera that a network's run learned or assumed for recordings without one, kept fixed; `None` if all had one.
 #[must_use]
 pub fn assumed_camera(estimator: &DepthEstimator) -> Option<AssumedCamera> {
     let assumed = estimator.config().assumed_camera?;
@@ -243,7 +244,8 @@ fn simulated(config: &TrainConfig, cameras: Vec<SimulatedCamera>) -> DataSetConf
 mod tests {
     use super::*;
 
-    /// An import has Monodepth2's settings, and warps by its own PoseNet's motion alone if those are taken for what it learned by.
+    /// An import has Monodepth2's settings. If they were taken for those it was trained with, only its PoseNet's motion would be used for
+    /// warping.
     #[test]
     fn imported_weights_have_not_learned_from_drives() {
         let mut config = Preset::Monodepth2.config();
@@ -263,7 +265,7 @@ mod tests {
         };
         assert_eq!(around(640, 192), [[512, 160], [768, 224]]);
         assert_eq!(around(1024, 320), [[832, 256], [1216, 384]]);
-        // Of so low an image a step of 32 pixels is too much.
+        // For such a low image, a step of 32 pixels is too large.
         assert_eq!(around(320, 96), Vec::<[usize; 2]>::new());
     }
 
@@ -281,7 +283,7 @@ mod tests {
         learn_at_several_sizes(&mut config, true);
         assert_eq!(config.augmentation.video_sizes, own);
         assert_eq!(config.augmentation.sizes, video);
-        // Those of one size wait until there are some.
+        // Settings of single sizes are applied once there are sizes.
         let set: [String; 2] = [
             "augmentation.sizes[1].width = 800".into(),
             "augmentation.video_sizes=[]".into(),
@@ -304,7 +306,7 @@ mod tests {
             config.freeze
         };
         let (nothing, pose): ([&str; 0], _) = ([], ["pose"]);
-        // From a network without PoseNet, and from one that an earlier adaptation left without.
+        // For a network without PoseNet, and for one that an earlier adaptation left without.
         for before in [&nothing[..], &pose[..]] {
             assert_eq!(frozen(before, &["loss.smoothness=0.01"]), pose);
             assert_eq!(frozen(before, &["view_motion=distance"]), nothing);
