@@ -33,7 +33,7 @@ fn drive(folder: &Path, seed: u64, fps: f64) -> PathBuf {
     .unwrap()
 }
 
-/// Crops a drive's images to their middle, half as wide and half as high, and resizes them: a camera with twice the focal length.
+/// Crops a drive's images to their middle, half as wide and half as high: at the network's input size, a camera with twice the focal length.
 fn zoom(drive: &Path) {
     for entry in fs::read_dir(drive.join("image_02/data")).unwrap() {
         let path = entry.unwrap().path();
