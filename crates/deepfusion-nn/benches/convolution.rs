@@ -1,7 +1,7 @@
-//! Convolutions of the networks on a GPU or, without a GPU's feature, on the processor through Burn's tensors:
-//! `cargo bench -p deepfusion-nn --features vulkan --bench convolution`. Its peer is `benches/peers/torch_convolution.py`.
+//! Convolutions of the networks on a GPU or, without a GPU feature, on the processor through Burn's tensors:
+//! `cargo bench -p deepfusion-nn --features vulkan --bench convolution`. `benches/peers/torch_convolution.py` measures the same in PyTorch.
 //!
-//! Throughput is in multiply-adds of a forward pass; forward and backward together are three times as many.
+//! Throughput is in multiply-adds: those of a forward pass; forward and backward together have three times as many.
 
 #![allow(clippy::expect_used, reason = "a benchmark's panic is its message")]
 
@@ -10,13 +10,13 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use deepfusion_nn::ops::{ConvOptions, Precision, conv2d, supports};
 use std::time::Instant;
 
-/// Passes in flight before the device is waited for: few launches are done before the next is there.
+/// Passes that are queued before waiting for the device, so that launches do not limit the throughput.
 const AT_ONCE: u64 = 20;
 
 /// A layer: its name, channels in and out, height and width, kernel, stride, and whether its padding mirrors.
 type Layer = (&'static str, [usize; 2], [usize; 2], usize, usize, bool);
 
-/// Of the ResNet-18 depth network at 640×192; both frames of four samples.
+/// Layers of the ResNet-18 depth network at 640×192, for both frames of four samples.
 const LAYERS: [Layer; 8] = [
     ("layer1", [64, 64], [48, 160], 3, 1, false),
     ("layer2 3x3/2", [64, 128], [48, 160], 3, 2, false),
@@ -102,7 +102,7 @@ fn convolution(criterion: &mut Criterion) {
     }
 }
 
-/// How long `passes` take, the device waited for.
+/// How long `passes` take, until the device has finished.
 fn timed(device: &Device, passes: u64, mut pass: impl FnMut()) -> std::time::Duration {
     let wait = || device.sync().expect("the device answers");
     wait();

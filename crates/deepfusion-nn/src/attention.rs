@@ -25,7 +25,7 @@ pub struct Attention {
     pub squeeze: Conv2d,
     /// W₂, 1×1 back to the channels.
     pub excite: Conv2d,
-    /// From the channels' mean and maximum to the spatial mask.
+    /// Convolution from the channels' mean and maximum to the spatial mask.
     pub spatial: Conv2d,
     #[module(skip)]
     form: AttentionForm,
@@ -69,7 +69,7 @@ impl Attention {
         }
     }
 
-    /// The feature under its masks, in the configured [`AttentionForm`].
+    /// The feature with its masks applied, in the configured [`AttentionForm`].
     ///
     /// # Shapes
     /// - `x`, output: `[batch, channels, height, width]`
@@ -78,12 +78,12 @@ impl Attention {
         self.apply(x, masks)
     }
 
-    /// The feature under these masks.
+    /// The feature with these masks applied.
     ///
     /// # Shapes
     /// As [`Self::forward`].
     pub fn apply(&self, x: Tensor<4>, masks: AttentionMasks) -> Tensor<4> {
-        // One factor a value, so that the feature is read once.
+        // One factor for each value, so that the feature is read once.
         let both = masks.spatial.mul(masks.channel);
         match self.form {
             AttentionForm::Product => x.mul(both),
@@ -92,7 +92,7 @@ impl Attention {
     }
 }
 
-/// Global feature aggregation: each channel's mean over the image, projected and added at every pixel.
+/// Global feature aggregation: the channels' means over the image, projected and added at every pixel.
 #[derive(Module, Debug)]
 pub struct GlobalAggregation {
     /// 1×1 on the mean over the image.

@@ -11,8 +11,8 @@ use crate::{DecoderConfig, Error};
 /// Number of scales at which disparity is predicted: 1, 1/2, 1/4, 1/8 of the input's size.
 pub const SCALES: usize = 4;
 
-/// One stage: 3×3 + ELU, nearest ×2 (but for the first at output stride 16), the skip feature appended,
-/// 3×3 + ELU; all reflection-padded.
+/// One stage: 3×3 + ELU, nearest ×2 (except in the first stage at output stride 16), the skip feature appended, 3×3 + ELU; all
+/// reflection-padded.
 #[derive(Module, Debug)]
 pub struct DecoderStage {
     /// Before the upsampling.
@@ -27,7 +27,7 @@ impl DecoderStage {
     /// # Shapes
     /// - `x`: `[batch, in, height, width]`
     /// - `skip`: `[batch, skip, 2·height, 2·width]`
-    /// - output: `[batch, out, 2·height, 2·width]`; without the factors where the stage does not enlarge
+    /// - output: `[batch, out, 2·height, 2·width]`; without the factors 2, as for `skip`, if the stage does not enlarge
     pub fn forward(&self, x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
         let reduced = elu(self.reduce.forward(x));
         let joined = match skip {
@@ -49,9 +49,8 @@ pub struct DisparityDecoder {
 }
 
 impl DisparityDecoder {
-    /// A new decoder for features of `encoder_channels` (fine to coarse). Where the two coarsest features
-    /// have one size (`output_stride` 16), the first stage does not enlarge. A `head_bias` makes each head
-    /// start with that bias instead of a random one.
+    /// A new decoder for features of `encoder_channels` (fine to coarse). If the two coarsest features have the same size (`output_stride`
+    /// 16), the first stage does not enlarge. A `head_bias` makes each head start with that bias instead of a random one.
     ///
     /// # Errors
     /// As [`DecoderConfig::validate`].
@@ -68,7 +67,7 @@ impl DisparityDecoder {
         let stages = (0..5)
             .map(|index| {
                 let width = config.widths[index];
-                // Stage 0 meets the feature at stride 16, …, stage 3 the one at stride 2, stage 4 none.
+                // Stage 0 appends the feature at stride 16, …, stage 3 the one at stride 2, stage 4 none.
                 let skip = if index < 4 {
                     encoder_channels[3 - index]
                 } else {
@@ -104,14 +103,14 @@ impl DisparityDecoder {
     /// σ = sigmoid(head(stage)), a disparity between the ends of the network's depth range.
     ///
     /// # Shapes
-    /// - `features`: five, `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`, the last one as large as the one
-    ///   before it at output stride 16
+    /// - `features`: five, `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`; at output stride 16 the last one has the size of the one
+    ///   before
     /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
     pub fn forward(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
         self.forward_with_feature(features).0
     }
 
-    /// The same, and the feature that the finest head reads, `[batch, widths[4], height, width]`.
+    /// As [`Self::forward`], and the feature that the finest head reads, `[batch, widths[4], height, width]`.
     pub fn forward_with_feature(&self, features: [Tensor<4>; 5]) -> (Vec<Tensor<4>>, Tensor<4>) {
         let [f0, f1, f2, f3, f4] = features;
         let skips = [Some(f3), Some(f2), Some(f1), Some(f0), None];

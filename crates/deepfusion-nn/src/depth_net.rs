@@ -18,27 +18,27 @@ use crate::weights::{self, Weights};
 use crate::{ArchitectureProblem, DepthNetConfig, Error};
 use deepfusion_model::{DISP_NET_LEVELS, UNCERTAINTY_PREFIX};
 
-/// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
+/// Initial output of the uncertainty head at every pixel: the expected error of ln depth.
 const FIRST_SCALE: f32 = 0.2;
 
 /// Disparity of a single image: a ResNet and its decoder or DispNet at four scales, Lite-Mono at three, or R-MSFM's refinements.
 #[derive(Module, Debug)]
 pub struct DepthNet {
-    /// Lite-Mono. Where there is one, there is nothing else but the uncertainty head.
+    /// Lite-Mono. If present, all other parts except the uncertainty head are absent.
     pub lite_mono: Option<LiteMono>,
-    /// R-MSFM. Where there is one, there is nothing else.
+    /// R-MSFM. If present, all other parts are absent.
     pub r_msfm: Option<RMsfm>,
-    /// DispNet. Where there is one, there is nothing else but the uncertainty head.
+    /// DispNet. If present, all other parts except the uncertainty head are absent.
     pub disp_net: Option<DispNet>,
-    /// The backbone.
+    /// The ResNet encoder.
     pub encoder: Option<ResNet>,
-    /// Context encoding of the features of `layer1`…`layer4`; empty where there is none.
+    /// Context encoding of the features of `layer1`…`layer4`; empty without it.
     pub hce: Vec<HierarchicalContext>,
-    /// Attention on the same; empty where there is none.
+    /// Attention on the same features; empty without it.
     pub attention: Vec<Attention>,
     /// Global aggregation of the coarsest feature.
     pub aggregation: Option<GlobalAggregation>,
-    /// The decoder.
+    /// The ResNet's decoder.
     pub decoder: Option<DisparityDecoder>,
     /// 3×3 from the decoder's finest feature to ln b, b the Laplace scale of the error of ln depth. Lite-Mono's feature has half of
     /// the image's size; ln b is then enlarged.
@@ -50,16 +50,16 @@ pub struct DepthNet {
 pub struct DepthOutput {
     /// Sigmoid disparities, as from [`DepthNet::forward`].
     pub disparities: Vec<Tensor<4>>,
-    /// ln b of each pixel, `[batch, 1, height, width]`; `None` of a network without that head.
+    /// ln b of each pixel, `[batch, 1, height, width]`; `None` for a network without uncertainty head.
     pub log_scale: Option<Tensor<4>>,
 }
 
-/// What a [`DepthNet`] computes on the way from features to disparities: the paper's Fig. 5.
+/// Intermediate results of a [`DepthNet`] between features and disparities: the paper's Fig. 5.
 #[derive(Debug, Clone)]
 pub struct Inspection {
-    /// The encoder's features, fine to coarse: five of a ResNet, three of Lite-Mono and of R-MSFM, seven of DispNet.
+    /// The encoder's features, fine to coarse: five for a ResNet, three for Lite-Mono and R-MSFM, seven for DispNet.
     pub features: Vec<Tensor<4>>,
-    /// What the decoder reads: the same with context, under their masks, aggregated.
+    /// What the decoder reads: the features after context encoding, attention and aggregation.
     pub refined: Vec<Tensor<4>>,
     /// The masks on the features of `layer1`…`layer4`; empty without attention.
     pub masks: Vec<AttentionMasks>,
@@ -112,14 +112,14 @@ impl DepthNet {
             (None, Some(disp_net)) => disp_net.decoder_widths()[DISP_NET_LEVELS - 1],
             (None, None) => config.decoder.widths[4],
         };
-        // Drawn last: the other weights are those of the same seed without it.
+        // Drawn last, so that the other weights are the same for a seed with or without it.
         net.uncertainty = config.uncertainty.then(|| {
             let head = Conv2dConfig::new(finest, 1, 3).reflected();
             let mut head = head.init(&mut rng, device);
             head.bias = Some(Param::from_data([FIRST_SCALE.ln()], device));
             head
         });
-        // A ResNet has seen to its own; others have batch norms, too.
+        // A ResNet freezes its own batch norms; other networks have batch norms, too.
         Ok(if config.encoder.frozen_statistics {
             freeze_statistics(net, true)
         } else {
@@ -127,7 +127,7 @@ impl DepthNet {
         })
     }
 
-    /// Nothing yet.
+    /// A network without any part.
     fn empty() -> Self {
         Self {
             lite_mono: None,
@@ -213,7 +213,7 @@ impl DepthNet {
 
     #[expect(
         clippy::expect_used,
-        reason = "what is neither Lite-Mono nor R-MSFM nor DispNet has both"
+        reason = "a network that is not Lite-Mono, R-MSFM or DispNet has both"
     )]
     fn resnet(&self) -> (&ResNet, &DisparityDecoder) {
         let (encoder, decoder) = (self.encoder.as_ref(), self.decoder.as_ref());
@@ -249,8 +249,8 @@ impl DepthNet {
         }
     }
 
-    /// As [`Self::forward_with_uncertainty`], for training the uncertainty head alone: the rest of the network keeps nothing for
-    /// a backward pass and is as in inference, with its running statistics, which stay as they are.
+    /// As [`Self::forward_with_uncertainty`], for training the uncertainty head alone. The rest of the network runs as in inference: it
+    /// uses its running statistics without updating them, and keeps nothing for a backward pass.
     ///
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
@@ -263,8 +263,8 @@ impl DepthNet {
         }
     }
 
-    /// The network with these weights, which must fit it. One exception is the uncertainty head: if the weights lack it,
-    /// the network keeps its own; if the network lacks it, theirs is ignored. Returns whether the head is new.
+    /// The network with these weights, which must fit it, except for the uncertainty head. If the weights lack the head, the network keeps
+    /// its own; if the network lacks it, the weights' head is ignored. Returns whether the head is new.
     ///
     /// # Errors
     /// As [`weights::apply`].
@@ -272,7 +272,7 @@ impl DepthNet {
         weights::apply_but_for(self, weights, UNCERTAINTY_PREFIX)
     }
 
-    /// What kind of network it is, for messages.
+    /// The kind of network, for messages.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match (&self.lite_mono, &self.r_msfm, &self.disp_net) {
@@ -287,10 +287,10 @@ impl DepthNet {
     ///
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
-    /// - output: as of [`ResNet::forward`]
+    /// - output: as from [`ResNet::forward`]
     ///
     /// # Panics
-    /// If the network is Lite-Mono, R-MSFM or DispNet, as [`Self::forward`] else.
+    /// If the network is Lite-Mono, R-MSFM or DispNet; else as [`Self::forward`].
     pub fn encode(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
         self.resnet().0.forward(images)
     }

@@ -1,5 +1,5 @@
-//! Explainability (Zhou et al., "Unsupervised Learning of Depth and Ego-Motion from Video", CVPR 2017): how far a warp between two frames can
-//! explain them, pixel by pixel.
+//! Explainability (Zhou et al., "Unsupervised Learning of Depth and Ego-Motion from Video", CVPR 2017): how well a warp between two frames
+//! can explain them, pixel by pixel.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
@@ -10,17 +10,17 @@ use crate::ops;
 use crate::resample::doubled;
 use deepfusion_model::EXPLAINABILITY_WIDTHS;
 
-/// From the pose network's coarsest feature to a mask for each of both frames.
+/// Computes a mask for each of two frames from the pose network's coarsest feature.
 #[derive(Module, Debug)]
 pub struct Explainability {
-    /// 3×3 with ReLU, coarse to fine; before all but the first the image is enlarged twofold.
+    /// 3×3 with ReLU, coarse to fine; the feature is enlarged by 2 before each layer except the first.
     pub layers: Vec<Conv2d>,
     /// 3×3 to the masks' logits, at half of the frames' size.
     pub head: Conv2d,
 }
 
 impl Explainability {
-    /// A new one for a feature of so many channels, with Xavier's weights.
+    /// A new module for a feature of `channels` channels, with Xavier's weights.
     pub(crate) fn new(channels: usize, rng: &mut WeightRng, device: &Device) -> Self {
         let mut from = channels;
         let mut conv = |to: usize| {
@@ -36,7 +36,7 @@ impl Explainability {
         }
     }
 
-    /// ln(E / (1 − E)) of the first and the second frame.
+    /// ln(E / (1 − E)) of the first and the second frame's masks E.
     ///
     /// # Shapes
     /// - `feature`: `[batch, channels, height / 32, width / 32]`

@@ -17,14 +17,13 @@ const LAST_ENLARGEMENT: usize = 4;
 /// Added to a feature's mean square before it is divided by its root.
 const FEATURE_EPSILON: f64 = 1e-6;
 
-/// Which of the encoder's five features a level reads: those at strides 16, 8 and 4, which are the same whether the
-/// encoder ends at stride 32 or 16.
+/// Index of the encoder's feature that a level reads: those at strides 16, 8 and 4, which exist whether the encoder ends at stride 32 or
+/// 16.
 fn feature(level: usize) -> usize {
     FLOW_LEVELS - level
 }
 
-/// Optical flow at several sizes. u points right, v down: the pixel p of the first frame is found at p + flow(p)
-/// in the second.
+/// Optical flow at several sizes. u points right, v down: pixel p of the first frame lies at p + flow(p) in the second.
 #[derive(Debug, Clone)]
 pub struct FlowOutput {
     /// `[batch, 2, height, width]`, the image's own size, in its pixels.
@@ -37,7 +36,7 @@ pub struct FlowOutput {
 /// One level of the flow decoder.
 #[derive(Module, Debug)]
 pub struct FlowLevel {
-    /// 1×1, from the encoder's feature to what is correlated.
+    /// 1×1, from the encoder's feature to the feature that is correlated.
     pub project: Conv2d,
     /// 3×3 + ELU each.
     pub hidden: Vec<Conv2d>,
@@ -46,9 +45,8 @@ pub struct FlowLevel {
 }
 
 impl FlowLevel {
-    /// The projected feature, divided by its root mean square over the channels in each pixel: a correlation is then
-    /// the cosine of the angle between two features, within ±1 whatever the encoder's scale, and rises with their
-    /// likeness alone.
+    /// The projected feature, divided by its root mean square over the channels in each pixel. The correlation of two features is then the
+    /// cosine of their angle, within ±1: it depends on their similarity alone, not on the encoder's scale.
     ///
     /// # Shapes
     /// - `feature`: `[batch, channels, height, width]`
@@ -89,8 +87,8 @@ impl FlowLevel {
     }
 }
 
-/// Optical flow from the encoder's features of two frames, coarse to fine: at each size the second frame's features
-/// are warped by the flow so far, and what a local correlation still finds is added to it.
+/// Optical flow from the encoder's features of two frames, coarse to fine: at each size the second frame's features are warped by the flow
+/// so far, and the displacement that a local correlation still finds is added.
 #[derive(Module, Debug)]
 pub struct FlowDecoder {
     /// Coarse to fine.
@@ -100,8 +98,8 @@ pub struct FlowDecoder {
 }
 
 impl FlowDecoder {
-    /// A new decoder for features of `encoder_channels` (fine to coarse). Its first flow is zero everywhere: the last
-    /// convolution of every level starts at zero.
+    /// A new decoder for features of `encoder_channels` (fine to coarse). Its initial flow is zero everywhere: the last convolution of
+    /// every level starts at zero.
     ///
     /// # Errors
     /// As [`FlowDecoderConfig::validate`].
@@ -179,7 +177,7 @@ impl FlowDecoder {
         })
     }
 
-    /// `features` gives both frames' at each level.
+    /// Decodes the flow. `features` returns both frames' features at a level.
     fn decode(&self, features: impl Fn(usize, &FlowLevel) -> (Tensor<4>, Tensor<4>)) -> FlowOutput {
         let refine = |index: usize, flow: Option<Tensor<4>>| {
             let level = &self.levels[index];
@@ -196,8 +194,7 @@ impl FlowDecoder {
     }
 }
 
-/// The flow at `factor` times the size, bilinear with half-pixel centres; its pixels are as much smaller, so that its
-/// values grow too.
+/// The flow at `factor` times the size, bilinear with half-pixel centres. The values grow by the same factor, since pixels become smaller.
 fn enlarged(flow: Tensor<4>, factor: usize) -> Tensor<4> {
     let [_, _, height, width] = flow.dims();
     let device = flow.device();

@@ -16,8 +16,8 @@ pub struct HierarchicalContext {
     pub reduce: Option<ConvNorm>,
     /// 3×3, one for each rate.
     pub dilated: Vec<ConvNorm>,
-    /// 1×1 on the mean over the image, with bias and without batch normalisation: one value a channel
-    /// and image is too few for statistics.
+    /// 1×1 on the mean over the image, with bias and without batch normalisation: one value per channel and image is too few for
+    /// statistics.
     pub global: Option<Conv2d>,
     /// 1×1 over all branches.
     pub project: ConvNorm,

@@ -1,11 +1,11 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The random numbers that new weights are drawn from.
+/// The random number generator for new weights.
 ///
-/// One generator is handed through a network's constructor, so that a seed fixes every weight
-/// whatever else draws random numbers in the same process. Burn's own generator is global to the
-/// process and its initialisation lazy: there the order of first use would decide the weights.
+/// One generator is passed through a network's constructor, so that a seed determines every weight, whatever else draws random numbers in
+/// the same process. Burn's own generator is global to the process, and its initialisation is lazy: the weights would depend on the order
+/// of first use.
 #[derive(Debug, Clone)]
 pub struct WeightRng(ChaCha8Rng);
 
@@ -31,8 +31,8 @@ impl WeightRng {
             .collect()
     }
 
-    /// Xavier's weights of `pairs` of an input and an output channel, `area` taps each: uniform in ±√(6 / (area·channels)), `channels` inputs
-    /// and outputs together (Glorot and Bengio, AISTATS 2010, Eq. 16).
+    /// Xavier's weights for `pairs` pairs of an input and an output channel with `area` taps each: uniform in ±√(6 / (area·channels)),
+    /// `channels` being the number of input and output channels together (Glorot and Bengio, AISTATS 2010, Eq. 16).
     pub(crate) fn xavier(&mut self, pairs: usize, area: usize, channels: usize) -> Vec<f32> {
         self.uniform(pairs * area, (6.0 / (area * channels) as f32).sqrt())
     }

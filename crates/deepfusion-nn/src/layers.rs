@@ -1,5 +1,4 @@
-//! The layers every network here is made of: convolution, batch normalisation, and the small
-//! operations without weights between them.
+//! Layers of all networks: convolution, batch normalisation, and small operations without weights.
 
 mod channels;
 mod depthwise;
@@ -15,7 +14,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use crate::init::{WeightInit, WeightRng};
 use crate::ops::{self, ConvOptions};
 
-/// What a [`Conv2d`] is built from: square kernels, one stride, padding and dilation for both axes.
+/// Configuration of a [`Conv2d`]: a square kernel, and the same stride, padding and dilation for both axes.
 #[derive(Debug, Clone, Copy)]
 pub struct Conv2dConfig {
     /// Channels of the input.
@@ -28,7 +27,7 @@ pub struct Conv2dConfig {
     pub options: ConvOptions,
     /// Whether a bias is added.
     pub bias: bool,
-    /// How the weights are drawn.
+    /// How the weights are initialised.
     pub init: WeightInit,
 }
 
@@ -67,14 +66,14 @@ impl Conv2dConfig {
         config
     }
 
-    /// The same, padded by reflection.
+    /// The same convolution, padded by reflection.
     #[must_use]
     pub fn reflected(mut self) -> Self {
         self.options.reflect = true;
         self
     }
 
-    /// The same with dilation `rate`, still keeping the size; no change for a 1×1 kernel.
+    /// The same convolution with dilation `rate`, padded to keep the size; no change for a 1×1 kernel.
     #[must_use]
     pub fn dilated(mut self, rate: usize) -> Self {
         self.options.dilation = rate;
@@ -82,14 +81,14 @@ impl Conv2dConfig {
         self
     }
 
-    /// The same without a bias.
+    /// The same convolution without a bias.
     #[must_use]
     pub fn without_bias(mut self) -> Self {
         self.bias = false;
         self
     }
 
-    /// Draws the weights.
+    /// Creates the layer with random weights.
     #[must_use]
     pub fn init(&self, rng: &mut WeightRng, device: &Device) -> Conv2d {
         let area = self.kernel * self.kernel;
@@ -210,11 +209,10 @@ pub fn global_mean(x: Tensor<4>) -> Tensor<4> {
 /// Batch normalisation over (batch, height, width), y = γ (x − μ) / √(σ² + ε) + β, with
 /// torchvision's names, ε = 1e-5 and momentum 0.1.
 ///
-/// **Training** (the network is on an autodiff device and [`Self::training`] is set): μ and σ² are
-/// the batch's own, and the running statistics move towards them, the variance in its unbiased form
-/// as in PyTorch. **Evaluation** (after [`Module::valid`], or on a plain device) and **frozen
-/// statistics** ([`freeze_statistics`]): μ and σ² are the running ones and do not change; γ and β
-/// still learn where the statistics are frozen.
+/// **Training** (the network is on an autodiff device and [`Self::training`] is set): μ and σ² are the batch's own, and the running
+/// statistics move towards them, the variance in its unbiased form as in PyTorch. **Evaluation** (after [`Module::valid`], or on a plain
+/// device) and **frozen statistics** ([`freeze_statistics`]): μ and σ² are the running ones and do not change. With frozen statistics γ and
+/// β still learn.
 #[derive(Module, Debug)]
 pub struct BatchNorm2d {
     /// γ, `[channels]`.
@@ -235,7 +233,7 @@ impl BatchNorm2d {
     /// Weight of the new batch in the running statistics.
     pub const MOMENTUM: f64 = 0.1;
 
-    /// γ = 1, β = 0, mean 0, variance 1.
+    /// A new layer: γ = 1, β = 0, mean 0, variance 1.
     #[must_use]
     pub fn new(channels: usize, device: &Device) -> Self {
         Self {
@@ -253,7 +251,7 @@ impl BatchNorm2d {
         self.normalise(input, false)
     }
 
-    /// The same with a ReLU after it, in one pass where the batch's own statistics are used.
+    /// As [`Self::forward`], followed by a ReLU, in one pass if the batch's own statistics are used.
     ///
     /// # Shapes
     /// As [`Self::forward`].
@@ -264,7 +262,7 @@ impl BatchNorm2d {
     fn normalise(&self, input: Tensor<4>, with_relu: bool) -> Tensor<4> {
         let (gamma, beta) = (self.weight.val(), self.bias.val());
         if !(self.training.is_enabled() && input.is_autodiff()) {
-            // One multiplication and one addition a pixel: y = x·s + (β − μ·s), s = γ / √(σ² + ε).
+            // One multiplication and one addition per pixel: y = x·s + (β − μ·s), s = γ / √(σ² + ε).
             let channels = gamma.dims()[0];
             let deviation = self.running_var.value().add_scalar(Self::EPSILON).sqrt();
             let scale = gamma.div(deviation);
@@ -277,7 +275,7 @@ impl BatchNorm2d {
         let [batch, _, height, width] = input.dims();
         let result = ops::batch_norm(input, gamma, beta, Self::EPSILON, with_relu);
         let count = (batch * height * width) as f64;
-        // A single value has no unbiased variance; its biased one, 0, is kept.
+        // A single value has no unbiased variance; the biased one, 0, is used.
         let unbiased = count / (count - 1.0).max(1.0);
         let batch = [result.mean, result.variance];
         self.move_statistics_towards(batch, unbiased);
@@ -290,14 +288,14 @@ impl BatchNorm2d {
         let old = both.map(RunningState::value);
         let new = ops::running_statistics(old, batch, Self::MOMENTUM, unbiased);
         for (running, value) in both.into_iter().zip(new) {
-            // `update` would divide the value by the number of threads that gave one, a launch each on a GPU, and stay pending until the
-            // next step. A clone shares the value.
+            // `update` would divide the value by the number of threads that set one (an extra launch on a GPU), and stay pending until the
+            // next step. The clone shares the value with the original.
             running.clone().map(&mut Replace(Some(value)));
         }
     }
 }
 
-/// Puts a value in the place of a running statistic's.
+/// Replaces the value of a running statistic.
 struct Replace(Option<Tensor<1>>);
 
 impl ModuleMapper for Replace {

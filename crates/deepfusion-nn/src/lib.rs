@@ -1,8 +1,8 @@
 //! The depth, pose and flow networks, and the differentiable operations under them.
 //!
-//! A config struct ([`DepthNetConfig`], [`PoseNetConfig`]) describes a network and is stored beside its weights;
-//! `DepthNet::new(&config, &device)` builds it; `forward` runs it. Networks on an autodiff device train (their batch
-//! norms follow the batches); [`Module::valid`](burn::module::Module::valid) gives the network that predicts.
+//! A config struct ([`DepthNetConfig`], [`PoseNetConfig`]) describes a network and is stored beside its weights; `DepthNet::new(&config,
+//! &device)` builds it; `forward` runs it. Networks on an autodiff device are in training mode (their batch norms follow the batches).
+//! [`Module::valid`](burn::module::Module::valid) returns the network for inference.
 //!
 //! Tensors are N×C×H×W. Images are RGB in [0, 1]; their normalisation is part of the network.
 

@@ -11,7 +11,7 @@ use crate::weights::{Weights, apply_but_for};
 use crate::{Error, PoseNetConfig};
 use deepfusion_model::POSE_WIDTH;
 
-/// Radians per unit of the raw output: a new network then starts near no rotation at all.
+/// Radians per unit of the raw output: small, so that a new network starts with almost no rotation.
 pub const RADIANS_PER_UNIT: f64 = 0.01;
 
 /// A rigid motion per sample, as the network predicts it.
@@ -23,7 +23,7 @@ pub struct PoseOutput {
     pub translation: Tensor<2>,
 }
 
-/// From the encoder's coarsest feature to six numbers per pose.
+/// Computes six numbers per pose from the encoder's coarsest feature.
 #[derive(Module, Debug)]
 pub struct PoseDecoder {
     /// 1×1 to 256, ReLU.
@@ -54,15 +54,15 @@ impl PoseDecoder {
     }
 }
 
-/// The camera's motion between the two stacked frames. The trainer decides on its direction: the
-/// network is always given the frames in time order.
+/// Predicts the camera's motion between two stacked frames. The network always gets the frames in time order, and the trainer decides on
+/// the direction.
 #[derive(Module, Debug)]
 pub struct PoseNet {
-    /// The backbone.
+    /// The ResNet encoder.
     pub encoder: ResNet,
     /// The decoder.
     pub decoder: PoseDecoder,
-    /// The explainability masks, where it has them.
+    /// The explainability masks, if the network has them.
     pub explainability: Option<Explainability>,
     #[module(skip)]
     metres_per_unit: f64,
@@ -83,7 +83,7 @@ impl PoseNet {
     /// As [`PoseNetConfig::validate`].
     pub fn with_seed(config: &PoseNetConfig, seed: u64, device: &Device) -> Result<Self, Error> {
         config.validate()?;
-        // Not the numbers the depth network of the same seed starts from.
+        // A different random stream than that of the depth network with the same seed.
         let mut rng = WeightRng::with_stream(seed, 1);
         let encoder = ResNet::new(&config.encoder, &mut rng, device)?;
         let mut conv = |channels_in: usize, channels_out: usize, kernel: usize| {
@@ -95,7 +95,7 @@ impl PoseNet {
             conv2: conv(POSE_WIDTH, POSE_WIDTH, 3),
             output: conv(POSE_WIDTH, 6 * config.poses, 1),
         };
-        // Drawn last: the other weights are those of the same seed without it.
+        // Drawn last, so that the other weights are the same for a seed with or without it.
         let channels = config.encoder.channels()[4];
         let explainability = config
             .explainability
@@ -108,21 +108,21 @@ impl PoseNet {
         })
     }
 
-    /// axis-angle = 0.01·o₀…₂, translation = `metres_per_unit`·o₃…₅, o the first pose's raw output.
+    /// axis-angle = 0.01·o₀…₂, translation = `metres_per_unit`·o₃…₅, where o is the first pose's raw output.
     ///
     /// # Shapes
     /// - `stacked`: `[batch, 6, height, width]`, two RGB images in [0, 1] in time order
-    /// - output: `[batch, 3]` twice
+    /// - output: twice `[batch, 3]`
     pub fn forward(&self, stacked: Tensor<4>) -> PoseOutput {
         let [.., coarsest] = self.encoder.forward(stacked);
         self.motion(coarsest)
     }
 
-    /// The same, and the logits of the explainability masks, where it has them.
+    /// As [`Self::forward`], and the logits of the explainability masks, if the network has them.
     ///
     /// # Shapes
     /// - `stacked`: as for [`Self::forward`]
-    /// - output: as of [`Self::forward`]; `[batch, 2, height, width]`, of the first and the second image
+    /// - output: as from [`Self::forward`]; `[batch, 2, height, width]`, for the first and the second image
     pub fn forward_explained(&self, stacked: Tensor<4>) -> (PoseOutput, Option<Tensor<4>>) {
         let [.., coarsest] = self.encoder.forward(stacked);
         let masks = self.explainability.as_ref();
@@ -138,8 +138,8 @@ impl PoseNet {
         }
     }
 
-    /// The network with these weights, which must fit it, but for the explainability masks: if the weights lack them, the network keeps its
-    /// own; if the network lacks them, theirs are ignored. Returns whether the masks are new.
+    /// The network with these weights, which must fit it, except for the explainability masks. If the weights lack the masks, the network
+    /// keeps its own; if the network lacks them, the weights' masks are ignored. Returns whether the masks are new.
     ///
     /// # Errors
     /// As [`weights::apply`](crate::weights::apply).

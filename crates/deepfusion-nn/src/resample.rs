@@ -1,9 +1,9 @@
 use crate::ops;
 use burn::tensor::{Device, Tensor, TensorData};
 
-/// Differentiable bilinear enlargement with half-pixel centres: a kernel of its own on a GPU, elsewhere two matrix products, out = A·X·Bᵀ.
+/// Differentiable bilinear resizing with half-pixel centres: a kernel of its own on a GPU, elsewhere two matrix products, out = A·X·Bᵀ.
 ///
-/// The two matrices hold the weights of the bilinear filter; for maps of a channel or two their products are cheaper than gathering four
+/// The two matrices are the weights of the bilinear filter. For maps of one or two channels their products are cheaper than gathering four
 /// neighbours.
 #[derive(Debug, Clone)]
 pub struct BilinearResize {
@@ -14,7 +14,7 @@ pub struct BilinearResize {
 }
 
 impl BilinearResize {
-    /// From `from` = [height, width] to `to`.
+    /// Resizes from `from` = [height, width] to `to`.
     #[must_use]
     pub fn new(from: [usize; 2], to: [usize; 2], device: &Device) -> Self {
         Self {
@@ -25,7 +25,7 @@ impl BilinearResize {
     }
 
     /// # Shapes
-    /// - `x`: `[N, C, h, w]` of the size this was made for
+    /// - `x`: `[N, C, h, w]`, of the size `from`
     /// - output: `[N, C, H, W]`
     #[must_use]
     pub fn apply(&self, x: Tensor<4>) -> Tensor<4> {
@@ -58,8 +58,8 @@ fn matrices_of(from: [usize; 2], to: [usize; 2], device: &Device) -> [Tensor<3>;
     [along(0), columns.swap_dims(1, 2)]
 }
 
-/// Bilinear ×2 with half-pixel centres: each pixel becomes two along each axis, three quarters itself and a quarter its neighbour
-/// on that side; a pixel at the border is its own neighbour. For many channels, where [`BilinearResize`]'s products are more work.
+/// Bilinear ×2 with half-pixel centres: each pixel becomes two along each axis, three quarters itself and a quarter its neighbour on that
+/// side. A pixel at the border is its own neighbour. For many channels, for which [`BilinearResize`] is slower.
 ///
 /// # Shapes
 /// - `x`: `[N, C, h, w]`
@@ -105,7 +105,7 @@ fn weights(from: usize, to: usize) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// By hand: 2 → 4 puts the centres at −¼, ¼, ¾, 1¼.
+    /// Computed by hand: 2 → 4 puts the centres at −¼, ¼, ¾, 1¼.
     #[test]
     fn centres_are_half_pixels() {
         let device = Device::flex();

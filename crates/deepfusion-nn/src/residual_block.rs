@@ -1,4 +1,4 @@
-//! The blocks that a ResNet's layers are made of.
+//! The residual blocks of a ResNet's layers.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -8,7 +8,7 @@ use crate::init::WeightRng;
 use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig};
 use crate::ops;
 
-/// What a block is built from, beside its kind.
+/// Configuration of a block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BlockConfig {
     pub(crate) depth: ResNetDepth,
@@ -16,12 +16,12 @@ pub(crate) struct BlockConfig {
     /// Channels of the 3×3 convolutions.
     pub(crate) width: usize,
     pub(crate) stride: usize,
-    /// Of the 3×3 convolutions: one in a bottleneck, both in a basic block.
+    /// Dilation of the 3×3 convolutions: one in a bottleneck, both in a basic block.
     pub(crate) dilation: usize,
 }
 
-/// One residual block: basic (two 3×3 convolutions), or bottleneck (1×1, 3×3, 1×1) where `conv3`
-/// is there. The stride sits in the 3×3 convolution of a bottleneck, as in torchvision.
+/// One residual block: basic (two 3×3 convolutions), or bottleneck (1×1, 3×3, 1×1) if `conv3` is present. As in torchvision, the 3×3
+/// convolution of a bottleneck has the stride.
 #[derive(Module, Debug)]
 pub struct ResidualBlock {
     /// Basic: 3×3 with the stride. Bottleneck: 1×1 to the block's width.
@@ -36,7 +36,7 @@ pub struct ResidualBlock {
     pub conv3: Option<Conv2d>,
     /// After `conv3`.
     pub bn3: Option<BatchNorm2d>,
-    /// The shortcut's 1×1 convolution and batch norm, where the shape changes.
+    /// The shortcut's 1×1 convolution and batch norm, if the shape changes.
     pub downsample: Option<(Conv2d, BatchNorm2d)>,
 }
 

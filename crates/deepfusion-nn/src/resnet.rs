@@ -9,8 +9,8 @@ use crate::ops::max_pool_3x3_stride_2;
 use crate::residual_block::{BlockConfig, ResidualBlock};
 use crate::{Error, InputNormalisation, ResNetConfig};
 
-/// A ResNet without its classifier. The fields carry torchvision's names, so that the path of a
-/// tensor, such as `layer1.0.conv1.weight`, is its name in torchvision's files.
+/// A ResNet without its classifier. The fields have torchvision's names, so that a tensor's path, such as `layer1.0.conv1.weight`, is its
+/// name in torchvision's files.
 #[derive(Module, Debug)]
 pub struct ResNet {
     /// 7×7 at stride 2.
@@ -30,7 +30,7 @@ pub struct ResNet {
 }
 
 impl ResNet {
-    /// A new encoder with weights drawn as torchvision draws them.
+    /// A new encoder with torchvision's initialisation.
     ///
     /// # Errors
     /// As [`ResNetConfig::validate`].
@@ -55,8 +55,8 @@ impl ResNet {
     ///
     /// # Shapes
     /// - `images`: `[batch, 3·frames, height, width]`, RGB in [0, 1]
-    /// - output: five features `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`, k = 0…4; the last one is as
-    ///   large as the one before it at output stride 16
+    /// - output: five features `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`, k = 0…4; at output stride 16 the last one has the size
+    ///   of the one before
     pub fn forward(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
         let x = normalised(self.normalisation, images);
         let f0 = self.bn1.forward_relu(self.conv1.forward(x));
@@ -74,7 +74,7 @@ impl ResNet {
     }
 }
 
-/// The blocks of layer 1 to 4, counted from 0.
+/// The blocks of one of the layers 1 to 4, which are counted from 0.
 pub(crate) fn layer(
     config: &ResNetConfig,
     index: usize,
@@ -103,7 +103,7 @@ pub(crate) fn run(layer: &[ResidualBlock], x: Tensor<4>) -> Tensor<4> {
     layer.iter().fold(x, |x, block| block.forward(x))
 }
 
-/// (x − mean) / std, the three channels of each frame alike.
+/// (x − mean) / std of the three channels, the same for each frame.
 ///
 /// # Shapes
 /// - `images`, output: `[batch, 3·frames, height, width]`

@@ -1,4 +1,4 @@
-//! What a network costs, counted from its configuration, against its weights and its graph.
+//! A network's parameters and operations, computed from its configuration, against its weights and its graph.
 
 use burn::tensor::Device;
 use deepfusion_infer::Op;
@@ -30,7 +30,7 @@ fn check(config: &DepthNetConfig) {
         let shape = graph.shape(deepfusion_infer::ValueId(index + 1));
         let (w, h) = shape.size(SIZE.width, SIZE.height);
         let channels = match op {
-            // Its parts lie there already.
+            // Concatenation costs nothing: the parts are already in place.
             Op::Concat { .. } => 0,
             Op::UpsampleConcat { input, .. } => graph.shape(*input).channels,
             _ => shape.channels,
@@ -86,7 +86,7 @@ fn lite_monos_costs_are_those_of_its_graph_and_its_weights() {
     check(&config);
 }
 
-/// Its graph has 1×3 and 3×1 kernels as parts of 3×3, of which two thirds are zeros.
+/// The graph has 1×3 and 3×1 kernels as 3×3 kernels, of which two thirds are zeros.
 #[test]
 fn r_msfms_costs_are_those_of_its_graph_and_its_weights() {
     for iterations in [3, 6] {
@@ -110,7 +110,7 @@ fn r_msfms_costs_are_those_of_its_graph_and_its_weights() {
             let named = node.name.starts_with("r_msfm.start") || node.name == "r_msfm.sigmoid";
             match (strip, named) {
                 (true, _) => count / 3,
-                // What only says where the refinement starts, and the sigmoid, are no layers.
+                // The start of the refinement and the sigmoid are not layers.
                 (_, true) => 0,
                 _ => *count,
             }
@@ -119,7 +119,7 @@ fn r_msfms_costs_are_those_of_its_graph_and_its_weights() {
     }
 }
 
-/// Its graph has transposed kernels as convolutions of which three quarters are zeros.
+/// The graph has transposed kernels as convolutions, of which three quarters are zeros.
 #[test]
 fn disp_nets_costs_are_those_of_its_graph_and_its_weights() {
     let mut config = DepthNetConfig::disp_net();
@@ -139,7 +139,7 @@ fn disp_nets_costs_are_those_of_its_graph_and_its_weights() {
             if node.name.ends_with(".enlarge") {
                 count / 4
             } else if node.name.ends_with(".disparity") {
-                // No layer: 10·σ + 0.01.
+                // 10·σ + 0.01 is not a layer.
                 0
             } else {
                 *count

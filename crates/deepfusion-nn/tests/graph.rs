@@ -1,4 +1,4 @@
-//! A network as a graph, batch normalisation folded, gives what the network itself gives.
+//! A network as a graph, with folded batch normalisation, has the same output as the network itself.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_infer::{Engine, Precision};
@@ -9,7 +9,7 @@ use deepfusion_nn::{
     LiteMonoSize, ResNetDepth,
 };
 
-/// Weights as after some training: batch norms with statistics and factors of their own.
+/// Weights as after some training: batch norms with different statistics and factors.
 fn trained(config: &DepthNetConfig) -> Weights {
     let net = DepthNet::with_seed(config, 5, &Device::flex()).unwrap();
     let mut weights = weights::collect(&net);
@@ -29,7 +29,7 @@ fn trained(config: &DepthNetConfig) -> Weights {
             } else if name.starts_with("lite_mono.decoder.") && name.ends_with("weight") {
                 *value *= 3.0;
             } else if name.starts_with("r_msfm.weights.expand") {
-                // A quarter of it is the logarithm of a weight.
+                // A quarter of the output is the logarithm of a weight.
                 *value *= 20.0;
             } else if name.starts_with("disp_net.heads") {
                 *value *= 8.0;
@@ -38,7 +38,7 @@ fn trained(config: &DepthNetConfig) -> Weights {
             } else if name == "r_msfm.update.change_2.weight" {
                 *value *= 20.0;
             } else if name == "decoder.heads.0.weight" {
-                // New weights give an answer that is the same everywhere.
+                // With new weights the output would be nearly the same everywhere.
                 *value *= 40.0;
             } else if name == "decoder.heads.0.bias" {
                 *value = 0.0;
@@ -53,7 +53,7 @@ fn image(width: usize, height: usize) -> Vec<f32> {
     (0..3 * width * height).map(value).collect()
 }
 
-/// Lite-Mono's finest head set so that the answer for an image is neither flat nor at the sigmoid's ends.
+/// Weights with Lite-Mono's finest head set so that the output for an image is neither flat nor near the sigmoid's limits.
 fn with_centred_head(
     config: &DepthNetConfig,
     mut weights: Weights,
@@ -74,7 +74,7 @@ fn with_centred_head(
         }
         weights.clone()
     };
-    // So small that the sigmoid is straight.
+    // So small that the sigmoid is linear.
     let small = 1e-3;
     let device = Device::flex();
     let net = weights::apply(DepthNet::new(config, &device).unwrap(), &head(small, 0.0)).unwrap();
@@ -120,16 +120,16 @@ fn check(config: &DepthNetConfig, width: usize, height: usize) {
         });
     assert!(
         span.1 - span.0 > 0.05,
-        "a flat answer would prove nothing: {span:?}"
+        "a flat output would prove nothing: {span:?}"
     );
-    // Sums in another order; the paper's product of masks makes the most of it: 1.0e-4 with AVX2's.
+    // Sums in a different order. The error is largest for the paper's product of masks: 1.0e-4 with AVX2.
     let (f32_off, _) = off(Precision::F32);
     assert!(f32_off < 2e-4, "f32 off by {f32_off}");
     if Engine::has_bf16() {
-        // Rounding to eight bits in each of some sixty layers; processors' dot products round differently. The paper's product
-        // of masks makes the most of it: 0.009 in the mean square, the others up to 0.0025 (AMD's AVX-512 BF16).
+        // Rounding to eight bits in each of some sixty layers; dot products of different processors round differently. The error is largest
+        // for the paper's product of masks: 0.009 root mean square, up to 0.0025 for the others (AMD's AVX-512 BF16).
         let (most, usual) = off(Precision::Bf16);
-        assert!(usual < 0.02, "bf16 off by {usual} in the mean square");
+        assert!(usual < 0.02, "bf16 off by {usual} root mean square");
         assert!(most < 0.2, "bf16 off by {most}");
     }
 }
@@ -139,7 +139,7 @@ fn a_basic_block_network() {
     check(&DepthNetConfig::new(ResNetDepth::ResNet18), 192, 96);
 }
 
-/// The head for uncertainty is a second output, and depth is what it is without the head.
+/// The uncertainty head is a second output, and depth is the same as without the head.
 #[test]
 fn a_network_that_says_how_sure_it_is() {
     let config = DepthNetConfig {
@@ -175,9 +175,9 @@ fn a_network_that_says_how_sure_it_is() {
         });
     assert!(
         high - low > 0.05,
-        "a flat answer would prove nothing: {low} {high}"
+        "a flat output would prove nothing: {low} {high}"
     );
-    // Alone the graph has one output, as exported models have.
+    // `depth_graph` has one output, as exported models have.
     let alone = depth_graph(&config, weights).unwrap();
     assert_eq!(alone.outputs().len(), 1);
 }
@@ -200,7 +200,7 @@ fn lite_mono() {
 #[test]
 fn r_msfm() {
     for iterations in [3, 6] {
-        // From the middle of the range of disparities: there the answer is neither flat nor at the sigmoid's ends.
+        // Starts in the middle of the disparity range, where the output is neither flat nor near the sigmoid's limits.
         let config = DepthNetConfig {
             initial_depth_m: None,
             ..DepthNetConfig::r_msfm(iterations)
@@ -209,7 +209,7 @@ fn r_msfm() {
     }
 }
 
-/// At sizes whose sixth and seventh halvings round up.
+/// At sizes for which the sixth and seventh halvings round up.
 #[test]
 fn disp_net() {
     let small = |base_width: usize| DepthNetConfig {
@@ -262,7 +262,7 @@ fn a_narrow_network_whose_channels_fill_no_vector() {
     check(&config, 96, 64);
 }
 
-/// The paper's, narrower. Its rate of 12 is wider than the coarsest features are high.
+/// The paper's network, narrower. Its rate of 12 exceeds the height of the coarsest features.
 fn paper() -> DepthNetConfig {
     let mut config = DepthNetConfig::paper();
     config.encoder.base_width = 24;
@@ -325,7 +325,7 @@ fn weights_of_another_network_are_refused_by_name() {
         matches!(error, Err(Error::NotFinite { count: 1, .. })),
         "{error:?}"
     );
-    // ResNet-34's tensors are ResNet-18's and more.
+    // ResNet-34 has all of ResNet-18's tensors, and more.
     let deeper = trained(&DepthNetConfig::new(ResNetDepth::ResNet34));
     let error = depth_graph(&config, deeper);
     assert!(

@@ -1,10 +1,10 @@
-//! The flow decoder in both directions, forward and backward: `cargo bench -p deepfusion-train --bench flow`. The peer is
-//! `benches/peers/torch_flow.py`.
+//! The flow decoder in both directions, forward and backward: `cargo bench -p deepfusion-train --bench flow`.
+//! `benches/peers/torch_flow.py` measures the same in PyTorch.
 
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a benchmark ends where it cannot run"
+    reason = "a benchmark that cannot run may panic"
 )]
 
 use burn::module::Module;
@@ -17,7 +17,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 const BATCH: usize = 4;
 
-/// On features of a ResNet-18; backward with the gradients of features and weights.
+/// The flow decoder on features of a ResNet-18; the backward pass computes the gradients of features and weights.
 fn flow_decoder(criterion: &mut Criterion) {
     let device = Device::flex().autodiff();
     let channels = ResNetConfig::new(ResNetDepth::ResNet18).channels();
@@ -60,7 +60,7 @@ mod group {
     }
 }
 
-/// On one of rayon's threads, as the program runs.
+/// Runs on one of rayon's threads, as the program does.
 fn main() {
     rayon::scope(|_| group::flow());
     Criterion::default().configure_from_args().final_summary();

@@ -1,10 +1,10 @@
-//! Training steps and inference on random images: `cargo bench -p deepfusion-train`. The peers are
-//! `benches/peers/torch_step.py` and, for the whole step, `torch_light_step.py` and `torch_full_step.py` beside it.
+//! Training steps and inference on random images: `cargo bench -p deepfusion-train`. `benches/peers/torch_step.py` measures the same in
+//! PyTorch; for the whole step, `torch_light_step.py` and `torch_full_step.py` beside it.
 
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
-    reason = "a benchmark ends where it cannot run"
+    reason = "a benchmark that cannot run may panic"
 )]
 
 use burn::tensor::{Device, Distribution, Tensor};
@@ -20,9 +20,9 @@ use deepfusion_train::{
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Of Adam's steps.
+/// Adam's learning rate.
 const LEARNING_RATE: f64 = 1e-4;
-/// Longer gradients are shortened to this.
+/// Norm to which longer gradients are clipped.
 const CLIP_NORM: f64 = 10.0;
 
 fn images(batch: usize, height: usize, width: usize, device: &Device) -> Tensor<4> {
@@ -57,7 +57,7 @@ fn depth_net_gradients(criterion: &mut Criterion) {
     );
 }
 
-/// The same with clipped Adam, and that of the ResNet-50 at 640×192, batch 2.
+/// The same with an Adam step and gradient clipping, and once more with a ResNet-50 at 640×192, batch 2.
 fn depth_net_step(criterion: &mut Criterion) {
     let device = Device::flex().autodiff();
     for (name, depth, (batch, height, width)) in [
@@ -77,7 +77,7 @@ fn depth_net_step(criterion: &mut Criterion) {
         let x = images(batch, height, width, &device);
         criterion.bench_function(name, |b| {
             b.iter(|| {
-                // Moved, as the trainer does: an optimiser that has the only copy changes it where it is.
+                // Moved, as in the trainer: with the only copy, the optimiser updates the weights in place.
                 let before = net.take().expect("given back by the step before");
                 let mut raw = loss_of(&before, x.clone()).backward();
                 let mut gradients = NamedGradients::default();
@@ -121,8 +121,8 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
     }
 }
 
-/// A whole training step of the preset `light` at 320×96, batch 4: depth of both frames, motion, views, the
-/// preset's losses, backward, clipped Adam; the batch is there already.
+/// A whole training step of the preset `light` at 320×96, batch 4: depth of both frames, motion, view synthesis, the preset's losses,
+/// backward pass, Adam with gradient clipping. The batch is already loaded.
 fn light_step(criterion: &mut Criterion) {
     let mut config = Preset::Light.config();
     training_step(criterion, "training step, preset light", config.clone());
@@ -143,7 +143,7 @@ fn full_step(criterion: &mut Criterion) {
 fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig) {
     let device = Device::flex().autodiff();
     config.pose_net.metres_per_unit = 0.8;
-    // The views' gradient passes through PoseNet, as in the peers' steps.
+    // The gradient of view synthesis passes through PoseNet, as in PyTorch's steps.
     config.view_motion = ViewMotion::Distance;
     (config.size.width, config.size.height) = (320, 96);
     let mut model = Some(Model::new(&config, &device).expect("the preset is valid"));
@@ -169,7 +169,7 @@ fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig)
     });
 }
 
-/// Inference of a ResNet's depth network at 640×192: through Burn, and in the fused engine.
+/// Inference of a ResNet depth network at 640×192: in Burn and in the fused engine.
 fn inference(criterion: &mut Criterion) {
     let device = Device::flex();
     for (name, depth) in [
@@ -215,7 +215,7 @@ mod group {
     }
 }
 
-/// On one of rayon's threads, as the program runs.
+/// Runs on one of rayon's threads, as the program does.
 fn main() {
     rayon::scope(|_| group::step());
     Criterion::default().configure_from_args().final_summary();

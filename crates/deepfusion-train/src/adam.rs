@@ -17,7 +17,7 @@ use values::{Values, to_vec, update_on_device};
 pub use gradients::NamedGradients;
 pub(crate) use undecided::MOST_UNDECIDED;
 
-/// A parameter's moments, in the same place as its gradient.
+/// A parameter's moments, on the same device as its gradient.
 #[derive(Debug, Clone)]
 struct Moments {
     first: Values,
@@ -26,22 +26,22 @@ struct Moments {
 
 /// Adam (Kingma and Ba), β₁ = 0.9, β₂ = 0.999, ε = 1e-8, with the gradient clipped by its norm.
 ///
-/// The moments are kept by the parameters' names. On the processor the update is one pass over parameter, gradient and moments. On a GPU
-/// all of them stay there. The gradient's norm decides whether there is a step, and by how much the gradient is shortened: a run with one
-/// worker leaves both to the GPU, and reads only now and then which steps were made.
+/// The moments are stored by parameter name. On the processor the update is one pass over parameter, gradient and moments. On a GPU all
+/// three stay on the device. The gradient's norm decides whether a step is made, and how far the gradient is clipped. A run with one worker
+/// lets the GPU decide both, and reads only every few steps which of them were made.
 #[derive(Debug, Clone, Default)]
 pub struct Adam {
     moments: BTreeMap<String, Moments>,
-    /// Steps made, without those of `undecided`.
+    /// Steps made, without those in `undecided`.
     steps: u32,
     undecided: Option<Undecided>,
 }
 
-/// A step that was begun and is to be applied: [`Adam::begin`].
+/// A step that [`Adam::begin`] prepared, to be applied to the parameters.
 #[derive(Debug, Clone)]
 pub struct PreparedStep {
     pub(crate) settings: AdamStep,
-    /// In place of those of `settings` where the device has computed them.
+    /// The factors that the device computed; they replace those in `settings`.
     pub(crate) factors: Option<AdamFactors>,
 }
 
@@ -58,7 +58,7 @@ pub enum StepOutcome {
 }
 
 impl Adam {
-    /// Steps made, as far as it is known: without those that a device has decided about since it was last asked.
+    /// Steps known to have been made. Those that a device decided about since the last read are not counted yet.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
@@ -101,9 +101,9 @@ impl Adam {
         (outcome, Some(step))
     }
 
-    /// The same of gradients on a device that decides by itself, with nothing read from it: `squares`, `[1]`, is the sum of their squares.
-    /// The step is made if that and the `losses` are finite. Returns whether it is, `[1]`; [`Self::settle`] is called when it was read, at the
-    /// latest after [`MOST_UNDECIDED`] steps.
+    /// As [`Self::begin`], but the device decides and nothing is read from it. `squares`, `[1]`, is the sum of the gradients' squares. The
+    /// step is made if `squares` and `losses` are finite. Returns whether it is made, `[1]`. Once that has been read, [`Self::settle`] must
+    /// be called, at the latest after [`MOST_UNDECIDED`] steps.
     #[must_use]
     pub(crate) fn begin_on_device(
         &mut self,
@@ -120,7 +120,7 @@ impl Adam {
             .is_finite()
             .all();
         let scale = if clip_norm > 0.0 {
-            // min(1, clip_norm / norm); without a gradient nothing is divided by zero.
+            // min(1, clip_norm / norm); the clamp avoids a division by zero where the gradient is zero.
             let norm = squares.clamp_min(f32::MIN_POSITIVE).sqrt();
             norm.recip().mul_scalar(clip_norm).clamp_max(1.0)
         } else {
@@ -134,7 +134,7 @@ impl Adam {
         (is_made, step)
     }
 
-    /// Of the steps that were begun on a device, so many were made: all of them have been heard of.
+    /// Counts the steps that were made of those begun on a device, once the outcome of all of them has been read.
     pub(crate) fn settle(&mut self, made: u32) {
         self.steps += made;
         self.undecided = None;
@@ -238,7 +238,7 @@ impl Adam {
     }
 }
 
-/// A step that changes its gradient in nothing and corrects no moments.
+/// Settings of a step without gradient scaling and without bias correction.
 fn settings(learning_rate: f64, weight_decay: f64) -> AdamStep {
     AdamStep {
         learning_rate: learning_rate as f32,
@@ -252,7 +252,7 @@ fn settings(learning_rate: f64, weight_decay: f64) -> AdamStep {
     }
 }
 
-/// How many values each parameter of a model has, by its name among the moments.
+/// The number of values of each of a model's parameters, by its name among the moments.
 fn parameter_lengths(model: &Model) -> BTreeMap<String, usize> {
     let mut lengths = BTreeMap::new();
     let mut note = |prefix: &str, module: Weights| {
@@ -275,7 +275,7 @@ fn parameter_lengths(model: &Model) -> BTreeMap<String, usize> {
 struct Update<'a> {
     path: Vec<String>,
     step: &'a AdamStep,
-    /// Computed on the device, or brought there for the first parameter that needs them.
+    /// The step's factors on the device: computed there, or copied there for the first parameter that needs them.
     factors: Option<AdamFactors>,
     gradients: &'a NamedGradients,
     moments: &'a mut BTreeMap<String, Moments>,
@@ -293,7 +293,7 @@ impl ModuleMapper for Update<'_> {
         let Some(gradient) = self.gradients.by_name.get(&name) else {
             return param;
         };
-        // A parameter's first step makes its moments; those of a file were held against it when they were read.
+        // A parameter's first step creates its moments. Those read from a file have already been checked against the parameter.
         let moments = self.moments.entry(name).or_insert_with(|| Moments {
             first: gradient.zeros(),
             second: gradient.zeros(),

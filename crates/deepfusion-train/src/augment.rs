@@ -23,7 +23,7 @@ enum Change {
 const GREY: [f32; 3] = [0.299, 0.587, 0.114];
 
 impl Jitter {
-    /// Draws a jitter, or none.
+    /// Draws a jitter with probability `settings.jitter`, else `None`.
     pub fn draw(settings: &Augmentation, rng: &mut impl Rng) -> Option<Self> {
         if !rng.random_bool(settings.jitter.clamp(0.0, 1.0)) {
             return None;
@@ -42,7 +42,7 @@ impl Jitter {
     /// Applies it to an image.
     ///
     /// # Shapes
-    /// `image` 3×H×W, RGB in [0, 1], and stays so.
+    /// `image` is 3×H×W, RGB in [0, 1], before and after.
     pub fn apply(&self, image: &mut [f32]) {
         let area = image.len() / 3;
         let (red, rest) = image.split_at_mut(area);

@@ -25,14 +25,15 @@ pub struct SnippetBatch {
     pub inverse_intrinsics: Tensor<3>,
     /// Length of the camera's translation by source in time, each B, in metres.
     pub distance_m: Vec<Tensor<1>>,
-    /// What these lengths weigh in the speed loss by source, each B ([`crate::losses::distance_weight`]); `None` where all weigh 1.
+    /// Weights of these lengths in the speed loss by source, each B ([`crate::losses::distance_weight`]); `None` where all are 1.
     pub distance_weight: Vec<Option<Tensor<1>>>,
-    /// The camera's `source_from_target`, by source, B each: as measured by the vehicle's sensors, and of the other camera as calibrated.
+    /// The camera's `source_from_target` by source, B each: measured by the vehicle's sensors; for the other camera, from the calibration.
     pub measured: Vec<Motion>,
-    /// Which samples are of drives whose turns were measured, B, 1 or 0; `None` where all are. The others' `measured` says nothing.
+    /// Which samples are of drives whose turns were measured, B, 1 or 0; `None` where all are. For the others the rotation in `measured` is
+    /// meaningless.
     pub turns_known: Option<Tensor<1>>,
-    /// Which samples have the other camera's view, B, 1 or 0; `None` where all have what the run has. The others show their target
-    /// in its place, which no loss may look at.
+    /// Which samples have the other camera's view, B, 1 or 0; `None` where no sample lacks a view that the run uses. The others have a copy
+    /// of their target in its place, which no loss may use.
     pub other_camera: Option<Tensor<1>>,
     /// Offsets of the sources in time.
     pub offsets: Vec<i32>,
@@ -79,7 +80,7 @@ struct RawBatch {
 #[derive(Default)]
 struct ImageCache {
     images: HashMap<(usize, usize, InputSize), Arc<Vec<u8>>>,
-    /// What all of them take.
+    /// Size of all images in the cache.
     bytes: usize,
 }
 
@@ -89,7 +90,7 @@ struct Maker {
     set: SampleSet,
     /// Whether samples are mirrored and jittered.
     augment: bool,
-    /// How many batches in a row have one size: those that several workers learn from in one step.
+    /// How many batches in a row have the same size: those that several workers learn from in one step.
     workers: usize,
     cache: Mutex<ImageCache>,
 }
@@ -108,14 +109,14 @@ impl std::fmt::Debug for BatchLoader {
 }
 
 impl BatchLoader {
-    /// Batches number `first`, `first + 1`, … of the sampler, mirrored and jittered as the
-    /// configuration says. What a batch holds depends on the seed and its number alone.
+    /// Batches number `first`, `first + 1`, … of the sampler, mirrored and jittered as the configuration says. The content of a batch
+    /// depends only on the seed and its number.
     #[must_use]
     pub fn training(config: &TrainConfig, set: SampleSet, first: usize) -> Self {
         Self::training_batches(config, set, first.., 1)
     }
 
-    /// As [`Self::training`], the batches of these numbers, of which `workers` make one step: they have one size.
+    /// As [`Self::training`], for the batches of these numbers. Every `workers` batches make one step and have the same size.
     pub(crate) fn training_batches(
         config: &TrainConfig,
         set: SampleSet,
@@ -220,11 +221,11 @@ struct Item {
     inverse_intrinsics: [f32; 9],
     /// Distance, rotation and translation by source, the other camera's last.
     motion: Vec<(f32, [f32; 9], [f32; 3])>,
-    /// What the distances weigh, by source.
+    /// Weights of the distances, by source.
     weights: Vec<f32>,
     /// Whether the vehicle's turns were measured.
     turns_known: bool,
-    /// Whether the other camera's view is there, where the run has stereo.
+    /// Whether the sample has the other camera's view, where the run has stereo.
     other_camera: bool,
 }
 
@@ -305,7 +306,7 @@ impl Maker {
         let sources = &sample.snippet.sources;
         let target = (sample.dataset, sample.snippet.target);
         let mut clean = Vec::new();
-        // A batch's samples have as many views: the target stands for one that is not there.
+        // All samples of a batch have the same number of views: the target replaces a missing one.
         let other_camera = sample.stereo.is_some() || !self.config.stereo;
         let in_place = (!other_camera).then_some(target);
         let sources_seen = sample.sources().chain(in_place);
@@ -329,8 +330,7 @@ impl Maker {
         if flip {
             k = k.flipped();
         }
-        // Where no yaw rate was recorded nothing reads this: `SampleSet` refuses configurations that would, and `auto` looks at
-        // `turns_known`.
+        // Without a yaw rate nothing reads this: `SampleSet` refuses configurations that would, and `auto` looks at `turns_known`.
         let measured = sources.iter().map(|source| {
             let motion = source.motion.source_from_target;
             (
@@ -409,7 +409,7 @@ impl Maker {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, ImageCache> {
-        // A thread that panicked while holding the cache left it whole: entries go in at once.
+        // A thread that panicked while holding the lock left the cache consistent: an entry is inserted by a single call.
         self.cache
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner)

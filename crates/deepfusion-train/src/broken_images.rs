@@ -1,35 +1,36 @@
-//! Images that cannot be read, found before training begins: one of them would end the run in its middle.
+//! Finds images that cannot be read before training begins: each of them would end the run halfway.
 
 use crate::{Error, Skipped};
 use deepfusion_data::Dataset;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// So many broken images of a recording are left out, and more only up to one in so many.
+/// Up to this many broken images of a recording are left out; more only if they are at most one in [`ONE_IN`].
 const FEW: usize = 3;
 const ONE_IN: usize = 20;
-/// Those that are named; the others are counted.
+/// How many broken images are named; the others are only counted.
 const NAMED: usize = 3;
 
 /// A recording and a frame of it, by their indices.
 pub(crate) type FrameIndex = (usize, usize);
 
-/// What looks for them among the frames of a run: [`BrokenImages::among`], or [`BrokenImages::none`].
+/// Finds the broken images among the frames of a run: [`BrokenImages::among`], or [`BrokenImages::none`].
 pub(crate) type ImageCheck = fn(&[Dataset], &BTreeSet<FrameIndex>) -> Result<BrokenImages, Error>;
 
-/// Frames to do without.
+/// Frames that are left out because their images cannot be read.
 #[derive(Debug, Default)]
 pub(crate) struct BrokenImages {
     frames: BTreeSet<FrameIndex>,
-    /// Of each recording that has some.
+    /// One entry for each recording with broken images.
     pub(crate) reasons: Vec<Skipped>,
 }
 
 impl BrokenImages {
-    /// Those among the frames of a run. Which they are depends on the files alone: a run that goes on, and every worker, leaves out the same.
+    /// Finds the broken images among the frames of a run. The result depends on the files alone: a resumed run and every worker leave out
+    /// the same frames.
     ///
     /// # Errors
-    /// [`Error::BrokenImages`] where they are too many for a mishap.
+    /// [`Error::BrokenImages`] if a recording has too many of them, or only such images.
     pub(crate) fn among(datasets: &[Dataset], used: &BTreeSet<FrameIndex>) -> Result<Self, Error> {
         let broken: BTreeMap<FrameIndex, String> = used
             .par_iter()
@@ -66,13 +67,13 @@ impl BrokenImages {
         Ok(Self { frames, reasons })
     }
 
-    /// None, unchecked.
+    /// Checks nothing and leaves out nothing.
     pub(crate) fn none(_: &[Dataset], _: &BTreeSet<FrameIndex>) -> Result<Self, Error> {
         Ok(Self::default())
     }
 
     /// Whether a frame's image can be read.
-    pub(crate) fn is_whole(&self, frame: FrameIndex) -> bool {
+    pub(crate) fn is_readable(&self, frame: FrameIndex) -> bool {
         !self.frames.contains(&frame)
     }
 }

@@ -11,7 +11,7 @@ use crate::{Adam, Error, LearnedFocal, Model};
 
 /// Saves networks and optimiser to a run's checkpoints and loads them.
 pub trait Checkpoints {
-    /// Writes a checkpoint; it replaces the one before only when it is complete.
+    /// Writes a checkpoint. It replaces the previous one only when it is complete.
     ///
     /// # Errors
     /// [`Error::Model`] naming the file.
@@ -63,7 +63,7 @@ impl Checkpoints for RunFolder {
         if let Some(pose_net) = &model.pose_net {
             all = all.merged(weights::collect(pose_net).with_prefix("pose."));
         }
-        // Only training needs it, but a run that starts from `best` trains.
+        // Only training needs the flow decoder, but a new run may start from `best`.
         if let Some(decoder) = &model.flow_decoder {
             all = all.merged(weights::collect(decoder).with_prefix("flow."));
         }
@@ -158,7 +158,7 @@ impl Checkpoints for RunFolder {
         model.depth_net = depth_net;
         let (mut new_pose_net, mut new_masks) = (false, false);
         if let Some(pose_net) = model.pose_net.take() {
-            // Of a run that left PoseNet out there is none, nor of an imported depth network.
+            // A run that left PoseNet out has none, nor has an imported depth network.
             new_pose_net = pose.tensors.is_empty();
             model.pose_net = Some(if new_pose_net {
                 pose_net

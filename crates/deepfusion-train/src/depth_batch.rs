@@ -11,8 +11,7 @@ use deepfusion_nn::InputSize;
 use rand::Rng;
 use rayon::prelude::*;
 
-/// Share of the largest depth that the networks can express beyond which a pixel only has to be far: the
-/// sigmoid never reaches its end.
+/// Beyond this share of the largest depth that the networks can express, a pixel only has to be far: a sigmoid never reaches its limit.
 const FAR_SHARE: f64 = 0.9;
 
 /// A batch of B images whose depth is known.
@@ -50,13 +49,13 @@ pub struct DepthLoader {
 }
 
 impl DepthLoader {
-    /// Batches number `first`, `first + 1`, … What a batch holds depends on the seed and its number alone.
+    /// Batches number `first`, `first + 1`, … The content of a batch depends only on the seed and its number.
     #[must_use]
     pub fn training(config: &TrainConfig, set: DepthSet, first: usize) -> Self {
         Self::training_batches(config, set, first.., 1)
     }
 
-    /// As [`Self::training`], the batches of these numbers, of which `workers` make one step: they have one size.
+    /// As [`Self::training`], for the batches of these numbers. Every `workers` batches make one step and have the same size.
     pub(crate) fn training_batches(
         config: &TrainConfig,
         set: DepthSet,

@@ -30,7 +30,7 @@ impl DepthFrame {
         (self.dataset, self.frame)
     }
 
-    /// The frame itself.
+    /// The recording's frame.
     pub(crate) fn of<'a>(&self, datasets: &'a [Dataset]) -> &'a deepfusion_data::Frame {
         &datasets[self.dataset].frames()[self.frame]
     }
@@ -45,7 +45,7 @@ pub struct SimulatedViews {
     pub set: usize,
     /// Number of views in one pass.
     pub views: usize,
-    /// What renders them.
+    /// The renderer of the views.
     pub endless: Arc<Endless>,
 }
 
@@ -84,12 +84,12 @@ pub(crate) enum ViewRef {
     View(usize, u64),
 }
 
-/// Everything with known depth that a run learns from, or validates on.
+/// All images with known depth that a run trains or validates on.
 #[derive(Debug, Clone, Default)]
 pub struct DepthSet {
     /// The recordings.
     pub datasets: Arc<Vec<Dataset>>,
-    /// The index in `data.sets` of each.
+    /// Index in `data.sets` of each recording.
     pub set_of: Arc<Vec<usize>>,
     /// Their frames with depth.
     pub frames: Vec<DepthFrame>,
@@ -148,13 +148,13 @@ impl DepthSet {
         self.frames.len() + self.simulated.iter().map(|s| s.views).sum::<usize>()
     }
 
-    /// Those that were recorded and not simulated.
+    /// Views in a pass that were recorded, not simulated.
     #[must_use]
     pub fn recorded(&self) -> usize {
         self.frames.len()
     }
 
-    /// Whether there is nothing.
+    /// Whether there are no views.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -169,15 +169,15 @@ impl DepthSet {
         frames.chain(views).collect()
     }
 
-    /// These views of training, counted from 0 over the whole run: in a pass every frame comes once and each simulated set as often as it has
-    /// views, in a new order each pass. Simulated views themselves come in the order of their numbers, since neighbours share a world.
+    /// The training views of these draws, counted from 0 over the whole run. In a pass every frame comes once and each simulated set as
+    /// often as it has views, in a new order each pass. Simulated views come in the order of their numbers, since neighbours share a world.
     pub(crate) fn pick(&self, seed: u64, draws: Range<usize>) -> Vec<ViewRef> {
         let order = Sampler::new(self.len().max(1), 1, seed).samples_at(draws.clone());
         let picks = order.into_iter().zip(draws);
         picks.map(|(place, draw)| self.at(place, draw)).collect()
     }
 
-    /// What stands at a place of a pass, for a draw.
+    /// The view at a place of a pass. `draw` numbers the simulated views.
     fn at(&self, mut place: usize, draw: usize) -> ViewRef {
         if place < self.frames.len() {
             return ViewRef::Frame(place);
@@ -192,10 +192,10 @@ impl DepthSet {
         ViewRef::Frame(0)
     }
 
-    /// A view; a simulated one by a camera of the given size.
+    /// Loads or renders a view; a simulated one at the given size.
     ///
     /// # Errors
-    /// [`Error::Data`] if an image or its depth cannot be read; [`Error::NoDepth`] if it has disappeared.
+    /// [`Error::Data`] if an image or its depth cannot be read; [`Error::NoDepth`] if the frame has no depth any more.
     pub(crate) fn view(&self, pick: ViewRef, size: InputSize) -> Result<DepthView, Error> {
         match pick {
             ViewRef::Frame(index) => self.frame(self.frames[index]),
@@ -218,7 +218,7 @@ impl DepthSet {
     fn frame(&self, DepthFrame { dataset, frame }: DepthFrame) -> Result<DepthView, Error> {
         let recording = &self.datasets[dataset];
         let dense = recording.dense_depth(frame)?;
-        // A simulated drive knows where the sky is: there its depth is infinite, here 0.
+        // The files of a simulated drive mark the sky with infinite depth; here it is 0.
         let sky = dense.is_some();
         let truth = match dense {
             Some(mut depth) => {
@@ -233,7 +233,7 @@ impl DepthSet {
         })?;
         let Frame { drive, number } = Frame::of(recording, frame);
         let camera = recording.intrinsics(frame);
-        // Depth cameras often have fewer pixels than the colour camera they look along.
+        // Depth cameras often have fewer pixels than the colour camera beside them.
         let (width, height) = (camera.width as usize, camera.height as usize);
         let depth = DepthMap {
             data: fit_depth(&depth, width, height, sky),
@@ -250,7 +250,7 @@ impl DepthSet {
         })
     }
 
-    /// A camera of this set at the size of its images: the first recording's, else the simulator's, or a typical one.
+    /// A camera of this set at the size of its images: that of the first recording, else the simulator's, else a typical one.
     #[must_use]
     pub fn camera(&self) -> Option<Intrinsics> {
         let recorded = self.frames.first();
@@ -263,7 +263,8 @@ impl DepthSet {
         recorded.map(of_frame).or_else(simulated)
     }
 
-    /// The camera of every frame with its place in `data.sets`, at the images' own sizes, and those that simulated views always have.
+    /// The cameras of all frames, at the images' own sizes, and those that all simulated views of a set share, each with its index in
+    /// `data.sets`.
     pub(crate) fn cameras(&self) -> impl Iterator<Item = (usize, Intrinsics)> {
         let of_frame = |f: &DepthFrame| {
             let camera = self.datasets[f.dataset].intrinsics(f.frame);
@@ -276,13 +277,13 @@ impl DepthSet {
         self.frames.iter().map(of_frame).chain(held)
     }
 
-    /// Whether views are simulated by cameras that are drawn with them.
+    /// Whether simulated views have randomly drawn cameras.
     pub(crate) fn draws_cameras(&self) -> bool {
         let drawn = |s: &SimulatedViews| s.endless.config().cameras.is_empty();
         self.simulated.iter().any(drawn)
     }
 
-    /// The part that belongs to one set of `data.sets`.
+    /// The frames and views of one set of `data.sets`.
     #[must_use]
     pub fn of_set(&self, set: usize) -> Self {
         let own = |f: &&DepthFrame| self.set_of[f.dataset] == set;
@@ -296,7 +297,7 @@ impl DepthSet {
     }
 }
 
-/// The camera that takes the views; where any does, a lens as most phones have it, 69° wide.
+/// The camera of the views; if it is drawn at random, a typical phone camera with a field of view of 69°.
 fn typical_camera(config: &EndlessConfig) -> Intrinsics {
     if let Some(camera) = config.cameras.first() {
         return camera.intrinsics;
@@ -409,7 +410,7 @@ mod tests {
             orders.push(seen.clone());
             seen.sort_unstable();
             assert!(seen.iter().copied().eq(0..30), "pass {pass}: {seen:?}");
-            // Batches that cross the border of two passes are those of the passes.
+            // A batch that spans two passes has the views of both.
             assert_eq!(set.pick(5, 100 * pass + 40..100 * pass + 46), picks[40..46]);
         }
         assert_ne!(orders[0], orders[1]);

@@ -9,27 +9,27 @@ use self::samples::named;
 pub use self::samples::{NoStereo, SampleProblem, SharedFrames, Skipped};
 pub use self::stopped::{LoaderProblem, ThreadsProblem, WorkersProblem};
 
-/// What can go wrong while learning.
+/// What can go wrong in training.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Nothing to learn from.
+    /// There is no training sample.
     #[error("no training sample in {data}: {reason}")]
     NoSamples {
-        /// The data that was given.
+        /// Which data it is, in words.
         data: String,
-        /// Why nothing is left.
+        /// Why there is no sample.
         reason: SampleProblem,
     },
-    /// A configuration that reads how the car turned, and a drive that does not say.
+    /// The configuration requires the vehicle's turns, and they are not known for a drive.
     #[error(
-        "{drive}: how the car turned is not known, and this configuration reads it: no yaw rate was recorded"
+        "{drive}: no yaw rate was recorded, and this configuration requires the vehicle's turns"
     )]
     NoYawRate {
         /// The drive.
         drive: String,
     },
-    /// A drive whose other camera is wanted as a view, and cannot be one.
+    /// A drive's second camera was requested as a view, and cannot be used as one.
     #[error("{drive}: {why}")]
     NoStereo {
         /// The drive.
@@ -37,19 +37,19 @@ pub enum Error {
         /// Why not.
         why: NoStereo,
     },
-    /// A run that was asked for a vehicle's motion as its PoseNet sees it.
+    /// Odometry was requested from a run without PoseNet.
     #[error("{}: this run has no PoseNet", run.display())]
     NoPoseNet {
         /// The run, or a checkpoint of it.
         run: PathBuf,
     },
-    /// A recording to learn depth from that has none.
-    #[error("{drive}: no frame has depth, and `learn` asks for it")]
+    /// A recording to learn depth from has no depth.
+    #[error("{drive}: no frame has depth, and `learn` requires it")]
     NoDepth {
         /// The drive.
         drive: String,
     },
-    /// A drive of which many images cannot be read, or all.
+    /// Many or all images of a drive cannot be read.
     #[error("{drive}: {broken} of {} cannot be read: {}", count_of(*of, "image"), named(images, *broken))]
     BrokenImages {
         /// The drive.
@@ -58,33 +58,33 @@ pub enum Error {
         broken: usize,
         /// How many images it has.
         of: usize,
-        /// The first of them, each with what is wrong with it.
+        /// The first of them, each with its error.
         images: Vec<String>,
     },
-    /// Validation frames that are learned from: their loss would say how well they are known by heart.
+    /// Validation frames are also training frames: their loss would measure memorisation.
     #[error("validation frames are training frames: {}", frames_by_drive(shared))]
     SharedFrames {
         /// The drives with such frames.
         shared: Vec<SharedFrames>,
     },
-    /// A camera is to be learned, and a recording says what it is.
-    #[error("{drive}: it says what its camera is, and the camera is to be learned")]
+    /// A camera is to be learned, and a recording has a known camera.
+    #[error("{drive}: its camera is known, but the run is to learn one")]
     CameraKnown {
         /// The drive.
         drive: String,
     },
-    /// A camera is to be learned, and images of two sizes are of two cameras.
+    /// A camera is to be learned, and the images have two sizes, so there are two cameras.
     #[error(
-        "one camera is learned, of images of one size: {} has {}x{}, {} has {}x{}",
+        "a run learns one camera, of images of one size: {} has {}x{}, {} has {}x{}",
         drives[0], sizes[0].0, sizes[0].1, drives[1], sizes[1].0, sizes[1].1
     )]
     SeveralCameras {
-        /// Two drives.
+        /// Two drives with images of different sizes.
         drives: [String; 2],
         /// Width and height of their images.
         sizes: [(u32, u32); 2],
     },
-    /// A loss that is not a number.
+    /// A loss is infinite or NaN.
     #[error("step {step}: the loss term `{term}` is {value}; frames {frames}")]
     NotFinite {
         /// The step, counted from 1.
@@ -96,41 +96,41 @@ pub enum Error {
         /// The drives and frame numbers of the batch.
         frames: String,
     },
-    /// Gradients that stay non-finite.
+    /// Many gradients in a row were not finite.
     #[error(
         "{count} steps in a row had a gradient that is not finite, the last at step {step}; frames {frames}"
     )]
     GradientsNotFinite {
-        /// How many.
+        /// Number of such steps in a row.
         count: usize,
         /// The last such step.
         step: usize,
         /// The drives and frame numbers of its batch.
         frames: String,
     },
-    /// A precision that the device, or this processor, does not have.
+    /// The device or this processor does not support a precision.
     #[error(
         "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, or a GPU with tensor cores for it), \
          found {found}"
     )]
     Precision {
-        /// The one asked for.
+        /// The requested precision.
         found: &'static str,
     },
     /// The loader's threads could not be started.
-    #[error("no threads to load images with: {reason}")]
+    #[error("cannot start the threads that load images: {reason}")]
     Threads {
-        /// What the system says.
+        /// The system's error.
         #[source]
         reason: ThreadsProblem,
     },
-    /// The loader's thread died.
-    #[error("the loader of images stopped: {reason}")]
+    /// The image loader stopped early.
+    #[error("the image loader stopped: {reason}")]
     Loader {
-        /// What it died of.
+        /// Why it stopped.
         reason: LoaderProblem,
     },
-    /// Workers that learn together, and cannot.
+    /// Several workers cannot train together.
     #[error("worker {rank} of {count}: {reason}")]
     Workers {
         /// This worker, from 0.
@@ -141,16 +141,16 @@ pub enum Error {
         #[source]
         reason: WorkersProblem,
     },
-    /// Samples should be held out, and none are.
-    #[error("no sample is held out to validate on")]
+    /// The configuration requires held-out samples, and there are none.
+    #[error("no sample is held out for validation")]
     NoValidation,
-    /// The recording.
+    /// An error of a recording.
     #[error(transparent)]
     Data(Box<deepfusion_data::Error>),
-    /// The simulator, of which views are learned from.
+    /// An error of the simulator that renders training views.
     #[error(transparent)]
     Simulator(#[from] deepfusion_sim::Error),
-    /// The configuration, the run's folder, or the networks' weights.
+    /// An error of the configuration, the run's folder, or the networks' weights.
     #[error(transparent)]
     Model(#[from] deepfusion_model::Error),
 }
@@ -165,67 +165,63 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoSamples { .. } => Some(
-                "training needs consecutive frames of a moving camera, with time stamps and speeds"
+                "give consecutive frames of a moving camera, with time stamps and speeds"
                     .into(),
             ),
             Self::NoYawRate { .. } => Some(
-                "turns are taken from the images where these show enough of them, unless data.measured_turns_only is set; else train with \
-                 view_motion auto, distance or posenet and loss.rotation = 0, or give a yaw rate: yaw_rate_radps in speed.csv, or imu.csv"
+                "give a yaw rate (yaw_rate_radps in speed.csv, or imu.csv), or train with view_motion auto, distance or posenet and \
+                 loss.rotation = 0; without data.measured_turns_only, images that show the turns well also do"
                     .into(),
             ),
             Self::NoStereo { .. } => Some(
-                "stereo needs both cameras of a drive, as KITTI's image_02 and image_03; without it one camera and the speeds will do"
+                "give both cameras of a drive, like KITTI's image_02 and image_03, or train without stereo"
                     .into(),
             ),
             Self::NoDepth { .. } => Some(
-                "learn = \"self\" needs no depth but a speed; RGB-D folders, drives with LiDAR scans and simulated drives \
-                 have depth"
+                "give RGB-D folders, drives with LiDAR scans or simulated drives, or set learn = \"self\", which needs speeds instead of \
+                 depth"
                     .into(),
             ),
             Self::BrokenImages { .. } => Some(
-                "fetch the recording again, or leave it out; a few such images would be done without"
+                "copy or download the recording again, or leave it out; only a few broken images are skipped"
                     .into(),
             ),
             Self::SharedFrames { .. } => Some(
-                "validate on other drives or other frames, or on none that are named: the end of each drive \
-                 is held out then"
+                "validate on other drives or frames; if none are given, the end of each training drive is held out"
                     .into(),
             ),
             Self::CameraKnown { .. } => Some(
-                "a camera that is known is better than one that is learned: train without assumed_camera.learn, or leave this recording out"
+                "train without assumed_camera.learn, or leave this recording out; a known camera is better than a learned one"
                     .into(),
             ),
             Self::SeveralCameras { .. } => {
                 Some("train on the recordings of one camera, at one size".into())
             }
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
-                "the last good checkpoint is kept; look at the frames named above, or lower the \
-                 learning rate, and resume"
+                "check the frames named above or lower the learning rate, then resume from the last good checkpoint"
                     .into(),
             ),
             Self::NoPoseNet { .. } => Some(
-                "it learned by the vehicle's motion alone (`freeze` names `pose`), or is an imported depth network; a run that starts from it \
-                 without that has a PoseNet, too"
+                "give a run with a PoseNet: this one learned from the vehicle's motion alone (`freeze` names `pose`) or is an imported \
+                 depth network; a new run that starts from it has one unless it freezes `pose`"
                     .into(),
             ),
-            Self::Precision { .. } => Some("set `precision` so in the configuration".into()),
+            Self::Precision { .. } => Some("set `precision` to \"f32\" in the configuration".into()),
             Self::Threads { .. } => Some(
-                "the system allows this user too few threads or too little memory; see `ulimit -u`"
+                "raise the system's limits for this user's threads (`ulimit -u`) or memory"
                     .into(),
             ),
             Self::Loader { .. } => Some(
-                "this is a fault of the program: please report it with the lines above; what was saved is whole, and \
-                 the run can be resumed from there"
+                "this is a bug: please report it with the lines above; the run can be resumed from its last checkpoint"
                     .into(),
             ),
             Self::Workers { .. } => Some(
-                "all workers need the same configuration, recordings and start; after a failure start all of them again, and resume: the last \
-                 checkpoint is whole"
+                "give all workers the same configuration, recordings and starting weights; after a failure restart all of them and resume \
+                 from the last checkpoint"
                     .into(),
             ),
             Self::NoValidation => Some(
-                "give longer drives or some to validate on; `validation_share = 0` trains without validation \
-                 and chooses no `best`"
+                "give longer drives or validation drives; `validation_share = 0` trains without validation and without a `best` checkpoint"
                     .into(),
             ),
             Self::Data(error) => error.hint(),
@@ -247,7 +243,7 @@ impl From<deepfusion_nn::Error> for Error {
     }
 }
 
-/// Each drive that has such frames, with their number.
+/// The number of shared targets of each drive that has some.
 fn frames_by_drive(shared: &[SharedFrames]) -> String {
     let drives = shared.iter().filter(|s| s.targets > 0);
     let drives = drives.map(|s| format!("{} of {}", s.targets, s.drive));

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// What the trainer reports. It never prints; the caller decides what to do with its events.
 #[derive(Debug, Clone)]
 pub enum TrainEvent {
-    /// Training begins, or goes on.
+    /// Training begins or resumes.
     Started {
         /// Steps already done.
         from_step: usize,
@@ -14,17 +14,17 @@ pub enum TrainEvent {
         steps: usize,
         /// Training samples.
         samples: usize,
-        /// Of these, images with known depth that were recorded.
+        /// Of these, recorded images with known depth.
         known_depth: usize,
-        /// And those that are simulated.
+        /// Of these, simulated images.
         simulated: usize,
         /// Held-out samples.
         validation_samples: usize,
         /// The data's mean displacement per pair, in metres.
         mean_displacement_m: f64,
     },
-    /// A step of the optimiser was made, or skipped. On a GPU the numbers of some steps are read together, and their events come one after
-    /// the other then.
+    /// A step of the optimiser was made or skipped. On a GPU the numbers of several steps are read together; their events then come one
+    /// right after the other.
     Step {
         /// Counted from 1.
         step: usize,
@@ -38,51 +38,51 @@ pub enum TrainEvent {
         images_per_second: f64,
         /// Seconds until the end at the present pace.
         remaining_s: f64,
-        /// Displacement by the vehicle's speed over displacement by PoseNet, smoothed over the last
-        /// steps: 1 when the scale is metric. Of known depth alone and without PoseNet, true over predicted depth; NaN where neither is learned from.
+        /// Displacement by the vehicle's speed over displacement by PoseNet, smoothed over the last steps: 1 when the scale is metric.
+        /// Without PoseNet, or for known depth alone, true over predicted depth; NaN if the run learns from neither.
         scale_ratio: f64,
         /// Norm of the gradient before clipping.
         gradient_norm: f64,
     },
     /// The held-out samples were evaluated.
     Validated {
-        /// After this step.
+        /// Steps done.
         step: usize,
         /// Their loss.
         losses: LossTerms,
         /// The value that selects `best`: the part of the loss that depth can change.
         selection: f64,
-        /// As of a step.
+        /// As in [`TrainEvent::Step`].
         scale_ratio: f64,
         /// Whether this is the best so far.
         best: bool,
     },
-    /// A picture of what is being learned.
+    /// The networks' outputs for a training image.
     Panel {
-        /// After this step.
+        /// Steps done.
         step: usize,
-        /// The images.
+        /// The panel.
         panel: Box<SamplePanel>,
     },
     /// A checkpoint was written.
     Saved {
-        /// After this step.
+        /// Steps done.
         step: usize,
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
     },
-    /// The camera that the run has learned, at its end or where it was stopped.
+    /// The camera that the run has learned, at its end or when it is stopped.
     Camera {
         /// The camera, at the size of the images.
         camera: Intrinsics,
         /// Its focal lengths, and how well the drives determined them.
         learned: LearnedCamera,
     },
-    /// Something looks wrong but training goes on.
+    /// Something looks wrong, but training continues.
     Warning {
-        /// After this step.
+        /// Steps done.
         step: usize,
-        /// What, with its figures.
+        /// What looks wrong, with its numbers.
         warning: TrainWarning,
     },
 }
@@ -90,8 +90,8 @@ pub enum TrainEvent {
 /// What the listener wants the trainer to do next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Control {
-    /// Go on.
+    /// Continue training.
     Continue,
-    /// Save and stop, after the last step that was made.
+    /// Save a checkpoint and stop after the steps made so far.
     Stop,
 }

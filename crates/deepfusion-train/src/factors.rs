@@ -30,7 +30,8 @@ impl BatchFactors {
         }
     }
 
-    /// Those of a network with a canonical focal length, seen through a lens with so many times the f_y, one number: depth grows with it.
+    /// The factors of a network with a canonical focal length, for a camera whose f_y is `ratio` (one number) times as large: depth grows
+    /// in proportion.
     #[must_use]
     pub(crate) fn refocused(&self, ratio: Tensor<1>) -> Self {
         Self {
@@ -87,7 +88,7 @@ mod tests {
         max_m: 30.0,
     };
 
-    /// Each sample's depth and motion are exactly its own set's, in both halves of a bidirectional batch.
+    /// Each sample's depth and motion use its own set's factors, in both halves of a bidirectional batch.
     #[test]
     fn every_sample_has_its_own_metres() {
         let device = Device::flex();

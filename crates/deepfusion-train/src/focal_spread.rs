@@ -9,24 +9,24 @@ use crate::{
     BatchLoader, Error, ForwardPass, Model, Motion, SampleSet, Schedule, SnippetBatch, TrainConfig,
 };
 
-/// Parts of the drives that are asked each by itself.
+/// Number of parts of the drives that are evaluated separately.
 const BLOCKS: usize = 12;
-/// Fewest of them whose disagreement says something.
+/// Fewest parts whose disagreement is meaningful.
 const LEAST_BLOCKS: usize = 4;
-/// Samples of a block, spread over it.
+/// Samples taken from each part, spread over it.
 const SAMPLES: usize = 3;
-/// Step of the differences in ln f: a warped pixel moves by a fraction of itself.
+/// Step of the finite differences in ln f: warped pixels move by a fraction of a pixel.
 const STEP: f64 = 0.05;
-/// A standard deviation of ln f above which nothing is known of f.
+/// If the standard deviation of ln f is larger, the drives do not determine f.
 const MOST: f64 = 0.5;
 
-/// The standard deviation of ln f; `None` where the loss hardly depends on it.
+/// The standard deviation of ln f; `None` where the loss hardly depends on f.
 ///
-/// The networks are held, and the loss of parts of the drives is taken at f and 5 % to either side. Each part says by its slope g_b how far
-/// it would like f elsewhere, all of them by their curvature H how much that matters. σ² = n/(n − 1) · Σ(g_b − ḡ)²/(ΣH_b)² is the sandwich
-/// of M-estimators with a part for a cluster. To it the step (Σg/ΣH)² is added by which f is off its optimum. Where the turns are
-/// PoseNet's, these would have followed another f: they are divided by it, so that only what no turn can imitate counts (Gordon et al.,
-/// arXiv 1904.04998). An error in the scale of measured turns goes into f as it is, and is not part of this.
+/// With the networks fixed, the loss of each part of the drives is computed at f and 5 % to either side. This gives its slope g_b and
+/// curvature H_b. σ² = n/(n − 1) · Σ(g_b − ḡ)²/(ΣH_b)² is the sandwich estimator with each part as a cluster. (Σg/ΣH)² is added, the
+/// squared distance of f from its optimum. PoseNet's turns would have adapted to another f. They are therefore divided by it, so that only
+/// changes that no turn can imitate count (Gordon et al., arXiv 1904.04998). An error in the scale of measured turns leads to the same
+/// error of f; it is not part of σ.
 ///
 /// # Errors
 /// [`Error::Data`] where an image cannot be read, [`Error::Loader`].
@@ -56,8 +56,7 @@ pub(crate) fn focal_spread(
     Ok(sandwich(&blocks))
 }
 
-/// The standard deviation that slopes and curvatures of parts of the data give; `None` for too few, and where the sum has no minimum
-/// that is worth the name.
+/// The standard deviation from the parts' slopes and curvatures; `None` if there are too few parts or their sum has no clear minimum.
 fn sandwich(blocks: &[(f64, f64)]) -> Option<f64> {
     let n = blocks.len() as f64;
     if blocks.len() < LEAST_BLOCKS {
@@ -71,12 +70,12 @@ fn sandwich(blocks: &[(f64, f64)]) -> Option<f64> {
     (curvature > 0.0 && sigma < MOST).then_some(sigma)
 }
 
-/// A few samples of each of up to [`BLOCKS`] parts of the samples, which follow one another in time.
+/// A few samples from each of up to [`BLOCKS`] consecutive parts.
 fn of_blocks(samples: &SampleSet) -> SampleSet {
     let all = &samples.samples;
     let blocks = BLOCKS.min(all.len() / SAMPLES);
     let chosen = (0..blocks * SAMPLES).map(|i| {
-        // In the middle of a block's thirds.
+        // The middle of each third of a part.
         let place = (2 * i + 1) * all.len() / (2 * blocks * SAMPLES);
         all[place].clone()
     });
@@ -86,11 +85,11 @@ fn of_blocks(samples: &SampleSet) -> SampleSet {
     }
 }
 
-/// The photometric loss at ln f + step, the networks' outputs for the batch being what they are.
+/// The photometric loss at ln f + step, with the networks' outputs unchanged.
 fn loss_at(model: &Model, (batch, pass): (&SnippetBatch, &ForwardPass), step: f64) -> f64 {
     let device = batch.intrinsics.device();
     let batch = SnippetBatch {
-        // Depth is the networks': that it would follow another f says nothing about f.
+        // Depth stays the network's: if it followed f, that would reveal nothing about f.
         factors: batch.factors.clone(),
         ..model.refocused(batch, Tensor::from_data([step as f32], &device))
     };
@@ -100,7 +99,7 @@ fn loss_at(model: &Model, (batch, pass): (&SnippetBatch, &ForwardPass), step: f6
         inverse_intrinsics: batch.inverse_intrinsics.clone().repeat_dim(0, times),
         motions: match model.config().view_motion {
             ViewMotion::Vehicle => pass.motions.clone(),
-            // Of `auto` those that warp are of drives whose turns are not known.
+            // With `auto`, PoseNet's motions warp only drives whose turns are not known.
             ViewMotion::PoseNet | ViewMotion::Distance | ViewMotion::Auto => {
                 let followed = pass.motions.iter().map(|m| following(m, step.exp()));
                 followed.collect()
@@ -116,8 +115,7 @@ fn loss_at(model: &Model, (batch, pass): (&SnippetBatch, &ForwardPass), step: f6
     model.loss(&pass, &batch, schedule).terms.reprojection
 }
 
-/// The motions as a network would have learned them with so many times the focal length: what they do in the middle of the image is the
-/// same.
+/// The motions that a network would have learned with `ratio` times the focal length: they move the middle of the image in the same way.
 fn following(motion: &Motion, ratio: f64) -> Motion {
     let device = motion.rotation.device();
     let read = |data: TensorData| -> Vec<f64> { data.iter::<f64>().collect() };
@@ -143,8 +141,8 @@ fn following(motion: &Motion, ratio: f64) -> Motion {
 mod tests {
     use super::*;
 
-    /// Means of normal numbers: of losses (x − x_b)²/2 the slope at 0 is −x_b and the curvature 1, so that the sandwich is the standard
-    /// error of the mean, and the mean itself is the step to the optimum.
+    /// The losses (x − x_b)²/2 have the slope −x_b and the curvature 1 at 0. So the sandwich is the standard error of the mean, and the
+    /// mean is the step to the optimum.
     #[test]
     fn is_the_standard_error_of_a_mean() {
         let x = [0.11, -0.05, 0.02, -0.08, 0.04, -0.04];
@@ -162,7 +160,7 @@ mod tests {
         assert_eq!(sandwich(&hill), None);
     }
 
-    /// Small turns and shifts move the middle of the image alike through both lenses.
+    /// Small turns and shifts move the middle of the image in the same way for both focal lengths.
     #[test]
     fn the_middle_of_the_image_does_not_determine_it() {
         let device = Device::flex();

@@ -1,4 +1,4 @@
-//! Weights that do not learn.
+//! Weights that training leaves unchanged.
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
@@ -6,8 +6,8 @@ use deepfusion_model::{Error as ModelError, ExpectedSetting};
 
 use crate::{Error, Model, SampleSet, TrainConfig};
 
-/// Takes the weights that `config.freeze` names out of learning: their gradients are not computed. A name is a weight's own
-/// (`depth.encoder.conv1.weight`) or that of what it is part of (`depth.encoder`), as among the moments of [`crate::Adam`].
+/// Freezes the weights that `config.freeze` names: their gradients are not computed. A name is that of a weight
+/// (`depth.encoder.conv1.weight`) or of a module that contains it (`depth.encoder`), as in [`crate::Adam::state`].
 ///
 /// # Errors
 /// [`ModelError::Config`] for a name that no weight has, or if nothing is left to learn from the videos or from the images with
@@ -61,10 +61,11 @@ pub(crate) fn freeze(
 struct Freeze<'a> {
     config: &'a TrainConfig,
     path: Vec<String>,
-    /// Whether a weight of the name was there.
+    /// The names in `config.freeze`, and whether a weight matched each of them.
     names: Vec<(&'a str, bool)>,
-    /// Weights that still learn from video, and from known depth.
+    /// Number of weights that still learn from video.
     from_video: usize,
+    /// Number of weights that still learn from known depth.
     from_depth: usize,
 }
 
@@ -78,13 +79,13 @@ impl Freeze<'_> {
         self.path[0] == "depth" && self.path.get(1).is_some_and(|part| part == "uncertainty")
     }
 
-    /// PoseNet, too: where the views are not warped by its poses, it has a loss of its own (`loss.speed`).
+    /// PoseNet learns, too: where its poses do not warp the views, it has a loss of its own (`loss.speed`).
     fn learns_from_video(&self) -> bool {
         !self.is_uncertainty()
     }
 
     fn learns_from_depth(&self) -> bool {
-        // At weight 0 the head for uncertainty learns alone: `Model::learn_depth`.
+        // At weight 0 only the uncertainty head learns: see `Model::learn_depth`.
         self.path[0] == "depth" && (self.config.loss.depth.weight > 0.0 || self.is_uncertainty())
     }
 }
@@ -98,7 +99,7 @@ impl ModuleMapper for Freeze<'_> {
     }
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         if !param.is_require_grad() {
-            // Running statistics.
+            // Running statistics are not weights.
             return param;
         }
         let weight = self.path.join(".");

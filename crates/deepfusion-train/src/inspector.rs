@@ -7,7 +7,7 @@ use deepfusion_runtime::{FeatureMap, LayerMaps};
 use crate::runner::depth_net;
 use crate::{Error, StoredNetwork};
 
-/// Shows a depth network's intermediate feature maps. It runs in Burn, whichever engine predicts.
+/// Computes a depth network's intermediate feature maps, always in Burn, whichever engine predicts.
 #[derive(Debug)]
 pub struct Inspector {
     net: DepthNet,

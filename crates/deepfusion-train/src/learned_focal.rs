@@ -1,4 +1,4 @@
-//! The focal length of a camera that nobody gave, as a parameter.
+//! The focal length of an unknown camera, as a parameter.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
@@ -9,7 +9,7 @@ use crate::{
     ViewMotion,
 };
 
-/// How far the focal length is from the one that was assumed, ln(f/f₀): of both axes, since turns to the side say nothing about fy. All
+/// The logarithm of the focal length over the assumed one, ln(f/f₀). Both axes share it, since turns to the side do not determine fy. All
 /// recordings of a run share it.
 #[derive(Module, Debug)]
 pub struct LearnedFocal {
@@ -18,7 +18,7 @@ pub struct LearnedFocal {
 }
 
 impl LearnedFocal {
-    /// That of the assumed camera itself.
+    /// The focal length of the assumed camera: ln(f/f₀) = 0.
     #[must_use]
     pub fn new(device: &Device) -> Self {
         Self {
@@ -26,9 +26,9 @@ impl LearnedFocal {
         }
     }
 
-    /// The same within what a camera may be: where nothing determines it, it walks off.
+    /// Clamps the focal length to the range that `camera` allows. It would drift away where nothing determines it.
     #[must_use]
-    pub(crate) fn held_to(self, camera: &AssumedCamera) -> Self {
+    pub(crate) fn clamped_to(self, camera: &AssumedCamera) -> Self {
         let (least, most) = camera.ratios();
         if !is_cpu(&self.log_ratio.val().device()) {
             return self.clamped(least, most);
@@ -43,7 +43,7 @@ impl LearnedFocal {
         }
     }
 
-    /// The same where the number is, so that a step on a GPU does not wait for it.
+    /// Clamps on the device, so that a step on a GPU does not wait for the number to be read.
     fn clamped(self, least: f64, most: f64) -> Self {
         let (least, most) = (least.ln() as f32, most.ln() as f32);
         let held = |log: Tensor<1>| log.inner().clamp(least, most).autodiff().require_grad();
@@ -59,9 +59,9 @@ impl LearnedFocal {
     }
 }
 
-/// A batch seen through another focal length, by ln(f/f₀), one number. Differentiable: K·diag(r, r, 1) and its inverse. The depths of a
-/// network with a `canonical` focal length are brought to this one, but have no gradient by it: f would else be drawn to wherever it makes
-/// up for metres that the network has wrong, which it could learn as well.
+/// The batch with another focal length, given by ln(f/f₀), one number. Differentiable: K·diag(r, r, 1) and its inverse. The depths of a
+/// network with a `canonical` focal length are scaled to the new one, but without a gradient. Otherwise f would compensate for errors in
+/// the network's scale, which the network itself can learn to avoid.
 pub(crate) fn refocused(
     batch: &SnippetBatch,
     log_ratio: Tensor<1>,
@@ -71,7 +71,7 @@ pub(crate) fn refocused(
         vec![log_ratio.clone(), log_ratio.clone(), log_ratio.zeros_like()],
         0,
     );
-    // A row beside K scales its columns, a column beside its inverse its rows: the principal point is left alone.
+    // A row times K scales its columns, a column times K⁻¹ its rows. The principal point stays the same.
     let columns = logs.clone().exp().reshape([1, 1, 3]);
     let rows = logs.neg().exp().reshape([1, 3, 1]);
     SnippetBatch {
@@ -85,7 +85,7 @@ pub(crate) fn refocused(
     }
 }
 
-/// That there is one camera to learn, and none that is known.
+/// Checks that there is one camera to learn, and no known one.
 ///
 /// # Errors
 /// [`Error::CameraKnown`], [`Error::SeveralCameras`].
@@ -121,17 +121,17 @@ pub(crate) fn check_camera(config: &TrainConfig, sets: [&SampleSet; 2]) -> Resul
     Ok(())
 }
 
-/// Turns that move the image by less than this many pixels of the network's input, as a mean over pairs, determine no focal length.
+/// The focal length is not determined if turns move the network's input by fewer pixels than this, as a mean over pairs.
 const LEAST_TURN_PX: f64 = 0.3;
 
-/// What should be known before a camera is learned: that the vehicle hardly turns, or that its turns are not used.
+/// The warning before a camera is learned: the vehicle hardly turns, or its measured turns are not used.
 pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<TrainWarning> {
     config.learned_camera()?;
     let k = samples.camera()?;
     let (width, height) = (config.size.width as u32, config.size.height as u32);
     let focal_px = k.resized(width, height).fx;
     let sources = samples.samples.iter().flat_map(|s| &s.snippet.sources);
-    // Known of all pairs of a drive with a yaw rate, and of none without.
+    // Turns are known for all pairs of a drive with a yaw rate, and for none of one without.
     let turns: Vec<f64> = sources
         .filter_map(|s| Some(s.motion.source_from_target?.angle()))
         .collect();
@@ -153,7 +153,7 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Train
 mod tests {
     use super::*;
 
-    /// What a GPU does without reading the number is what the processor does.
+    /// The clamp on a GPU, which does not read the number, gives the same as that on the processor.
     #[test]
     fn both_ways_hold_the_focal_length() {
         let device = Device::flex().autodiff();
@@ -163,13 +163,13 @@ mod tests {
             let focal = || LearnedFocal {
                 log_ratio: Param::from_data(TensorData::from([log_ratio]), &device),
             };
-            let held = focal().held_to(&camera).ratio();
+            let held = focal().clamped_to(&camera).ratio();
             let clamped = focal().clamped(least, most);
             assert!((clamped.ratio() - held).abs() < 1e-5 * held, "{held}");
             assert!((held - expected).abs() < 1e-5 * held, "{held} {expected}");
             assert!(
                 clamped.log_ratio.val().is_require_grad(),
-                "it goes on learning"
+                "it still requires its gradient"
             );
         }
     }

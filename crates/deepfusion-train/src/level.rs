@@ -4,7 +4,7 @@ use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
 use deepfusion_nn::{SCALES, ops};
 
-/// Images and cameras at one size at which views are compared.
+/// Images and cameras at one of the sizes at which views are compared.
 #[derive(Debug, Clone)]
 pub(crate) struct Level {
     /// Targets, T×3×H×W.
@@ -81,7 +81,7 @@ fn resizing(factor: f64, device: &Device) -> Tensor<3> {
     Tensor::from_data([matrix], device)
 }
 
-/// The image at every scale of the decoder, each the means of the last one's 2×2 blocks.
+/// The image at every scale of the decoder: each pixel is the mean of a 2×2 block of the scale before.
 pub(crate) fn pyramid(image: Tensor<4>) -> Vec<Tensor<4>> {
     let mut images = vec![image];
     for scale in 1..SCALES {
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use deepfusion_geometry::Intrinsics;
 
-    /// Halving the image and halving the camera mean the same.
+    /// The matrix agrees with resizing the camera.
     #[test]
     fn the_matrix_resizes_the_camera() {
         let device = Device::flex();

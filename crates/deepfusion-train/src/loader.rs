@@ -17,7 +17,7 @@ pub(crate) struct Ahead<T> {
 }
 
 impl<T: Send + 'static> Ahead<T> {
-    /// Makes one item for each plan, on so many threads; the number passed along only counts them in messages.
+    /// Makes one item for each plan, on `threads` threads. The plans' numbers are used only in messages.
     pub(crate) fn start<P: Send + Sync + 'static>(
         threads: usize,
         plans: impl Iterator<Item = (usize, P)> + Send + 'static,
@@ -39,7 +39,7 @@ impl<T: Send + 'static> Ahead<T> {
             sender.send(Ok(None)).ok();
         };
         if let Err(error) = start_thread(threads, run) {
-            // The channel is empty and holds more than one; its receiver is still here.
+            // `send` succeeds: the receiver is alive, and the empty channel has room.
             complaints.send(Err(error)).ok();
         }
         Self {
@@ -51,7 +51,7 @@ impl<T: Send + 'static> Ahead<T> {
     /// The next one; `None` after the last.
     ///
     /// # Errors
-    /// The error of making it; [`Error::Threads`] if the thread could not start; [`Error::Loader`] if it has died.
+    /// The error from making the item; [`Error::Threads`] if the thread could not start; [`Error::Loader`] if it has died.
     pub(crate) fn next(&self) -> Option<Result<T, Error>> {
         if self.ended.get() {
             return None;
@@ -71,8 +71,8 @@ impl<T: Send + 'static> Ahead<T> {
     }
 }
 
-/// Runs `make` on a thread with a pool of its own. The shared pool will not do: the trainer waits for a
-/// batch on one of its threads, which could be the only one.
+/// Runs `make` on a thread with a rayon pool of its own. The global pool could deadlock: the trainer waits for a batch on one of its
+/// threads, which may be the only one.
 fn start_thread(
     threads: usize,
     make: impl FnOnce(rayon::ThreadPool) + Send + 'static,

@@ -5,19 +5,19 @@ use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
 use deepfusion_nn::{DepthNet, FlowDecoder, PoseNet, SCALES, WeightRng};
 
-/// The networks of a run, and what a training step needs.
+/// The networks of a run, with what a training step needs.
 #[derive(Debug, Clone)]
 pub struct Model {
-    /// Disparity of an image.
+    /// The depth network: disparity from an image.
     pub depth_net: DepthNet,
-    /// Motion between two; not of a run that [leaves it out](TrainConfig::leaves_pose_net_out).
+    /// PoseNet: the motion between two images; `None` in a run that [leaves it out](TrainConfig::leaves_pose_net_out).
     pub pose_net: Option<PoseNet>,
-    /// Optical flow from the depth network's features of both; only while training with a flow loss.
+    /// Optical flow from the depth network's features of two images; only while training with a flow loss.
     pub flow_decoder: Option<FlowDecoder>,
-    /// The focal length of a camera that nobody gave, in a run that learns it.
+    /// The focal length of an unknown camera, in a run that learns it.
     pub focal: Option<LearnedFocal>,
     pub(crate) config: TrainConfig,
-    /// From scale s to full resolution.
+    /// Resizes from scale s to full resolution, by scale.
     pub(crate) enlarge: Vec<BilinearResize>,
 }
 
@@ -33,9 +33,9 @@ pub struct ViewFlow {
 /// The networks' outputs for a batch: T targets, which are frame 0 alone, or frames 0 and 1.
 #[derive(Debug, Clone)]
 pub struct ForwardPass {
-    /// Sigmoid disparities of the targets, T×1×H/2ˢ×W/2ˢ, as of [`DepthNet::forward`].
+    /// Sigmoid disparities of the targets, T×1×H/2ˢ×W/2ˢ, as from [`DepthNet::forward`].
     pub disparities: Vec<Tensor<4>>,
-    /// PoseNet's `source_from_target`, by view, T each, the measured one without PoseNet; of the other camera's view the calibrated one.
+    /// PoseNet's `source_from_target` by view, T each; without PoseNet the measured one. For the other camera's view, the calibrated one.
     pub motions: Vec<Motion>,
     /// The same, measured by the vehicle's sensors.
     pub measured: Vec<Motion>,
@@ -53,9 +53,9 @@ pub struct ForwardPass {
     pub inverse_intrinsics: Tensor<3>,
 }
 
-/// The batch's displacements that the loss saw, measured and predicted, each summed, one value in metres: for the scale ratio.
+/// The sums of the batch's measured and predicted displacements, one value each, in metres, for the scale ratio.
 pub(crate) fn displacements(pass: &ForwardPass, batch: &SnippetBatch) -> [Tensor<1>; 2] {
-    // The other camera's view is no motion.
+    // The other camera's baseline is not a displacement in time.
     let in_time = pass.motions.iter().take(batch.distance_m.len());
     let predicted = in_time.map(|m| m.distance().narrow(0, 0, batch.len()));
     [batch.distance_m.clone(), predicted.collect()]
@@ -109,7 +109,7 @@ impl Model {
         }
     }
 
-    /// The depth and pose networks for inference, on the device below autodiff.
+    /// The depth and pose networks for inference, on the device without autodiff.
     #[must_use]
     pub fn valid(&self, device: &Device) -> Self {
         let mut model = Self::with_networks(
@@ -122,7 +122,7 @@ impl Model {
         model
     }
 
-    /// The batch as the learned camera sees it; as it is where none is learned.
+    /// The batch with the learned camera's intrinsics; unchanged if the run learns no camera.
     #[must_use]
     pub fn see(&self, batch: SnippetBatch) -> SnippetBatch {
         match &self.focal {
@@ -131,12 +131,12 @@ impl Model {
         }
     }
 
-    /// The batch seen through assumed cameras of other focal lengths.
+    /// The batch with the focal length of the assumed camera changed by ln(f/f₀) = `log_ratio`.
     pub(crate) fn refocused(&self, batch: &SnippetBatch, log_ratio: Tensor<1>) -> SnippetBatch {
         refocused(batch, log_ratio, self.config.canonical_focal_px.is_some())
     }
 
-    /// A scale's disparity at full resolution: the run's size, or the batch's where it has its own.
+    /// A scale's disparity at full resolution: the run's size, or the batch's own size.
     pub(crate) fn enlarged(
         &self,
         scale: usize,
@@ -155,7 +155,7 @@ impl Model {
         BilinearResize::new(from, [height, width], &disparity.device()).apply(disparity)
     }
 
-    /// The run's configuration, with what was taken from the data.
+    /// The run's configuration, completed with values taken from the data.
     #[must_use]
     pub fn config(&self) -> &TrainConfig {
         &self.config
@@ -174,11 +174,11 @@ impl Model {
             Reprojection::Bidirectional => self.forward_bidirectional(batch),
             Reprojection::Minimum | Reprojection::Mean => self.forward_target(batch),
         };
-        // What was measured is in metres already.
+        // Without PoseNet the motions are measured, and already in metres.
         if let (Some(factors), Some(_)) = (&batch.factors, &self.pose_net) {
             pass.motions = pass.motions.iter().map(|m| factors.scale(m)).collect();
         }
-        // In metres already, and nobody's guess.
+        // The other camera's pose is calibrated, in metres.
         pass.motions
             .extend(batch.measured.iter().skip(batch.offsets.len()).cloned());
         pass
@@ -234,7 +234,7 @@ impl Model {
         }
     }
 
-    /// Frame 0 is the target of every source: T = B, a view each.
+    /// Frame 0 is the target of every source: T = B, one view for each source.
     fn forward_target(&self, batch: &SnippetBatch) -> ForwardPass {
         let (motions, explained) = match &self.pose_net {
             Some(pose_net) => motions_from_target(pose_net, batch),
@@ -280,8 +280,7 @@ impl Model {
 /// PoseNet's motions of frame 0 to every source, and the logits of the masks.
 fn motions_from_target(pose_net: &PoseNet, batch: &SnippetBatch) -> (Vec<Motion>, Vec<Tensor<4>>) {
     let target = &batch.network[0];
-    // The pose network is given the frames in time order; for a source before the target it
-    // then says `target_from_source`.
+    // The pose network gets the frames in time order. For a source before the target its output is `target_from_source`.
     let stacked = batch
         .offsets
         .iter()
@@ -300,7 +299,7 @@ fn motions_from_target(pose_net: &PoseNet, batch: &SnippetBatch) -> (Vec<Motion>
     let explained = logits.into_iter().flat_map(|logits| {
         let views = batch.offsets.iter().enumerate();
         views.map(move |(i, offset)| {
-            // Where the source is before it, the target is the second of the two.
+            // If the source comes before the target, the target is the second frame.
             let target = usize::from(*offset < 0);
             logits.clone().narrow(0, i * n, n).narrow(1, target, 1)
         })
@@ -330,8 +329,7 @@ pub(crate) fn swap_halves(x: Tensor<4>) -> Tensor<4> {
     )
 }
 
-/// The pose network with a bias that means one unit of translation ahead: a point of frame 0 has a
-/// smaller z in frame 1.
+/// The pose network with a bias of one unit of translation ahead: a point of frame 0 has a smaller z in frame 1.
 fn start_moving(mut pose_net: PoseNet) -> PoseNet {
     let output = &mut pose_net.decoder.output;
     output.bias = output.bias.take().map(|bias| {

@@ -18,7 +18,7 @@ use deepfusion_nn::{DepthOutput, DepthScale, ops};
 pub struct Schedule {
     /// λ_v.
     pub speed_weight: f64,
-    /// Whether dynamic pixels are masked, and the flow and the rigid flow have to agree.
+    /// Whether dynamic pixels are masked, and the agreement of optical and rigid flow is part of the loss.
     pub masks_active: bool,
 }
 
@@ -31,7 +31,7 @@ pub struct BatchLoss {
     pub terms: LossTerms,
     /// The reprojection at the finest scale.
     pub finest: ReprojectionOutput,
-    /// The first view's source warped to the targets at that scale, T×3×H×W.
+    /// The first view's source warped to the targets at the finest scale, T×3×H×W.
     pub warped: Tensor<4>,
     /// The dynamic pixels of the first view, T×1×H×W, if they were computed.
     pub moving: Option<Tensor<4, Bool>>,
@@ -67,7 +67,7 @@ impl Model {
         }
     }
 
-    /// The same with its terms still on the device: those of the [`BatchLoss`] are zero.
+    /// As [`Self::loss`], with the terms still on the device: those of the [`BatchLoss`] are zero.
     pub(crate) fn loss_on_device(
         &self,
         pass: &ForwardPass,
@@ -102,7 +102,7 @@ impl Model {
             };
             let mut compared = compared(views, level, masks.as_deref());
             if let Some(there) = &batch.other_camera {
-                // The other camera's view is the last; only `minimum` has one.
+                // The other camera's view is the last one; only `minimum` supports it.
                 let other = compared.pop().map(|view| view.only_where(there));
                 compared.extend(other);
             }
@@ -122,7 +122,7 @@ impl Model {
             }
         }
         #[expect(clippy::expect_used, reason = "one for each scale")]
-        let output = finest_output.expect("a decoder has a scale at least");
+        let output = finest_output.expect("a decoder has at least one scale");
         sum.note(share(&output.valid), |terms| &mut terms.valid_share);
         sum.note(share(&output.explained), |terms| &mut terms.explained_share);
         let added = |terms: Vec<Tensor<1>>| terms.into_iter().reduce(|a, b| a + b);
@@ -161,7 +161,7 @@ impl Model {
         (loss, unread)
     }
 
-    /// The loss of images whose depth is known, and the network's prediction for them.
+    /// The loss of images with known depth, and the network's prediction for them.
     #[must_use]
     pub fn learn_depth(&self, batch: &DepthBatch) -> DepthPass {
         let (pass, unread) = self.learn_depth_on_device(batch);
@@ -173,9 +173,9 @@ impl Model {
         }
     }
 
-    /// The same with its numbers still on the device: the terms of the [`DepthPass`] are zero, its ratio NaN.
+    /// As [`Self::learn_depth`], with the numbers still on the device: the terms of the [`DepthPass`] are zero, its ratio is NaN.
     pub(crate) fn learn_depth_on_device(&self, batch: &DepthBatch) -> (DepthPass, Unread) {
-        // At weight 0 the head for uncertainty learns alone: what has no gradient is not even decayed.
+        // At weight 0 only the uncertainty head learns. The other weights have no gradient, so they do not decay either.
         let alone = self.config.loss.depth.weight == 0.0 && self.depth_net.uncertainty.is_some();
         let images = batch.network.clone();
         let DepthOutput {
@@ -306,12 +306,11 @@ impl Model {
         })
     }
 
-    /// The affine invariant loss between each frame's depth and the other's seen from it. Both frames are
-    /// targets here: the other depth is that of the batch's other half.
+    /// The affine invariant loss between each frame's depth and the other's seen from it. Both frames are targets here: the other depth is
+    /// in the batch's other half.
     ///
-    /// Where a pixel lies in the other frame depends on depth and motion together, and would couple the scale of one
-    /// to that of the other; so both are detached here. The translation is left out of the depth seen from this
-    /// frame: it shifts all of it by the same length, which b takes up.
+    /// Where a pixel lies in the other frame depends on depth and motion together, which would couple their scales. So both are detached
+    /// here. The translation is left out of the depth seen from this frame: it shifts all depths by the same length, which b absorbs.
     fn affine_loss(
         &self,
         (pass, batch): (&ForwardPass, &SnippetBatch),
@@ -346,11 +345,11 @@ impl Model {
     /// The loss between PoseNet's motion and the vehicle's.
     fn motion_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
         let views = pass.motions.iter().zip(&pass.measured);
-        // The other camera's view is nothing that PoseNet could know.
+        // PoseNet does not predict the other camera's pose.
         let views = views.take(batch.offsets.len());
         match self.config.view_motion {
             ViewMotion::Vehicle | ViewMotion::Auto => {
-                // None where every drive's turns are known, as they have to be for `Vehicle`.
+                // `None` where the turns of all drives are known, which `Vehicle` requires.
                 let known = batch.turns_known.clone().map(|known| self.both_ways(known));
                 mean_of(views.enumerate(), |(view, (motion, measured))| {
                     let whole = losses::motion(motion, measured, known.clone());
@@ -383,10 +382,10 @@ impl Model {
         self.both_ways(batch.distance_m[view].clone())
     }
 
-    /// What each sample of a batch has, for the targets, T.
+    /// A value of each sample of the batch (B), for each of the targets (T).
     fn both_ways(&self, samples: Tensor<1>) -> Tensor<1> {
         match self.config.reprojection {
-            // The second half of the targets looks back, as far.
+            // The second half of the targets looks back over the same distance.
             Reprojection::Bidirectional => Tensor::cat(vec![samples.clone(), samples], 0),
             Reprojection::Minimum | Reprojection::Mean => samples,
         }
@@ -410,7 +409,7 @@ impl Model {
         }
     }
 
-    /// PoseNet's motions at the vehicle's distances, by view; the other camera's as calibrated.
+    /// PoseNet's motions with the vehicle's distances, by view; the other camera's pose as calibrated.
     fn at_measured_distance(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
         let views = pass.motions.iter().enumerate();
         let scaled = views.map(|(view, motion)| match batch.distance_m.get(view) {
@@ -459,7 +458,7 @@ fn compared(views: &ScaleViews, level: &Level, masks: Option<&[Tensor<4, Bool>]>
         .collect()
 }
 
-/// A mask at a smaller width, true where most of its pixels are.
+/// A mask at a smaller width, true where most of a block's pixels are true.
 fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
     if mask.dims()[3] == width {
         return mask.clone();
@@ -467,7 +466,7 @@ fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
     meaned(&mask.clone().float(), width).greater_elem(0.5)
 }
 
-/// The means of an image's blocks at a smaller width.
+/// An image at a smaller width: the means of its blocks.
 fn meaned(image: &Tensor<4>, width: usize) -> Tensor<4> {
     let factor = image.dims()[3] / width;
     if factor == 1 {
@@ -496,7 +495,7 @@ fn agreement(
     })
 }
 
-/// The sum that is differentiated, and its terms, which stay on the device until they are read.
+/// The sum that is differentiated, with its terms, which stay on the device until they are read.
 #[derive(Default)]
 struct Sum {
     total: Option<Tensor<1>>,
@@ -504,7 +503,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Adds a term if there is one; what is kept of it is its unweighted value.
+    /// Adds a weighted term if there is one, and keeps its unweighted value.
     fn add(&mut self, term: Option<Tensor<1>>, weight: f64, field: TermField) {
         let Some(term) = term else { return };
         self.note(term.clone(), field);
@@ -515,7 +514,7 @@ impl Sum {
         });
     }
 
-    /// Keeps a value that is no part of the sum.
+    /// Keeps a value that is not part of the sum.
     fn note(&mut self, value: Tensor<1>, field: TermField) {
         self.terms.note(field, value);
     }
@@ -523,7 +522,7 @@ impl Sum {
     /// The sum, and its terms.
     #[expect(clippy::expect_used, reason = "every loss has a term")]
     fn end(mut self) -> (Tensor<1>, Unread) {
-        let total = self.total.expect("a loss has a term at least");
+        let total = self.total.expect("a loss has at least one term");
         self.terms.note(|terms| &mut terms.total, total.clone());
         (total, self.terms)
     }

@@ -22,11 +22,11 @@ pub struct SamplePanel {
 /// The supervision of a panel's image.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Supervision {
-    /// Its neighbour in the video.
+    /// A source: its neighbour in the video.
     View {
         /// The source warped to the image, 3×H×W.
         warped: Vec<f32>,
-        /// The photometric error that counts, H×W.
+        /// The photometric error in the loss, H×W.
         error: Vec<f32>,
         /// 1 where the warped source explains the pixel, 0 where it is masked, H×W.
         mask: Vec<f32>,
@@ -39,7 +39,7 @@ pub enum Supervision {
     Depth {
         /// True disparity, 1/m, H×W, 0 in the sky; NaN where unknown.
         truth: Vec<f32>,
-        /// ln of predicted over known depth, H×W, 0 where nothing is known.
+        /// ln of predicted over known depth, H×W, 0 where depth is not known.
         error: Vec<f32>,
     },
 }

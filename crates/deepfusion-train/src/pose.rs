@@ -1,6 +1,6 @@
 use burn::tensor::Tensor;
 
-/// Rigid motions of a batch, named `a_from_b` like everywhere: x_a = R·x_b + t.
+/// Rigid motions of a batch, named `a_from_b`: x_a = R·x_b + t.
 #[derive(Debug, Clone)]
 pub struct Motion {
     /// R, N×3×3.
@@ -34,7 +34,7 @@ impl Motion {
         }
     }
 
-    /// These motions, then the other's, along the batch.
+    /// All motions of `parts`, one after the other along the batch.
     #[must_use]
     pub fn cat(parts: Vec<Self>) -> Self {
         let (rotations, translations) = parts
@@ -195,9 +195,8 @@ mod tests {
         }
     }
 
-    /// Zero motion is a kink of a naive norm; the others are ordinary points. Central differences in
-    /// f32 with step 1e-2: the function is smooth, so the error of the step is below 1e-4 and that of
-    /// rounding about 1e-5.
+    /// At zero motion a plain norm has a kink; the other points are ordinary. Central differences in f32 with step 1e-2: the function is
+    /// smooth, so the error of the step is below 1e-4 and that of rounding about 1e-5.
     #[test]
     fn gradients_equal_finite_differences() {
         let device = Device::flex().autodiff();

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// A trained pose network, ready for consecutive images of a drive.
 ///
-/// Nothing is corrected for a camera other than the one trained on: PoseNet sees pixels, and with
-/// another focal length the same motion moves them differently.
+/// It does not correct for a camera other than that of the training: PoseNet sees pixels, and with another focal length the same motion
+/// moves them differently.
 #[derive(Debug)]
 pub struct PosePredictor {
     config: TrainConfig,
@@ -27,7 +27,8 @@ impl PosePredictor {
     /// one. `set` names one of the data sets the run learned from, where it learned several.
     ///
     /// # Errors
-    /// [`Error::NoPoseNet`] for a run that left it out, or an imported depth network; [`deepfusion_model::Error::EncodersOnly`]; as [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
+    /// [`Error::NoPoseNet`] for a run without PoseNet or an imported depth network; [`deepfusion_model::Error::EncodersOnly`]; as
+    /// [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
     pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
         let config = folder.read_config()?;
@@ -59,7 +60,7 @@ impl PosePredictor {
         &self.config
     }
 
-    /// The camera the network learned with, at the size of its images; `None` for imported weights.
+    /// The camera of the training, at the size of its images; `None` for imported weights.
     #[must_use]
     pub fn training_camera(&self) -> Option<Intrinsics> {
         self.camera

@@ -10,7 +10,7 @@ use deepfusion_runtime::{
 
 use crate::{Error, TrainConfig};
 
-/// The network as it is trained, on any of Burn's devices.
+/// Runs a depth network in Burn, as in training, on any of its devices.
 #[derive(Debug, Clone)]
 pub struct BurnRunner {
     net: DepthNet,
@@ -65,14 +65,14 @@ impl DepthRunner for BurnRunner {
 }
 
 impl RunnerPlan for BurnRunner {
-    /// The tensors are shared.
+    /// The weights' tensors are shared.
     fn runner(&self) -> Result<Box<dyn DepthRunner>, RuntimeError> {
         Ok(Box::new(self.clone()))
     }
 }
 
-/// The most memory that a GPU's allocator has held for this process, in bytes: what it keeps for the next tensors counts, as a GPU's own
-/// tools count it. `None` on a processor, or where the allocator does not say.
+/// The peak memory that the GPU allocator reserved for this process, in bytes. It includes what is kept for later tensors, as in the GPU
+/// vendor's tools. `None` on a processor, or if the allocator does not report it.
 #[must_use]
 pub fn peak_device_bytes(device: &Device) -> Option<u64> {
     let pools = device.clone().inner().memory_pool_report()?;
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(packed.step, 7);
         let built = depth_net(&packed.config, &packed.weights, &device).unwrap();
         assert!(collect(&built).tensors == saved.tensors);
-        // What is neither names the network.
+        // Errors name the network.
         let cut = StoredNetwork::packed("street", table(), &bytes[..bytes.len() / 2], 7, None);
         assert!(cut.unwrap_err().to_string().contains("street"));
         let mut broken = table();

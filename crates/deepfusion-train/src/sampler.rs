@@ -2,10 +2,10 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
-/// The order in which samples are seen: every epoch a new permutation.
+/// The order of the samples: every epoch has a new permutation.
 ///
-/// It has no state: the samples of a step follow from the seed and the step alone, so that a resumed
-/// run sees exactly what the uninterrupted one would have.
+/// It has no state: the samples of a step depend on the seed and the step alone, so that a resumed run sees exactly the same samples as an
+/// uninterrupted one.
 #[derive(Debug, Clone)]
 pub struct Sampler {
     samples: usize,

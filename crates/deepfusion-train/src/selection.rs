@@ -2,18 +2,17 @@ use crate::{LossTerms, TrainConfig, ViewMotion};
 
 /// The value that selects `best`: the part of a held-out loss that depth can change, at weights that never change.
 ///
-/// It is the photometric error alone if the vehicle's sensors give the distance of the views (`distance`, `vehicle`, `auto`):
-/// PoseNet's own loss says nothing about depth and would dominate the choice. With `posenet` the views depend on PoseNet
-/// alone, depth and motion share one scale, and the photometric error cannot see it; the speed term, at its full weight,
-/// can.
+/// It is the photometric error alone if the vehicle's sensors give the distance between the views (`distance`, `vehicle`, `auto`):
+/// PoseNet's own loss does not depend on depth and would dominate the choice. With `posenet` the views depend on PoseNet alone, and depth
+/// and motion share one scale. The photometric error does not depend on that scale, so the speed term is added, at its full weight.
 ///
 /// Smoothness and the affine term are left out, though depth changes them: a flat depth minimises the former, and
 /// neither measures how well the images are explained. Flow and masks exist only in training.
 ///
-/// The explainability masks' price is included: without it the masks alone could make the error small.
+/// The loss of the explainability masks is included: without it the masks alone could make the error small.
 ///
-/// The loss on known depth is included at its own weight, and is the whole value for a run that learns from known depth alone. Where the
-/// uncertainty head learns alone (`loss.depth.weight` 0), that is its own loss, which may be negative.
+/// The loss on known depth is included at its own weight, and is the whole value for a run that learns from known depth alone. If only the
+/// uncertainty head learns (`loss.depth.weight` 0), the value is that head's loss, which may be negative.
 pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
     let views = match config.view_motion {
         ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
@@ -34,7 +33,7 @@ mod tests {
     use super::*;
     use crate::Preset;
 
-    /// Depth explains the images better, while PoseNet drifts from the vehicle's measurements.
+    /// Depth explains the images better, but PoseNet drifts away from the vehicle's measurements.
     #[test]
     fn only_what_depth_can_change_decides() {
         let mut config = Preset::Tiny.config();
@@ -51,7 +50,7 @@ mod tests {
             config.view_motion = motion;
             assert!(selection(&config, &late) < selection(&config, &early));
         }
-        // The scale of depth follows PoseNet's there.
+        // With `posenet` the scale of depth follows PoseNet's.
         config.view_motion = ViewMotion::PoseNet;
         assert!((selection(&config, &late) - (0.09 + 0.2 * 0.5)).abs() < 1e-12);
         assert!(selection(&config, &late) > selection(&config, &early));
@@ -59,7 +58,7 @@ mod tests {
         assert_eq!(selection(&config, &late), 0.09);
     }
 
-    /// Depth stays as it is then: only what the head learns can be better or worse.
+    /// Depth does not change then: only the head's loss can.
     #[test]
     fn the_head_for_uncertainty_alone_is_chosen_by_its_own_loss() {
         let mut config = Preset::Tiny.config();

@@ -58,7 +58,7 @@ pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFra
         .collect()
 }
 
-/// Files by number, with links resolved. Consecutive frames of one file need a single look-up.
+/// Numbers files, with links resolved. Consecutive frames of the same file need a single look-up.
 #[derive(Default)]
 pub(crate) struct Files {
     numbers: HashMap<PathBuf, usize>,

@@ -12,7 +12,7 @@ use deepfusion_geometry::Intrinsics;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Whether every distance of a sample is sure enough, as far as that is known.
+/// Whether all distances of a sample are certain enough; a distance of unknown uncertainty is.
 fn is_sure(snippet: &Snippet) -> bool {
     snippet.sources.iter().all(|source| {
         let motion = &source.motion;
@@ -21,7 +21,8 @@ fn is_sure(snippet: &Snippet) -> bool {
     })
 }
 
-/// Where this reason stands among the others. Both cameras of a drive, or a drive that is validated on as well, have one.
+/// The position of this reason in `skipped`, where it is added unless it is there. The two cameras of a drive, or its training and
+/// validation, give the same reason only once.
 fn noted(skipped: &mut Vec<Skipped>, reason: Skipped) -> usize {
     let text = reason.to_string();
     let place = skipped.iter().position(|s| s.to_string() == text);
@@ -38,25 +39,25 @@ pub struct Sample {
     pub dataset: usize,
     /// The frames and the motion between them.
     pub snippet: Snippet,
-    /// The other camera's view of the target's moment, where the run has stereo and the drive another camera.
+    /// The other camera's view at the target's moment, if the run has stereo and the drive a second camera.
     pub stereo: Option<StereoSource>,
 }
 
 impl Sample {
-    /// Every frame that the sample shows beside its target: recording and frame.
+    /// All frames of the sample other than its target: recording and frame.
     pub fn sources(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let own = self.snippet.sources.iter().map(|s| (self.dataset, s.frame));
         own.chain(self.stereo.iter().map(|s| (s.dataset, s.frame)))
     }
 
-    /// The same with its target.
+    /// All frames of the sample: the target and [`Self::sources`].
     fn shown(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.sources().chain([(self.dataset, self.snippet.target)])
     }
 }
 
-/// Leaves out of training what the other way of learning holds out: depth of frames whose views are held out, and views of frames whose depth is.
-/// A drive of which nothing would be left keeps what it has.
+/// Keeps what one way of learning holds out also out of the other's training: depth of frames in held-out samples, and samples with frames
+/// whose depth is held out. A drive that would have nothing left keeps everything.
 fn keep_apart(
     (samples, depth): (&mut Vec<Sample>, &mut DepthSet),
     (held_out, held_depth): (&[Sample], &DepthSet),
@@ -66,7 +67,7 @@ fn keep_apart(
     }
     let mut files = Files::default();
     let datasets = Arc::clone(&depth.datasets);
-    // By their files: a drive may be in two data sets, or its depth in another than its views.
+    // Frames are compared by file: a drive may be in two data sets, or its depth in another one than its video.
     let mut place =
         |(dataset, frame): (usize, usize)| files.place(&datasets[dataset].frames()[frame].image);
     let mut shown = |sample: &Sample| -> Vec<_> { sample.shown().map(&mut place).collect() };
@@ -80,8 +81,8 @@ fn keep_apart(
     retain_where_some_stay(samples, |sample| sample.dataset, unseen);
 }
 
-/// Leaves out of training what shows a held-out target as the other camera's view: where a split selects frames of each camera, other moments of each
-/// are held out. A recording of which nothing would be left keeps what it has.
+/// Leaves out training samples whose second camera's view is a held-out target: a split that selects frames for each camera may hold out
+/// different moments of each. A recording that would have nothing left keeps everything.
 fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample], datasets: &[Dataset]) {
     let mut files = Files::default();
     let mut place =
@@ -96,7 +97,7 @@ fn leave_out_held_views(samples: &mut Vec<Sample>, held_out: &[Sample], datasets
     retain_where_some_stay(samples, |sample| sample.dataset, |i| !shown[i]);
 }
 
-/// Leaves out frames with depth whose image cannot be read, and notes it.
+/// Leaves out frames with depth whose image cannot be read, and adds the reason to `skipped`.
 fn leave_out_broken(
     [train, held]: [&mut DepthSet; 2],
     check: ImageCheck,
@@ -106,7 +107,9 @@ fn leave_out_broken(
     let used = frames.map(DepthFrame::place).collect();
     let broken = check(&train.datasets, &used)?;
     for depth in [train, held] {
-        depth.frames.retain(|frame| broken.is_whole(frame.place()));
+        depth
+            .frames
+            .retain(|frame| broken.is_readable(frame.place()));
     }
     for reason in broken.reasons {
         noted(skipped, reason);
@@ -114,7 +117,7 @@ fn leave_out_broken(
     Ok(())
 }
 
-/// Keeps what `keep` says, by place, and all of each data set of which it would leave nothing.
+/// Keeps the items for whose index `keep` is true, and all items of a recording that would have none left.
 fn retain_where_some_stay<T>(
     all: &mut Vec<T>,
     dataset: impl Fn(&T) -> usize,
@@ -172,8 +175,8 @@ impl SampleSet {
         Self::split_by(config, train, validation, BrokenImages::among)
     }
 
-    /// As [`Self::split_sets`], with the frames whose image cannot be read: which frames a run may have seen, of recordings whose images need not be
-    /// there any more. None is looked at.
+    /// As [`Self::split_sets`], without checking any image: finds the frames that a run may have seen, even if the recordings' images no
+    /// longer exist.
     ///
     /// # Errors
     /// As [`Self::split_sets`].
@@ -220,7 +223,7 @@ impl SampleSet {
                 let (mut all, mut none) = DepthSet::split(config, &datasets, &set_of, 0.0)?;
                 leave_out_broken([&mut all, &mut none], check, &mut skipped)?;
                 held_depth = DepthSet {
-                    // Those of training's worlds are not for validation.
+                    // The simulated views of validation have worlds of their own.
                     simulated: held_depth.simulated,
                     ..all
                 };
@@ -255,7 +258,7 @@ impl SampleSet {
         }
         for (i, set) in config.data.sets.iter().enumerate() {
             let motion = || train.samples.iter().any(|s| train.set_of[s.dataset] == i);
-            // A set that has no depth was refused already.
+            // A set without depth has already been refused.
             if set.learn.from_motion() && !motion() {
                 return Err(Error::NoSamples {
                     data: format!("data set {}", set.name),
@@ -273,7 +276,7 @@ impl SampleSet {
         (check, skipped): (ImageCheck, &mut Vec<Skipped>),
     ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
         let (mut train, mut held) = (Vec::new(), Vec::new());
-        // Why drives have no sample: an error, the last, or unsure distances. Where they stand in `skipped`.
+        // Why drives have no sample: the last error, or uncertain distances, as positions in `skipped`.
         let (mut last, mut unsure) = (None, Vec::<usize>::new());
         let learns = |dataset: &usize| config.learn(set_of[*dataset]);
         let other_cameras = OtherCameras::of(datasets, set_of);
@@ -305,7 +308,7 @@ impl SampleSet {
                     let (a, b) = hold_out(snippets, share);
                     let other = config.stereo.then(|| other_cameras.beside(dataset));
                     let other = other.transpose()?.flatten();
-                    // A frame that the other camera lacks is left out.
+                    // A frame without a counterpart in the other camera is left out.
                     let sample = |snippet: Snippet| {
                         let number = recording.frames()[snippet.target].number;
                         let stereo = match &other {
@@ -333,9 +336,9 @@ impl SampleSet {
         }
         let used = train.iter().chain(&held).flat_map(Sample::shown).collect();
         let broken = check(datasets, &used)?;
-        let is_whole = |sample: &Sample| sample.shown().all(|frame| broken.is_whole(frame));
-        train.retain(is_whole);
-        held.retain(is_whole);
+        let is_readable = |sample: &Sample| sample.shown().all(|frame| broken.is_readable(frame));
+        train.retain(is_readable);
+        held.retain(is_readable);
         for reason in broken.reasons {
             last = Some(noted(skipped, reason));
         }
@@ -350,7 +353,7 @@ impl SampleSet {
         let mut reasons: Vec<Skipped> = places.filter_map(|i| all[i].take()).collect();
         let one = match reasons.pop() {
             Some(Skipped::Drive(error)) if reasons.is_empty() => match Arc::try_unwrap(error) {
-                // Nothing else is wrong than what an error says.
+                // The error is the only reason: return it as it is.
                 Ok(error) => return Err(error.into()),
                 Err(shared) => Some(Skipped::Drive(shared)),
             },
@@ -392,15 +395,15 @@ impl SampleSet {
         self.samples.first().map(of).or_else(|| self.depth.camera())
     }
 
-    /// f_y of every sample as the network sees it, with the sample's place in `data.sets`: video's images are shown whole, parts of the network's shape
-    /// are cut from those of known depth.
+    /// f_y of every sample at the network's input size, with the sample's index in `data.sets`. Images of video are resized as a whole;
+    /// images with known depth are cropped to the network's aspect ratio first.
     pub(crate) fn focal_lengths_px(
         &self,
         config: &TrainConfig,
     ) -> impl Iterator<Item = (usize, f64)> {
         let (width, height) = (config.size.width as u32, config.size.height as u32);
         let of_video = move |sample: &Sample| {
-            // What is of no recording is an error of whoever loads it.
+            // A sample of a missing recording is an error when it is loaded.
             let camera = self
                 .datasets
                 .get(sample.dataset)?

@@ -8,7 +8,7 @@ use deepfusion_geometry::{Intrinsics, Se3};
 
 use crate::{Error, NoStereo, SampleSet, TrainConfig, TrainWarning};
 
-/// How far the two cameras' intrinsics may differ, in pixels: rectified ones are the same.
+/// How far the two cameras' intrinsics may differ, in pixels. Rectified cameras have the same.
 const SAME_CAMERA_PX: f64 = 0.5;
 
 /// A view by the drive's other camera.
@@ -18,14 +18,14 @@ pub struct StereoSource {
     pub dataset: usize,
     /// Its frame of the same moment.
     pub frame: usize,
-    /// From the target's camera to that one, metres.
+    /// Transforms points of the target's camera to that camera, in metres.
     pub source_from_target: Se3,
 }
 
-/// How many of these recordings have another camera among them whose images are views of the same moments.
+/// Number of these recordings that have a second camera among them with images of the same moments.
 ///
 /// # Errors
-/// [`Error::NoStereo`] where one has another camera that is no view: not rectified, or with no frame in common.
+/// [`Error::NoStereo`] if a second camera cannot be used as a view: not rectified, or without a common frame.
 pub fn recordings_with_stereo(datasets: &[Dataset]) -> Result<usize, Error> {
     let one_set = vec![0; datasets.len()];
     let others = OtherCameras::of(datasets, &one_set);
@@ -37,7 +37,7 @@ pub fn recordings_with_stereo(datasets: &[Dataset]) -> Result<usize, Error> {
 /// The other cameras of a run's recordings.
 pub(crate) struct OtherCameras<'a> {
     datasets: &'a [Dataset],
-    /// By set, folder, name and camera.
+    /// Indices of the recordings by set, folder, name and camera.
     places: HashMap<(usize, &'a Path, &'a str, Camera), usize>,
     set_of: &'a [usize],
 }
@@ -61,10 +61,10 @@ impl<'a> OtherCameras<'a> {
         }
     }
 
-    /// The camera beside a recording's; `None` where the recording has one camera.
+    /// The second camera of a recording; `None` if it has only one.
     ///
     /// # Errors
-    /// [`Error::NoStereo`] where there are two, and neither is a view of the other.
+    /// [`Error::NoStereo`] if there are two cameras and neither can be used as a view of the other.
     pub(crate) fn beside(&self, dataset: usize) -> Result<Option<OtherCamera>, Error> {
         let own = &self.datasets[dataset];
         let fail = |why| Error::NoStereo {
@@ -110,7 +110,7 @@ impl<'a> OtherCameras<'a> {
 }
 
 impl OtherCamera {
-    /// The view of the frame with this number, where that camera has it.
+    /// This camera's view of the frame with this number, if it has that frame.
     pub(crate) fn at(&self, number: u64) -> Option<StereoSource> {
         Some(StereoSource {
             dataset: self.dataset,
@@ -120,7 +120,7 @@ impl OtherCamera {
     }
 }
 
-/// Which drives learn without the other camera's view in a run that has stereo.
+/// The warning about drives that learn without a second camera's view in a run with stereo.
 pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<TrainWarning> {
     if !config.stereo {
         return None;

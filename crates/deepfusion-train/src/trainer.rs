@@ -1,4 +1,4 @@
-//! A training run: from its first step, or its last checkpoint, to its end.
+//! A training run, from its first step or its last checkpoint to its end.
 
 mod among;
 mod figures;
@@ -37,15 +37,15 @@ pub struct Trainer {
     config: TrainConfig,
     folder: RunFolder,
     device: Device,
-    /// There but while the optimiser has it.
+    /// `None` only while the optimiser owns it.
     model: Option<Model>,
     adam: Adam,
     state: Checkpoint,
     train: SampleSet,
     validation: SampleSet,
     workers: WorkerGroup,
-    /// Whether numbers are left on the device at first: a GPU would wait for each of them to be read. On the processor they cost nothing,
-    /// and a loss that is not finite is found before its gradients are computed.
+    /// Whether numbers stay on the device at first: reading each of them would make a GPU wait. On the processor reading is free, and a
+    /// loss that is not finite is found before its gradients are computed.
     reads_late: bool,
     read_interval: ReadInterval,
 }
@@ -57,7 +57,7 @@ pub struct TrainSummary {
     pub step: usize,
     /// Steps of the whole run.
     pub steps: usize,
-    /// Steps skipped for a gradient that was not finite.
+    /// Steps skipped because the gradient was not finite.
     pub skipped: usize,
     /// The lowest value of the quantity that selects `best`.
     pub best_validation: Option<f64>,
@@ -77,7 +77,7 @@ impl std::fmt::Debug for Trainer {
 }
 
 impl Trainer {
-    /// Begins a run in a folder: `init` gets the networks with random weights and gives those to begin with.
+    /// Starts a run in a folder. `init` gets networks with random weights and returns the networks to start from.
     ///
     /// # Errors
     /// [`Error::Model`], [`Error::NoSamples`], [`Error::NoValidation`].
@@ -91,8 +91,8 @@ impl Trainer {
         Self::create_among(Box::new(SingleWorker), config, folder, sets, device, init)
     }
 
-    /// As [`Self::create`], one of several [`Workers`]; `config.batch` and `config.accumulate` are each worker's. Worker 0 alone writes
-    /// into the folder.
+    /// As [`Self::create`], as one of several [`Workers`]. `config.batch` and `config.accumulate` apply to each worker. Only worker 0
+    /// writes into the folder.
     ///
     /// # Errors
     /// As [`Self::create`].
@@ -141,7 +141,7 @@ impl Trainer {
         })
     }
 
-    /// Resumes from the folder's last checkpoint: weights, optimiser, schedule and samples.
+    /// Resumes from the folder's last checkpoint: weights, optimiser, position in the schedule and in the samples.
     ///
     /// # Errors
     /// [`ModelError::NoCheckpoint`]; as [`RunFolder::load`]; [`Error::NoSamples`], [`Error::NoValidation`].
@@ -154,7 +154,7 @@ impl Trainer {
         Self::resume_among(Box::new(SingleWorker), config, folder, sets, device)
     }
 
-    /// As [`Self::resume`], one of several [`Workers`]: each reads the folder's last checkpoint.
+    /// As [`Self::resume`], as one of several [`Workers`]. Each reads the folder's last checkpoint.
     ///
     /// # Errors
     /// As [`Self::resume`].
@@ -199,7 +199,7 @@ impl Trainer {
         self.config.steps_of(self.epoch_steps())
     }
 
-    /// Optimiser steps in one pass over the data, of all workers together: over its video, if there is any.
+    /// Optimiser steps in one pass of all workers over the data: over its video, if there is any.
     #[must_use]
     pub fn epoch_steps(&self) -> usize {
         let (samples, batch) = match self.train.samples.len() {
@@ -222,26 +222,26 @@ impl Trainer {
         self.folder.path()
     }
 
-    /// The networks as they are now.
+    /// The networks in their current state.
     #[must_use]
     #[expect(clippy::expect_used, reason = "a step gives back what it took")]
     pub fn model(&self) -> &Model {
         self.model.as_ref().expect("no step is being made")
     }
 
-    /// The samples that are learned from.
+    /// The training samples.
     #[must_use]
     pub fn samples(&self) -> &SampleSet {
         &self.train
     }
 
-    /// The configuration, with the units that the run found where it leaves them open.
+    /// The configuration, completed with the values that the run found in the data.
     #[must_use]
     pub fn config(&self) -> &TrainConfig {
         &self.config
     }
 
-    /// Trains to the end, or until `listen` returns [`Control::Stop`]; either way the last checkpoint is written.
+    /// Trains to the end, or until `listen` returns [`Control::Stop`]. Writes the last checkpoint in either case.
     ///
     /// # Errors
     /// [`Error::NotFinite`] naming term and frames; the last good checkpoint stays. [`Error::Data`] if an
@@ -283,10 +283,10 @@ impl Trainer {
         let mut stopped = false;
         while self.state.step < steps && !stopped {
             let learned = self.learn(&loaders, self.schedule(steps));
-            // One that failed does not leave the others waiting for its gradients.
+            // A worker that failed must not leave the others waiting for its gradients.
             let [failed] = self.workers.any([learned.is_err()])?;
             if learned.is_err() {
-                // What went before is heard of before.
+                // Earlier steps are reported before the error.
                 self.report_waiting(&mut reports, listen)?;
             }
             let mut learned = learned?;
@@ -316,7 +316,7 @@ impl Trainer {
                 } else {
                     self.save_last(listen)
                 };
-                // The first worker alone validates and writes: the others must not wait for its next gradients.
+                // Only the first worker validates and writes. If that fails, the others must not wait for its next gradients.
                 let [failed] = self.workers.any([reported.is_err()])?;
                 reported?;
                 if failed {

@@ -1,23 +1,23 @@
-//! Numbers of batches that stay on the device until all are read at once.
+//! Numbers of batches that stay on the device until they are all read in one transfer.
 
 use crate::LossTerms;
 use burn::tensor::Tensor;
 
-/// Where a term stands among the others.
+/// The field of a term.
 pub(crate) type TermField = fn(&mut LossTerms) -> &mut f64;
 
-/// The terms of a batch's loss, and what says how metric its scale is, on the device.
+/// The terms of a batch's loss and the values of its scale ratio, on the device.
 #[derive(Default)]
 pub(crate) struct Unread {
     fields: Vec<TermField>,
     scale: Option<Scale>,
-    /// Those of the fields, one value each.
+    /// The terms of `fields`, one value each.
     terms: Vec<Tensor<1>>,
-    /// What says the scale, one value each.
+    /// The values that the scale ratio is computed from, one value each.
     of_scale: Vec<Tensor<1>>,
 }
 
-/// By what a scale is measured.
+/// How the scale ratio is measured.
 #[derive(Clone, Copy)]
 enum Scale {
     /// Displacement by the vehicle's speed over displacement by PoseNet.
@@ -26,10 +26,10 @@ enum Scale {
     Bias,
 }
 
-/// What was read of a batch.
+/// The numbers that were read of a batch.
 pub(crate) struct BatchNumbers {
     pub(crate) terms: LossTerms,
-    /// 1 when the scale is metric; NaN where nothing says it.
+    /// 1 when the scale is metric; NaN if it is not known.
     pub(crate) scale_ratio: f64,
 }
 
@@ -56,17 +56,17 @@ impl Unread {
         self.of_scale = values.collect();
     }
 
-    /// Gives the terms' values away; [`Self::numbers`] still knows whose they are.
+    /// Moves the terms' values out. [`Self::numbers`] can still assign them to their fields.
     pub(crate) fn take_terms(&mut self) -> Vec<Tensor<1>> {
         std::mem::take(&mut self.terms)
     }
 
-    /// Gives the values away that say the scale.
+    /// Moves the values of the scale ratio out.
     pub(crate) fn take_scale(&mut self) -> Vec<Tensor<1>> {
         std::mem::take(&mut self.of_scale)
     }
 
-    /// How many terms there are.
+    /// Number of terms.
     pub(crate) fn term_count(&self) -> usize {
         self.fields.len()
     }
@@ -76,7 +76,8 @@ impl Unread {
         read_at_once(&mut [&mut self]).remove(0)
     }
 
-    /// The batch's own among numbers that were read: the terms, and what says the scale, each in the order of the batches.
+    /// Takes the batch's own numbers from those that were read: the terms and the values of the scale ratio, each in the order of the
+    /// batches.
     pub(crate) fn numbers(
         &self,
         terms: &mut impl Iterator<Item = f64>,
@@ -123,7 +124,7 @@ pub(crate) fn read_at_once(batches: &mut [&mut Unread]) -> Vec<BatchNumbers> {
 
 #[cfg(test)]
 thread_local! {
-    /// Transfers of this thread.
+    /// Number of this thread's transfers.
     pub(crate) static TRANSFERS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
@@ -143,7 +144,7 @@ mod tests {
     use super::*;
     use burn::tensor::Device;
 
-    /// Read together or alone, each batch has its own numbers.
+    /// Read together or alone, each batch gets its own numbers.
     #[test]
     fn numbers_go_where_they_belong() {
         let device = Device::flex().autodiff();

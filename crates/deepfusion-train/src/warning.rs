@@ -1,52 +1,56 @@
-//! What looks wrong while a run is trained.
+//! Warnings of a training run.
 
 use deepfusion_hint::count_of;
 
-/// What looks wrong in a run, though its training goes on.
+/// Something looks wrong in a run, but training continues.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrainWarning {
-    /// The camera is learned, and no pair of frames has a measured turn.
+    /// A camera is learned, and no pair of frames has a measured turn.
     #[error(
-        "the camera is learned without measured turns: only strong ones determine the focal length then; a yaw rate and view_motion auto determine it much better"
+        "the camera is learned without measured turns: only sharp turns determine the focal length then; a yaw rate with view_motion auto \
+         determines it much better"
     )]
     NoMeasuredTurns,
-    /// The camera is learned, and the vehicle drives straight on.
+    /// A camera is learned, and the vehicle hardly turns.
     #[error(
         "the vehicle hardly turns, {:.2} degrees from image to image: these drives will not determine the camera's focal length; add some with bends",
         mean_rad.to_degrees()
     )]
     HardlyTurns {
-        /// The mean turn between the frames of a pair.
+        /// The mean turn between the frames of a pair, in radians.
         mean_rad: f64,
     },
-    /// The camera is learned, and the measured turns are not used.
+    /// A camera is learned, and the measured turns are not used.
     #[error(
-        "the camera is learned with the turns that PoseNet finds, which determine it only where they are strong; the measured ones, view_motion auto, determine it much better"
+        "the camera is learned with PoseNet's turns, which determine it only where they are sharp; the measured turns (view_motion auto) \
+         determine it much better"
     )]
     MeasuredTurnsUnused,
-    /// The camera was learned, and could as well be another.
+    /// The learned camera is not determined: others would explain the images equally well.
     #[error(
-        "the drives do not determine the camera's focal length: without turns (and, with the turns of a network, without strong ones) another focal length explains the images as well; depth of what is not straight ahead is not to be relied on, nor its metres"
+        "the drives do not determine the camera's focal length: without turns (with PoseNet's turns, without sharp ones) another focal \
+         length explains the images equally well; do not rely on the metres, nor on depth that is not straight ahead"
     )]
     CameraUndetermined,
-    /// Drives without turns in a run that takes what each one's sensors know.
+    /// Drives with unknown turns in a run with `view_motion` `auto`.
     #[error(
-        "no turns are known of {drive}{}: warped by PoseNet's at the measured distance",
+        "the turns of {drive}{} are not known: warped by PoseNet's motion at the measured distance",
         and_others(*others)
     )]
     NoTurns {
-        /// The first of them.
+        /// The first of these drives.
         drive: String,
-        /// How many more there are.
+        /// Number of the other drives.
         others: usize,
     },
-    /// Cameras of several focal lengths in one of several data sets.
+    /// One of several data sets has cameras with different focal lengths.
     #[error(
-        "a data set has several focal lengths, and no canonical_focal_px: its metres are then those of no camera in particular; name one, or give each camera a set of its own"
+        "a data set has several focal lengths and no canonical_focal_px, so its metres fit none of its cameras; set canonical_focal_px, \
+         or give each camera a data set of its own"
     )]
     SeveralFocalLengths,
-    /// Drives of one camera in a run that has stereo.
+    /// Drives with only one camera in a run with stereo.
     #[error(
         "{drive}{} {} from {} own frames alone",
         and_others(*others),
@@ -54,38 +58,39 @@ pub enum TrainWarning {
         if *others == 0 { "its" } else { "their" }
     )]
     OneCamera {
-        /// The first of them.
+        /// The first of these drives.
         drive: String,
-        /// How many more there are.
+        /// Number of the other drives.
         others: usize,
     },
     /// A step's gradient is infinite or NaN.
     #[error("step skipped: the gradient is not finite (frames {})", frames.join(", "))]
     StepSkipped {
-        /// What the step would have learned from.
+        /// The drives and frames of its samples.
         frames: Vec<String>,
     },
-    /// Few pixels are in view of the frame that they are compared with: the geometry has diverged.
+    /// Few pixels are in view of the frame to which they are warped: the geometry has diverged.
     #[error(
-        "only {:.0} % of the pixels are in view of the other frame: depth or motion has come apart",
+        "only {:.0} % of the pixels are in view of the other frame: depth or motion has diverged",
         100.0 * share
     )]
     FewInView {
-        /// Their share, 0 to 1.
+        /// The share of pixels, 0 to 1.
         share: f64,
     },
     /// The masks of dynamic pixels remove too much of what depth should learn from.
     #[error(
-        "{:.0} % of the pixels are taken to move by themselves: the flow explains more than depth and motion do; a longer warm-up (`loss.moving.warmup_share`) lets depth learn first",
+        "{:.0} % of the pixels count as dynamic: the flow explains more than depth and motion do; a longer warm-up \
+         (`loss.moving.warmup_share`) lets depth learn first",
         100.0 * share
     )]
     ManyDynamic {
-        /// Their share, 0 to 1.
+        /// The share of pixels, 0 to 1.
         share: f64,
     },
 }
 
-/// So many drives beside the one that is named.
+/// The number of drives beside the named one, as text.
 fn and_others(others: usize) -> String {
     match others {
         0 => String::new(),
@@ -102,8 +107,8 @@ mod tests {
         for (warning, said) in [
             (
                 TrainWarning::NoMeasuredTurns,
-                "the camera is learned without measured turns: only strong ones determine the focal length then; a yaw rate and \
-                 view_motion auto determine it much better",
+                "the camera is learned without measured turns: only sharp turns determine the focal length then; a yaw rate with \
+                 view_motion auto determines it much better",
             ),
             (
                 TrainWarning::HardlyTurns {
@@ -114,14 +119,13 @@ mod tests {
             ),
             (
                 TrainWarning::MeasuredTurnsUnused,
-                "the camera is learned with the turns that PoseNet finds, which determine it only where they are strong; the measured ones, \
-                 view_motion auto, determine it much better",
+                "the camera is learned with PoseNet's turns, which determine it only where they are sharp; the measured turns \
+                 (view_motion auto) determine it much better",
             ),
             (
                 TrainWarning::CameraUndetermined,
-                "the drives do not determine the camera's focal length: without turns (and, with the turns of a network, without strong \
-                 ones) another focal length explains the images as well; depth of what is not straight ahead is not to be relied on, nor \
-                 its metres",
+                "the drives do not determine the camera's focal length: without turns (with PoseNet's turns, without sharp ones) another \
+                 focal length explains the images equally well; do not rely on the metres, nor on depth that is not straight ahead",
             ),
         ] {
             assert_eq!(warning.to_string(), said);
@@ -138,7 +142,7 @@ mod tests {
             let drive = "monday".into();
             TrainWarning::OneCamera { drive, others }.to_string()
         };
-        let warped = "warped by PoseNet's at the measured distance";
+        let warped = "warped by PoseNet's motion at the measured distance";
         for (others, and) in [
             (0, ""),
             (1, " and 1 other drive"),
@@ -146,7 +150,7 @@ mod tests {
         ] {
             assert_eq!(
                 no_turns(others),
-                format!("no turns are known of monday{and}: {warped}")
+                format!("the turns of monday{and} are not known: {warped}")
             );
         }
         assert_eq!(
@@ -174,11 +178,11 @@ mod tests {
             ),
             (
                 TrainWarning::FewInView { share: 0.124 },
-                "only 12 % of the pixels are in view of the other frame: depth or motion has come apart",
+                "only 12 % of the pixels are in view of the other frame: depth or motion has diverged",
             ),
             (
                 TrainWarning::ManyDynamic { share: 0.57 },
-                "57 % of the pixels are taken to move by themselves: the flow explains more than depth and motion do; a longer warm-up \
+                "57 % of the pixels count as dynamic: the flow explains more than depth and motion do; a longer warm-up \
                  (`loss.moving.warmup_share`) lets depth learn first",
             ),
         ] {

@@ -18,7 +18,7 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// The largest window, about the image's middle.
+    /// The largest window, centred in the image.
     pub(crate) fn centred(camera: &Intrinsics, config: &TrainConfig) -> Self {
         let [width, height] = largest(camera, config);
         Self {
@@ -29,10 +29,10 @@ impl Window {
         }
     }
 
-    /// A random window, smaller by up to `augmentation.zoom`, as a longer lens would see it.
+    /// A random window, smaller by a factor of up to `augmentation.zoom`, as seen by a longer lens.
     pub(crate) fn draw(camera: &Intrinsics, config: &TrainConfig, rng: &mut impl Rng) -> Self {
         let zoom = f64::from(config.augmentation.zoom.max(1.0));
-        // Evenly in the logarithm: half the draws are below its root.
+        // Uniform in the logarithm: half of the draws are below the root of `zoom`.
         let share = zoom.powf(-rng.random::<f64>());
         let [width, height] =
             largest(camera, config).map(|side| ((f64::from(side) * share).round() as u32).max(1));
@@ -48,7 +48,7 @@ impl Window {
         (self.width, self.height) == (width, height)
     }
 
-    /// The image's part.
+    /// The window's part of the image.
     pub(crate) fn of_image<'a>(&self, image: &'a RgbImage) -> Cow<'a, RgbImage> {
         if self.is_whole(image.width(), image.height()) {
             return Cow::Borrowed(image);
@@ -57,7 +57,7 @@ impl Window {
         Cow::Owned(part.to_image())
     }
 
-    /// The depth's part.
+    /// The window's part of the depth map.
     pub(crate) fn of_depth<'a>(&self, depth: &'a DepthMap) -> Cow<'a, DepthMap> {
         if self.is_whole(depth.width as u32, depth.height as u32) {
             return Cow::Borrowed(depth);
@@ -71,7 +71,7 @@ impl Window {
         })
     }
 
-    /// The camera that sees this part alone.
+    /// The camera of this window alone.
     pub(crate) fn of_camera(&self, camera: &Intrinsics) -> Intrinsics {
         camera.cropped(self.x, self.y, self.width, self.height)
     }
@@ -110,7 +110,7 @@ mod tests {
         }
     }
 
-    /// Wherever it is cut, the picture, its depth and its camera are cut alike, and nothing is stretched.
+    /// Image, depth and camera are cropped in the same way, and nothing is stretched.
     #[test]
     fn image_depth_and_camera_are_cut_alike() {
         let mut config = Preset::Tiny.config();

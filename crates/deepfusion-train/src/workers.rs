@@ -1,8 +1,8 @@
-//! Several processes that learn one network together: synchronous data parallelism.
+//! Several processes that train one network together: synchronous data parallelism.
 //!
-//! Each worker holds the same networks and takes its own part of every step's samples. The gradients are averaged over the workers by
-//! whatever connects them (MPI, NCCL, gloo, …), behind one operation: the sum of a flat array ([`Workers::sum`]). K workers with batches of
-//! B and `accumulate` a learn what one worker learns with batches of B and `accumulate` K·a, to rounding.
+//! Each worker has a copy of the networks and takes its own part of every step's samples. The gradients are averaged over the workers by a
+//! library for communication (MPI, NCCL, gloo, …), behind one operation: the sum of a flat array ([`Workers::sum`]). K workers with batches
+//! of B and `accumulate` = a learn the same as one worker with batches of B and `accumulate` = K·a, up to rounding.
 
 use std::error::Error as StdError;
 
@@ -10,23 +10,23 @@ use deepfusion_nn::weights::Weights;
 
 use crate::{Error, LossTerms, NamedGradients, WorkersProblem};
 
-/// What connects one trainer with the others.
+/// A trainer's connection to the other workers.
 pub trait Workers: Send {
-    /// Which this is, from 0. Worker 0 validates, logs and writes the checkpoints.
+    /// This worker's index, from 0. Worker 0 validates, logs and writes the checkpoints.
     fn rank(&self) -> usize;
 
-    /// How many there are.
+    /// Number of workers.
     fn count(&self) -> usize;
 
-    /// Replaces the values by their sums over all workers, the same on each. All workers call it in the same order with equally
-    /// many values.
+    /// Replaces the values by their sums over all workers. All workers get the same sums. They call it in the same order and with the same
+    /// number of values.
     ///
     /// # Errors
-    /// Where the others cannot be reached: training ends, and what was saved stays.
+    /// If the others cannot be reached. Training then ends; saved checkpoints stay.
     fn sum(&mut self, values: &mut [f32]) -> Result<(), Box<dyn StdError + Send + Sync>>;
 }
 
-/// A trainer without others.
+/// A trainer that works alone.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SingleWorker;
 
@@ -44,7 +44,7 @@ impl Workers for SingleWorker {
     }
 }
 
-/// The workers of a trainer, and what they have to agree on.
+/// A trainer's connection to its workers, with the operations that the trainer needs.
 pub(crate) struct WorkerGroup(Box<dyn Workers>);
 
 impl WorkerGroup {
@@ -87,16 +87,15 @@ impl WorkerGroup {
         Ok(())
     }
 
-    /// For each flag, whether any worker has it up.
+    /// For each flag, whether any worker has set it.
     pub(crate) fn any<const N: usize>(&mut self, flags: [bool; N]) -> Result<[bool; N], Error> {
         let mut sums = flags.map(|flag| f32::from(u8::from(flag)));
         self.sum(&mut sums)?;
         Ok(sums.map(|sum| sum > 0.0))
     }
 
-    /// Fails where the workers do not hold the same: numbers of which each is compared in its lowest 16 bits, so that their sums are
-    /// exact.
-    pub(crate) fn hold_the_same(&mut self, what: [u64; 3]) -> Result<(), Error> {
+    /// Fails if the workers' numbers (hashes) differ. Only the lowest 16 bits of each are compared, so that their sums are exact.
+    pub(crate) fn check_equal(&mut self, what: [u64; 3]) -> Result<(), Error> {
         let own = what.map(|number| (number & 0xffff) as f32);
         let mut sums = own;
         self.sum(&mut sums)?;
@@ -105,7 +104,7 @@ impl WorkerGroup {
             .iter()
             .zip(sums)
             .position(|(own, sum)| own * count != sum);
-        // A worker whose own is by chance the mean of all sees no difference: those that differ from it do.
+        // A worker whose number happens to be the mean of all sees no difference, but the others do.
         let [differs_here] = self.any([differs.is_some()])?;
         if !differs_here {
             return Ok(());
@@ -122,7 +121,7 @@ impl WorkerGroup {
         })
     }
 
-    /// A network's tensors, the running statistics of its batch norms averaged over the workers.
+    /// A network's tensors with the running statistics of its batch norms averaged over the workers.
     pub(crate) fn mean_statistics(&mut self, mut weights: Weights) -> Result<Weights, Error> {
         let is_running =
             |name: &str| name.ends_with("running_mean") || name.ends_with("running_var");
@@ -175,7 +174,7 @@ impl WorkerGroup {
 mod tests {
     use super::*;
 
-    /// A worker among others that give what the test sets.
+    /// A worker among others whose values the test sets.
     struct Among {
         rank: usize,
         others: Vec<f32>,
@@ -218,10 +217,10 @@ mod tests {
         for part in ["worker 1 of 2", "the other is gone"] {
             assert!(error.contains(part), "{part}: {error}");
         }
-        let error = among(&[7.0]).hold_the_same([7, 8, 7]).unwrap_err();
-        assert!(error.to_string().contains("other samples"), "{error}");
+        let error = among(&[7.0]).check_equal([7, 8, 7]).unwrap_err();
+        assert!(error.to_string().contains("different samples"), "{error}");
         let alone = &mut WorkerGroup::of(Box::new(SingleWorker));
-        alone.hold_the_same([1, 2, 3]).unwrap();
+        alone.check_equal([1, 2, 3]).unwrap();
         let mut values = [1.0];
         alone.mean(&mut values).unwrap();
         assert_eq!(values, [1.0]);

@@ -1,4 +1,4 @@
-//! The affine invariant loss inside the whole: it neither sees nor moves the scale of depth or motion.
+//! The affine invariant loss within the whole loss: it neither depends on nor changes the scale of depth or motion.
 
 use crate::support::{drive, small};
 use burn::tensor::{Device, Tensor};
@@ -6,7 +6,7 @@ use deepfusion_train::{
     BatchLoader, ForwardPass, Model, Schedule, SnippetBatch, TrainConfig, ViewMotion,
 };
 
-/// A pair of frames at 96×64, and a configuration whose views follow PoseNet.
+/// A pair of frames at 96×64, and a configuration whose views are warped by PoseNet.
 fn pair() -> (TrainConfig, SnippetBatch) {
     let folder = tempfile::tempdir().unwrap();
     let (mut config, samples, _) = small(&drive(folder.path(), 6), 1);
@@ -18,15 +18,15 @@ fn pair() -> (TrainConfig, SnippetBatch) {
     (config, loader.next(&device).unwrap().unwrap())
 }
 
-/// What the gradient is taken by.
+/// What the gradient is taken with respect to.
 struct Leaves {
     /// 1/depth of both frames, 2×1×64×96, in 1/m.
     inverse: Tensor<4>,
-    /// Factors of all depths and of all translations.
+    /// A factor of all depths and one of all translations.
     scales: [Tensor<1>; 2],
 }
 
-/// Waves of 8 to 16 m, others in the second frame; a block of the first stands at 1 m and hides what is behind it.
+/// Depths in waves of 8 to 16 m, different in the two frames. A block of the first frame at 1 m hides what is behind it.
 fn leaves(device: &Device) -> Leaves {
     let depth = |frame: usize, y: usize, x: usize| {
         if frame == 0 && (20..40).contains(&y) && (30..50).contains(&x) {
@@ -45,7 +45,7 @@ fn leaves(device: &Device) -> Leaves {
     }
 }
 
-/// The gradient of the whole loss at a weight of the affine term: of each pixel, of depth's scale, of motion's.
+/// The gradient of the whole loss at a given weight of the affine term, with respect to each pixel, the scale of depth and that of motion.
 fn gradient(config: &TrainConfig, batch: &SnippetBatch, affine: f64) -> (Vec<f32>, [f32; 2]) {
     let device = Device::flex().autodiff();
     let mut config = config.clone();
@@ -66,7 +66,7 @@ fn gradient(config: &TrainConfig, batch: &SnippetBatch, affine: f64) -> (Vec<f32
     (pixels.iter().collect(), scales)
 }
 
-/// The pass with the leaves' finest disparity and their scales; everything else stands still.
+/// The pass with the leaves' finest disparity and scales; everything else is constant.
 fn scaled(mut pass: ForwardPass, leaves: &Leaves, model: &Model) -> ForwardPass {
     let range = model.range();
     let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
@@ -75,7 +75,7 @@ fn scaled(mut pass: ForwardPass, leaves: &Leaves, model: &Model) -> ForwardPass 
     pass.disparities = pass.disparities.into_iter().map(Tensor::detach).collect();
     pass.disparities[0] = inverse.sub_scalar(low).div_scalar(high - low);
     for view in &mut pass.motions {
-        // Half a metre ahead, and the way back.
+        // Half a metre ahead, and back.
         let ahead =
             Tensor::<2>::from_data([[0.02, 0.0, -0.5], [-0.02, 0.0, 0.5]], &motion.device());
         view.translation = ahead * motion.clone().reshape([1, 1]);
@@ -84,7 +84,7 @@ fn scaled(mut pass: ForwardPass, leaves: &Leaves, model: &Model) -> ForwardPass 
     pass
 }
 
-/// Depth and motion scaled apart: the term pulls at neither, nor at what the other frame does not see.
+/// The term has no gradient for the scale of depth or of motion, nor for pixels that the other frame does not see.
 #[test]
 fn the_affine_term_pulls_at_no_scale_and_at_nothing_hidden() {
     let (config, batch) = pair();
@@ -92,19 +92,19 @@ fn the_affine_term_pulls_at_no_scale_and_at_nothing_hidden() {
     let (with, scales_with) = gradient(&config, &batch, 1.0);
     let own: Vec<f32> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
     let largest = own.iter().fold(0.0_f32, |most, g| most.max(g.abs()));
-    assert!(largest > 1e-4, "the term is there: {largest}");
+    assert!(largest > 1e-4, "the term has a gradient: {largest}");
     let inverse: Vec<f32> = leaves(&Device::flex().autodiff())
         .inverse
         .into_data()
         .iter()
         .collect();
-    // What the pixels pull at depth's scale, were they not to cancel out.
+    // The pixels' gradient for the scale of depth, if it did not cancel out.
     let strength: f32 = own.iter().zip(&inverse).map(|(g, d)| (g * d).abs()).sum();
     for (i, name) in ["depth", "motion"].iter().enumerate() {
         let pull = scales_with[i] - scales_without[i];
         assert!(pull.abs() < 1e-3 * strength, "{name}: {pull} of {strength}");
     }
-    // The middle of the block is nowhere in the second frame.
+    // The second frame does not show the middle of the block.
     for (y, x) in [(28, 36), (30, 40), (32, 44)] {
         let hidden = own[y * 96 + x].abs();
         assert!(hidden < 1e-4 * largest, "{x} {y}: {hidden} of {largest}");

@@ -10,7 +10,7 @@ use deepfusion_train::{
 use std::fs;
 use std::path::Path;
 
-/// The street as a folder with speeds alone.
+/// The street as a folder with speeds but no yaw rates.
 fn without_yaw_rate(folder: &Path, frames: usize) {
     let simulation = street(frames);
     folder_without_camera(&simulation, folder);
@@ -58,7 +58,7 @@ fn losses(model: &Model, motion: ViewMotion, batch: &SnippetBatch) -> LossTerms 
     model.loss(&pass, batch, schedule).terms
 }
 
-/// Both losses are means over the pairs, so what a pair adds to `auto`'s is what it adds to `vehicle`'s or to `distance`'s.
+/// The losses are means over the pairs, so a pair adds to the loss of `auto` what it adds to that of `vehicle` or `distance`.
 #[test]
 fn each_pair_counts_as_its_drive_does() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A few images that cannot be read are done without, many are not.
+//! A few images that cannot be read are left out; many are an error.
 
 use crate::support::{drive, small_without_data};
 use deepfusion_data::{Dataset, OpenOptions};
@@ -52,7 +52,7 @@ fn samples_of_broken_images_are_left_out() {
     }
 
     (5..8).for_each(|frame| cut(&drive, frame));
-    // Who asks what a run may have seen does not read the images.
+    // To find what a run may have seen, images are not read.
     let datasets = Dataset::open(&drive, &OpenOptions::default()).unwrap();
     let recordings = datasets.into_iter().map(|dataset| (0, dataset)).collect();
     let mut config = small_without_data(1);

@@ -1,4 +1,4 @@
-//! Resuming a run, and starting another one from it.
+//! Resuming a run, and starting a new one from it.
 
 use crate::support::{drive, small};
 use burn::tensor::Device;
@@ -12,7 +12,7 @@ use deepfusion_train::{
 };
 use std::path::Path;
 
-/// A run of two steps with a flow decoder or without, in `name` beside a drive.
+/// A run of two steps with or without a flow decoder, in the folder `name`, on a drive of its own.
 fn trained(at: &Path, name: &str, flow: bool) -> (Trainer, RunFolder) {
     let (mut config, train, validation) = small(&drive(&at.join(format!("street-{name}")), 10), 2);
     if flow {
@@ -55,7 +55,7 @@ fn a_run_starts_from_the_flow_decoder_too_or_says_that_it_is_new() {
         .load_networks(CheckpointKind::Best, with.config(), &device)
         .unwrap();
     assert_eq!(anew, ["the flow decoder"]);
-    // A run that goes on does not do so with another decoder than it had.
+    // A resumed run must have the decoder that it had.
     let error = run
         .load(CheckpointKind::Last, with.config(), &device)
         .unwrap_err();
@@ -100,14 +100,14 @@ fn moments_that_are_not_their_parameters_are_refused_by_name() {
         error.to_string().contains("`adam.m.depth.nothing`"),
         "{error}"
     );
-    // As it was, it goes on.
+    // With its own file it resumes.
     weights::write_safetensors(&path, &whole).unwrap();
     run.load(CheckpointKind::Last, trainer.config(), &Device::flex())
         .unwrap();
 }
 
-/// Imported ResNet-50 encoders start the paper's network, whose last layer is dilated and whose other parts the
-/// import does not have. Narrower here, by nothing but the width.
+/// The paper's network starts from imported ResNet-50 encoders: its last layer is dilated, and the import lacks the other parts. Only the
+/// width is smaller here.
 #[test]
 fn imported_encoders_start_a_network_with_other_parts() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ fn imported_encoders_start_a_network_with_other_parts() {
     let kind = CheckpointKind::Last;
     run.save(kind, &theirs, None, &state).unwrap();
     assert_eq!(run.read_state(kind).unwrap(), state);
-    // What has learned nothing predicts nothing.
+    // A network without a trained decoder must not predict.
     let error = StoredNetwork::of_run(folder.path(), None).unwrap_err();
     assert!(matches!(error, ModelError::EncodersOnly { .. }), "{error}");
     let error = PosePredictor::load(folder.path(), None, &device).unwrap_err();
@@ -155,7 +155,7 @@ fn imported_encoders_start_a_network_with_other_parts() {
     assert!(depth(&ours) != depth(&new));
     let decoder = |m: &Model| weights::collect(&m.depth_net.decoder).tensors;
     assert!(decoder(&ours) == decoder(&new), "the rest is the seed's");
-    // Another ResNet stays an error.
+    // A different ResNet is still an error.
     let error = run
         .load_networks(kind, &narrow(Preset::Light.config()), &device)
         .unwrap_err();
@@ -164,7 +164,7 @@ fn imported_encoders_start_a_network_with_other_parts() {
         "{error}"
     );
 
-    // A run that was trained as a whole is taken as a whole.
+    // From a run that was trained as a whole all parts are taken.
     state.encoders_only = false;
     run.save(kind, &theirs, None, &state).unwrap();
     assert!(run.load_networks(kind, &paper, &device).is_err());

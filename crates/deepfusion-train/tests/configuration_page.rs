@@ -1,4 +1,4 @@
-//! docs/reference/configuration.md is what the comments in the source say. `UPDATE_REFERENCE=1` writes it anew.
+//! docs/reference/configuration.md is generated from the comments in the source. `UPDATE_REFERENCE=1` updates it.
 
 use deepfusion_train::{ConfigKey, Preset, config_keys};
 use std::fmt::Write;
@@ -29,7 +29,7 @@ fn row(key: &ConfigKey, value: Option<&toml::Value>) -> String {
 
 #[test]
 fn the_reference_page_is_up_to_date() {
-    // Through its text: a number of 32 bits is then the one that is written there.
+    // Through TOML, so that a 32-bit number is shown as it is written.
     let written = Preset::Light.config().to_toml().unwrap();
     let values: toml::Table = toml::from_str(&written).unwrap();
     let value_of = |key: &str| {
@@ -58,7 +58,7 @@ fn the_reference_page_is_up_to_date() {
     let found = std::fs::read_to_string(&path).unwrap();
     assert!(
         found == page,
-        "{} is not what the comments say: run this test with UPDATE_REFERENCE=1",
+        "{} differs from the comments in the source: run this test with UPDATE_REFERENCE=1",
         path.display()
     );
 }

@@ -1,4 +1,4 @@
-//! Learning from known depth: of simulated views, of recordings, and beside a video's own motion.
+//! Learning from known depth: of simulated views, of recordings, and together with video.
 
 use crate::support::drive;
 use burn::tensor::{Device, Tensor};
@@ -42,7 +42,7 @@ fn streets(steps: usize) -> TrainConfig {
     config
 }
 
-/// With a recording beside the simulated views, or alone.
+/// Adds recordings as a data set, beside the simulated views if there are any.
 fn with_recording(config: &mut TrainConfig, paths: Vec<PathBuf>, learn: Learn) {
     config.data.sets.push(DataSetConfig {
         name: "drive".into(),
@@ -93,7 +93,7 @@ fn run(trainer: &mut Trainer, until: Option<usize>) -> (Vec<LossTerms>, Option<S
     (steps, supervision)
 }
 
-/// The held-out error falls by more than a tenth within forty steps, and a run that was stopped goes on as if it had not been.
+/// The held-out error falls by more than a tenth within forty steps, and a resumed run equals an uninterrupted one.
 #[test]
 fn simulated_views_teach_depth_and_resume_exactly() {
     let folder = tempfile::tempdir().unwrap();
@@ -114,7 +114,7 @@ fn simulated_views_teach_depth_and_resume_exactly() {
         before.depth,
         after.depth
     );
-    // Forty steps of a tiny network are no metric depth yet; metres that are millimetres would be seen.
+    // After forty steps a tiny network's depth is not metric yet, but a confusion of metres and millimetres would show.
     assert!((0.1..10.0).contains(&scale_ratio), "{scale_ratio}");
     assert!(
         steps
@@ -144,7 +144,8 @@ fn simulated_views_teach_depth_and_resume_exactly() {
     assert_eq!(begun, steps[..12]);
 }
 
-/// Every other batch has another size, those in turns; a run that stopped before one of them goes on as if it had not.
+/// Every other batch has one of the other sizes, in turn. A run that is stopped before such a batch and resumed equals an uninterrupted
+/// one.
 #[test]
 fn batches_of_other_sizes_take_turns() {
     let folder = tempfile::tempdir().unwrap();
@@ -174,7 +175,7 @@ fn batches_of_other_sizes_take_turns() {
     assert!(config.validate().is_err());
 }
 
-/// The head for uncertainty learns beside a depth that stays what it was, to the last bit.
+/// The uncertainty head learns while depth stays the same, to the last bit.
 #[test]
 fn the_head_for_uncertainty_learns_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -204,7 +205,7 @@ fn the_head_for_uncertainty_learns_alone() {
         let same = *tensor == new[name];
         assert_eq!(same, !name.starts_with("uncertainty."), "{name}");
     }
-    // Where nothing has depth, the head could not learn.
+    // Without known depth the head could not learn.
     let mut video = Preset::Tiny.config();
     video.depth_net.uncertainty = true;
     let error = video.validate().unwrap_err();
@@ -220,7 +221,7 @@ fn batches(config: &TrainConfig, set: &SampleSet) -> Vec<DepthBatch> {
     std::iter::from_fn(next).map(Result::unwrap).collect()
 }
 
-/// A drive's scans are learned from where it says so, its motion where it says that; both where both.
+/// A drive's scans, its motion or both are learned from, as `learn` of its set requires.
 #[test]
 fn a_drive_is_learned_from_as_its_set_says() {
     let folder = tempfile::tempdir().unwrap();
@@ -250,7 +251,7 @@ fn a_drive_is_learned_from_as_its_set_says() {
         if !depth {
             continue;
         }
-        // Exact depth of all eight frames, the last one held out; where views are held out, too, so is the depth of what they show.
+        // Exact depth of eight frames, the last one held out. If samples of video are held out, too, so is the depth of their frames.
         let held: Vec<usize> = validation
             .samples
             .iter()
@@ -285,7 +286,7 @@ fn a_drive_is_learned_from_as_its_set_says() {
         assert!(steps[0].depth > 0.0);
         assert_eq!(steps[0].reprojection > 0.0, motion);
     }
-    // A drive to validate on must be another one, whatever is learned of it.
+    // A drive to validate on must be another one, whatever is learned from it.
     for learn in [Learn::Depth, Learn::Both] {
         let mut config = streets(1);
         config.data.sets.clear();
@@ -297,7 +298,7 @@ fn a_drive_is_learned_from_as_its_set_says() {
             "{learn:?}: {error}"
         );
     }
-    // A real drive's scans are all that it knows.
+    // A real drive has only scans.
     std::fs::remove_dir_all(scanned.join("proj_depth")).unwrap();
     let mut config = streets(1);
     config.data.sets.clear();
@@ -310,7 +311,7 @@ fn a_drive_is_learned_from_as_its_set_says() {
         let far = batch.truth.far.clone().sum().into_scalar::<f32>();
         assert!(far < 0.05 * 96.0 * 64.0 * batch.len() as f32, "no sky");
     }
-    // Without either there is nothing to learn from, and that is said before the run begins.
+    // Without exact depth or scans there is nothing to learn from: an error before the run begins.
     std::fs::remove_dir_all(scanned.join("velodyne_points")).unwrap();
     let mut config = streets(1);
     config.data.sets.clear();
@@ -320,8 +321,8 @@ fn a_drive_is_learned_from_as_its_set_says() {
     assert!(error.hint().unwrap().contains("learn = \"self\""));
 }
 
-/// Simulated depth and a real drive's motion in one step: both gradients arrive, and each is logged. Stopped after the first step, the run
-/// goes on to the same weights, to the last bit.
+/// Simulated depth and the motion of a drive in one step: both losses have gradients, and each is logged. Stopped after the first step and
+/// resumed, the run ends with the same weights, to the last bit.
 #[test]
 fn depth_and_motion_are_learned_in_one_step_and_resume_exactly() {
     let folder = tempfile::tempdir().unwrap();
@@ -356,7 +357,7 @@ fn depth_and_motion_are_learned_in_one_step_and_resume_exactly() {
     assert!(learned(&resumed) == learned(&whole));
 }
 
-/// Weights that stay leave something to learn from each kind of sample that a run has.
+/// Frozen weights must leave something to learn from each kind of sample in a run.
 #[test]
 fn frozen_weights_leave_every_source_something_to_teach() {
     let folder = tempfile::tempdir().unwrap();
@@ -416,8 +417,8 @@ fn frozen_weights_leave_every_source_something_to_teach() {
     }
 }
 
-/// What looks the same through twice the lens is twice as far: the truth that the network is asked for, divided by what its
-/// output means, is the same.
+/// What looks the same through a lens of twice the focal length is twice as far away: the true depth divided by the depth that the
+/// network's output stands for is the same.
 #[test]
 fn a_longer_lens_sees_the_same_as_farther() {
     let config = streets(1);
@@ -468,7 +469,8 @@ fn sets_that_cannot_be_learned_from_so_are_refused_by_field() {
     }
 }
 
-/// Pairs of bf16 learn as f32 does: the same views, nearly the same losses. Where the processor cannot, the run is refused.
+/// With bf16 convolutions a run learns as in f32: from the same views, with nearly the same losses. On a processor without bf16 it is
+/// refused.
 #[test]
 fn convolutions_in_bf16_learn_the_same() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
-//! The first steps of each network beside PyTorch's, in double precision, by the tensor operations that GPUs compute, too: the networks and
-//! losses are PyTorch's, and gradients the same to 1e-5, where no rounding decides for a pixel.
+//! The first steps of each network against PyTorch, in double precision, by the tensor operations that GPUs run, too. Networks and losses
+//! equal PyTorch's, and gradients to 1e-5: in double precision, rounding does not decide about pixels.
 //!
-//! A program of its own, since a device's numbers are chosen once in a process.
+//! A test binary of its own, since a process chooses a device's number format once.
 
 #![allow(
     clippy::unwrap_used,
@@ -18,7 +18,7 @@ use burn::tensor::{Device, FloatDType};
 use deepfusion_train::Preset;
 use steps::{Numbers, check};
 
-/// Two steps: the second's loss has the first's gradients and update in it.
+/// Two steps: the loss of the second depends on the first step's gradients and update.
 fn check_in_double(preset: Preset) {
     static CHOSEN: Once = Once::new();
     CHOSEN.call_once(|| Device::flex().configure(FloatDType::F64).unwrap());

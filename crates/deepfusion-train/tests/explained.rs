@@ -1,4 +1,4 @@
-//! Explainability masks: which frame they are of, what they weigh, and what keeps them up.
+//! Explainability masks: which frame they belong to, what they weight, and what keeps them from vanishing.
 
 use crate::support::{drive, small_without_data};
 use burn::module::Param;
@@ -10,7 +10,7 @@ use deepfusion_train::{
     SnippetBatch, TrainConfig, ViewMotion,
 };
 
-/// Three frames at 96×64, and a small network that explains them.
+/// A small network with explainability masks, for three frames at 96×64.
 fn settings() -> TrainConfig {
     let mut config = small_without_data(1);
     (config.batch, config.frames) = (1, vec![-1, 1]);
@@ -40,7 +40,7 @@ fn loss(model: &Model, pass: &ForwardPass, batch: &SnippetBatch) -> BatchLoss {
     model.loss(pass, batch, schedule)
 }
 
-/// A model whose masks' logits are these for the first and the second frame of a pair, everywhere.
+/// A model whose masks have these constant logits, for the first and the second frame of a pair.
 fn with_logits(config: &TrainConfig, logits: [f32; 2]) -> Model {
     let device = Device::flex().autodiff();
     let mut model = Model::new(config, &device).unwrap();
@@ -52,7 +52,7 @@ fn with_logits(config: &TrainConfig, logits: [f32; 2]) -> Model {
     model
 }
 
-/// Pairs are in time order: of the pair with the frame before it the target is the second, of the other the first.
+/// Pairs are in time order: the target is the second frame of the pair with the frame before it, and the first of the other pair.
 #[test]
 fn masks_are_the_targets() {
     let config = settings();
@@ -70,7 +70,7 @@ fn masks_are_the_targets() {
     }
 }
 
-/// Masks of ½ halve the error and cost ln 2 of their own weight; both terms pull at them.
+/// Masks of ½ halve the error, and their own loss is ln 2; both terms have a gradient for them.
 #[test]
 fn masks_weigh_the_error_and_have_their_price() {
     let config = settings();
@@ -105,7 +105,7 @@ fn masks_weigh_the_error_and_have_their_price() {
     let masks = pose_net.explainability.as_ref().unwrap();
     let size = |gradient: Tensor<1>| gradient.abs().max().into_scalar::<f32>();
     let bias = masks.head.bias.as_ref().unwrap().val();
-    // ½·(½·error − 0.2·½) for each frame's pixels: the price is higher here.
+    // ½·(½·error − 0.2·½) for each frame's pixels: here the masks' own loss dominates.
     assert!(size(bias.grad(&gradients).unwrap()) > 1e-3);
 }
 

@@ -1,4 +1,4 @@
-//! Two data sets in one run: another camera, another speed, another range, each with its own metres.
+//! Two data sets in one run, with different cameras, speeds and depth ranges, each with its own metres per unit.
 
 use burn::tensor::{Device, Tensor};
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, load_rgb, save_png};
@@ -33,7 +33,7 @@ fn drive(folder: &Path, seed: u64, fps: f64) -> PathBuf {
     .unwrap()
 }
 
-/// Cuts a drive's images to their middle, half as wide and half as high: a camera with twice the focal length.
+/// Crops a drive's images to their middle, half as wide and half as high: at the network's input size, a camera with twice the focal length.
 fn zoom(drive: &Path) {
     for entry in fs::read_dir(drive.join("image_02/data")).unwrap() {
         let path = entry.unwrap().path();
@@ -68,7 +68,7 @@ struct Both {
     drives: [PathBuf; 2],
 }
 
-/// A road at 10 frames a second, and a zoomed camera elsewhere at 30: a third of the way per pair.
+/// A road at 10 frames per second, and another drive with a zoomed camera at 30: a third of the distance per pair.
 fn both() -> Both {
     let folder = tempfile::tempdir().unwrap();
     let drives = [
@@ -148,8 +148,8 @@ fn scale_ratio(model: &Model, config: &TrainConfig, set: SampleSet) -> f64 {
     measured / predicted
 }
 
-/// One network for two lenses says the metres of one of them, and depth by the other is brought to it: else the same pixels would have to be near
-/// by the one and far by the other.
+/// A network for two focal lengths predicts metres for one of them, and depth of the other is scaled to it. Otherwise the same pixels would
+/// have to be near for one camera and far for the other.
 #[test]
 fn cameras_of_one_set_are_brought_to_one_focal_length() {
     let both = both();
@@ -174,7 +174,7 @@ fn cameras_of_one_set_are_brought_to_one_focal_length() {
         .remove(0);
     let fy = first.intrinsics(0).resized(96, 64).fy;
     assert_eq!(differ.config().canonical_focal_px, Some(fy));
-    // Whoever predicts with the run goes by its camera, which has that focal length.
+    // Predictions with the run use its camera, which has that focal length.
     let (folder, _) = RunFolder::open(differ.folder()).unwrap();
     assert_eq!(folder.read_config().unwrap().canonical_focal_px, None);
     let findings = folder.read_findings().unwrap();
@@ -194,7 +194,7 @@ fn cameras_of_one_set_are_brought_to_one_focal_length() {
     assert!((focal(&second) - 2.0).abs() < 1e-6);
 }
 
-/// The factors come from the data, set by set, and reach every sample of a batch with its own camera.
+/// The factors are found in the data, set by set, and each sample of a batch gets those of its set and camera.
 #[test]
 fn every_sample_brings_its_own_camera_range_and_unit() {
     let both = both();
@@ -211,14 +211,14 @@ fn every_sample_brings_its_own_camera_range_and_unit() {
     let (folder, _) = RunFolder::open(trainer.folder()).unwrap();
     let found = folder.read_findings().unwrap().sets;
     let [k_road, k_garage] = [0, 1].map(|set: usize| found[set].camera.unwrap().resized(96, 64));
-    // The file has what was set, and what was found apart from it.
+    // The file has the settings, and separately what was found.
     let set = folder.read_settings().unwrap();
     assert!(set.data.sets.iter().all(|set| set.metres_per_unit == 0.0));
     assert_eq!(folder.read_config().unwrap(), *config);
     assert!((k_garage.fx / k_road.fx - 2.0).abs() < 1e-6);
     assert!(validation.samples.iter().any(|s| s.dataset == 0));
 
-    // Samples of both sets mixed in batches of four, in the order of the set's samples.
+    // Batches of four with samples of both sets.
     let mut mixed = train.clone();
     mixed.samples = (0..4)
         .flat_map(|i| [0, 1].map(|set| train.of_set(set).samples[i].clone()))
@@ -245,8 +245,8 @@ fn every_sample_brings_its_own_camera_range_and_unit() {
     assert_eq!(seen, 8);
 }
 
-/// PoseNet starts out driving one unit ahead (`start_moving`), which is each set's own displacement: without the
-/// factors one of the two would start, and stay for long, off by their ratio. A short training keeps both.
+/// PoseNet starts with one unit ahead (`start_moving`), which is each set's own displacement. Without the factors, one of the two sets
+/// would be off by their ratio at the start and for a long time. A short training keeps both near 1.
 #[test]
 fn both_scale_ratios_are_near_one() {
     let both = both();
@@ -262,7 +262,7 @@ fn both_scale_ratios_are_near_one() {
         }
     };
     near(&trainer, "at the start");
-    // The same network with one unit for all.
+    // The same network with one unit for both sets.
     let mut pooled = config.clone();
     pooled.data.sets.clear();
     let device = Device::flex().autodiff();
@@ -283,7 +283,7 @@ fn both_scale_ratios_are_near_one() {
     near(&trainer, "after 12 steps");
 }
 
-/// A set of which nothing can be used is named, instead of being left out in silence.
+/// A set without usable samples is an error that names it; it is not silently left out.
 #[test]
 fn a_set_without_samples_is_an_error() {
     let both = both();

@@ -1,4 +1,4 @@
-//! The focal length of a camera that nobody gave, learned with the networks. The simulator knows the truth.
+//! The focal length of an unknown camera, learned with the networks and compared with the simulator's.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use deepfusion_train::{
 };
 use nalgebra::Vector3;
 
-/// Five pictures a second, so that the bends turn the view by some pixels a frame.
+/// Five frames per second, so that the bends turn the view by some pixels per frame.
 fn simulated(seed: u64, frames: usize) -> Simulation {
     Simulation::new(&SimConfig {
         seed,
@@ -30,12 +30,12 @@ fn simulated(seed: u64, frames: usize) -> Simulation {
     .unwrap()
 }
 
-/// A road with bends to both sides: 1.5 degrees a frame.
+/// A road with bends to both sides: 1.5 degrees per frame.
 fn bends(frames: usize) -> Simulation {
     simulated(3, frames)
 }
 
-/// A straight road: 0.02 degrees a frame.
+/// A straight road: 0.02 degrees per frame.
 fn straight(frames: usize) -> Simulation {
     simulated(5, frames)
 }
@@ -45,7 +45,7 @@ fn config(steps: usize) -> TrainConfig {
     config.batch = 4;
     config.view_motion = ViewMotion::Vehicle;
     config.learning_rate_warmup_steps = 10;
-    // The simulator's camera sees 81 degrees.
+    // The simulator's camera has a field of view of 81 degrees.
     config.assumed_camera = Some(AssumedCamera {
         hfov_deg: 66.0,
         learning_rate: 0.01,
@@ -54,7 +54,7 @@ fn config(steps: usize) -> TrainConfig {
     config
 }
 
-/// Of a network without data to find its unit in.
+/// With a unit of translation, for a network without data to take it from.
 fn with_unit(mut config: TrainConfig) -> TrainConfig {
     config.pose_net.metres_per_unit = 1.0;
     config
@@ -88,7 +88,7 @@ fn motions(all: &[Se3], device: &Device) -> Motion {
     }
 }
 
-/// Pairs with a camera, and nothing for networks.
+/// Pairs of frames with a camera, without images for networks.
 fn pairs(k: &Intrinsics, source_from_target: &[Se3], device: &Device) -> SnippetBatch {
     let n = source_from_target.len();
     SnippetBatch {
@@ -107,7 +107,7 @@ fn pairs(k: &Intrinsics, source_from_target: &[Se3], device: &Device) -> Snippet
     }
 }
 
-/// A weighted sum of where pixels land, in f64 by the definition: p' = K·(R·D·K⁻¹·p̃ + t), a point at a time.
+/// A weighted sum of the coordinates where pixels land, point by point in f64 by the definition: p' = K·(R·D·K⁻¹·p̃ + t).
 fn landing(k: &Intrinsics, source_from_target: &Se3, depths: &[f64], weights: &[f64]) -> f64 {
     let width = k.width as usize;
     let of = |(i, depth): (usize, &f64)| {
@@ -121,8 +121,8 @@ fn landing(k: &Intrinsics, source_from_target: &Se3, depths: &[f64], weights: &[
     depths.iter().enumerate().map(of).sum()
 }
 
-/// Where the pixels of a small image land, and how that changes with fx, with fy, and with the learned number, which moves both. The
-/// reference is f64; f32 has 7 digits, of sums of 96 numbers of some ten pixels.
+/// Where the pixels of a small image land, and how that changes with fx, with fy, and with the learned number, which changes both. The
+/// reference is f64. f32 has 7 digits; the sums have 96 terms of some ten pixels.
 #[test]
 fn gradients_of_the_focal_lengths_equal_those_of_the_definition() {
     let device = Device::flex().autodiff();
@@ -160,7 +160,7 @@ fn gradients_of_the_focal_lengths_equal_those_of_the_definition() {
     let inverse: Vec<f32> = depths.iter().map(|d| d.recip() as f32).collect();
     let shape = [1, 1, height as usize, width as usize];
     let inverse = Tensor::<4>::from_data(TensorData::new(inverse, shape), &device);
-    // As the coordinates lie: all u, then all v.
+    // In the order of the coordinates: all u, then all v.
     let of_axis = |axis: usize| weights.iter().skip(axis).step_by(2);
     let planes: Vec<f32> = of_axis(0).chain(of_axis(1)).map(|w| *w as f32).collect();
     let shape = [1, 2, height as usize, width as usize];
@@ -198,7 +198,7 @@ fn gradients_of_the_focal_lengths_equal_those_of_the_definition() {
     close(number(fx.grad(&gradients).unwrap()), by_fx, "fx");
     close(number(fy.grad(&gradients).unwrap()), by_fy, "fy");
 
-    // The camera that is learned, here 20 % above the assumed one: its value and its gradient.
+    // The learned camera, here with a focal length 20 % above the assumed one: its value and its gradient.
     let assumed = Intrinsics {
         fx: k.fx / 1.2,
         fy: k.fy / 1.2,
@@ -220,7 +220,7 @@ fn gradients_of_the_focal_lengths_equal_those_of_the_definition() {
     close(gradient, k.fx * by_fx + k.fy * by_fy, "ln f");
 }
 
-/// With the true depth and motion of bends, the photometric error alone brings a focal length that is 30 % off to the true one.
+/// With the true depth and motion in bends, the photometric error alone corrects a focal length that is 30 % off.
 #[test]
 fn the_photometric_error_of_bends_finds_the_focal_length() {
     let device = Device::flex().autodiff();
@@ -270,7 +270,7 @@ fn the_photometric_error_of_bends_finds_the_focal_length() {
     assert!((found - 1.0).abs() < 0.02, "{found} of the true one");
 }
 
-/// What a run said: its losses, how the focal length went, and its camera at the end.
+/// The events of a run: its losses, the course of the focal length, and its camera at the end.
 #[derive(Debug, PartialEq)]
 struct Outcome {
     losses: Vec<(usize, LossTerms)>,
@@ -309,8 +309,8 @@ fn start(config: &TrainConfig, run: &Path, sets: (SampleSet, SampleSet)) -> Trai
     Trainer::create(config.clone(), folder, sets, &Device::flex(), Ok).unwrap()
 }
 
-/// Networks that know nothing, a camera that is off by a third: after so few steps that depth is only a beginning, measured turns have
-/// brought the focal length to the true one, and the spread says that they have.
+/// New networks and a camera that is off by a third. After a few steps depth is still poor, but measured turns have corrected the focal
+/// length, and the spread confirms it.
 #[test]
 fn a_short_run_finds_the_camera_of_bends() {
     let folder = tempfile::tempdir().unwrap();
@@ -333,7 +333,7 @@ fn a_short_run_finds_the_camera_of_bends() {
     assert!(learned.is_reliable(), "{learned:?}");
     assert!(outcome.warnings.is_empty(), "{:?}", outcome.warnings);
 
-    // Whoever uses the run has this camera.
+    // The run's camera is the learned one.
     let (run, _) = RunFolder::open(&at("run")).unwrap();
     let findings = run.read_findings().unwrap();
     assert_eq!(findings.learned_camera, Some(learned));
@@ -344,13 +344,13 @@ fn a_short_run_finds_the_camera_of_bends() {
     assert_eq!(findings.camera, Some(camera));
 }
 
-/// Driving straight ahead, every focal length explains the images.
+/// On a straight drive, every focal length explains the images.
 #[test]
 fn a_straight_drive_says_that_it_does_not_determine_the_focal_length() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     folder_without_camera(&straight(40), &at("drive"));
-    // Nor with a canonical focal length, where depth follows f: metres that are wrong must not be taken for an f.
+    // With a canonical focal length depth follows f. Then errors in the metres must not change f.
     for canonical_focal_px in [None, Some(60.0)] {
         let mut config = config(30);
         config.validate_every = 30;
@@ -371,7 +371,7 @@ fn a_straight_drive_says_that_it_does_not_determine_the_focal_length() {
     }
 }
 
-/// To the last digit, of losses and camera, in f32 and, where the processor has it, in bf16.
+/// Losses and camera are the same to the last digit, in f32 and, if the processor supports it, in bf16.
 #[test]
 fn a_resumed_run_learns_the_same_camera() {
     let folder = tempfile::tempdir().unwrap();
@@ -384,7 +384,7 @@ fn a_resumed_run_learns_the_same_camera() {
         }
         let mut config = config(6);
         (config.precision, config.batch) = (precision, 2);
-        // Depth follows the focal length then, as do its factors.
+        // Then depth and its factors follow the focal length.
         config.canonical_focal_px = Some(60.0);
         let begun = |name: &str| {
             let name = format!("{name}-{precision:?}");

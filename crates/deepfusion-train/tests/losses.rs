@@ -1,4 +1,4 @@
-//! The terms of the loss against PyTorch (`reference/losses.py`, `reference/depth.py`) and against finite differences.
+//! The loss terms against PyTorch (`reference/losses.py`, `reference/depth.py`) and finite differences.
 
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
@@ -11,7 +11,7 @@ use std::path::Path;
 
 const SSIM_WEIGHT: f64 = 0.85;
 
-/// The fixture's tensors, on a device that differentiates.
+/// The fixture's tensors, on an autodiff device.
 struct Reference {
     tensors: Weights,
     device: Device,
@@ -128,7 +128,7 @@ fn the_affine_invariant_loss_equals_pytorch() {
     let mask = reference.mask("affine/valid");
     let loss = || affine_invariant(x.clone(), y.clone(), &mask);
     reference.check("affine", loss(), &[("x", x.clone())]);
-    // It is what x is held against.
+    // y is the reference of x and has no gradient.
     let pulled = y.grad(&loss().backward()).map(read);
     assert!(pulled.is_none_or(|g| g.iter().all(|g| *g == 0.0)));
 }
@@ -209,7 +209,7 @@ fn moving_pixels_equal_pytorch() {
         coords: ends,
         visible: everywhere,
     };
-    // The dynamic pixels of each limit on what cannot stand still, of both, and of none.
+    // The dynamic pixels with each of the two limits on what cannot be static, with both, and with none.
     for (min_epipolar_px, min_parallax_ratio, name) in [
         (0.5, 0.0, "moving"),
         (0.0, 2.0, "along"),
@@ -232,7 +232,7 @@ fn moving_pixels_equal_pytorch() {
     }
 }
 
-/// Neither depth's scale nor an offset changes the loss, and its gradient does not pull at them.
+/// Neither the scale of depth nor an offset changes the loss, and its gradient changes neither.
 #[test]
 fn the_affine_invariant_loss_is_blind_to_the_scale() {
     let reference = Reference::read();
@@ -258,7 +258,7 @@ fn the_affine_invariant_loss_is_blind_to_the_scale() {
         let (other, _) = at(a, b);
         assert!((other - one).abs() < 2e-5 * one, "{other} {one}");
     }
-    // Flat depths have no spread to divide by: the gradient stays finite.
+    // Flat depths have no spread to divide by. The gradient must stay finite.
     let flat = Tensor::<4>::full([1, 1, 4, 6], 10.0, &reference.device).require_grad();
     let everywhere = flat.clone().greater_elem(0.0);
     let loss = affine_invariant(flat.clone(), flat.clone(), &everywhere);
@@ -266,8 +266,7 @@ fn the_affine_invariant_loss_is_blind_to_the_scale() {
     assert!(gradient.iter().all(|g| g.is_finite()));
 }
 
-/// A depth drawn towards its mean, or both of them, never costs less, and costs 1 in the end: nothing is won by being
-/// flat.
+/// Moving one depth or both towards the mean never lowers the loss, which ends at 1: a flat depth is no advantage.
 #[test]
 fn the_affine_invariant_loss_does_not_reward_a_flat_depth() {
     let reference = Reference::read();
@@ -293,8 +292,8 @@ fn the_affine_invariant_loss_does_not_reward_a_flat_depth() {
             let of = |too| if too { share } else { 1.0 };
             let (loss, slope) = at(of(x_too), of(y_too));
             assert!(loss > last - 1e-5, "{share}: {loss} after {last}");
-            // Nor does its gradient draw either of them there; what is left is that a and b are fitted by squares and
-            // the loss is not.
+            // Nor does its gradient move either of them there. The rest arises because a and b minimise squares and the loss is an absolute
+            // difference.
             assert!(slope.iter().all(|s| *s < 1e-3), "{share}: {slope:?}");
             last = loss;
         }
@@ -302,7 +301,7 @@ fn the_affine_invariant_loss_does_not_reward_a_flat_depth() {
     }
 }
 
-/// Two flows that contradict each other everywhere still see what is in view: their error teaches them.
+/// For two flows that contradict each other everywhere, all pixels in view still count, so that they can learn from the error.
 #[test]
 fn a_flow_that_never_comes_back_keeps_learning() {
     let reference = Reference::read();
@@ -320,7 +319,7 @@ fn a_flow_that_never_comes_back_keeps_learning() {
     assert!(gradient.iter().filter(|g| **g != 0.0).count() > gradient.len() / 2);
 }
 
-/// Without a visible pixel there is nothing to learn, and no NaN.
+/// Without a visible pixel the loss is the smoothness, and not NaN.
 #[test]
 fn a_flow_out_of_view_costs_its_smoothness_alone() {
     let device = Device::flex().autodiff();
@@ -333,8 +332,8 @@ fn a_flow_out_of_view_costs_its_smoothness_alone() {
     assert!(gradient.iter().all(|g| g.is_finite()));
 }
 
-/// Central differences along random directions: a kink of one pixel's |·| or of a bilinear cell is then one
-/// among hundreds. The steps leave 1e-3 of the derivative in f32; `seen` is quadratic and takes a long one.
+/// Central differences along random directions, so that a kink of one pixel's |·| or of a bilinear cell is one among hundreds of values. In
+/// f32 the steps leave an error of 1e-3 of the derivative. `seen` is quadratic and allows a long step.
 #[test]
 fn gradients_equal_finite_differences() {
     let reference = Reference::read();
@@ -434,7 +433,8 @@ fn the_loss_on_known_depth_equals_pytorchs() {
     reference.check("depth", found.loss, &inputs);
 }
 
-/// How sure the network is: PyTorch's Laplace distribution, scales beyond the limits among them; the sky and unknown pixels say nothing.
+/// The uncertainty loss against PyTorch's Laplace distribution, with scales beyond the limits, too. The sky and unknown pixels have no
+/// effect.
 #[test]
 fn the_likelihood_of_the_error_of_depth_equals_pytorchs() {
     let reference = Reference::of("depth.safetensors");
@@ -453,7 +453,7 @@ fn the_likelihood_of_the_error_of_depth_equals_pytorchs() {
     reference.check("uncertainty", loss(), &inputs);
 }
 
-/// A batch's loss is the mean of its images', though of one more pixels count than of the other. So workers can share a batch out.
+/// A batch's loss is the mean of its images' losses, though they have different numbers of valid pixels. So workers can divide a batch.
 #[test]
 fn a_batchs_loss_is_the_mean_of_its_images() {
     type Cut<'a> = &'a dyn Fn(Tensor<4>) -> Tensor<4>;

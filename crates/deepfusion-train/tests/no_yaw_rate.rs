@@ -1,11 +1,11 @@
-//! A recording without a yaw rate: what may be trained on it.
+//! Which configurations can train on a recording without a yaw rate.
 
 use deepfusion_data::{Dataset, OpenOptions, RgbImage};
 use deepfusion_hint::Hint;
 use deepfusion_train::{Error, Preset, SampleSet, TrainConfig, ViewMotion};
 use std::fs;
 
-/// Six images at 10 Hz with speeds alone.
+/// Six images at 10 Hz with speeds but no yaw rate.
 fn recording() -> (tempfile::TempDir, Dataset) {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -50,7 +50,7 @@ fn what_reads_turns_is_refused_and_the_rest_trains() {
     };
     let changes: [&dyn Fn(&mut TrainConfig); 2] = [&vehicle, &rotation];
     for change in changes {
-        let error = with(change).expect_err("nobody knows how the car turned");
+        let error = with(change).expect_err("the turns are not known");
         assert!(matches!(error, Error::NoYawRate { .. }), "{error}");
         assert!(error.hint().unwrap().contains("yaw_rate_radps"));
     }

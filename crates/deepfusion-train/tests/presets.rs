@@ -1,4 +1,4 @@
-//! Every preset learns from known depth, from its own motion, and from both.
+//! Every preset learns from known depth, from the vehicle's motion, and from both.
 
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
@@ -19,7 +19,7 @@ pub(crate) fn narrow(preset: Preset) -> TrainConfig {
     config.steps = Some(1);
     config.learning_rate_warmup_steps = 0;
     let net = &mut config.depth_net;
-    // The others read no ResNet's settings.
+    // The others do not use a ResNet's settings.
     if net.is_resnet() {
         net.encoder = net.encoder.clone().with_base_width(8);
         net.decoder.widths = [16, 16, 8, 8, 8];
@@ -33,7 +33,7 @@ pub(crate) fn narrow(preset: Preset) -> TrainConfig {
     config
 }
 
-/// One step on a drive; the losses, and whether the depth network and PoseNet have other weights than before.
+/// One step on a drive. Returns the losses, and whether the weights of the depth network and of PoseNet changed.
 fn step(config: &TrainConfig, drive: &Path, at: &Path) -> (LossTerms, [bool; 2]) {
     let opened = Dataset::open(drive, &OpenOptions::default()).unwrap();
     let recordings = opened.into_iter().map(|d| (0, d)).collect();
@@ -104,7 +104,7 @@ fn every_preset_learns_from_depth_from_motion_and_from_both() {
             assert_eq!(losses.depth > 0.0, depth, "{which}");
             assert_eq!(losses.reprojection > 0.0, motion, "{which}");
             assert!(losses.total > 0.0, "{which}");
-            // The depth alone teaches PoseNet nothing.
+            // PoseNet learns nothing from depth alone.
             assert_eq!(changed, [true, motion], "{which}");
         }
     }

@@ -1,4 +1,4 @@
-//! The recipes in the repository are configurations that this program takes.
+//! The recipes in the repository are valid configurations.
 
 use deepfusion_train::{Compute, TrainConfig};
 use std::path::Path;
@@ -13,9 +13,9 @@ fn every_recipe_is_a_configuration() {
         if path.extension().is_some_and(|e| e == "toml") {
             let [processor, gpu] = [Compute::Processor, Compute::Gpu]
                 .map(|on| TrainConfig::read_over_preset(&path, on).unwrap());
-            // A recipe gives the same wherever it is followed.
+            // A recipe gives the same configuration on every device.
             assert_eq!(processor, gpu, "{}", path.display());
-            // The field's lists for KITTI name frames of both cameras.
+            // The usual split files for KITTI list frames of both cameras.
             if path.parent().is_some_and(|at| at.ends_with("kitti")) {
                 assert_eq!(processor.data.camera, "both", "{}", path.display());
             }

@@ -1,4 +1,4 @@
-//! Learning from an RGB-D folder: its metres, its holes, which are no sky, and no speed.
+//! Learning from an RGB-D folder: in metres, with holes that are not sky, and without speeds.
 
 use crate::support::small_without_data;
 use burn::tensor::{Device, Tensor};
@@ -10,11 +10,11 @@ use deepfusion_train::{
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 use std::path::Path;
 
-/// Of the colour images: twice the network's input.
+/// Width of the colour images: twice the network's input.
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 128;
 
-/// A slanted wall, in millimetres, with both of the values that mean none: 0 in a corner, 65535 in the one across.
+/// A slanted wall, in millimetres, with both values for missing depth: 0 in one corner, 65535 in the opposite one.
 fn depth_mm(x: u32, y: u32) -> u16 {
     match (x, y) {
         (..96, ..40) => 0,
@@ -23,7 +23,7 @@ fn depth_mm(x: u32, y: u32) -> u16 {
     }
 }
 
-/// Six frames as 7-Scenes has them, so many colour pixels across and down to one of depth. No poses, no times, no speeds.
+/// Six frames in the layout of 7-Scenes, without poses, times and speeds. A depth pixel covers `across` by `down` colour pixels.
 fn write_folder(folder: &Path, [across, down]: [u32; 2]) {
     for n in 0..6_u32 {
         let at = |ending: &str| folder.join(format!("frame-{n:06}.{ending}"));
@@ -40,7 +40,7 @@ fn write_folder(folder: &Path, [across, down]: [u32; 2]) {
     std::fs::write(folder.join("camera-intrinsics.txt"), camera).unwrap();
 }
 
-/// A small network that learns from the depth of `folder`, and what it learns from.
+/// A small network that learns from the depth of `folder`, and its samples.
 fn learning(folder: &Path, steps: usize) -> (TrainConfig, SampleSet, SampleSet) {
     let mut config = small_without_data(steps);
     config.data.learn = Learn::Depth;
@@ -56,13 +56,16 @@ fn values(plane: &Tensor<4>) -> Vec<f32> {
     plane.clone().into_data().iter().collect()
 }
 
-/// Every pixel's metres are those of the depth image at its centre; a hole is neither known nor far.
+/// Every pixel has the depth of the depth image at its centre, in metres. A hole is neither known nor far.
 #[test]
 fn depth_images_are_learned_from_in_metres_and_their_holes_are_no_sky() {
     let folder = tempfile::tempdir().unwrap();
     write_folder(folder.path(), [1, 1]);
     let (config, train, validation) = learning(folder.path(), 1);
-    assert!(train.samples.is_empty(), "no speed, so no motion");
+    assert!(
+        train.samples.is_empty(),
+        "without speeds there are no samples of video"
+    );
     assert_eq!((train.depth.len(), validation.depth.len()), (5, 1));
     let loader = DepthLoader::validation(&config, train.depth);
     let batch = loader.next(&Device::flex()).unwrap().unwrap();
@@ -87,7 +90,7 @@ fn depth_images_are_learned_from_in_metres_and_their_holes_are_no_sky() {
     assert_eq!(holes, 2 * 2 * 48 * 20, "both corners of both images");
 }
 
-/// Twenty steps bring the wall a good deal nearer to where it is.
+/// Twenty steps lower the error of the wall's depth by more than a tenth.
 #[test]
 fn a_network_learns_from_depth_images_without_a_speed() {
     let folder = tempfile::tempdir().unwrap();
@@ -114,7 +117,7 @@ fn a_network_learns_from_depth_images_without_a_speed() {
     assert!(last < 0.9 * first, "{first} to {last}");
 }
 
-/// A sensor with fewer pixels, as a phone's: each of its pixels is four of the colour image.
+/// A depth sensor with fewer pixels, as in a phone: each of its pixels covers four of the colour image.
 #[test]
 fn depth_images_may_have_fewer_pixels_than_the_colour() {
     let folder = tempfile::tempdir().unwrap();
@@ -136,7 +139,7 @@ fn depth_images_may_have_fewer_pixels_than_the_colour() {
     }
 }
 
-/// Depth images of another shape than the colour images are refused with both sizes: nothing says how they lie over each other.
+/// Depth images with another aspect ratio than the colour images are refused with both sizes, since their alignment is not known.
 #[test]
 fn depth_images_of_another_shape_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Against the simulator, which knows the truth.
+//! Tests against the simulator's ground truth.
 
 use crate::support::{drive, small, street};
 use burn::tensor::{Device, Tensor, TensorData};
@@ -29,9 +29,8 @@ fn values(tensor: Tensor<4>) -> Vec<f32> {
     tensor.into_data().try_into_vec().unwrap()
 }
 
-/// Warping frame 1 with frame 0's true depth and the true motion gives frame 0: every sign and
-/// convention of back-projection, motion, projection and sampling. Pixels count where the point is
-/// visible in both frames: its depth in frame 1 is the depth seen there.
+/// Warping frame 1 with frame 0's true depth and the true motion gives frame 0: every sign and convention of back-projection, motion,
+/// projection and sampling. Only pixels whose point is visible in both frames count: its depth in frame 1 equals the depth there.
 #[test]
 fn the_true_depth_and_motion_reproduce_the_other_frame() {
     let device = Device::flex();
@@ -96,7 +95,7 @@ fn the_true_depth_and_motion_reproduce_the_other_frame() {
     }
 }
 
-/// Runs to the end or to `stop`, and gives every step's and validation's losses.
+/// Runs to the end or to `stop`. Returns the losses of all steps and validations.
 fn losses(trainer: &mut Trainer, stop: Option<usize>) -> Vec<(usize, LossTerms)> {
     let mut all = Vec::new();
     trainer
@@ -134,15 +133,15 @@ fn so_does_a_run_with_every_term_of_the_loss() {
     assert_eq!(
         steps.len(),
         7,
-        "training sees the flow, validation does not"
+        "the flow loss exists in training, but not in validation"
     );
     assert!(whole.iter().all(|(_, l)| l.affine > 0.0));
-    // The agreement waits for the flow to be learned: 20 % of seven steps.
+    // The agreement starts after a warm-up of the flow: 20 % of seven steps.
     let agreeing: Vec<_> = steps.iter().map(|(_, l)| l.agreement > 0.0).collect();
     assert_eq!(agreeing, [false, false, true, true, true, true, true]);
 }
 
-/// Trains seven steps at once, and again with an interruption after three; gives the losses.
+/// Trains seven steps at once, and again with an interruption after three. Returns the losses.
 fn resumed_equals_whole(change: impl Fn(&mut TrainConfig)) -> Vec<(usize, LossTerms)> {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 14);
@@ -170,7 +169,7 @@ fn resumed_equals_whole(change: impl Fn(&mut TrainConfig)) -> Vec<(usize, LossTe
     whole
 }
 
-/// Written between validations by time, exactly where training stands; and what is learned does not depend on it.
+/// Checkpoints between validations are due by time, have the current step, and do not change what is learned.
 #[test]
 fn a_checkpoint_is_written_when_its_time_has_come() {
     let folder = tempfile::tempdir().unwrap();
@@ -205,7 +204,7 @@ fn a_checkpoint_is_written_when_its_time_has_come() {
             .unwrap();
         (saved, losses)
     };
-    // So short that it has passed with every step.
+    // So short that a checkpoint is due after every step.
     let (often, learned) = steps_saved(1e-12);
     assert_eq!(often, [1, 2, 3, 4]);
     let (never, the_same) = steps_saved(0.0);
@@ -213,7 +212,7 @@ fn a_checkpoint_is_written_when_its_time_has_come() {
     assert_eq!(learned, the_same);
 }
 
-/// Two frames are each other's target; three have one target and the flow to both sides.
+/// Of two frames, each is the target of the other. Three frames have one target, and flows to both sides.
 #[test]
 fn the_flow_is_seen_from_every_target_in_both_arrangements() {
     let folder = tempfile::tempdir().unwrap();
@@ -270,15 +269,14 @@ fn a_checkpoint_of_another_network_is_refused_by_its_tensor() {
     let error = run.load(CheckpointKind::Last, &wider, &device).unwrap_err();
     assert!(error.to_string().contains("encoder"), "{error}");
     assert!(matches!(error, Error::Model(ModelError::Network(_))));
-    // A run is not overwritten.
+    // An existing run is not overwritten.
     assert!(matches!(
         RunFolder::create(run.path()),
         Err(ModelError::RunExists { .. })
     ));
 }
 
-/// Samples that are mirrored have a mirrored camera and motion; what they hold depends on their number
-/// alone.
+/// Mirrored samples have a mirrored camera and motion. A batch's content depends on its number alone.
 #[test]
 fn batches_are_the_same_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -301,7 +299,7 @@ fn batches_are_the_same_again() {
     );
 }
 
-/// What the views follow: PoseNet in everything, in everything but the distance, or in nothing.
+/// Views are warped by PoseNet's motion, by PoseNet's motion at the measured distance, or by the vehicle's motion.
 #[test]
 fn the_views_follow_the_motion_that_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
@@ -319,7 +317,7 @@ fn the_views_follow_the_motion_that_is_asked_for() {
     };
     for compare_at in [CompareAt::Full, CompareAt::Own] {
         let of = |motion, metres, seed| reprojection(motion, compare_at, metres, seed);
-        // Whether PoseNet's length alone matters, and whether another PoseNet does.
+        // Whether the length of PoseNet's translation matters, and whether other weights of PoseNet matter.
         for (motion, length, net) in [
             (ViewMotion::PoseNet, true, true),
             (ViewMotion::Distance, false, true),

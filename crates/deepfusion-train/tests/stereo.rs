@@ -1,4 +1,4 @@
-//! The other camera's view: where it is, what it shows, and what is refused.
+//! The other camera's view: its pose, its content, and what is refused.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -48,7 +48,8 @@ fn samples(config: &TrainConfig, drive: &Path, camera: Cameras) -> Result<Sample
     Ok(SampleSet::split(config, opened(drive, camera), None)?.0)
 }
 
-/// A split may hold out moments of one camera that it has the other learn from: there they are no second view.
+/// A split may hold out a moment of one camera and train on the same moment of the other. The held-out image must not be the other's second
+/// view.
 #[test]
 fn a_held_out_target_is_no_view_in_training() {
     let folder = tempfile::tempdir().unwrap();
@@ -94,14 +95,15 @@ fn a_held_out_target_is_no_view_in_training() {
         of(&held),
         [each(left, &[6, 7, 8]), each(right, &[3, 4])].concat()
     );
-    // The left camera's 3 and 4 would show the right one's.
+    // The left camera's frames 3 and 4 would have the right one's as second views.
     assert_eq!(
         of(&train),
         [each(left, &[0, 1, 2]), each(right, &[0, 1])].concat()
     );
 }
 
-/// Each camera's frame is explained by the other's, by its exact depth, at the calibrated baseline and at no other; mirrored or not.
+/// Each camera's frame is explained by the other's, warped with exact depth and the calibrated baseline, and with no other baseline;
+/// mirrored or not.
 #[test]
 fn the_other_cameras_view_is_where_the_depth_says() {
     let folder = tempfile::tempdir().unwrap();
@@ -175,7 +177,7 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().try_into_vec().unwrap()
 }
 
-/// The exact depth of the picture that an image is: of either camera, mirrored or not.
+/// The exact depth of an image, which may be of either camera and mirrored; and whether it is mirrored.
 fn depth_of(street: &Simulation, name: &str, image: &[f32]) -> (Vec<f32>, bool) {
     let index: usize = name.rsplit('/').next().unwrap().parse().unwrap();
     let mut found: Option<(f32, Vec<f32>, bool)> = None;
@@ -198,11 +200,11 @@ fn depth_of(street: &Simulation, name: &str, image: &[f32]) -> (Vec<f32>, bool) 
         }
     }
     let (apart, depth, flip) = found.unwrap();
-    assert!(apart < 1.0, "no picture of the street: {apart}");
+    assert!(apart < 1.0, "not an image of the street: {apart}");
     (depth, flip)
 }
 
-/// The baseline is in the warp alone: PoseNet is asked for the pair in time, and its loss and the scale ratio are that pair's.
+/// The baseline is used only for warping. PoseNet sees the pair in time, and its loss and the scale ratio depend on that pair alone.
 #[test]
 fn posenet_is_not_asked_for_the_other_camera() {
     let folder = tempfile::tempdir().unwrap();
@@ -234,7 +236,7 @@ fn posenet_is_not_asked_for_the_other_camera() {
         masks_active: false,
     };
     let with = model.loss(&pass, &batch, schedule);
-    // Without the other camera's view the loss of PoseNet's motion is the same, that of the pictures is not.
+    // Without the other camera's view the loss of PoseNet's motion is the same, but the photometric loss differs.
     let mut alone = batch.clone();
     alone.clean.pop();
     alone.network.pop();
@@ -244,7 +246,7 @@ fn posenet_is_not_asked_for_the_other_camera() {
     assert_ne!(with.terms.reprojection, without.terms.reprojection);
 }
 
-/// Of two drives one has one camera: it learns from its own frames, as without stereo, beside the other's pairs.
+/// One of two drives has only one camera. It learns from its own frames, as without stereo, while the other uses both cameras.
 #[test]
 fn a_drive_with_one_camera_learns_beside_one_with_two() {
     let folder = tempfile::tempdir().unwrap();
@@ -264,7 +266,7 @@ fn a_drive_with_one_camera_learns_beside_one_with_two() {
     let paired = set.samples.iter().filter(|s| s.stereo.is_some()).count();
     assert_eq!((set.samples.len(), paired), (12, 8));
 
-    // It may be validated on by itself, and not trained on by itself.
+    // Such a drive alone is enough for validation, but not for training.
     let (two, one) = (opened(&two, Cameras::Both), opened(&one, Cameras::Both));
     let (_, held_out, _) =
         SampleSet::split(&config, two.clone(), Some(one.clone())).unwrap_or_else(|e| panic!("{e}"));
@@ -320,7 +322,7 @@ fn one_camera_is_no_stereo() {
         other => panic!("{other:?}"),
     };
     assert_eq!(why(Cameras::Left), NoStereo::OneCamera);
-    // A drive whose second camera has other frames.
+    // A drive whose second camera has no frame of the same moment.
     for entry in std::fs::read_dir(drive.join("image_03/data")).unwrap() {
         let path = entry.unwrap().path();
         if !path.ends_with("0000000004.png") {

@@ -1,4 +1,4 @@
-//! The trainer's events, and the ends of a run.
+//! The trainer's events, and how runs end.
 
 use crate::support::{drive, small};
 use burn::tensor::Device;
@@ -29,7 +29,7 @@ fn events(trainer: &mut Trainer) -> (Vec<TrainEvent>, TrainSummary) {
     (events, summary)
 }
 
-/// Samples of a recording that is not there: whoever makes a batch of them panics.
+/// Samples of a recording that does not exist: making a batch of them panics.
 fn broken(samples: &SampleSet) -> SampleSet {
     let mut broken = samples.clone();
     for sample in &mut broken.samples[1..] {
@@ -103,7 +103,7 @@ fn nothing_held_out_is_an_error_unless_it_was_asked_for() {
     assert!(!events.iter().any(validated));
 }
 
-/// A step of two batches reports the mean of both, and its panel names the sample that it shows.
+/// A step of two batches reports the mean of both, and its panel has the name of its sample.
 #[test]
 fn a_step_of_several_batches_reports_all_of_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,7 +151,7 @@ fn a_step_of_several_batches_reports_all_of_them() {
     assert_eq!(panel.name, batches[1].names[0]);
 }
 
-/// PoseNet's own loss would decide by far, and says nothing about depth where the vehicle gives the motion.
+/// If the vehicle gives the motion, PoseNet's own loss does not depend on depth, but it would dominate the choice.
 #[test]
 fn best_is_chosen_by_what_depth_can_change() {
     let folder = tempfile::tempdir().unwrap();
@@ -181,7 +181,7 @@ fn best_is_chosen_by_what_depth_can_change() {
                 _ => losses.reprojection,
             };
             assert_eq!(selection, of_depth);
-            assert!(losses.total > of_depth, "smoothness at least is beside it");
+            assert!(losses.total > of_depth, "the total has smoothness at least");
             assert_eq!(best, selection < lowest, "{motion:?}");
             lowest = lowest.min(selection);
             validations += 1;
@@ -196,7 +196,7 @@ fn frozen_weights_stay_and_the_others_learn() {
     let folder = tempfile::tempdir().unwrap();
     let (mut config, train, validation) = small(&drive(&folder.path().join("street"), 8), 2);
     config.freeze = vec!["depth.encoder".into(), "depth.decoder.heads".into()];
-    // Momentum of a decay would move them, too.
+    // Weight decay would change them, too.
     config.weight_decay = 0.1;
     let sets = || (train.clone(), validation.clone());
     let mut trainer = started(folder.path(), config.clone(), sets()).unwrap();
@@ -206,7 +206,7 @@ fn frozen_weights_stay_and_the_others_learn() {
     let mut kept = 0;
     let stays = |before: &Tensors, after: &Tensors, kept: &mut usize| {
         for (name, tensor) in before {
-            // Running statistics follow the batches, frozen or not.
+            // Running statistics follow the batches, whether weights are frozen or not.
             if name.contains("running") {
                 continue;
             }
@@ -219,7 +219,7 @@ fn frozen_weights_stay_and_the_others_learn() {
     stays(&before, &after, &mut kept);
     assert!(kept > 40, "{kept}");
 
-    // So they do in a run that goes on.
+    // They also stay frozen in a resumed run.
     config.steps = Some(3);
     let run = RunFolder::open(trainer.folder()).unwrap().0;
     let mut resumed = Trainer::resume(config.clone(), run, sets(), &Device::flex()).unwrap();

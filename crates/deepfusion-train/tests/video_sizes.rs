@@ -1,4 +1,4 @@
-//! Video whose images are shown to the networks at several sizes.
+//! Video whose images are resized to several input sizes.
 
 use burn::tensor::{Device, Tensor};
 use deepfusion_data::{Dataset, OpenOptions};
@@ -60,7 +60,7 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().try_into_vec().unwrap()
 }
 
-/// Images, camera and metres of a batch are all of its size; the held-out images keep the run's own.
+/// Images, camera and metres of a batch fit its size. Held-out images keep the run's size.
 #[test]
 fn a_batch_has_one_size_in_everything() {
     let folder = tempfile::tempdir().unwrap();
@@ -78,7 +78,7 @@ fn a_batch_has_one_size_in_everything() {
         })
         .collect();
     assert_eq!((focals[0], focals[0]), (focals[2], focals[4]));
-    // Taller by half, the picture looks as if taken through a lens half as long again.
+    // An image that is half as tall again looks as if taken with 1.5 times the focal length.
     assert!((focals[1] / focals[0] - 1.5).abs() < 1e-6, "{focals:?}");
     assert!((focals[3] / focals[0] - 1.0).abs() < 1e-6, "{focals:?}");
 
@@ -90,7 +90,7 @@ fn a_batch_has_one_size_in_everything() {
     }
 }
 
-/// What depth is multiplied by in a batch that must have this size.
+/// The factor of depth in a batch, after a check of the batch's size.
 fn focal_of(batch: &SnippetBatch, size: InputSize, camera: deepfusion_geometry::Intrinsics) -> f64 {
     let InputSize { width, height } = size;
     for image in batch.clean.iter().chain(&batch.network) {
@@ -131,7 +131,7 @@ fn every_preset_learns_at_several_sizes() {
     }
 }
 
-/// A run that stopped before a batch of another size goes on as if it had not.
+/// A run that is stopped before a batch of another size and resumed equals an uninterrupted one.
 #[test]
 fn a_resumed_run_sees_the_same_sizes() {
     let folder = tempfile::tempdir().unwrap();
@@ -154,7 +154,7 @@ fn a_resumed_run_sees_the_same_sizes() {
     assert_eq!(begun, whole);
 }
 
-/// Without a canonical focal length one disparity would mean the same metres at every size; and a size must be one that the networks take.
+/// Without a canonical focal length, a disparity would stand for the same depth at every size. A size must also be valid for the networks.
 #[test]
 fn sizes_that_cannot_be_learned_at_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Steps of each network beside PyTorch's, in single precision, on the kernels: twenty of the two that are quick, eight of the others.
+//! Steps of each network against PyTorch, in single precision, with the kernels: twenty for the two quick networks, eight for the others.
 
 mod steps;
 

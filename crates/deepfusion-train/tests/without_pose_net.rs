@@ -1,4 +1,4 @@
-//! Runs that leave PoseNet out: the views are warped by the vehicle's motion, and PoseNet would not learn.
+//! Runs without PoseNet: views are warped by the vehicle's motion, and PoseNet would not learn.
 
 use crate::support::{drive, small};
 use burn::tensor::Device;
@@ -11,11 +11,11 @@ use deepfusion_train::{
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Two steps by the vehicle's motion, with PoseNet or without.
+/// Two steps with the vehicle's motion, with or without PoseNet.
 fn settings(config: &TrainConfig, pose_net: bool) -> TrainConfig {
     let mut config = TrainConfig {
         view_motion: ViewMotion::Vehicle,
-        // The gradient's norm has PoseNet's in it.
+        // The gradient's norm would include PoseNet's gradient.
         clip_norm: 0.0,
         ..config.clone()
     };
@@ -29,7 +29,7 @@ fn depth_weights(trainer: &Trainer) -> BTreeMap<String, WeightTensor> {
     collect(&trainer.model().depth_net).tensors
 }
 
-/// Goes on for so many steps; the speed terms and scale ratios of steps and validations.
+/// Continues for at most `most` steps. Returns the speed terms and scale ratios of steps and validations.
 fn run(trainer: &mut Trainer, most: usize) -> Vec<(f64, f64)> {
     let mut said = Vec::new();
     trainer
@@ -61,7 +61,7 @@ fn run(trainer: &mut Trainer, most: usize) -> Vec<(f64, f64)> {
     said
 }
 
-/// The depth network learns the very same, PoseNet's numbers are absent, and the run goes on where it was stopped.
+/// The depth network learns exactly the same, PoseNet's numbers are absent, and the run can be resumed.
 #[test]
 fn depth_learns_the_same_without_pose_net() {
     let folder = tempfile::tempdir().unwrap();
@@ -99,7 +99,7 @@ fn depth_learns_the_same_without_pose_net() {
     assert!(depth_weights(&resumed) == depth_weights(&whole));
 }
 
-/// Its checkpoint holds no PoseNet: asking for one is an error, and a run that starts from it has a new one.
+/// The checkpoint has no PoseNet: requesting one is an error, and a run that starts from the checkpoint has a new one.
 #[test]
 fn its_checkpoint_has_none() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Workers that learn together learn what one learns alone.
+//! Several workers together learn the same as one alone.
 
 use std::error::Error as StdError;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use deepfusion_train::{
     TrainEvent, Trainer, Workers,
 };
 
-/// Workers in the threads of one process. One that is gone is noticed by the others at their next sum.
+/// Workers as threads of one process. If one ends, the others notice at their next sum.
 #[derive(Clone)]
 struct Threads {
     rank: usize,
@@ -63,7 +63,7 @@ impl Workers for Threads {
 
 type Sets = (SampleSet, SampleSet);
 
-/// Trains with each of the workers in a thread of its own; gives the steps' losses of each, or what it failed of.
+/// Trains with each worker in a thread of its own. Returns each worker's losses by step, or its error.
 fn together(
     count: usize,
     out: &Path,
@@ -112,7 +112,7 @@ fn alone(out: &Path, (config, sets): &(TrainConfig, Sets)) -> Vec<LossTerms> {
     losses(&mut trainer).unwrap()
 }
 
-/// The largest difference of two runs' losses, as a share.
+/// The largest relative difference between two runs' losses.
 fn apart(a: &[LossTerms], b: &[LossTerms]) -> f64 {
     assert_eq!(a.len(), b.len());
     let pairs = a.iter().zip(b).flat_map(|(a, b)| {
@@ -124,13 +124,13 @@ fn apart(a: &[LossTerms], b: &[LossTerms]) -> f64 {
 
 fn prepared(at: &Path) -> (TrainConfig, Sets) {
     let (mut config, train, validation) = small(&drive(&at.join("street"), 20), 4);
-    // Batch norms would see each worker's own batch.
+    // Otherwise batch norms would use the statistics of each worker's own batch.
     config.depth_net.encoder.frozen_statistics = true;
     config.pose_net.encoder.frozen_statistics = true;
     (config, (train, validation))
 }
 
-/// With batches that take turns in size, one size is that of all workers' batches of a step.
+/// With batches of several sizes, all workers' batches of a step have the same size.
 #[test]
 fn workers_take_turns_in_size_together() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ fn workers_take_turns_in_size_together() {
     let (mut config, sets) = prepared(folder.path());
     (config.batch, config.accumulate, config.steps) = (1, 1, Some(2));
     config.canonical_focal_px = Some(60.0);
-    // So slow that the second step sees the first one's weights.
+    // So small that the weights stay practically the same.
     config.learning_rate = 1e-12;
     config.augmentation.video_sizes = vec![InputSize {
         width: 128,
@@ -147,13 +147,13 @@ fn workers_take_turns_in_size_together() {
     let start = (config.clone(), sets.clone());
     let shared = together(2, &at("two"), |_, _, _| {}, &start);
     let two = shared[0].as_ref().unwrap();
-    // Two samples in one batch.
+    // The same two samples in one batch.
     config.batch = 2;
     let one = alone(&at("one"), &(config.clone(), sets.clone()));
     assert_eq!(two.len(), 2);
     let apart = |a: &LossTerms, b: &LossTerms| (a.reprojection - b.reprojection).abs();
     assert!(one.iter().zip(two).all(|(a, b)| apart(a, b) < 1e-5));
-    // Other sizes are seen by the losses.
+    // A different size changes the losses.
     config.augmentation.video_sizes.clear();
     let own = alone(&at("own"), &(config, sets));
     assert!(apart(&one[1], &own[1]) > 1e-4);
@@ -179,12 +179,12 @@ fn two_workers_learn_what_one_learns_with_twice_the_batches() {
     let [first, second] = &shared.try_into().unwrap();
     let (first, second) = (first.as_ref().unwrap(), second.as_ref().unwrap());
     assert_eq!(first.len(), 4);
-    // All of them report the whole step.
+    // All workers report the losses of the whole step.
     assert!(apart(first, second) == 0.0);
     // Only the first one writes.
     assert!(!at("two").join("unused/config.toml").exists());
 
-    // The same samples one batch after the other.
+    // The same samples, one batch after the other.
     config.accumulate = 2;
     let one = alone(&at("one"), &(config.clone(), sets.clone()));
     assert!(apart(&one, first) < 1e-4, "{}", apart(&one, first));
@@ -196,7 +196,7 @@ fn two_workers_learn_what_one_learns_with_twice_the_batches() {
         .fold(0.0, f32::max);
     assert!(most < 1e-4, "{most}");
 
-    // And at once.
+    // The same samples in one batch.
     (config.batch, config.accumulate) = (2, 1);
     let at_once = alone(&at("at_once"), &(config, sets));
     assert!(apart(&at_once, first) < 1e-4, "{}", apart(&at_once, first));
@@ -212,7 +212,7 @@ fn a_worker_that_fails_ends_the_others() {
         &out,
         |rank, _, (train, _)| {
             if rank == 1 {
-                // Sources that are not there, but for the first sample's.
+                // Only the first sample's sources exist.
                 let sources = train.samples[1..]
                     .iter_mut()
                     .flat_map(|s| &mut s.snippet.sources);
@@ -235,20 +235,20 @@ fn workers_that_do_not_hold_the_same_do_not_begin() {
     let start = prepared(folder.path());
     type Change = fn(usize, &mut TrainConfig, &mut Sets);
     let cases: [(&str, &str, Change); 5] = [
-        ("weights", "other weights", |rank, config, _| {
+        ("weights", "different weights", |rank, config, _| {
             config.seed += rank as u64;
         }),
-        ("samples", "other samples", |rank, _, (train, _)| {
+        ("samples", "different samples", |rank, _, (train, _)| {
             train.samples.truncate(train.samples.len() - rank);
         }),
-        ("drives", "other samples", |rank, _, (train, _)| {
+        ("drives", "different samples", |rank, _, (train, _)| {
             let last = train.samples.len() - 1;
             train.samples.swap(0, rank * last);
         }),
-        ("settings", "other settings", |rank, config, _| {
+        ("settings", "different settings", |rank, config, _| {
             config.learning_rate *= 1.0 + rank as f64;
         }),
-        ("loss", "other settings", |rank, config, _| {
+        ("loss", "different settings", |rank, config, _| {
             config.loss.smoothness *= 1.0 + rank as f64;
         }),
     ];

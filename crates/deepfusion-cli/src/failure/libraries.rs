@@ -500,26 +500,23 @@ impl Reportable for deepfusion_train::Error {
                 .map(|hint| format!("{hint}; `deepfusion data inspect` shows what is there")),
             Self::Precision { .. } => Some(set_in_file("precision")),
             Self::CameraKnown { .. } => Some(
-                "a camera that is known is better than one that is learned: leave --intrinsics learn out, or this recording".into(),
+                "leave --intrinsics learn out, or this recording; a known camera is better than a learned one".into(),
             ),
             Self::SharedFrames { .. } => Some(
-                "validate on other drives (--val-data) or other frames (--val-split), or leave both out: the end of each drive \
-                 is held out then"
+                "validate on other drives (--val-data) or frames (--val-split); without both, the end of each training drive is held out"
                     .into(),
             ),
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
-                "the last good checkpoint is kept; look at the frames named above, or lower the \
-                 learning rate, and continue with --resume"
+                "check the frames named above or lower the learning rate, then continue from the last good checkpoint with --resume"
                     .into(),
             ),
             Self::Loader { .. } => Some(
-                "this is a fault of the program: please report it with the lines above; what was saved is whole, and \
-                 --resume goes on from there"
+                "this is a bug: please report it with the lines above; --resume continues from the last checkpoint"
                     .into(),
             ),
             Self::NoValidation => Some(
-                "give longer drives or --val-data; `validation_share = 0` in a config file trains without validation \
-                 and chooses no `best`"
+                "give longer drives or --val-data; `validation_share = 0` in a config file trains without validation and without a `best` \
+                 checkpoint"
                     .into(),
             ),
             _ => self.hint(),

@@ -52,16 +52,16 @@ fn the_head_for_uncertainty_comes_and_goes() {
         .unwrap();
     assert!(!is_new);
     assert_eq!(depth(&cut), expected);
-    // The same seed draws the same network with the head and without.
+    // The same seed draws the same network with or without the head.
     let drawn = build(&sure, 3).with_weights(&old).unwrap().0;
     assert_eq!(depth(&drawn).0, depth(&build(&sure, 3)).0);
-    // What lacks anything else is still another network's.
+    // Weights that lack anything else are still refused.
     let mut lacking = old;
     lacking.tensors.remove("decoder.heads.0.bias");
     assert!(build(&sure, 4).with_weights(&lacking).is_err());
 }
 
-/// Every part is one switch, and what is off leaves no tensor behind.
+/// Every part has a switch of its own, and a part that is off has no tensors.
 #[test]
 fn each_part_is_switched_on_its_own() {
     let device = Device::flex();
@@ -93,7 +93,7 @@ fn each_part_is_switched_on_its_own() {
             let there = with.keys().any(|name| name.starts_with(prefix));
             assert_eq!(there, k == i, "{prefix} in part {i}");
         }
-        // The encoder's weights are the same ones, dilated or not.
+        // The encoder's weights are the same, whether dilated or not.
         for (name, tensor) in without.iter().filter(|(n, _)| n.starts_with("encoder.")) {
             assert!(with[name] == *tensor, "{name}");
         }

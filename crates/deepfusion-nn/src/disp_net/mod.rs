@@ -1,5 +1,5 @@
-//! DispNet as SfMLearner has it (Zhou et al., "Unsupervised Learning of Depth and Ego-Motion from Video", CVPR 2017): an image halved seven
-//! times and enlarged again with skips, without batch normalisation; the disparities of coarse scales are read by the next one.
+//! DispNet as in SfMLearner (Zhou et al., "Unsupervised Learning of Depth and Ego-Motion from Video", CVPR 2017): the image is halved seven
+//! times and enlarged again with skip connections, without batch normalisation. Each scale reads the disparity of the next coarser one.
 
 mod transposed;
 
@@ -19,9 +19,9 @@ use deepfusion_model::{DISP_NET_DISPARITY, DISP_NET_KERNELS};
 /// Two convolutions with ReLU.
 #[derive(Module, Debug)]
 pub struct Halving {
-    /// At stride 2.
+    /// 7×7, 5×5 or 3×3 at stride 2.
     pub halve: Conv2d,
-    /// At the size it gives.
+    /// The second convolution, which keeps the size.
     pub keep: Conv2d,
 }
 
@@ -34,21 +34,21 @@ impl Halving {
     }
 }
 
-/// A transposed convolution, and a convolution of what it gives beside what else has that size; ReLU after both.
+/// A transposed convolution, then a convolution of its result and the other inputs of the same size; ReLU after both.
 #[derive(Module, Debug)]
 pub struct Doubling {
     /// 3×3 at stride 2, transposed.
     pub enlarge: TransposedConv2d,
-    /// 3×3.
+    /// 3×3 of the enlarged feature and the other inputs.
     pub join: Conv2d,
 }
 
 /// Encoder, decoder and heads.
 #[derive(Module, Debug)]
 pub struct DispNet {
-    /// Seven, fine to coarse.
+    /// Seven halvings, fine to coarse.
     pub encoder: Vec<Halving>,
-    /// Seven, coarse to fine.
+    /// Seven doublings, coarse to fine.
     pub decoder: Vec<Doubling>,
     /// 3×3 to the disparities of the scales 0…3.
     pub heads: Vec<Conv2d>,
@@ -56,7 +56,7 @@ pub struct DispNet {
     normalisation: InputNormalisation,
 }
 
-/// A zero-padded convolution with Xavier's weights and no bias yet.
+/// A zero-padded convolution with Xavier's weights.
 fn conv(
     channels: [usize; 2],
     (kernel, stride): (usize, usize),
@@ -117,7 +117,7 @@ impl DispNet {
         })
     }
 
-    /// What each halving gives, fine to coarse.
+    /// The results of the halvings, fine to coarse.
     ///
     /// # Shapes
     /// - `images`: `[batch, 3, height, width]`, RGB in [0, 1]

@@ -4,20 +4,21 @@ use burn::tensor::{Device, Tensor, TensorData};
 use crate::init::WeightRng;
 use crate::ops::{self, ConvOptions, Precision};
 
-/// A transposed convolution of 3×3 and stride 2 (PyTorch's with padding 1 and output padding 1): the image's size twice, or cut.
+/// A transposed convolution of 3×3 and stride 2 (PyTorch's with padding 1 and output padding 1). The output has twice the image's size, or
+/// is cropped.
 ///
 /// Along each axis out(2i) = w₁·x(i) and out(2i + 1) = w₂·x(i) + w₀·x(i + 1), zeros beyond the edge: a convolution of 2×2 to four times the
 /// channels, which become the four pixels of a block.
 #[derive(Module, Debug)]
 pub struct TransposedConv2d {
-    /// `[in, out, 3, 3]`, as PyTorch has it.
+    /// `[in, out, 3, 3]`, as in PyTorch.
     pub weight: Param<Tensor<4>>,
     /// `[out]`.
     pub bias: Param<Tensor<1>>,
 }
 
 impl TransposedConv2d {
-    /// A new one with Xavier's weights and a bias of 0.
+    /// A new layer with Xavier's weights and a bias of 0.
     pub(super) fn new(
         [channels_in, channels_out]: [usize; 2],
         rng: &mut WeightRng,
@@ -51,7 +52,7 @@ impl TransposedConv2d {
             precision: Precision::F32,
         };
         let bias = Tensor::cat(vec![bias; 4], 0);
-        // Padded on both sides, of which one is needed: a row and a column too many, which are cut with the rest.
+        // Padding is needed on one side, but applied on both: the surplus row and column are cropped with the rest.
         let wide = ops::conv2d(x, Tensor::cat(blocks, 0), Some(bias), options);
         wide.reshape([batch, 2, 2, channels, h + 1, w + 1])
             .permute([0, 3, 4, 1, 5, 2])

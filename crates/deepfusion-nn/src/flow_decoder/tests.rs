@@ -38,7 +38,7 @@ fn a_new_decoders_flow_is_zero_at_every_size_and_learns() {
             }
             assert_eq!(largest(output.flow), 0.0);
         }
-        // A start at zero must not be a standstill: every level's last convolution has a gradient.
+        // The decoder must be able to learn from its start at zero: every level's last convolution has a gradient.
         let gradients = there.flow.sub_scalar(1.0).abs().mean().backward();
         for level in &decoder.levels {
             let gradient = level.output.weight.val().grad(&gradients).unwrap();
@@ -72,7 +72,7 @@ fn set(weight: &mut WeightTensor, [out, channel]: [usize; 2], value: f32) {
     weight.values[(out * weight.shape[1] + channel) * area + area / 2] = value;
 }
 
-/// Weights by hand that put out the displacement whose correlation is near 1.
+/// Weights set by hand so that the output is the displacement whose correlation is near 1.
 fn matcher(config: &FlowDecoderConfig, channels: [usize; 5], device: &Device) -> FlowDecoder {
     let side = 2 * config.radius + 1;
     let decoder = decoder(config, channels, device);
@@ -88,7 +88,7 @@ fn matcher(config: &FlowDecoderConfig, channels: [usize; 5], device: &Device) ->
         edit("project.weight", &|project| {
             (0..config.feature_width).for_each(|c| set(project, [c, c], 1.0));
         });
-        // ELU(20·corr − 16): 4 at a match, nearly −1 elsewhere; the −1s cancel but for the match's own.
+        // ELU(20·corr − 16): 4 at a match, nearly −1 elsewhere. The −1s cancel except for the match's own.
         edit("hidden.0.bias", &|bias| bias.values.fill(-16.0));
         edit("hidden.0.weight", &|hidden| {
             (0..side * side).for_each(|d| set(hidden, [d, d], 20.0));
@@ -104,7 +104,7 @@ fn matcher(config: &FlowDecoderConfig, channels: [usize; 5], device: &Device) ->
     weights::apply(decoder, &by_hand).unwrap()
 }
 
-/// The values of `t` moved by (u, v) pixels, with zeros where nothing came from.
+/// `t` moved by (u, v) pixels, with zeros where no pixel moved to.
 fn moved(t: &Tensor<4>, [u, v]: [i64; 2]) -> Tensor<4> {
     let [_, _, height, width] = t.dims();
     let margin = |by: i64| (by.max(0) as usize, (-by).max(0) as usize);
@@ -116,8 +116,8 @@ fn moved(t: &Tensor<4>, [u, v]: [i64; 2]) -> Tensor<4> {
     padded.narrow(2, bottom, height).narrow(3, right, width)
 }
 
-/// Everything moves 16 pixels to the right and 32 up, which the coarsest level sees as (1, −2): it must say so with
-/// the right signs, and the finer ones, having warped by it, must find nothing left.
+/// Everything moves 16 pixels to the right and 32 up, which is (1, −2) at the coarsest level. That level must find it with the right signs,
+/// and the finer ones must find nothing more after warping.
 #[test]
 fn the_flow_leads_from_the_first_frame_to_the_second() {
     let device = Device::flex();
@@ -139,7 +139,7 @@ fn the_flow_leads_from_the_first_frame_to_the_second() {
     });
     let decoder = matcher(&config, channels, &device);
     let output = decoder.forward(&first, &second);
-    // Away from the border, where the match lies out of the image.
+    // Away from the border, where the match lies outside the image.
     let inside = |flow: Tensor<4>, axis: usize| -> f32 {
         let flow = flow.narrow(1, axis, 1).narrow(2, 64, 64).narrow(3, 32, 96);
         let deviation = flow.clone().sub_scalar([16.0, -32.0][axis]);

@@ -20,7 +20,7 @@ impl ChannelNorm {
     /// Added to the variance.
     pub const EPSILON: f64 = deepfusion_model::LAYER_NORM_EPSILON;
 
-    /// γ = 1, β = 0.
+    /// A new layer: γ = 1, β = 0.
     #[must_use]
     pub fn new(channels: usize, device: &Device) -> Self {
         let all = |value: f32| {
@@ -47,17 +47,17 @@ impl ChannelNorm {
     }
 }
 
-/// Two 1×1 with a GELU between them: to more channels and back.
+/// Two 1×1 convolutions with a GELU between them: to more channels and back.
 #[derive(Module, Debug)]
 pub struct Bottleneck {
     /// W₁, to `expansion` times the channels.
     pub expand: Conv2d,
-    /// W₂, back.
+    /// W₂, back to the original channels.
     pub project: Conv2d,
 }
 
 impl Bottleneck {
-    /// A new one.
+    /// A new layer.
     #[must_use]
     pub fn new(channels: usize, expansion: usize, rng: &mut WeightRng, device: &Device) -> Self {
         let mut point = |from: usize, to: usize| {
@@ -80,7 +80,7 @@ impl Bottleneck {
     }
 }
 
-/// Factors of a residual branch's channels, all 1e-6: a new branch gives next to nothing (layer scale; Touvron et al., arXiv
+/// Factors of a residual branch's channels, all 1e-6: a new branch contributes almost nothing (layer scale; Touvron et al., arXiv
 /// 2103.17239).
 pub(crate) fn layer_scale(channels: usize, device: &Device) -> Param<Tensor<1>> {
     Param::from_data(

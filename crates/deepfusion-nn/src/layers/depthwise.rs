@@ -14,8 +14,8 @@ pub struct DepthwiseConv2d {
 }
 
 impl DepthwiseConv2d {
-    /// A new one with a `kernel` of an odd side. Its weights are normal with variance 2 / (channels · kernel²), as PyTorch counts a
-    /// depthwise kernel's outputs.
+    /// A new layer with an odd `kernel` side. Its weights are normal with variance 2 / (channels · kernel²), since PyTorch counts the
+    /// fan-out of a depthwise kernel like this.
     #[must_use]
     pub fn new(
         channels: usize,

@@ -10,16 +10,16 @@ use crate::layers::{Conv2d, Conv2dConfig};
 /// Attention between the channels of a feature, in groups (heads).
 #[derive(Module, Debug)]
 pub struct CrossCovariance {
-    /// 1×1 to queries, keys and values, `channels` each and in this order; each is its heads' channels one after the other.
+    /// 1×1 to queries, keys and values, in this order, with `channels` channels each; in each of them the channels of a head lie together.
     pub qkv: Conv2d,
-    /// τ, the factor of each head's similarities, `[heads]`.
+    /// τ, the factor of the similarities of each head, `[heads]`.
     pub temperature: Param<Tensor<1>>,
     /// 1×1 over all heads.
     pub project: Conv2d,
 }
 
 impl CrossCovariance {
-    /// Added to the squared length of a query or a key: it is then at least 1e-12, PyTorch's smallest.
+    /// Added to the squared length of a query or key, so that the length is at least 1e-12, as in PyTorch.
     pub const SQUARED_LENGTH_EPSILON: f64 = 1e-24;
 
     /// A new module for a feature of `channels` channels, a multiple of `heads`.
@@ -37,7 +37,7 @@ impl CrossCovariance {
         }
     }
 
-    /// P·[softmax(τ·q̂·k̂ᵀ)·v] of each head, q̂ and k̂ the queries and keys of length 1: rows are channels, columns pixels.
+    /// P·[softmax(τ·q̂·k̂ᵀ)·v] of each head, where q̂ and k̂ are queries and keys of length 1: rows are channels, columns pixels.
     ///
     /// # Shapes
     /// - `x`, output: `[batch, channels, height, width]`

@@ -88,7 +88,7 @@ impl SmoothDecoder {
         self.forward_with_feature(features).0
     }
 
-    /// The same, and the feature that the finest head reads, `[batch, widths[0] / 2, height / 2, width / 2]`.
+    /// As [`Self::forward`], and the feature that the finest head reads, `[batch, widths[0] / 2, height / 2, width / 2]`.
     ///
     /// # Panics
     /// Unless there are three features.

@@ -7,9 +7,9 @@ use crate::layers::{BatchNorm2d, Bottleneck, DepthwiseConv2d, layer_scale, scale
 /// One of the consecutive dilated convolutions (CDC): y = x + γ·W₂·gelu(W₁·bn(w ⋆ x)), w depthwise.
 #[derive(Module, Debug)]
 pub struct DilatedBlock {
-    /// 3×3, dilated.
+    /// w, 3×3, dilated.
     pub depthwise: DepthwiseConv2d,
-    /// After it.
+    /// Batch normalisation after `depthwise`.
     pub bn: BatchNorm2d,
     /// W₁ and W₂.
     pub bottleneck: Bottleneck,

@@ -7,12 +7,12 @@ use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig, ConvNorm};
 use crate::resnet::normalised;
 use crate::{InputNormalisation, LiteMonoConfig, ops};
 
-/// The blocks of one size.
+/// The blocks of one stage, which have the same size.
 #[derive(Module, Debug)]
 pub struct LiteMonoStage {
-    /// One after the other.
+    /// Dilated blocks, one after the other.
     pub dilated: Vec<DilatedBlock>,
-    /// After them.
+    /// The global block after them.
     pub global: GlobalBlock,
 }
 
@@ -30,10 +30,10 @@ impl LiteMonoStage {
 pub struct LiteMonoEncoder {
     /// Three 3×3 with batch normalisation and GELU, the first at stride 2.
     pub stem: Vec<ConvNorm>,
-    /// The 3×3 at stride 2 before each stage. It reads what was last, what the stage before began with (after the first), and the
-    /// image at its size.
+    /// The 3×3 at stride 2 before each stage. It reads the last result, the input of the stage before (from the second stage on), and the
+    /// image at the same size.
     pub reduce: Vec<Conv2d>,
-    /// At 1/4, 1/8 and 1/16 of the image's size.
+    /// The stages, at 1/4, 1/8 and 1/16 of the image's size.
     pub stages: Vec<LiteMonoStage>,
     #[module(skip)]
     normalisation: InputNormalisation,
@@ -97,7 +97,7 @@ impl LiteMonoEncoder {
     }
 }
 
-/// The mean over 3×3 pixels at stride 2, zeros of a border of one pixel included.
+/// The mean over 3×3 pixels at stride 2; the zeros of a border of one pixel count.
 fn halved(image: Tensor<4>) -> Tensor<4> {
     let options = AvgPoolOptions::new([3, 3])
         .with_stride([2, 2])

@@ -13,13 +13,13 @@ use crate::layers::{Bottleneck, ChannelNorm, Conv2d, Conv2dConfig, layer_scale, 
 pub struct GlobalBlock {
     /// W_p, a 1×1; only in the first stage.
     pub position: Option<Conv2d>,
-    /// Before the attention.
+    /// Norm before the attention.
     pub attention_norm: ChannelNorm,
-    /// A.
+    /// A, the attention between channels.
     pub attention: CrossCovariance,
     /// γ_a, `[channels]`.
     pub attention_scale: Param<Tensor<1>>,
-    /// Before the bottleneck.
+    /// Norm before the bottleneck.
     pub norm: ChannelNorm,
     /// W₁ and W₂.
     pub bottleneck: Bottleneck,

@@ -22,9 +22,9 @@ use crate::{Error, InputNormalisation, LiteMonoConfig};
 /// Encoder and decoder.
 #[derive(Module, Debug)]
 pub struct LiteMono {
-    /// Three features of an image.
+    /// The encoder, with three features.
     pub encoder: LiteMonoEncoder,
-    /// Disparities of them.
+    /// The decoder, from these features to disparities.
     pub decoder: SmoothDecoder,
 }
 
@@ -47,7 +47,7 @@ impl LiteMono {
         })
     }
 
-    /// Sigmoid disparities, as of [`DepthNet::forward`](crate::DepthNet::forward) but at three scales.
+    /// Sigmoid disparities, as from [`DepthNet::forward`](crate::DepthNet::forward), but at three scales.
     ///
     /// # Shapes
     /// - `images`: `[batch, 3, height, width]`, RGB in [0, 1]

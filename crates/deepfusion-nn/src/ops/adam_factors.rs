@@ -1,15 +1,15 @@
-//! What a step of Adam takes from the device.
+//! The factors of a step of Adam as a tensor.
 
 use burn::tensor::{Bool, Device, Tensor};
 use deepfusion_kernels::AdamStep;
 
-/// The factors of a step of Adam that may be known on the device alone: the gradient's, 1 − β₁ᵗ, 1 − β₂ᵗ, and whether the step is made
-/// (1) or everything stays as it is (0). Four numbers in one tensor, so that no step has to read them.
+/// The factors of a step of Adam that may be known only on the device: the gradient's factor, 1 − β₁ᵗ, 1 − β₂ᵗ, and whether the step is
+/// made (1) or nothing changes (0). Four numbers in one tensor, so that the host need not read them.
 #[derive(Debug, Clone)]
 pub struct AdamFactors(Tensor<1>);
 
 impl AdamFactors {
-    /// Those of a step that is made, as `step` has them.
+    /// The factors in `step`, for a step that is made.
     #[must_use]
     pub fn of(step: &AdamStep, device: &Device) -> Self {
         let factors = [
@@ -21,7 +21,7 @@ impl AdamFactors {
         Self(Tensor::from_data(factors, device))
     }
 
-    /// Those that were computed on the device.
+    /// Factors that were computed on the device.
     ///
     /// # Shapes
     /// - `gradient_scale`, `is_made`: `[1]`
@@ -36,13 +36,13 @@ impl AdamFactors {
         Self(Tensor::cat(factors, 0))
     }
 
-    /// All four, one after the other.
+    /// All four factors in one tensor, `[4]`.
     #[cfg(feature = "gpu")]
     pub(super) fn together(&self) -> Tensor<1> {
         self.0.clone()
     }
 
-    /// Each by itself, `[1]`.
+    /// Each factor as a tensor of its own, `[1]`.
     pub(super) fn each(&self) -> [Tensor<1>; 4] {
         std::array::from_fn(|place| self.0.clone().narrow(0, place, 1))
     }

@@ -26,7 +26,7 @@ pub fn autocast<R>(precision: Precision, work: impl FnOnce() -> R) -> R {
     work()
 }
 
-/// A convolution's options, with the precision that is in force on this thread.
+/// A convolution's options, with this thread's precision.
 pub(super) fn within(options: ConvOptions) -> ConvOptions {
     ConvOptions {
         precision: PRECISION.get().unwrap_or(options.precision),

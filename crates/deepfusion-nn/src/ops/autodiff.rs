@@ -1,5 +1,4 @@
-//! How the operations are derived: what each keeps from its forward pass, and which of its parents
-//! receive a gradient.
+//! How the operations are differentiated: what each keeps from its forward pass, and which of its parents receive a gradient.
 
 use super::kernel::{ConvOptions, KernelBackward, KernelOps};
 use burn::backend::autodiff::{

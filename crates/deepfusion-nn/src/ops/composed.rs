@@ -1,5 +1,4 @@
-//! The operations composed of Burn's own: what the backends without kernels run, and what the
-//! kernels are tested against.
+//! The operations composed of Burn's own. Backends without kernels run them, and the kernels are tested against them.
 
 use super::{AdamFactors, BatchNormOutput, ConvOptions};
 use burn::tensor::{
@@ -98,8 +97,8 @@ pub fn gelu(x: Tensor<4>) -> Tensor<4> {
     burn::tensor::activation::gelu(x)
 }
 
-/// [`super::elu`], as relu(x) + e^(−relu(−x)) − 1: the exponential's argument is never positive, so
-/// that large activations cannot make an infinity whose gradient is NaN.
+/// [`super::elu`], as relu(x) + e^(−relu(−x)) − 1: the exponential's argument is never positive, so that large activations cannot become
+/// infinite with a NaN gradient.
 #[must_use]
 pub fn elu(x: Tensor<4>) -> Tensor<4> {
     let below = burn::tensor::activation::relu(x.clone().neg())
@@ -313,7 +312,7 @@ pub fn adam(
         .clone()
         .mul_scalar(1.0 - step.learning_rate * step.weight_decay);
     let moved = kept - direction.mul_scalar(step.learning_rate);
-    // Chosen, not multiplied: a gradient of NaN is none afterwards.
+    // Selected, not multiplied, so that a NaN gradient has no effect.
     let stays = is_made.lower_elem(0.5).expand(values.dims());
     let chosen = |new: Tensor<1>, old: Tensor<1>| new.mask_where(stays.clone(), old);
     (

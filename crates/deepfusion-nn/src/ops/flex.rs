@@ -1,4 +1,4 @@
-//! The operations on the CPU: Burn's Flex tensors handed to the kernels as slices.
+//! The operations on the CPU: Burn's Flex tensors are passed to the kernels as slices.
 
 mod backward;
 
@@ -13,7 +13,7 @@ use std::mem::MaybeUninit;
 
 type Float = FloatTensor<Flex>;
 
-/// A tensor's values in order, copied only where it is a view.
+/// A tensor's values in order, copied only if the tensor is a view.
 struct Values(Float);
 
 impl Values {
@@ -23,7 +23,7 @@ impl Values {
 
     #[expect(
         clippy::expect_used,
-        reason = "made contiguous, and of the type that the networks have"
+        reason = "made contiguous, and of the networks' type"
     )]
     fn slice(&self) -> &[f32] {
         self.0
@@ -45,20 +45,20 @@ fn zeros(sizes: &[usize]) -> Vec<f32> {
 /// fourteenth of a training step.
 ///
 /// # Safety
-/// `write` must write every value it is given room for.
+/// `write` must write every value of the memory that it is given.
 unsafe fn written<R>(
     len: usize,
     write: impl FnOnce(&mut [MaybeUninit<f32>]) -> R,
 ) -> (Vec<f32>, R) {
     let mut values = Vec::with_capacity(len);
     let result = write(&mut values.spare_capacity_mut()[..len]);
-    // SAFETY: the capacity is there, and so many values were written (the caller's promise).
+    // SAFETY: the capacity suffices, and `write` has written all values (the caller's promise).
     unsafe { values.set_len(len) };
     (values, result)
 }
 
-/// How many values a tensor of these sizes holds.
-#[expect(clippy::expect_used, reason = "the size of what is in memory")]
+/// The number of values of a tensor of these sizes.
+#[expect(clippy::expect_used, reason = "the size of a tensor in memory")]
 fn count(sizes: &[usize]) -> usize {
     let all = sizes.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
     all.expect("sizes of a tensor, which is in memory or as large as one that is")
@@ -109,7 +109,7 @@ fn warp_shape(image: &Float, coords: &Float) -> ([usize; 4], WarpShape) {
     )
 }
 
-/// Of N×C×H×W images.
+/// The shape of a correlation of N×C×H×W images.
 fn correlation_shape(sizes: [usize; 4], radius: usize) -> CorrelationShape {
     let [_, channels, height, width] = sizes;
     CorrelationShape {

@@ -1,8 +1,8 @@
 //! The operations on a GPU as kernels of their own, in CubeCL's language: a few launches each, forward and backward, where Burn's
-//! operations need dozens. What they compute is `composed`'s.
+//! operations need dozens. They compute the same as `composed`.
 //!
-//! A kernel runs along the pixels of a plane, and a grid's second axis counts the planes. What is summed over a plane, or over a channel of
-//! all images, is summed by one group of threads, in shared memory.
+//! A kernel runs along the pixels of a plane, and a grid's second axis counts the planes. One group of threads computes a sum over a plane,
+//! or over a channel of all images, in shared memory.
 
 #![allow(
     clippy::too_many_arguments,
@@ -42,18 +42,18 @@ fn dims<const D: usize>(tensor: &CubeTensor) -> [usize; D] {
     tensor.shape().dims()
 }
 
-/// A tensor as a kernel reads it: its values in order, copied where it is a view.
+/// A tensor as a kernel's input: its values in order, copied if the tensor is a view.
 fn input(tensor: CubeTensor) -> BufferArg {
     into_contiguous(tensor).into_buffer_arg()
 }
 
-/// Room for a result beside a tensor.
+/// Memory for a result, on the device of a tensor.
 fn room<const D: usize>(beside: &CubeTensor, shape: [usize; D]) -> CubeTensor {
     let (client, device) = (beside.client.clone(), beside.device.clone());
     empty_device_contiguous_dtype(client, device, Shape::from(shape), DType::F32)
 }
 
-/// Room for a result as a kernel writes it.
+/// A tensor as a kernel's output.
 fn output(tensor: &CubeTensor) -> BufferArg {
     tensor.clone().into_buffer_arg()
 }

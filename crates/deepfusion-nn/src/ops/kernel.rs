@@ -1,4 +1,4 @@
-//! The operations as Burn's dispatch sees them.
+//! The operations as traits for Burn's dispatch.
 
 use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
 use deepfusion_kernels::Precision;
@@ -12,7 +12,7 @@ pub struct ConvOptions {
     pub padding: usize,
     /// Step between kernel taps.
     pub dilation: usize,
-    /// Padding mirrors the image (without repeating its edge) instead of being zero.
+    /// Whether padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
     /// Precision of the products in the kernels; [`super::autocast`] overrides it.
     pub precision: Precision,
@@ -47,8 +47,8 @@ pub(super) trait KernelOps: Backend {
     /// See [`super::upsample_concat`].
     fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// See [`super::conv2d`]; `bias` is not read unless `has_bias`. The second result is what the gradient of the weights reads of `x`: `x`
-    /// itself, or that as the products take it.
+    /// See [`super::conv2d`]; `bias` is not read unless `has_bias`. The second result is the input that the gradient of the weights reads:
+    /// `x` itself, or `x` as the products need it.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
@@ -113,8 +113,8 @@ pub(super) trait KernelOps: Backend {
     ) -> FloatTensor<Self>;
 }
 
-/// The backward passes, on the backend below autodiff. Each gives the gradient of its inputs; where
-/// an input needs none, its work can be left out.
+/// The backward passes, on the backend below autodiff. Each returns the gradients of the inputs. A gradient that is not needed can be left
+/// out.
 pub(super) trait KernelBackward: Backend {
     /// Gradient of the input of [`KernelOps::kernel_depthwise`].
     fn depthwise_grad_x(
@@ -123,7 +123,7 @@ pub(super) trait KernelBackward: Backend {
         dilation: usize,
     ) -> FloatTensor<Self>;
 
-    /// Gradient of its weights, whose shape is given.
+    /// Gradient of the weights of [`KernelOps::kernel_depthwise`], whose shape is given.
     fn depthwise_grad_weight(
         x: FloatTensor<Self>,
         grad: FloatTensor<Self>,
@@ -137,8 +137,8 @@ pub(super) trait KernelBackward: Backend {
     /// Gradients of x and skip of [`KernelOps::kernel_upsample_concat`]; `channels` are those of x.
     fn upsample_concat_grad(grad: FloatTensor<Self>, channels: usize) -> [FloatTensor<Self>; 2];
 
-    /// Gradients of the input of [`KernelOps::kernel_conv2d`], of `size`, and of its weights, each where it is wanted. `kept` is the second
-    /// result.
+    /// Gradients of the input of [`KernelOps::kernel_conv2d`], which has the shape `size`, and of its weights, each if it is required.
+    /// `kept` is the second result of the forward pass.
     fn conv2d_grads(
         kept: FloatTensor<Self>,
         size: [usize; 4],
@@ -148,7 +148,7 @@ pub(super) trait KernelBackward: Backend {
         wanted: [bool; 2],
     ) -> [Option<FloatTensor<Self>>; 2];
 
-    /// Gradient of its bias.
+    /// Gradient of the bias of [`KernelOps::kernel_conv2d`].
     fn conv2d_grad_bias(grad: FloatTensor<Self>) -> FloatTensor<Self>;
 
     /// Gradients of x, γ and β of [`KernelOps::kernel_batch_norm`].
@@ -171,7 +171,7 @@ pub(super) trait KernelBackward: Backend {
         grad: FloatTensor<Self>,
     ) -> FloatTensor<Self>;
 
-    /// Gradient of its coordinates.
+    /// Gradient of the coordinates of [`KernelOps::kernel_warp`].
     fn warp_grad_coords(
         image: FloatTensor<Self>,
         coords: FloatTensor<Self>,
@@ -185,7 +185,7 @@ pub(super) trait KernelBackward: Backend {
         radius: usize,
     ) -> FloatTensor<Self>;
 
-    /// Gradient of its second image.
+    /// Gradient of the second image of [`KernelOps::kernel_local_correlation`].
     fn local_correlation_grad_second(
         first: FloatTensor<Self>,
         grad: FloatTensor<Self>,

@@ -1,12 +1,11 @@
 //! The project's own differentiable operations.
 //!
-//! In single precision they run on the kernels of `deepfusion-kernels` on the CPU (Burn's Flex backend), with
-//! backward passes of their own, and on kernels in CubeCL's language on a GPU (feature `gpu`); elsewhere they
-//! are composed of Burn's operations and mean the same. `kernel` declares them to Burn's dispatch, `flex` and
-//! `gpu` run them, `autodiff` derives them, and `composed` holds the other form. A few have kernels on a GPU alone, and are declared and
-//! derived beside them.
+//! In single precision they run on the kernels of `deepfusion-kernels` on the CPU (Burn's Flex backend), with backward passes of their own,
+//! and on kernels in CubeCL's language on a GPU (feature `gpu`); elsewhere they are composed of Burn's operations and compute the same.
+//! `kernel` declares them to Burn's dispatch, `flex` and `gpu` run them, `autodiff` differentiates them, and `composed` has the composed
+//! form. A few have kernels only on a GPU; they are declared and differentiated beside these kernels.
 
-/// Runs the forward pass and records the step: `$state` is built only where a gradient is needed.
+/// Runs the forward pass and records the step. `$state` is built only if a gradient is needed.
 macro_rules! record {
     ($op:expr, $C:ty, $nodes:expr, $output:expr, $state:expr) => {
         match $op.prepare::<$C>($nodes).compute_bound().stateful() {
@@ -45,7 +44,7 @@ pub use composed::{
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
-/// Whether it is the processor, on which the CPU's kernels run.
+/// Whether a device is the CPU, on which the CPU's kernels run.
 #[must_use]
 pub fn is_cpu(device: &Device) -> bool {
     matches!(
@@ -60,7 +59,7 @@ pub fn has_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
     is_cpu(&tensor.device()) && tensor.dtype() == DType::F32
 }
 
-/// Whether it is a GPU with kernels.
+/// Whether a device is a GPU with kernels.
 pub(crate) fn is_gpu(device: &Device) -> bool {
     #[cfg(feature = "gpu")]
     return matches!(
@@ -98,7 +97,7 @@ fn runs_kernels<const D: usize>(tensor: &Tensor<D>) -> bool {
 /// - output: `[N, O, H', W']`, H' = ⌊(H + 2·padding − dilation·(kh − 1) − 1) / stride⌋ + 1
 ///
 /// # Panics
-/// When the shapes do not fit each other, as Burn's own operations do, or an image is too small to be mirrored as far as the padding goes.
+/// When the shapes do not fit each other, as with Burn's own operations, or when an image is too small for its mirrored padding.
 #[must_use]
 pub fn conv2d(
     x: Tensor<4>,
@@ -113,7 +112,7 @@ pub fn conv2d(
     let [out, expected, _, _] = weight.dims();
     assert_eq!(channels, expected, "the input's channels are the weight's");
     let has_bias = bias.is_some();
-    // The kernel does not read the bias where there is none.
+    // Without a bias any tensor: the kernel does not read it.
     let bias = bias.unwrap_or_else(|| Tensor::empty([out], &x.device().inner()));
     let (output, _) = <Dispatch as KernelOps>::kernel_conv2d(
         x.into_dispatch(),
@@ -167,8 +166,8 @@ pub fn batch_norm(
     }
 }
 
-/// Running statistics after a batch, (1 − m)·running + m·batch: mean and variance, without gradient. The batch's variance counts
-/// `unbiased` times, as [`BatchNormOutput::variance`] lacks Bessel's correction.
+/// Running statistics after a batch, (1 − m)·running + m·batch: mean and variance, without gradient. The batch's variance is multiplied by
+/// `unbiased`, since [`BatchNormOutput::variance`] lacks Bessel's correction.
 ///
 /// # Shapes
 /// - all: `[C]`
@@ -202,7 +201,7 @@ pub fn running_statistics(
 /// - `weight`: `[C, 1, k, k]`, k odd
 ///
 /// # Panics
-/// When the shapes do not fit each other, as Burn's own operations do.
+/// When the shapes do not fit each other, as with Burn's own operations.
 #[must_use]
 pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> {
     if !runs_kernels(&x) {
@@ -215,7 +214,7 @@ pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> 
     ))
 }
 
-/// GELU, x·Φ(x), Φ the normal distribution.
+/// GELU, x·Φ(x), Φ the normal distribution function.
 #[must_use]
 pub fn gelu(x: Tensor<4>) -> Tensor<4> {
     if !runs_kernels(&x) {
@@ -224,7 +223,7 @@ pub fn gelu(x: Tensor<4>) -> Tensor<4> {
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_gelu(x.into_dispatch()))
 }
 
-/// ELU, x for x > 0 and eˣ − 1 below.
+/// ELU: x for x > 0, else eˣ − 1.
 #[must_use]
 pub fn elu(x: Tensor<4>) -> Tensor<4> {
     if !runs_kernels(&x) {
@@ -265,7 +264,7 @@ pub fn sigmoid(x: Tensor<4>) -> Tensor<4> {
     composed::sigmoid(x)
 }
 
-/// ResNet's 3×3 maximum at stride 2, padded by one. Of equal values the first, row by row, has the gradient.
+/// ResNet's 3×3 maximum at stride 2, padded by one. Of equal values the first one, row by row, gets the gradient.
 ///
 /// # Shapes
 /// - `x`: `[N, C, H, W]`
@@ -302,7 +301,7 @@ pub(crate) fn enlarged_on_gpu(x: &Tensor<4>, size: [usize; 2]) -> Option<Tensor<
     None
 }
 
-/// Every pixel repeated twice in both directions, then the skip feature behind it.
+/// Every pixel is repeated twice in both directions, and the skip feature appended.
 ///
 /// # Shapes
 /// - `x`: `[N, C, H, W]`
@@ -327,7 +326,7 @@ pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
     ))
 }
 
-/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border counts.
+/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border is read.
 ///
 /// # Shapes
 /// - `image`: `[N, C, H, W]`
@@ -341,7 +340,7 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
     assert_eq!(
         coords.dims()[..2],
         [image.dims()[0], 2],
-        "two coordinates a pixel"
+        "two coordinates for each pixel"
     );
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
         image.into_dispatch(),
@@ -365,9 +364,9 @@ pub fn flow_coords(flow: Tensor<4>) -> Tensor<4> {
     flow.add(Tensor::from_data(grid, &device))
 }
 
-/// Local correlation: the similarity of each pixel's feature to those around the same pixel of another image, out(d,
-/// p) = (1/C) Σ_c first(c, p)·second(c, p + d) for every displacement d of at most `radius` pixels along each axis;
-/// outside of its image `second` is zero. Displacement d is channel (d_y + radius)·(2·radius + 1) + (d_x + radius).
+/// Local correlation: the similarity of each pixel's feature to those around the same pixel of another image. out(d, p) = (1/C) Σ_c
+/// first(c, p)·second(c, p + d) for every displacement d of at most `radius` pixels along each axis. Outside its image `second` is zero.
+/// Displacement d is channel (d_y + radius)·(2·radius + 1) + (d_x + radius).
 ///
 /// # Shapes
 /// - `first`, `second`: `[N, C, H, W]`
@@ -389,8 +388,8 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
     ))
 }
 
-/// The pixel coordinates of one view's points in another view (the paper's Eq. 3–5): p' ~ H·p̃ + d·s, d
-/// the disparity. Points behind the other camera are sent far outside of its image.
+/// The pixel coordinates of one view's points in another view (the paper's Eq. 3–5): p' ~ H·p̃ + d·s, d the disparity. Points behind the
+/// other camera get coordinates far outside its image.
 ///
 /// # Shapes
 /// - `disparity`: `[N, 1, H, W]`, 1/m
@@ -462,8 +461,9 @@ pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
     ))
 }
 
-/// Adam's step of one parameter, as [`deepfusion_kernels::adam`], where the parameter is: its values and both moments after it. What
-/// `factors` hold of the step is theirs, and not `step`'s; of a step that is not made all three stay, whatever the gradient is.
+/// Adam's step of one parameter, as [`deepfusion_kernels::adam`], on the parameter's device. Returns its values and both moments after the
+/// step. `factors` take precedence over the same numbers in `step`. If the step is not made, all three stay the same, whatever the gradient
+/// is.
 ///
 /// # Shapes
 /// - all: `[count]`, without autodiff
@@ -491,7 +491,7 @@ pub fn adam(
     composed::adam(step, factors, values, gradient, [first, second])
 }
 
-/// The sum of the squares of all values of flat tensors on one device, without autodiff: one value, where they are.
+/// The sum of the squares of all values of flat tensors on one device, without autodiff: one value on that device.
 ///
 /// # Panics
 /// Without any tensor.

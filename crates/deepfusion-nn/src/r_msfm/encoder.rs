@@ -24,7 +24,7 @@ pub struct HalfResNet {
 }
 
 impl HalfResNet {
-    /// A new encoder with weights drawn as torchvision draws them.
+    /// A new encoder with torchvision's initialisation.
     pub(super) fn new(
         normalisation: InputNormalisation,
         rng: &mut WeightRng,

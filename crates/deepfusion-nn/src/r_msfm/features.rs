@@ -22,7 +22,7 @@ pub(super) fn reflected(
     config.init(rng, device)
 }
 
-/// How R-MSFM6 takes a feature up again: tanh(3×1(tanh(1×3(x)))).
+/// Computes the input of R-MSFM6's repeated refinements from the state: tanh(3×1(tanh(1×3(x)))).
 #[derive(Module, Debug)]
 pub struct Context {
     /// 1×3.
@@ -47,18 +47,18 @@ impl Context {
     }
 }
 
-/// The encoder's features at one size and with the state's channels.
+/// Brings the encoder's features to one size and the state's number of channels.
 #[derive(Module, Debug)]
 pub struct Features {
-    /// Of the coarsest: 3×3.
+    /// For the coarsest feature: 3×3.
     pub coarse: Conv2d,
-    /// Of the middle one: 3×3 at stride 2.
+    /// For the middle feature: 3×3 at stride 2.
     pub middle: Conv2d,
-    /// Of the finest: 3×3 at stride 2, to 96 channels.
+    /// For the finest feature: 3×3 at stride 2, to 96 channels.
     pub fine_reduce: Conv2d,
-    /// After it: 3×3 at stride 2.
+    /// After `fine_reduce`: 3×3 at stride 2.
     pub fine: Conv2d,
-    /// How R-MSFM6 takes each feature up again, from the coarsest to the finest; empty in R-MSFM3.
+    /// The repeated inputs of R-MSFM6, one for each feature from the coarsest to the finest; empty in R-MSFM3.
     pub context: Vec<Context>,
 }
 
@@ -76,12 +76,12 @@ impl Features {
         }
     }
 
-    /// What the state begins as.
+    /// The initial state.
     pub(super) fn first(&self, features: &[Tensor<4>; 3]) -> Tensor<4> {
         self.coarse.forward(features[2].clone()).tanh()
     }
 
-    /// What a refinement takes up.
+    /// The input of a refinement.
     pub(super) fn next(
         &self,
         taken_up: RefinementInput,

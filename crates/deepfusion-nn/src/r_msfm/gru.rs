@@ -9,11 +9,11 @@ use crate::ops::sigmoid;
 /// A gated recurrent unit of 1×3 or 3×1 convolutions.
 #[derive(Module, Debug)]
 pub struct GatedUnit {
-    /// z: how much of the candidate is taken.
+    /// z: the weight of the candidate.
     pub update: Strip,
-    /// r: how much of the state the candidate sees.
+    /// r: the weight of the state in the candidate.
     pub reset: Strip,
-    /// q.
+    /// q: the candidate.
     pub candidate: Strip,
 }
 
@@ -40,7 +40,7 @@ impl GatedUnit {
     }
 }
 
-/// Two gated units, along the rows and then along the columns.
+/// Two gated units, first along the rows, then along the columns.
 #[derive(Module, Debug)]
 pub struct SeparableGru {
     /// 1×3.

@@ -1,5 +1,5 @@
-//! R-MSFM (Zhou et al., "R-MSFM: Recurrent Multi-Scale Feature Modulation for Monocular Depth Estimating", ICCV 2021): features of half a
-//! ResNet-18, taken up from coarse to fine by a gated unit whose state refines one disparity at an eighth of the image's size.
+//! R-MSFM (Zhou et al., "R-MSFM: Recurrent Multi-Scale Feature Modulation for Monocular Depth Estimating", ICCV 2021): a gated unit reads
+//! the features of half a ResNet-18 from coarse to fine, and its state refines one disparity at an eighth of the image's size.
 
 mod encoder;
 mod features;
@@ -23,11 +23,11 @@ use crate::{Error, InputNormalisation, RMsfmConfig};
 /// Encoder, gated unit and refinement.
 #[derive(Module, Debug)]
 pub struct RMsfm {
-    /// Three features of an image.
+    /// The encoder, with three features.
     pub encoder: HalfResNet,
-    /// What they become, at an eighth of the image's size.
+    /// Brings them to an eighth of the image's size.
     pub features: Features,
-    /// Takes a feature up into the state.
+    /// Updates the state with a feature.
     pub gru: SeparableGru,
     /// Refines the disparity.
     pub update: Update,
@@ -40,7 +40,7 @@ pub struct RMsfm {
 }
 
 impl RMsfm {
-    /// A new network. `start` is the logit of the disparity that is refined first, everywhere.
+    /// A new network. `start` is the logit of the initial disparity, the same at every pixel.
     ///
     /// # Errors
     /// As [`RMsfmConfig::validate`].
@@ -72,7 +72,7 @@ impl RMsfm {
         self.disparities(self.encoder.forward(images))
     }
 
-    /// The same, from the encoder's features.
+    /// As [`Self::forward`], from the encoder's features.
     ///
     /// # Shapes
     /// - `features`: those of [`HalfResNet::forward`]

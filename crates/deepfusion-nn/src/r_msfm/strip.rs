@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use crate::init::WeightRng;
 use crate::ops::{self, ConvOptions, Precision};
 
-/// A convolution of 1×3 or 3×1 that keeps the size, over a border of zeros.
+/// A convolution of 1×3 or 3×1 that keeps the size, with zero padding.
 #[derive(Module, Debug)]
 pub struct Strip {
     /// `[out, in, 1, 3]` or `[out, in, 3, 1]`.
@@ -14,7 +14,7 @@ pub struct Strip {
 }
 
 impl Strip {
-    /// A new one, along the rows or (`down`) along the columns, with PyTorch's default weights.
+    /// A new layer along the rows or (`down`) along the columns, with PyTorch's default weights.
     pub(super) fn new(
         [channels_in, channels_out]: [usize; 2],
         down: bool,
@@ -47,7 +47,7 @@ impl Strip {
     }
 }
 
-/// The same kernel as a part of 3×3, zeros beside it: convolutions here have square kernels.
+/// The kernel as part of a 3×3 kernel with zeros beside it, since convolutions here have square kernels.
 fn square(weight: Tensor<4>) -> Tensor<4> {
     let axis = if weight.dims()[2] == 1 { 2 } else { 3 };
     let beside = weight.zeros_like().narrow(axis, 0, 1).detach();

@@ -9,7 +9,7 @@ use crate::R_MSFM_STATE;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
 
-/// Pixels of the image along a side of one of the disparity's.
+/// Pixels of the image along the side of a disparity pixel.
 const SIDE: usize = 8;
 
 /// One refinement. All convolutions are reflection-padded.
@@ -17,15 +17,15 @@ const SIDE: usize = 8;
 pub struct Update {
     /// 3×3 of the state, to 160 channels.
     pub state_1: Conv2d,
-    /// After it, to 128.
+    /// 3×3 after `state_1`, to 128.
     pub state_2: Conv2d,
     /// 7×7 of the disparity's logit, to 64.
     pub disparity_1: Conv2d,
-    /// 3×3 after it, to 32.
+    /// 3×3 after `disparity_1`, to 32.
     pub disparity_2: Conv2d,
-    /// 3×3 of both, to 191; the logit is appended.
+    /// 3×3 of state and disparity together, to 191; the logit is appended.
     pub join: Conv2d,
-    /// 3×3 of that, to 256.
+    /// 3×3 after `join`, to 256.
     pub change_1: Conv2d,
     /// 3×3 to the logit's change.
     pub change_2: Conv2d,
@@ -45,7 +45,7 @@ impl Update {
         }
     }
 
-    /// The refined logit, and what it was refined by.
+    /// The refined logit, and the feature that its change was computed from.
     ///
     /// # Shapes
     /// - `state`: `[batch, 128, height, width]`
@@ -62,12 +62,12 @@ impl Update {
     }
 }
 
-/// RAFT's convex enlargement: each pixel of the image is a weighted mean of the 3×3 pixels around its place.
+/// RAFT's convex upsampling: each pixel of the image is a weighted mean of the 3×3 pixels around its place.
 #[derive(Module, Debug)]
 pub struct ConvexWeights {
     /// 3×3, to 324 channels, reflection-padded.
     pub reduce: Conv2d,
-    /// 1×1, to nine logarithms for each of 64 pixels.
+    /// 1×1, to the logarithms of nine weights for each of 64 pixels.
     pub expand: Conv2d,
 }
 
@@ -86,7 +86,7 @@ impl ConvexWeights {
     pub fn enlarged(&self, small: Tensor<4>, seen: Tensor<4>) -> Tensor<4> {
         let [batch, _, height, width] = small.dims();
         let reduced = leaky_relu(self.reduce.forward(seen), SLOPE);
-        // A quarter, which balances the gradients.
+        // The factor of a quarter balances the gradients.
         let logits = self.expand.forward(reduced).mul_scalar(0.25);
         let shares = softmax(logits.reshape([batch, 9, SIDE * SIDE, height, width]), 1);
         let around = neighbours(small).unsqueeze_dim::<5>(2);
@@ -99,7 +99,7 @@ impl ConvexWeights {
     }
 }
 
-/// The 3×3 pixels around each, row by row; zeros beyond the edge.
+/// The 3×3 pixels around each pixel, row by row; zeros beyond the edge.
 ///
 /// # Shapes
 /// - `x`: `[batch, 1, height, width]`

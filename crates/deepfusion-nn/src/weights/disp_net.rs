@@ -1,5 +1,5 @@
-//! The files that people have of SfMLearner's DispNet, `dispnet_model_best.pth.tar`. Only their layout is used here: the names of the
-//! tensors and what they mean.
+//! The usual files of SfMLearner's DispNet, `dispnet_model_best.pth.tar`. Only their layout is used here: the names of the tensors and
+//! their meaning.
 
 use std::path::Path;
 
@@ -11,13 +11,13 @@ use super::{Imported, Weights, apply, read};
 use crate::{ArchitectureProblem, DepthNet, DepthNetConfig, Error};
 use deepfusion_model::{DISP_NET_DISPARITY, DISP_NET_LEVELS};
 
-/// Whether tensors have the names of DispNet's file.
+/// Whether the tensors have the names of DispNet's file.
 #[must_use]
 pub fn is_disp_net(weights: &Weights) -> bool {
     weights.tensors.contains_key("predict_disp1.0.weight")
 }
 
-/// Reads `dispnet_model_best.pth.tar`. Its disparity, 10·σ + 0.01 in units of its own, becomes a range of depths.
+/// Reads `dispnet_model_best.pth.tar`. Its disparity, 10·σ + 0.01 in its own unit, is converted to a depth range.
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for other files.

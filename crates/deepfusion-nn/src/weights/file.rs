@@ -9,13 +9,12 @@ use deepfusion_model::weights::{FileKind, FormatProblem, floats, read_safetensor
 use super::{WeightTensor, Weights};
 use crate::Error;
 
-/// How the names of the tensors begin that lie beside an epoch or an optimiser's state.
+/// Prefix of the weights' names in a file that also has an epoch or an optimiser's state.
 const NESTED: &str = "state_dict.";
 
-/// Reads every float tensor of a `.safetensors`, `.pth` or `.pt` file; the format is recognised by
-/// content, not by name. f64, f16 and bf16 become f32; integers (PyTorch's `num_batches_tracked`)
-/// and entries that are not tensors are skipped. Of a `.pth` that holds a `state_dict` beside other things, as training programs save
-/// it, these are the `state_dict`'s.
+/// Reads every float tensor of a `.safetensors`, `.pth` or `.pt` file; the format is recognised by content, not by name. f64, f16 and bf16
+/// become f32; integers (PyTorch's `num_batches_tracked`) and entries that are not tensors are skipped. If a `.pth` has a `state_dict`
+/// beside other entries, as training programs save it, only the `state_dict` is read.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it holds no weights.
@@ -36,7 +35,7 @@ fn read_pytorch(path: &Path) -> Result<Weights, Error> {
     let mut weights = Weights::new(path.display().to_string());
     for (name, tensor) in reader.into_tensors() {
         let read = || tensor.read().map_err(|e| unreadable(e.into()));
-        // The reader hands out the machine's own byte order.
+        // The reader returns the machine's own byte order.
         let values = match tensor.dtype() {
             TorchDType::F32 => floats(&read()?, f32::from_ne_bytes),
             TorchDType::F64 => floats(&read()?, |b| f64::from_ne_bytes(b) as f32),

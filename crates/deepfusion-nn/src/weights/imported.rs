@@ -1,4 +1,4 @@
-//! Networks of other programs, in whichever of the known layouts their files are.
+//! Networks of other programs, in any of the known file layouts.
 
 use burn::tensor::Device;
 
@@ -11,20 +11,20 @@ use super::r_msfm::{is_r_msfm, load_r_msfm};
 use super::read;
 use crate::{DepthNet, DepthNetConfig, Error, InputSize};
 
-/// Networks as files held them.
+/// Networks that were read from files.
 #[derive(Debug)]
 pub struct Imported {
-    /// What the depth network is.
+    /// The depth network's configuration.
     pub depth_config: DepthNetConfig,
     /// The depth network.
     pub depth_net: DepthNet,
-    /// The pose network and what it is, where the files have one.
+    /// The pose network and its configuration, if the files have one.
     pub pose: Option<Pose>,
-    /// The image size it was trained at, where `encoder.pth` says so.
+    /// The image size of the training, if `encoder.pth` contains it.
     pub input_size: Option<InputSize>,
 }
 
-/// Reads a file that holds a whole depth network, DispNet's; `None` for other files.
+/// Reads a file with a whole depth network, which is DispNet's; `None` for other files.
 ///
 /// # Errors
 /// As [`load_disp_net`].
@@ -36,7 +36,7 @@ pub fn load_whole(file: &Path, device: &Device) -> Result<Option<Imported>, Erro
     }
 }
 
-/// Reads Lite-Mono's, R-MSFM's or Monodepth2's files; which they are, the names of their tensors say.
+/// Reads Lite-Mono's, R-MSFM's or Monodepth2's files, recognised by the names of their tensors.
 ///
 /// # Errors
 /// As [`load_lite_mono`], [`load_r_msfm`] and [`load_monodepth2`].

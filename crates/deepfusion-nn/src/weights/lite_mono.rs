@@ -1,5 +1,4 @@
-//! Lite-Mono's published files. Only their layout is used here: the names of the tensors, what they mean, and the size stored
-//! beside them.
+//! Lite-Mono's published files. Only their layout is used here: the names of the tensors, their meaning, and the size stored beside them.
 
 use std::cmp::Ordering;
 
@@ -9,17 +8,17 @@ use super::monodepth2::{input_size, load_pose, rename};
 use super::{Imported, Monodepth2Files, Weights, apply, read};
 use crate::{ArchitectureProblem, DepthNet, DepthNetConfig, Error, LiteMonoConfig, LiteMonoSize};
 
-/// Whether tensors have the names of Lite-Mono's `encoder.pth`.
+/// Whether the tensors have the names of Lite-Mono's `encoder.pth`.
 pub(super) fn is_lite_mono(encoder: &Weights) -> bool {
     encoder.tensors.contains_key("stem2.0.conv.weight")
 }
 
-/// Reads Lite-Mono's `encoder.pth` and `depth.pth`, and Monodepth2's `pose_encoder.pth` and `pose.pth` where they are there too.
-/// Which network it is says the number of its blocks and their widths. Dilations leave no trace in the weights: they are those
-/// published for the size that `encoder.pth` names, 640×192 where it names none.
+/// Reads Lite-Mono's `encoder.pth` and `depth.pth`, and Monodepth2's `pose_encoder.pth` and `pose.pth` if they exist. The network is
+/// recognised by the number of its blocks and their widths. Weights do not reveal dilations: those published for the size in `encoder.pth`
+/// are used, or for 640×192 if it has no size.
 ///
 /// # Errors
-/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] if the encoder is none of the published ones.
+/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] if the encoder is not one of the published ones.
 pub fn load_lite_mono(files: &Monodepth2Files, device: &Device) -> Result<Imported, Error> {
     let encoder = tensors_alone(read(&files.encoder)?);
     let size = detect(&encoder)?;
@@ -53,8 +52,8 @@ pub fn load_lite_mono(files: &Monodepth2Files, device: &Device) -> Result<Import
     })
 }
 
-/// Without what a profiler (thop) counted and left in the published files, and without the layer norms of the dilated blocks, which
-/// no computation reads.
+/// Removes a profiler's (thop) counters, which are in the published files, and the layer norms of the dilated blocks, which no computation
+/// reads.
 fn tensors_alone(weights: Weights) -> Weights {
     let of_dilated = |name: &str| {
         let block = name.rsplit_once(".norm.").map(|(block, _)| block);
@@ -76,7 +75,7 @@ fn tensors_alone(weights: Weights) -> Weights {
     weights.renamed(|name| read.iter().any(|n| n == name).then(|| name.to_owned()))
 }
 
-/// Which of the published networks these are the weights of.
+/// The published network that has these weights.
 fn detect(encoder: &Weights) -> Result<LiteMonoSize, Error> {
     let unknown = |reason| Error::UnknownArchitecture {
         origin: encoder.origin.clone(),
@@ -115,7 +114,7 @@ fn detect(encoder: &Weights) -> Result<LiteMonoSize, Error> {
         .ok_or_else(|| unknown(ArchitectureProblem::LiteMono { widths, blocks }))
 }
 
-/// Linear layers as the 1×1 convolutions that they are here, a factor a head as a vector.
+/// Reshapes linear layers to 1×1 convolutions, and the heads' factors to a vector.
 fn as_convolutions(mut weights: Weights) -> Weights {
     for (name, tensor) in &mut weights.tensors {
         if name.ends_with(".temperature") {
@@ -127,7 +126,7 @@ fn as_convolutions(mut weights: Weights) -> Weights {
     weights
 }
 
-/// Our name for a tensor of `encoder.pth`, whose stages have so many dilated blocks.
+/// Our name for a tensor of `encoder.pth`, whose stages have these numbers of dilated blocks.
 fn encoder_name(name: &str, blocks: [usize; 3]) -> Option<String> {
     if name == "stem2.0.conv.weight" {
         return Some("reduce.0.weight".into());
@@ -156,13 +155,13 @@ fn encoder_name(name: &str, blocks: [usize; 3]) -> Option<String> {
     })?;
     match count.cmp(&block) {
         Ordering::Greater => Some(format!("stages.{stage}.dilated.{block}.{part}")),
-        // The attending block is the last of its stage.
+        // The block with attention is the last of its stage.
         Ordering::Equal => Some(format!("stages.{stage}.global.{part}")),
         Ordering::Less => None,
     }
 }
 
-/// How names within a block begin, theirs and ours.
+/// Prefixes of names within a block: theirs and ours.
 const PARTS: [(&str, &str); 12] = [
     ("ddwconv.conv.", "depthwise."),
     ("bn1.", "bn."),
@@ -178,8 +177,8 @@ const PARTS: [(&str, &str); 12] = [
     ("norm.", "norm."),
 ];
 
-/// Our name for a tensor of `depth.pth`. Its module list holds, in the order they are built, two blocks per stage, coarse to fine
-/// (0…5), then the heads of scales 0…2 (6…8).
+/// Our name for a tensor of `depth.pth`. Its module list has, in the order of construction, two blocks per stage, coarse to fine (0…5),
+/// then the heads of scales 0…2 (6…8).
 fn decoder_name(name: &str) -> Option<String> {
     let (index, rest) = name.strip_prefix("decoder.")?.split_once('.')?;
     let index: usize = index.parse().ok()?;

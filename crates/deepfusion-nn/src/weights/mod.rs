@@ -1,8 +1,8 @@
 //! Weights: collected from a network, applied to a network, and imported from other programs' files.
 //!
-//! A tensor's name is its path in the module, `encoder.layer1.0.conv1.weight`; the encoders' paths are torchvision's names.
-//! PyTorch's `.pth` files can be read. An import renames the tensors of a foreign file to ours and then requires an exact
-//! fit: nothing missing, nothing left over, every shape equal.
+//! A tensor's name is its path in the module, `encoder.layer1.0.conv1.weight`; the encoders' paths are torchvision's names. PyTorch's
+//! `.pth` files can be read. An import renames the tensors of another program's file to our names and then requires an exact fit: nothing
+//! missing, nothing left over, every shape equal.
 
 mod disp_net;
 mod file;

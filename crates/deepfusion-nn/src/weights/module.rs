@@ -6,7 +6,7 @@ use burn::tensor::{Tensor, TensorData};
 use super::{WeightTensor, Weights};
 use crate::Error;
 
-/// Every float tensor of the module by its path, the batch norms' running statistics included.
+/// All float tensors of the module by their paths, with the running statistics of batch norms.
 pub fn collect<M: Module>(module: &M) -> Weights {
     struct Collect {
         path: Vec<String>,
@@ -36,14 +36,13 @@ pub fn collect<M: Module>(module: &M) -> Weights {
     collect.weights
 }
 
-/// The module with the given weights, which must be exactly its own: same names, same shapes, finite.
+/// The module with the given weights, which must have exactly the module's names and shapes, and be finite.
 ///
-/// The running statistics of a module are shared with its clones (Burn keeps them behind a lock), so
-/// clones made before see the new ones too.
+/// A module shares its running statistics with its clones (Burn keeps them behind a lock), so earlier clones get the new ones, too.
 ///
 /// # Errors
-/// [`Error::MissingTensor`], [`Error::UnexpectedTensor`], [`Error::TensorShape`] naming the first such
-/// tensor, [`Error::NotFinite`]; the module is unchanged then (and dropped).
+/// [`Error::MissingTensor`], [`Error::UnexpectedTensor`], [`Error::TensorShape`] naming the first such tensor, [`Error::NotFinite`]. The
+/// module is then dropped unchanged.
 pub fn apply<M: Module>(module: M, weights: &Weights) -> Result<M, Error> {
     check(&shapes(&module), weights)?;
     Ok(module.map(&mut Apply {
@@ -52,8 +51,8 @@ pub fn apply<M: Module>(module: M, weights: &Weights) -> Result<M, Error> {
     }))
 }
 
-/// As [`apply`], but for tensors whose names begin with `part`: where the weights lack them the module keeps its own, and where the
-/// module lacks them theirs are passed over. Returns whether the module kept its own, which are new.
+/// As [`apply`], except for tensors whose names begin with `part`. If the weights lack them, the module keeps its own; if the module lacks
+/// them, the weights' are ignored. Returns whether the module kept its own, which are new.
 ///
 /// # Errors
 /// As [`apply`].
@@ -175,7 +174,7 @@ impl ModuleMapper for Apply<'_> {
     }
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let Some(tensor) = self.weights.tensors.get(&self.path.join(".")) else {
-            return param; // `check` has seen every name.
+            return param; // `check` requires every name.
         };
         param.map(|old| {
             let data = TensorData::new(tensor.values.clone(), tensor.shape.clone());

@@ -1,5 +1,5 @@
-//! Monodepth2's published files. Only their layout is used here: the names of the tensors, what they
-//! mean, and the two numbers stored beside them.
+//! Monodepth2's published files. Only their layout is used here: the names of the tensors, their meaning, and the two numbers stored beside
+//! them.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::torchvision::apply_torchvision;
 use super::{Imported, Weights, apply, detect_resnet, read};
 use crate::{DepthNet, DepthNetConfig, Error, InputSize, PoseNet, PoseNetConfig};
 
-/// Where the four files are.
+/// Paths of the four files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Monodepth2Files {
     /// `encoder.pth`.
@@ -22,7 +22,7 @@ pub struct Monodepth2Files {
 }
 
 impl Monodepth2Files {
-    /// The files under their published names in `folder`, `.safetensors` where there is no `.pth`.
+    /// The files with their published names in `folder`, as `.safetensors` if there is no `.pth`.
     #[must_use]
     pub fn in_folder(folder: &Path) -> Self {
         let file = |stem: &str| {
@@ -42,11 +42,11 @@ impl Monodepth2Files {
     }
 }
 
-/// A pose network and what it is.
+/// A pose network and its configuration.
 pub type Pose = (PoseNetConfig, PoseNet);
 
-/// Reads Monodepth2's `encoder.pth`, `depth.pth`, `pose_encoder.pth` and `pose.pth`. The ResNets are
-/// recognised by their blocks; the configs are the `monodepth2` preset.
+/// Reads Monodepth2's `encoder.pth`, `depth.pth`, `pose_encoder.pth` and `pose.pth`. The ResNets are recognised by their blocks; the
+/// configurations are those of the preset `monodepth2`.
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] if the encoder is not a ResNet.
@@ -81,7 +81,7 @@ pub(super) fn load_pose(encoder: &Path, decoder: &Path, device: &Device) -> Resu
     let encoder = read_encoder(encoder)?;
     let decoder = rename(read(decoder)?, pose_decoder_name)?;
     let mut config = PoseNetConfig::monodepth2(detect_resnet(&encoder)?);
-    // Both are read off the files: variants differ in the frames they see and the poses they give.
+    // Both are determined from the files: variants differ in the number of input frames and of output poses.
     if let Some(conv1) = encoder.tensors.get("conv1.weight")
         && conv1.shape.len() == 4
     {
@@ -96,7 +96,7 @@ pub(super) fn load_pose(encoder: &Path, decoder: &Path, device: &Device) -> Resu
     Ok((config, net))
 }
 
-/// Its encoders wrap torchvision's ResNet as `encoder`.
+/// Reads an encoder's file, in which torchvision's ResNet is called `encoder`.
 fn read_encoder(path: &Path) -> Result<Weights, Error> {
     Ok(read(path)?.under("encoder."))
 }
@@ -122,8 +122,8 @@ pub(super) fn rename(
     Ok(weights.renamed(name_of))
 }
 
-/// Our name for a tensor of `depth.pth`. Its module list holds, in the order they are built, two
-/// blocks per stage, coarse to fine (0…9), then the heads of scales 0…3 (10…13).
+/// Our name for a tensor of `depth.pth`. Its module list has, in the order of construction, two blocks per stage, coarse to fine (0…9),
+/// then the heads of scales 0…3 (10…13).
 fn depth_decoder_name(name: &str) -> Option<String> {
     let (index, rest) = name.strip_prefix("decoder.")?.split_once('.')?;
     let index: usize = index.parse().ok()?;

@@ -1,5 +1,4 @@
-//! R-MSFM's published files. Only their layout is used here: the names of the tensors, what they mean, and the size stored beside
-//! them.
+//! R-MSFM's published files. Only their layout is used here: the names of the tensors, their meaning, and the size stored beside them.
 
 use burn::tensor::Device;
 
@@ -8,12 +7,12 @@ use super::torchvision::apply_half;
 use super::{Imported, Monodepth2Files, Weights, apply, read};
 use crate::{ArchitectureProblem, DepthNet, DepthNetConfig, Error};
 
-/// Whether tensors have the names of R-MSFM's `depth.pth`.
+/// Whether the tensors have the names of R-MSFM's `depth.pth`.
 pub(super) fn is_r_msfm(depth: &Weights) -> bool {
     depth.tensors.contains_key("convX11.1.weight")
 }
 
-/// Reads R-MSFM's `encoder.pth` and `depth.pth`, and Monodepth2's `pose_encoder.pth` and `pose.pth` where they are there too.
+/// Reads R-MSFM's `encoder.pth` and `depth.pth`, and Monodepth2's `pose_encoder.pth` and `pose.pth` if they exist.
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for other files, and for R-MSFMX, whose encoder is a ResNet-50.
@@ -21,7 +20,7 @@ pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<Imported,
     let decoder = read(&files.depth)?;
     let iterations = detect(&decoder)?;
     let depth_config = DepthNetConfig {
-        // The published networks refine from the middle of the range of disparities.
+        // The published networks start their refinement in the middle of the disparity range.
         initial_depth_m: None,
         ..DepthNetConfig::r_msfm(iterations)
     };
@@ -30,7 +29,7 @@ pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<Imported,
         let encoder = read(&files.encoder)?.under("encoder.");
         net.encoder = apply_half(net.encoder.clone(), encoder)?;
         let decoder = rename(decoder, decoder_name)?;
-        // The encoder is a part of the same network.
+        // The encoder is part of the same network.
         let own = super::collect(&net.encoder).with_prefix("encoder.");
         *net = apply(net.clone(), &decoder.merged(own))?;
     }
@@ -46,7 +45,7 @@ pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<Imported,
     })
 }
 
-/// How often the network of these weights refines.
+/// Number of refinements of the network with these weights.
 fn detect(decoder: &Weights) -> Result<usize, Error> {
     let unknown = |reason| Error::UnknownArchitecture {
         origin: decoder.origin.clone(),
@@ -71,7 +70,7 @@ fn detect(decoder: &Weights) -> Result<usize, Error> {
     })
 }
 
-/// How names begin, theirs and ours.
+/// Prefixes of names: theirs and ours.
 const PARTS: [(&str, &str); 25] = [
     ("convX31.1.", "features.coarse."),
     ("convX21.1.", "features.middle."),

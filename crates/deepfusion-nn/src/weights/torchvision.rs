@@ -6,10 +6,9 @@ use super::{Weights, apply, read};
 use crate::r_msfm::HalfResNet;
 use crate::{ArchitectureProblem, Error, ResNet, ResNetDepth};
 
-/// Reads ImageNet weights, as torchvision publishes them (`resnet18-f37072fd.pth` and its like, or
-/// the same tensors as `.safetensors`), into an encoder. The classifier (`fc`) is left out; for an
-/// encoder of several frames the first convolution is repeated per frame and divided by their number,
-/// so that equal frames give the activations of the single image.
+/// Reads ImageNet weights as published by torchvision (such as `resnet18-f37072fd.pth`, or the same tensors as `.safetensors`) into an
+/// encoder. The classifier (`fc`) is left out. For an encoder of several frames the first convolution is repeated for each frame and
+/// divided by their number, so that equal frames give the same activations as a single image.
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for weights that are not a ResNet's.
@@ -19,7 +18,7 @@ pub fn load_torchvision_resnet(encoder: ResNet, path: &Path) -> Result<ResNet, E
     apply_torchvision(encoder, weights)
 }
 
-/// The same for the half of a ResNet-18 that R-MSFM has: what lies behind it is left out.
+/// As [`load_torchvision_resnet`], for the half of a ResNet-18 in R-MSFM: later layers are left out.
 ///
 /// # Errors
 /// As [`load_torchvision_resnet`].
@@ -63,7 +62,7 @@ pub(super) fn apply_torchvision(encoder: ResNet, weights: Weights) -> Result<Res
     apply(encoder, &weights)
 }
 
-/// Which ResNet these are the weights of, by torchvision's names.
+/// The ResNet that has these weights, by torchvision's names.
 ///
 /// # Errors
 /// [`Error::UnknownArchitecture`] if the blocks match no known ResNet.

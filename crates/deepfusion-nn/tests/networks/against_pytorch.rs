@@ -1,9 +1,8 @@
-//! The networks' outputs beside PyTorch's, on files with the names and shapes that people have.
+//! The networks' outputs against PyTorch, from files with the names and shapes of published ones.
 //!
-//! Tolerance: 1e-5 on what the networks put out, and on features relative to their root mean square. The
-//! reference is in double precision, so the difference is float32 rounding through 20 to 55 convolutions.
-//! Measured: disparities 2.3e-6 (ResNet-18; PyTorch's own float32: 3.5e-6) and 4.2e-7 (ResNet-50), poses
-//! 5e-7. The repeating weights of the `.pth` files cancel more, and so round more.
+//! Tolerance: 1e-5 for outputs, and for features relative to their root mean square. The reference is in double precision, so the
+//! difference is float32 rounding through 20 to 55 convolutions. Measured: disparities 2.3e-6 (ResNet-18; PyTorch's own float32: 3.5e-6)
+//! and 4.2e-7 (ResNet-50), poses 5e-7. With the repeating weights of the `.pth` files more cancels, so rounding errors are larger.
 
 use crate::networks::common::{images, largest_error, manifest, unpack, values, write_listed};
 use burn::tensor::Device;

@@ -22,7 +22,7 @@ pub(crate) use crate::networks::formula::{Listing, filled, formula, uniform, wri
 pub(crate) const BATCH: usize = 2;
 pub(crate) const HEIGHT: usize = 64;
 pub(crate) const WIDTH: usize = 96;
-/// After how many values the weights in the `.pth` files repeat.
+/// Number of values after which the weights in the `.pth` files repeat.
 pub(crate) const PERIOD: usize = 101;
 
 pub(crate) fn reference(file: &str) -> PathBuf {
@@ -62,8 +62,8 @@ pub(crate) fn expected() -> Weights {
     weights::read(&reference("expected.safetensors")).unwrap()
 }
 
-/// The largest |actual − expected|, and the root mean square of the expected values; the actual values are
-/// taken at every `step`-th place as in the reference.
+/// The largest |actual − expected|, and the root mean square of the expected values. Only every `step`-th actual value is compared, as in
+/// the reference.
 pub(crate) fn largest_difference(
     expected: &Weights,
     name: &str,
@@ -112,7 +112,7 @@ pub(crate) fn gradients(net: &impl Module, loss: Tensor<1>) -> Vec<(String, Vec<
     take_gradients(net, &mut loss.backward())
 }
 
-/// The same out of gradients that are there.
+/// As [`gradients`], from computed gradients.
 pub(crate) fn take_gradients(
     net: &impl Module,
     gradients: &mut Gradients,
@@ -144,8 +144,8 @@ pub(crate) fn take_gradients(
     collect.found
 }
 
-/// That gradients are those of a reference, whose tensors `theirs` names: each to 1e-4 of its root mean square, and all together. Where the
-/// reference says how far PyTorch's own float32 gradient is off (`…/float32`, in the same measure), three times that is allowed.
+/// Checks gradients against those of a reference, whose tensors `theirs` names: each to 1e-4 of its root mean square, and the norm of all.
+/// If the reference has the error of PyTorch's own float32 gradient (`…/float32`, in the same measure), the tolerance is three times that.
 pub(crate) fn check_gradients(
     expected: &Weights,
     found: Vec<(String, Vec<f32>)>,
@@ -165,7 +165,7 @@ pub(crate) fn check_gradients(
         let step = (gradient.len() / 11).max(1) | 1;
         let name = format!("{theirs}/gradient");
         let (off, _) = largest_difference(expected, &name, &gradient, step);
-        // What is nothing but rounding (a bias before a norm) is measured against 1e-6 of all.
+        // A gradient of nothing but rounding errors (a bias before a norm) is compared with 1e-6 of the norm of all.
         let error = off / rms.max(1e-6 * (exact as f32).sqrt());
         let theirs = expected.tensors.get(&format!("{theirs}/float32"));
         let allowed = theirs.map_or(1e-4, |t| t.values[0].mul_add(3.0, 1e-4));

@@ -1,8 +1,8 @@
-//! The paper's depth network and its parts beside PyTorch's: values, and the gradients of inputs and weights.
+//! The paper's depth network and its parts against PyTorch: values, and the gradients of inputs and weights.
 //!
-//! The reference (tests/reference/depth_network.py) is in double precision, so the difference is float32
-//! rounding. Tolerance: 1e-4 of each tensor's root mean square; measured, the largest: 3.6e-5. Nowhere is a sum so near to
-//! a ReLU's kink that rounding would carry it over (the generator prints how near).
+//! The reference (tests/reference/depth_network.py) is in double precision, so the difference is float32 rounding. Tolerance: 1e-4 of each
+//! tensor's root mean square; the largest measured error is 3.6e-5. No sum is so close to a ReLU's kink that rounding would carry it over
+//! (the generator prints the distance).
 
 #![allow(
     clippy::unwrap_used,
@@ -24,9 +24,9 @@ use crate::networks::common::{
     filled, largest_difference, reference, take_gradients, uniform, values,
 };
 
-/// Of a tensor's root mean square.
+/// Relative to a tensor's root mean square.
 const TOLERANCE: f32 = 1e-4;
-/// Values of a tensor that the reference keeps, at the most.
+/// Most values of a tensor that the reference keeps.
 const AT_MOST: usize = 60;
 
 fn step(len: usize) -> usize {
@@ -37,7 +37,7 @@ fn step(len: usize) -> usize {
     }
 }
 
-/// Runs a case of the reference: `forward` is what the module does with the input.
+/// Runs a case of the reference. `forward` applies the module to the input.
 fn check<M: Module>(
     case: &str,
     module: M,
@@ -77,7 +77,7 @@ fn check<M: Module>(
     let largest = gradients.map(|(.., rms)| *rms).fold(0.0, f32::max);
     let mut worst = (0.0, String::new());
     for (name, difference, rms) in compared {
-        // A bias before a batch norm has no gradient but rounding: that is measured against the others.
+        // The gradient of a bias before a batch norm is nothing but rounding errors: it is compared with the other gradients.
         let error = difference / rms.max(1e-4 * largest);
         if error > worst.0 {
             worst = (error, name.clone());
@@ -85,7 +85,7 @@ fn check<M: Module>(
     }
     println!("{case}: {} tensors, worst {worst:?}", actual.len());
     assert!(worst.0 < TOLERANCE, "{case}: {worst:?}");
-    // PyTorch has no gradient that is missing here.
+    // No gradient of PyTorch's is missing here.
     assert_eq!(actual.len(), expected.tensors.len(), "{case}");
 }
 
@@ -99,7 +99,7 @@ fn hierarchical_context() {
     let shape = [2, 24, 9, 17];
     let hce = init(&HceConfig::default(), 24);
     check("hce", hce.clone(), shape, |hce, x| vec![hce.forward(x)]);
-    // With the running statistics; a fresh one, those of the batch above were noted.
+    // With running statistics; a new module, since the batch above changed those of the first.
     let frozen = freeze_statistics(init(&HceConfig::default(), 24), true);
     check("hce_evaluated", frozen, shape, |hce, x| {
         vec![hce.forward(x)]
@@ -186,7 +186,7 @@ fn the_whole_network() {
     check("paper_18", net, shape, |net, x| net.forward(x));
     let fifty = small_paper(ResNetDepth::ResNet50, 8, AttentionForm::Residual);
     let net = freeze_statistics(DepthNet::new(&fifty, &device).unwrap(), true);
-    // Through `decode`, as another decoder beside this one does.
+    // Through `encode` and `decode`, as for a second decoder on the same encoder.
     check("paper_50", net, shape, |net, x| net.decode(net.encode(x)));
 }
 

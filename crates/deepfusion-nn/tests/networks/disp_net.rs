@@ -1,6 +1,6 @@
-//! SfMLearner's DispNet beside PyTorch's, on a file with the names and shapes that people have.
+//! SfMLearner's DispNet against PyTorch, from a file with the names and shapes of the usual one.
 //!
-//! The reference (tests/reference/sfmlearner.py) is in double precision, so the difference is float32 rounding. Tolerances: 1e-5 of
+//! The reference (tests/reference/sfmlearner.py) is in double precision, so the difference is float32 rounding. Tolerances: 1e-5 for
 //! disparities, 1e-4 of a gradient's root mean square. The sixth and seventh halvings of its images round up.
 
 #![allow(
@@ -63,7 +63,7 @@ fn the_published_network() {
     }
 }
 
-/// PyTorch counts as many.
+/// PyTorch counts the same number.
 #[test]
 fn parameters_are_those_published() {
     let device = Device::flex();
@@ -104,7 +104,7 @@ fn other_files_are_refused_by_name() {
     assert!(wide.contains("heads.0.weight"), "{wide}");
 }
 
-/// Training programs save the weights beside an epoch and an optimiser's state, which holds tensors, too.
+/// Training programs save weights beside an epoch and an optimiser's state, which has tensors, too.
 #[test]
 fn weights_are_found_beside_what_else_a_training_saved() {
     for name in ["state_dict.pth", "state_dict_legacy.pth"] {
@@ -141,7 +141,7 @@ fn gradients_are_pytorchs() {
         .unwrap()
         .depth_net;
     let expected = expected().under("training/");
-    // Those at which no ReLU is so near to its kink that rounding decides.
+    // The images at which no ReLU is so close to its kink that rounding decides.
     let clear = format!("images{}", expected.tensors["images"].values[0]);
     let loss = pattern_loss(net.forward(images(&clear, 3, &device)), &device);
     let off = values(loss.clone())[0] - expected.tensors["loss"].values[0];
@@ -149,7 +149,7 @@ fn gradients_are_pytorchs() {
     check_gradients(&expected, gradients(&net, loss), pytorch_name);
 }
 
-/// A new network starts at its depth: its heads' biases outweigh random weights.
+/// A new network starts at its initial depth: the heads' biases outweigh the random weights.
 #[test]
 fn a_new_network_starts_at_ten_metres() {
     let device = Device::flex();

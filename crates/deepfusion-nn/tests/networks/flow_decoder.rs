@@ -1,8 +1,8 @@
-//! The flow decoder beside PyTorch's: flows of both directions at every size, and the gradients of the encoder's
-//! features and of all weights.
+//! The flow decoder against PyTorch: flows in both directions at every size, and the gradients of the encoder's features and of all
+//! weights.
 //!
-//! The reference (tests/reference/flow_decoder.py) is in double precision, so the difference is float32 rounding.
-//! Tolerance: 1e-4 of each tensor's root mean square; measured, the largest of 38: 9.0e-6.
+//! The reference (tests/reference/flow_decoder.py) is in double precision, so the difference is float32 rounding. Tolerance: 1e-4 of each
+//! tensor's root mean square; the largest measured error of 38 tensors is 9.0e-6.
 
 #![allow(
     clippy::unwrap_used,
@@ -15,7 +15,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use deepfusion_nn::{FlowDecoder, FlowDecoderConfig, FlowOutput, WeightRng};
 
-/// Of a tensor's root mean square.
+/// Relative to a tensor's root mean square.
 const TOLERANCE: f32 = 1e-4;
 const CHANNELS: [usize; 5] = [4, 12, 20, 28, 36];
 const BATCH: usize = 2;

@@ -1,5 +1,5 @@
-//! The formula of the weights, in files and in networks; `tests/reference/networks.py` computes it, too. The tests of `deepfusion-train` read
-//! this file as well.
+//! The formula for weights in files and networks. `tests/reference/networks.py` computes it, too. The tests of `deepfusion-train` include
+//! this file.
 
 #![allow(clippy::unwrap_used, reason = "a test's panic is its message")]
 
@@ -9,8 +9,7 @@ use burn::module::Module;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use safetensors::tensor::{Dtype, TensorView};
 
-/// `count` values in [−1, 1) from a hash of the name and the index; repeating, and then without their
-/// mean, where there is a period.
+/// `count` values in [−1, 1) from a hash of the name and the index. With a period they repeat, and their mean is removed.
 pub(crate) fn uniform(name: &str, count: usize, period: Option<usize>) -> Vec<f32> {
     let seed = name.bytes().fold(0x811C_9DC5_u32, |seed, byte| {
         (seed ^ u32::from(byte)).wrapping_mul(0x0100_0193)
@@ -30,7 +29,7 @@ pub(crate) fn uniform(name: &str, count: usize, period: Option<usize>) -> Vec<f3
                 .collect();
             once.into_iter().cycle().take(count).collect()
         }
-        // With fewer values than a period nothing repeats.
+        // Fewer values than a period do not repeat.
         None => (0..count).map(|i| hash(i) as f32 * step - 1.0).collect(),
     }
 }
@@ -65,7 +64,7 @@ pub(crate) fn filled<M: Module>(module: M) -> M {
     weights::apply(module, &weights).unwrap()
 }
 
-/// A file's tensors in the order PyTorch lists them: name, shape, type.
+/// A file's tensors in PyTorch's order: name, shape, type.
 pub(crate) type Listing = Vec<(String, Vec<usize>, String)>;
 
 /// Writes a safetensors file with the names, shapes and types of a real one and the formula's weights.

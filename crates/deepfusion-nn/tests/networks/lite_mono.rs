@@ -1,6 +1,6 @@
-//! Lite-Mono beside PyTorch's, on files with the names and shapes that people have.
+//! Lite-Mono against PyTorch, from files with the names and shapes of the published ones.
 //!
-//! The reference (tests/reference/lite_mono.py) is in double precision, so the difference is float32 rounding. Tolerances: 1e-5 of
+//! The reference (tests/reference/lite_mono.py) is in double precision, so the difference is float32 rounding. Tolerances: 1e-5 for
 //! disparities, 1e-4 of a gradient's root mean square. Measured: 6e-7 and 7e-6.
 
 #![allow(
@@ -81,7 +81,7 @@ fn the_four_published_networks() {
     }
 }
 
-/// As torch.save writes them, with a profiler's counters and the size beside the tensors.
+/// Files from torch.save, with a profiler's counters and the size beside the tensors.
 #[test]
 fn the_files_of_torch() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,8 +102,8 @@ fn the_files_of_torch() {
     );
 }
 
-/// 3.1, 2.5, 2.2 and 8.7 million parameters are published; the networks have 3.07, 2.47, 2.15 and 8.77. Two of a published file's
-/// tensors a dilated block, a layer norm's, are read by no computation: those are not here.
+/// 3.1, 2.5, 2.2 and 8.7 million parameters are published; the networks have 3.07, 2.47, 2.15 and 8.77. In a published file, each dilated
+/// block has two tensors (of a layer norm) that no computation reads; they are not counted.
 #[test]
 fn parameters_are_those_published() {
     let device = Device::flex();
@@ -149,7 +149,7 @@ fn other_files_are_refused_by_name() {
     };
     let error = load_lite_mono(&mixed_up, &device).unwrap_err();
     assert!(error.to_string().contains("not Lite-Mono"), "{error}");
-    // A block less.
+    // An encoder with one block less.
     let mut weights = weights::read(&files.encoder).unwrap();
     let block = "stages.2.5.";
     weights.tensors.retain(|name, _| !name.starts_with(block));
@@ -237,7 +237,7 @@ fn gradients_and_running_statistics_are_pytorchs() {
     assert_eq!(compared, 2 * (3 + 3 + 3 + 6));
 }
 
-/// A new network starts at its depth, everywhere.
+/// A new network starts at its initial depth, at every pixel.
 #[test]
 fn a_new_network_starts_at_ten_metres() {
     let device = Device::flex();

@@ -1,5 +1,5 @@
-//! The networks and their operations beside PyTorch's, and weights in files. One binary: linking Burn takes far longer
-//! than running all of it.
+//! The networks and their operations against PyTorch, and weights in files. They are one binary, since linking Burn takes far longer than
+//! running all tests.
 
 mod against_pytorch;
 mod common;

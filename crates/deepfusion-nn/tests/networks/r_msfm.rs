@@ -1,6 +1,6 @@
-//! R-MSFM beside PyTorch's, on files with the names and shapes that people have.
+//! R-MSFM against PyTorch, from files with the names and shapes of the published ones.
 //!
-//! The reference (tests/reference/r_msfm.py) is in double precision, so the difference is float32 rounding. Tolerances: 1e-5 of
+//! The reference (tests/reference/r_msfm.py) is in double precision, so the difference is float32 rounding. Tolerances: 1e-5 for
 //! disparities, 1e-4 of a gradient's root mean square.
 
 #![allow(
@@ -167,8 +167,8 @@ fn gradients_are_pytorchs() {
     check_gradients(&expected, gradients(&net, loss), pytorch_name);
 }
 
-/// A new network starts at its depth: refinements of random weights change it little. Beyond the edge the enlargement sees zeros, which are
-/// far away, and a third of so small a disparity is at its edge.
+/// A new network starts at its initial depth: refinements with random weights change it little. Beyond the edge the upsampling reads zeros,
+/// which are far away. They affect a third of this small disparity's pixels.
 #[test]
 fn a_new_network_starts_at_ten_metres() {
     let device = Device::flex();

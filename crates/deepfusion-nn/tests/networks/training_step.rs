@@ -1,4 +1,4 @@
-//! One training step's statistics and gradients beside PyTorch's, and the modes of the batch norms.
+//! One training step's statistics and gradients against PyTorch, and the modes of batch norms.
 
 #![allow(
     clippy::unwrap_used,
@@ -63,9 +63,8 @@ fn pytorch_name(name: &str) -> String {
     }
 }
 
-/// Tolerance: 1e-4 of the gradient's root mean square. Batch norms over as few as 12 values, 20 of them
-/// in a row, amplify float32's rounding; the reference is in double precision. Measured: 1.3e-5, running
-/// statistics 3.5e-7.
+/// Tolerance: 1e-4 of the gradient's root mean square. Twenty batch norms in a row, some over only 12 values, amplify float32's rounding
+/// errors; the reference is in double precision. Measured: 1.3e-5, running statistics 3.5e-7.
 #[test]
 fn gradients_and_running_statistics_are_pytorchs() {
     let device = Device::flex().autodiff();
@@ -161,13 +160,13 @@ fn only_training_moves_the_statistics() {
     assert_eq!(
         statistics(&valid),
         before,
-        "evaluation leaves the statistics alone"
+        "evaluation does not change the statistics"
     );
 
     let trained = values(net.forward(x.clone()).swap_remove(0));
     let after = statistics(&net);
-    assert_ne!(after, before, "training moves them, visibly at once");
-    assert_ne!(trained, first, "and normalises by the batch");
+    assert_ne!(after, before, "training changes them at once");
+    assert_ne!(trained, first, "training normalises by the batch");
     assert_eq!(
         statistics(&valid),
         before,
@@ -192,7 +191,7 @@ fn frozen_statistics_stay_while_everything_learns() {
     assert!(bn.weight.val().grad(&gradients).is_some());
     assert!(bn.bias.val().grad(&gradients).is_some());
 
-    // Freezing outlives the way to evaluation and back; thawing ends it.
+    // Statistics stay frozen after switching to evaluation and back, until they are unfrozen.
     let net = net.valid().train();
     net.forward(images("images", 3, &device));
     assert_eq!(statistics(&net), before);
@@ -201,7 +200,8 @@ fn frozen_statistics_stay_while_everything_learns() {
     assert_ne!(statistics(&net), before);
 }
 
-/// A network configured so keeps every statistic, those of the context encoding too, which are not the encoder's.
+/// With frozen statistics in its configuration a network keeps all of them, also those of the context encoding, which is not part of the
+/// encoder.
 #[test]
 fn a_configuration_freezes_the_batch_norms_of_the_whole_network() {
     let device = Device::flex().autodiff();

@@ -1,4 +1,4 @@
-//! Weights to files and back, and what happens with files that do not fit.
+//! Weights written to files and read back, and files that do not fit.
 
 #![allow(
     clippy::unwrap_used,
@@ -36,7 +36,7 @@ fn tiny(seed: u64) -> DepthNet {
 fn a_network_survives_the_way_through_a_file_to_the_last_bit() {
     let device = Device::flex().autodiff();
     let net = tiny(1);
-    net.forward(images("images", 3, &device)); // Moves the running statistics away from 0 and 1.
+    net.forward(images("images", 3, &device)); // Changes the running statistics from 0 and 1.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("weights.safetensors");
     let mut saved = weights::collect(&net);
@@ -45,7 +45,7 @@ fn a_network_survives_the_way_through_a_file_to_the_last_bit() {
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,
-        "nothing is left beside it"
+        "no other file is left"
     );
 
     let read = weights::read(&path).unwrap();
@@ -64,7 +64,7 @@ fn a_network_survives_the_way_through_a_file_to_the_last_bit() {
     let loaded = weights::apply(tiny(2), &read).unwrap();
     assert!(weights::collect(&loaded).tensors == saved.tensors);
     let x = images("images", 3, &device);
-    // In training mode, gradients included: the loaded parameters still learn.
+    // In training mode, with gradients: the loaded parameters can still learn.
     let output = loaded.forward(x.clone()).swap_remove(0);
     assert_eq!(
         values(output.clone()),
@@ -206,7 +206,7 @@ fn files_cut_short_are_refused_wherever_the_cut_is() {
 #[test]
 fn nothing_is_left_of_a_file_that_could_not_be_written() {
     let folder = tempfile::tempdir().unwrap();
-    // A folder of that name: everything can be written, but the last step, the renaming, fails.
+    // There is a folder of that name: everything is written, but the renaming at the end fails.
     let path = folder.path().join("taken");
     fs::create_dir(&path).unwrap();
     fs::write(path.join("inside"), "x").unwrap();
@@ -239,7 +239,7 @@ fn weights_of_another_architecture_are_refused() {
         "{error}"
     );
 
-    // Monodepth2's files mixed up: the pose decoder where the depth decoder belongs.
+    // Monodepth2's files mixed up: the pose decoder in place of the depth decoder.
     let files = Monodepth2Files {
         encoder: unpack("encoder.pth", folder.path()),
         depth: pose,
@@ -317,7 +317,7 @@ fn a_listed_file_of_other_precision_is_read_as_f32() {
 }
 
 proptest::proptest! {
-    /// Whatever happens to a file's bytes, reading it gives weights or an error that names the file.
+    /// Whatever bytes a file has, reading it returns weights or an error that names the file.
     #[test]
     fn damaged_files_never_panic(
         hits in proptest::collection::vec((proptest::prelude::any::<u16>(), proptest::prelude::any::<u8>()), 1..8),

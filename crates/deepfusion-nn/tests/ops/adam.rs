@@ -56,7 +56,7 @@ fn step(count: i32) -> AdamStep {
     }
 }
 
-/// Factors that were computed on the device are a step's as well, and of one that is not made nothing changes, whatever its gradient is.
+/// A step works with factors that were computed on the device. A step that is not made changes nothing, whatever its gradient is.
 #[test]
 fn the_device_may_decide_about_a_step_of_adam() {
     let plain = device().inner();

@@ -7,12 +7,12 @@ use deepfusion_nn::ops;
 #[test]
 fn batch_normalisation() {
     let device = device();
-    // The second has more pixels than a GPU's group has threads.
+    // The second size has more pixels than a GPU's group has threads.
     for (size, relu) in [
         ([3, 4, 5, 6], false),
         ([3, 4, 5, 6], true),
         ([2, 3, 24, 31], true),
-        // And more planes than groups along an axis.
+        // More planes than groups along an axis.
         ([2, 40_000, 1, 2], false),
     ] {
         let x = random(size, &device);

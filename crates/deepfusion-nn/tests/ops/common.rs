@@ -1,14 +1,14 @@
-//! Where the kernels run, and how their values are made and compared.
+//! The device of the kernels, and how values are made and compared.
 
 #[cfg(any(feature = "vulkan", feature = "wgpu", feature = "metal"))]
 use burn::tensor::DeviceKind;
 use burn::tensor::{Device, Tensor, TensorData};
 use std::cell::Cell;
 
-/// Differences of two ways of summing the same few hundred products in f32.
+/// Two ways of summing the same few hundred products in f32 differ by less.
 const TOLERANCE: f32 = 2e-5;
 
-/// The device on which the kernels are checked: of a build for several, `cuda` where `DEEPFUSION_TEST_DEVICE` says so.
+/// The device on which the kernels are checked. In a build for several, `DEEPFUSION_TEST_DEVICE=cuda` selects `cuda`.
 pub(super) fn device() -> Device {
     #[cfg(feature = "cuda")]
     if std::env::var("DEEPFUSION_TEST_DEVICE").is_ok_and(|name| name == "cuda") {
@@ -31,7 +31,7 @@ pub(super) fn device() -> Device {
     Device::flex().autodiff()
 }
 
-/// Values from -1 to 1 (SplitMix64), the same in every run: each test has a thread of its own, and Burn's generator is one for all threads.
+/// Values from -1 to 1 (SplitMix64), the same in every run: each test has its own thread, and all threads share Burn's generator.
 pub(super) fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tensor<D> {
     thread_local! {
         static STATE: Cell<u64> = const { Cell::new(2026) };
@@ -47,13 +47,13 @@ pub(super) fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tens
     Tensor::from_data(TensorData::new(values, shape), device)
 }
 
-/// A copy on another device. What composed operations give is computed on the CPU, as Burn's own operations on a GPU are checked by nobody
-/// here: its gradient of a convolution's weights was wrong above 32,768 pixels (WGSL, lavapipe).
+/// A copy on another device. Composed operations run on the CPU, since Burn's own operations on a GPU are not checked here: its gradient of
+/// a convolution's weights was wrong above 32,768 pixels (WGSL, lavapipe).
 pub(super) fn on<const D: usize>(device: &Device, tensor: &Tensor<D>) -> Tensor<D> {
     Tensor::from_data(tensor.to_data(), device)
 }
 
-/// Where the kernels run, or, for what they are compared with, the CPU.
+/// The kernels' device or, for the operations that they are compared with, the CPU.
 pub(super) fn device_of(ours: bool) -> Device {
     if ours {
         device()

@@ -1,4 +1,4 @@
-//! Convolutions, depthwise ones, and those in bf16.
+//! Convolutions, depthwise convolutions, and convolutions in bf16.
 
 use super::common::{assert_close, device, device_of, leaf, on, random, weigh};
 use burn::tensor::{Device, Tensor};
@@ -16,10 +16,10 @@ fn convolution() {
         // More channels and pixels than a tile of a GPU's kernels has.
         (3, 1, 1, true, [2, 70, 9, 11]),
         (3, 2, 1, false, [3, 40, 24, 31]),
-        // Enough for the largest tiles, and a sum that is shared out.
+        // Enough for the largest tiles, and a sum that is divided into parts.
         (1, 1, 0, false, [1, 66, 128, 260]),
         (1, 1, 0, false, [1, 48, 256, 260]),
-        // As many channels as lie together where weights are taken tap by tap.
+        // A number of channels for which the terms run tap by tap.
         (3, 1, 1, true, [2, 64, 9, 11]),
         (3, 2, 1, false, [1, 128, 14, 19]),
         (1, 1, 0, false, [1, 80, 128, 260]),
@@ -79,7 +79,7 @@ fn convolution() {
     }
 }
 
-/// Each gradient where the other is not asked for, of tensors that are views.
+/// Each gradient without the other, for tensors that are views.
 #[test]
 fn one_gradient_of_a_convolution_alone() {
     let device = device();
@@ -118,11 +118,11 @@ fn one_gradient_of_a_convolution_alone() {
     assert_close("weight", run(true, false), run(false, false));
 }
 
-/// Within `autocast` a convolution and its gradients see their numbers rounded to bf16, and nothing else changes; after it,
-/// and on a processor without bf16, or a GPU without tensor cores for it, they do not.
+/// Within `autocast`, the inputs of a convolution and of its gradients are rounded to bf16, and nothing else changes. They are not rounded
+/// afterwards, nor on a processor without bf16 or a GPU without tensor cores for it.
 #[test]
 fn convolutions_within_autocast() {
-    // Of a GPU's tensor cores: less than a tile; each size of tile, partly filled; sums in parts; the gradient of the weights tap by tap.
+    // For a GPU's tensor cores: less than a tile; each size of tile, partly filled; sums in parts; the gradient of the weights tap by tap.
     for (size, out, stride, kernel) in [
         ([2, 32, 6, 9], 48, 1, 3),
         ([1, 32, 128, 260], 64, 1, 3),
@@ -165,7 +165,7 @@ fn convolutions_within_autocast_of(size: [usize; 4], out: usize, stride: usize, 
         let y = ops::autocast(precision, || {
             ops::conv2d(x.clone(), w.clone(), Some(bias.clone()), options)
         });
-        // The gradients are asked for outside.
+        // The gradients are computed outside of `autocast`.
         let gradients = y.clone().mul(weights.clone()).sum().backward();
         let (gx, gw) = (x.grad(&gradients).unwrap(), w.grad(&gradients).unwrap());
         (y.inner(), gx, gw)
@@ -184,8 +184,8 @@ fn convolutions_within_autocast_of(size: [usize; 4], out: usize, stride: usize, 
     let outside = |x: &Tensor<4>| ops::conv2d(x.clone(), w.clone(), None, options).into_data();
     let before = outside(&x);
     let inner = ops::autocast(bf16, || ops::autocast(f32, || outside(&x)));
-    assert_eq!(inner, before, "the inner one counts");
-    assert_eq!(outside(&x), before, "nothing is left of it");
+    assert_eq!(inner, before, "the inner precision applies");
+    assert_eq!(outside(&x), before, "the precision is restored");
 }
 
 #[test]
@@ -223,7 +223,7 @@ fn depthwise_convolution() {
     }
 }
 
-/// Without autodiff the same operations run plainly.
+/// Without autodiff the same kernels run.
 #[test]
 fn inference_runs_the_same_kernels() {
     let plain = Device::flex();

@@ -1,4 +1,4 @@
-//! What is computed value by value: activations, sums, joined maps.
+//! Pointwise operations: activations, sums, joined maps.
 
 use super::common::{assert_close, device, device_of, leaf, on, random, weigh};
 use deepfusion_nn::ops;
@@ -39,7 +39,7 @@ fn end_of_a_residual_block() {
     assert_close("sum", a.0, b.0);
     assert_close("of the first", a.1, b.1);
     assert_close("of the second", a.2, b.2);
-    // NaN must come through.
+    // NaN must be preserved.
     let none = x.clone().mul_scalar(f32::NAN);
     for sum in [
         ops::add_relu(none.clone(), y.clone()),

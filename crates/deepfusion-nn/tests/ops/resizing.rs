@@ -1,10 +1,10 @@
-//! Smaller and larger maps.
+//! Max pooling and enlargement.
 
 use super::common::{assert_close, device, device_of, leaf, on, random, weigh};
 use deepfusion_nn::BilinearResize;
 use deepfusion_nn::ops;
 
-/// Odd sizes, a single row, and many equal values, as behind a ReLU, of which the first has the gradient.
+/// Odd sizes, a single row, and many equal values, as after a ReLU, of which the first gets the gradient.
 #[test]
 fn max_pool() {
     for size in [[2, 3, 12, 16], [1, 2, 7, 9], [1, 1, 1, 5], [1, 1, 2, 1]] {
@@ -26,7 +26,7 @@ fn max_pool() {
     }
 }
 
-/// By the kernel of a GPU, against the matrix products of the processor.
+/// A GPU's kernel against the processor's matrix products.
 #[test]
 fn bilinear_enlargement() {
     for (from, to) in [

@@ -1,4 +1,4 @@
-//! One view beside another: projection, warping, photometric error, correlation.
+//! Operations between two views: projection, warping, photometric error, correlation.
 
 use super::common::{assert_close, device, leaf, random, weigh};
 use burn::tensor::Tensor;
@@ -15,7 +15,7 @@ fn warp_and_photometric_error_of(height: usize, width: usize) {
     let device = device();
     let image = random([2, 3, 6, 8], &device).abs();
     let target = random([2, 3, height, width], &device).abs();
-    // In view and out of it.
+    // Coordinates inside and outside the view.
     let coords = random([2, 2, height, width], &device)
         .mul_scalar(5.0)
         .add_scalar(3.0);
@@ -78,14 +78,14 @@ fn projection_and_smoothness() {
 
 fn projection_and_smoothness_of(height: usize, width: usize) {
     let device = device();
-    // Every third point lies behind the second camera. None is near its plane, where the projection is so steep
-    // that two ways of rounding differ by more than the tolerance.
+    // Every third point lies behind the second camera. None is near the camera's plane, where the projection is so steep that rounding
+    // differences exceed the tolerance.
     let behind: Vec<f32> = (0..2 * height * width)
         .map(|i| if i % 3 == 0 { 0.75 } else { 0.05 })
         .collect();
     let behind = Tensor::<1>::from_data(behind.as_slice(), &device).reshape([2, 1, height, width]);
     let depth = random([2, 1, height, width], &device).abs().mul_scalar(0.3) + behind;
-    // As much perspective in a large image as in a small one.
+    // The same amount of perspective in a large image as in a small one.
     let p = 5.0 / height as f32;
     let turn = Tensor::<3>::from_data(
         [

@@ -4,11 +4,11 @@
     python crates/deepfusion-nn/tests/reference/depth_network.py
 
 writes `depth_network.safetensors` beside this file: outputs, and gradients of the inputs and of every weight, for the
-loss Σ output·pattern with a random pattern. Computed in double precision from float32 weights and inputs, so that a
-test sees the Rust program's rounding alone. Of long tensors every `stride`-th value is kept.
+loss Σ output·pattern with a random pattern. Computed in double precision from float32 weights and inputs, so that the
+only difference in a test is the Rust program's rounding. Of long tensors every `stride`-th value is kept.
 
-The modules bear the Rust program's names, so that a state dictionary's names are its own, and their weights are the
-`formula` of networks.py, which the Rust tests compute too (tests/networks/common.rs).
+The modules have the Rust program's names, and so have the entries of a state dictionary. Their weights are the `formula`
+of networks.py, which the Rust tests compute, too (tests/networks/formula.rs).
 
 Needs torch, torchvision and numpy. `DepthNet` is also what benches/peers/torch_paper_step.py trains.
 """
@@ -28,7 +28,7 @@ AT_MOST = 60  # values of a tensor that are kept
 
 
 class Block(nn.Module):
-    """A residual block as torchvision's, with a dilation that torchvision's basic block refuses."""
+    """torchvision's residual block, with a dilation that torchvision's basic block does not support."""
 
     def __init__(self, bottleneck, inputs, width, stride, dilation):
         super().__init__()
@@ -216,8 +216,8 @@ def keep(expected, name, tensor):
 def case(expected, name, module, shape, train=True):
     """Output, and the gradients of input and weights, under the loss Σ mean(output·pattern).
 
-    A sum that is nearly 0 before a ReLU may be on its other side in float32, and then has another gradient: the nearest
-    is printed, and what is chosen here (sizes; running statistics in the deepest network) keeps away.
+    A sum near 0 before a ReLU may be on the other side of 0 in float32, with a different gradient. The smallest distance
+    is printed, and the choices here (sizes; running statistics in the deepest network) keep it large.
     """
     from networks import fill, uniform
 
@@ -245,7 +245,7 @@ def case(expected, name, module, shape, train=True):
 
 
 def check_resnet():
-    """The dilated ResNet above is torchvision's with its `replace_stride_with_dilation`, the grid applied."""
+    """Checks that the dilated ResNet above equals torchvision's with `replace_stride_with_dilation` and the grid applied."""
     theirs = torchvision.models.resnet50(weights=None, replace_stride_with_dilation=[False, False, True]).eval()
     for block, rate in zip(theirs.layer4, (2, 4, 8)):
         block.conv2.dilation = block.conv2.padding = (rate, rate)
@@ -271,7 +271,7 @@ def main():
     torch.manual_seed(0)
     check_resnet()
     expected = {}
-    # Wider than it is high, and smaller than the largest rate's reach: whole rows of taps see only zeros.
+    # Wider than high, and smaller than the reach of the largest rate: whole rows of taps read only zeros.
     case(expected, "hce", HierarchicalContext(24), (2, 24, 9, 17))
     case(expected, "hce_evaluated", HierarchicalContext(24), (2, 24, 9, 17), train=False)
     plain = HierarchicalContext(140, rates=(1, 2), global_pool=False, reduce_first=False)

@@ -8,12 +8,12 @@ Self-Supervised Monocular Depth Estimation", CVPR 2023, arXiv 2211.13202), its f
 the tensors in the published encoder.pth and depth.pth; none of the authors' code is in it. It writes, beside this file:
 
 - `lite_mono.json`: names, shapes and types of the tensors in these files, for the four published networks;
-- `lite_mono_encoder.pth.gz.gz`, `lite_mono_depth.pth.gz.gz`: those of Lite-Mono-tiny as torch.save writes them, with the counters
-  that a profiler left in the published ones, and the weights of `formula`, which repeat (see networks.py);
+- `lite_mono_encoder.pth.gz.gz`, `lite_mono_depth.pth.gz.gz`: these files for Lite-Mono-tiny from torch.save, with a profiler's counters
+  as in the published ones, and the weights of `formula`, which repeat (see networks.py);
 - `lite_mono.safetensors`: disparities, and a training step's gradients and running statistics, subsampled, computed in double
   precision from the float32 weights.
 
-Needs torch and numpy. The Rust tests compute the same `formula` (tests/networks/common.rs).
+Needs torch and numpy. The Rust tests compute the same `formula` (tests/networks/formula.rs).
 """
 
 import gzip
@@ -121,7 +121,7 @@ def bottleneck(block, x):
 
 def dilated(width, rate):
     conv = nn.Conv2d(width, width, 3, padding=rate, dilation=rate, groups=width, bias=False)
-    # The layer norm is in the files and in no computation.
+    # The layer norm is in the files, but no computation uses it.
     return named(
         gamma=torch.zeros(width),
         ddwconv=named(conv=conv),
@@ -279,7 +279,7 @@ def disparities(model, period, name):
 
 
 def save_pth(name, module, extra):
-    """As the published file: beside its tensors what thop counted, in double precision, and the size."""
+    """As the published file: tensors, thop's counters in double precision, and the size."""
     state = OrderedDict()
     for prefix in ("", *(part + "." for part, _ in module.named_children())):
         state[f"{prefix}total_ops"] = torch.tensor([0.0], dtype=torch.float64)

@@ -5,15 +5,15 @@
 
 writes, beside this file:
 
-- `manifest.json`: names, shapes and types of the tensors in the files that people have: torchvision's
+- `manifest.json`: names, shapes and types of the tensors in published files: torchvision's
   ResNets and Monodepth2's encoder.pth, depth.pth, pose_encoder.pth, pose.pth. The ResNets are torchvision's
   own; the two decoders are rebuilt here from their published layout.
-- `*.pth.gz.gz`: such files as torch.save writes them, at full size, with the weights of `formula`. Their
-  weights repeat every 101 values, so that gzip, twice, makes 45 megabytes into 50 kilobytes.
+- `*.pth.gz.gz`: such files from torch.save, at full size, with the weights of `formula`. Their weights repeat
+  every 101 values, so that gzip, applied twice, reduces 45 megabytes to 50 kilobytes.
 - `expected.safetensors`: outputs, running statistics and gradients, subsampled. They are computed in double
-  precision from the float32 weights: what a test sees as a difference is the Rust program's rounding alone.
+  precision from the float32 weights, so that the only difference in a test is the Rust program's rounding.
 
-Needs torch, torchvision, numpy. The Rust tests compute the same `formula` (tests/networks/common.rs).
+Needs torch, torchvision, numpy. The Rust tests compute the same `formula` (tests/networks/formula.rs).
 """
 
 import gzip
@@ -42,8 +42,8 @@ BATCH = 2
 def uniform(name, count, period):
     """`count` float32 values in [-1, 1) from a 32-bit hash of the name and the index.
 
-    With a period they repeat, their mean removed: a kernel whose values all lean to one side would
-    drown the image in a constant.
+    With a period they repeat, and their mean is removed: in a kernel with a large mean, a constant would dominate
+    the image.
     """
     seed = 0x811C9DC5
     for byte in name.encode():
@@ -70,7 +70,7 @@ def formula(name, shape, period):
     if name.endswith("running_var"):
         v = f(1.0) + f(0.3) * v
     elif len(shape) == 1 and name.endswith("weight"):
-        # The last batch norm of a residual branch is smaller, or the sum would grow with every block.
+        # The last batch norm of a residual branch is smaller; otherwise the sum would grow with every block.
         base = 0.4 if ".bn2." in name or ".bn3." in name else 1.0
         v = f(base) + f(0.2) * v
     elif len(shape) == 1:
@@ -210,8 +210,8 @@ def save_pth(name, module, extra=None, **options):
     state.update(extra or {})
     plain = io.BytesIO()
     torch.save(state, plain, **options)
-    # No time in the headers: the same run gives the same bytes. Once is not enough: deflate's longest
-    # match is 258 bytes, and the codes of such matches repeat in turn.
+    # No time in the headers, so that every run writes the same bytes. Compressed twice: deflate's longest match is 258 bytes, and the codes
+    # of such matches repeat, too.
     packed = gzip.compress(gzip.compress(plain.getvalue(), mtime=0), mtime=0)
     (HERE / f"{name}.pth.gz.gz").write_bytes(packed)
 

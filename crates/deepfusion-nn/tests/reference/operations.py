@@ -6,10 +6,10 @@
 draws random configurations (odd sizes, strides, paddings, dilations) and writes, beside this file:
 
 - `operations.json`: each case's name, operation, options and inputs. An input is (name, shape, scale, offset):
-  its values are offset + scale·`uniform`, which the Rust tests compute too (tests/networks/common.rs).
+  its values are offset + scale·`uniform`, which the Rust tests compute, too (tests/networks/formula.rs).
 - `operations.safetensors`: PyTorch's output and its gradient with respect to every input that has one, for
-  the loss Σ output·pattern with a random pattern. Computed in double precision from float32 inputs, so that a
-  test sees the Rust program's rounding alone. Of long tensors every `stride`-th value is kept.
+  the loss Σ output·pattern with a random pattern. Computed in double precision from float32 inputs, so that the
+  only difference in a test is the Rust program's rounding. Of long tensors every `stride`-th value is kept.
 
 Needs torch, torchvision (for networks.py) and numpy.
 """
@@ -62,7 +62,7 @@ def conv2d(x, weight, bias=None, *, stride, padding, dilation, reflect):
 
 
 def warp(image, coords):
-    """Coordinates are pixels; grid_sample takes the first and last pixel's centres as −1 and 1."""
+    """`coords` are in pixels; for grid_sample the centres of the first and last pixel are −1 and 1."""
     last = torch.tensor([image.shape[3] - 1, image.shape[2] - 1]).double()
     grid = coords.permute(0, 2, 3, 1) / last * 2 - 1
     return F.grid_sample(image, grid, padding_mode="border", align_corners=True)
@@ -99,7 +99,7 @@ def upsample_concat(x, skip=None):
 
 
 def project(depth, turn, shift):
-    """p' ~ H·p̃ + d·s; H is the identity and a little more."""
+    """p' ~ H·p̃ + d·s; H is close to the identity."""
     n, _, height, width = depth.shape
     y, x = torch.meshgrid(torch.arange(height).double(), torch.arange(width).double(), indexing="ij")
     pixels = torch.stack([x, y, torch.ones_like(x)]).reshape(1, 3, -1)
@@ -122,7 +122,7 @@ def smoothness(disparity, image):
 
 def convolutions(rng):
     settings = [(k, s, d) for k in (1, 3, 5, 7) for s in (1, 2, 3) for d in (1, 2, 3)]
-    # A 1×1 has no dilation; ten plain 3×3 with reflection, the decoder's, make forty.
+    # A 1×1 has no dilation. Ten plain 3×3 with reflection, as in the decoder, make forty.
     settings = [s for s in settings if s[0] > 1 or s[2] == 1] + [(3, 1, 1)] * 10
     for index, (kernel, stride, dilation) in enumerate(settings):
         reach = (kernel - 1) * dilation + 1
@@ -150,7 +150,7 @@ def others(rng):
 
     for _ in range(8):
         (n, c, h, w), (_, _, to_h, to_w) = size(), size()
-        # In view and out of it.
+        # Coordinates inside and outside the view.
         coords = ("coords", (n, 2, to_h, to_w), 0.7 * max(h, w), 0.5 * min(h, w))
         case("warp", warp, [("image", (n, c, h, w), 1.0, 0.0), coords], {})
     for alpha in (0.85, 0.85, 0.85, 1.0, 0.0, 0.5):

@@ -11,7 +11,7 @@ the published encoder.pth and depth.pth. It writes, beside this file:
 - `r_msfm.safetensors`: disparities after every refinement, and a training step's gradients, subsampled, computed in double precision
   from the float32 weights.
 
-Needs torch and numpy. Weights and images are those of `formula`, as lite_mono.py has it.
+Needs torch and numpy. Weights and images are those of `formula` in lite_mono.py.
 """
 
 import json
@@ -42,7 +42,7 @@ def run_basic(block, x):
 
 
 class Encoder(nn.Module):
-    """ResNet-18 whole, as the published file has it; the features are those up to the second layer."""
+    """A whole ResNet-18, as in the published file; the features are those up to the second layer."""
 
     def __init__(self):
         super().__init__()
@@ -67,7 +67,7 @@ class Encoder(nn.Module):
 
 
 def mirrored(inputs, outputs, kernel=3, stride=1):
-    """A layer behind its padding, at place 1 of a sequence."""
+    """A padding and its convolution, which is at place 1 of a sequence."""
     return [nn.ReflectionPad2d(kernel // 2), nn.Conv2d(inputs, outputs, kernel, stride)]
 
 
@@ -165,8 +165,8 @@ def build(iterations):
 
 
 def training():
-    """One training step's forward and backward pass of R-MSFM6: loss = Σ_k mean(σ_k · pattern_k). Also how far PyTorch's own float32
-    gradients are from these, over the root mean square of each: where tanh is near its ends, 1 − tanh² is little but rounding."""
+    """One training step's forward and backward pass of R-MSFM6: loss = Σ_k mean(σ_k · pattern_k). Also the error of PyTorch's
+    own float32 gradients, over the root mean square of each: where tanh is near ±1, 1 − tanh² is mostly rounding error."""
 
     def step(dtype):
         encoder, decoder = (part.train().to(dtype) for part in build(6))

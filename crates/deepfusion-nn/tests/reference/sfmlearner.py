@@ -4,7 +4,7 @@
     python crates/deepfusion-nn/tests/reference/sfmlearner.py
 
 The network is rebuilt here from the paper (Zhou et al., "Unsupervised Learning of Depth and Ego-Motion from Video", CVPR 2017, its
-figure of the architectures) and from the names and shapes of the tensors in the dispnet_model_best.pth.tar that people have. It writes, beside
+figure of the architectures) and from the names and shapes of the tensors in the usual dispnet_model_best.pth.tar. It writes, beside
 this file:
 
 - `sfmlearner.json`: names, shapes and types of the tensors in that file;
@@ -13,7 +13,7 @@ this file:
 - `state_dict.pth`, `state_dict_legacy.pth`: a tensor beside an epoch and an optimiser's state, as training programs save them with the new
   and the old layout of torch.save.
 
-Needs torch and numpy. Weights and images are those of `formula`, as lite_mono.py has it.
+Needs torch and numpy. Weights and images are those of `formula` in lite_mono.py.
 """
 
 import json
@@ -53,7 +53,7 @@ class DispNet(nn.Module):
             self.add_module(f"predict_disp{level}", nn.Sequential(nn.Conv2d(DOUBLED[7 - level], 1, 3, padding=1), nn.Sigmoid()))
 
     def forward(self, image):
-        """Sigmoids, finest first; the disparities of the paper are 10 times that and 0.01."""
+        """Sigmoids, finest first; the paper's disparities are 10·σ + 0.01."""
         x, skips = (image - 0.5) / 0.5, [image]
         for level in range(1, 8):
             x = getattr(self, f"conv{level}")(x)
@@ -79,8 +79,8 @@ def build():
 
 
 def clear_of_kinks():
-    """The first of many images at which no ReLU reads a value so near to 0 that rounding decides its gradient: none within 5e-6 of what it
-    reads in the mean square. Its number, and the images."""
+    """The first of many images at which no ReLU reads a value so close to 0 that rounding decides its gradient: none within 5e-6 of the
+    root mean square of its input. Returns the number and the images."""
     net, margins = build().eval(), []
     for part in net.modules():
         if isinstance(part, nn.ReLU):
@@ -97,8 +97,8 @@ def clear_of_kinks():
 
 
 def training():
-    """One training step's forward and backward pass: loss = Σ_k mean(σ_k · pattern_k). Also how far PyTorch's own float32 gradients are
-    from these, over the root mean square of each."""
+    """One training step's forward and backward pass: loss = Σ_k mean(σ_k · pattern_k). Also the error of PyTorch's own
+    float32 gradients, over the root mean square of each."""
     number, clear = clear_of_kinks()
     keep("training/images", torch.tensor([float(number)]), 1)
 

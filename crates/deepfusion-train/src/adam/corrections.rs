@@ -1,4 +1,4 @@
-//! By what Adam corrects its moments, which begin at zero.
+//! Adam's bias correction: the moments start at zero.
 
 /// Decay of the first moment.
 pub(super) const BETA1: f64 = 0.9;

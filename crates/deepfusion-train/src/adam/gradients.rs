@@ -8,19 +8,19 @@ use deepfusion_nn::ops::{self, has_kernels};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-/// Values that are read from a device at once: 32 MB, so that neither memory nor the largest buffer of a small GPU is exceeded.
+/// Number of values read from a device in one transfer: 32 MB, within the memory and the largest buffer of a small GPU.
 const AT_ONCE: usize = 8 << 20;
 
 /// A step's gradients by parameter name.
 #[derive(Debug, Default)]
 pub struct NamedGradients {
     pub(super) by_name: BTreeMap<String, Values>,
-    /// Whether those of the processor's kernels are tensors, too.
+    /// Whether gradients on the processor are kept as tensors, too, instead of plain values for its kernels.
     as_tensors: bool,
 }
 
 impl NamedGradients {
-    /// None yet; all of them will be tensors on the device, as a step that the device decides about needs them.
+    /// No gradients yet. All of them will be tensors on the device, which a step that the device decides about requires.
     pub(crate) fn on_device() -> Self {
         Self {
             as_tensors: true,
@@ -44,7 +44,7 @@ impl NamedGradients {
         });
     }
 
-    /// Adds a parameter's gradient to what there is of it.
+    /// Adds to a parameter's gradient.
     pub(super) fn insert(&mut self, name: String, gradient: Values) {
         match self.by_name.entry(name) {
             Entry::Vacant(entry) => {
@@ -56,7 +56,7 @@ impl NamedGradients {
 
     /// All values one after the other, in the order of the names.
     pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
-        // Those on the device in few transfers.
+        // Values on the device are read in few transfers.
         let mut read = Vec::new();
         let mut waiting: Vec<Tensor<1>> = Vec::new();
         for values in self.by_name.values() {
@@ -85,7 +85,7 @@ impl NamedGradients {
         }
     }
 
-    /// Takes the values back from where [`Self::append_to`] put them.
+    /// Replaces all values by those of `flat`, in the order of [`Self::append_to`].
     pub(crate) fn take_from(&mut self, flat: &[f32]) {
         let mut rest = flat;
         for values in self.by_name.values_mut() {
@@ -104,7 +104,7 @@ impl NamedGradients {
         (on_host + on_device).sqrt()
     }
 
-    /// The sum of squares: of the values in main memory, and, if there are any, of those on the device, one value there.
+    /// The sum of squares of the values in main memory, and that of the values on the device, if there are any, as one value there.
     pub(crate) fn squares(&self) -> (f64, Option<Tensor<1>>) {
         let mut on_host = 0.0;
         let mut on_device = Vec::new();

@@ -22,14 +22,14 @@ fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
             .collect();
         let images = Tensor::<4>::from_data(TensorData::new(values, [1, 6, 64, 64]), &device);
         let mut gradients = NamedGradients::default();
-        // Of two batches, as with `accumulate = 2`.
+        // Two batches a step, as with `accumulate = 2`.
         for part in [1.0, 3.0] {
             let motion = pose_net.forward(images.clone().mul_scalar(part));
             let loss = motion.axis_angle.sum() * 100.0 + motion.translation.sum();
             let (mut raw, mut of_batch) = (loss.backward(), NamedGradients::default());
             of_batch.add("pose", &pose_net, &mut raw, 0.5);
             for (name, values) in of_batch.by_name {
-                // As a GPU's would be.
+                // Gradients as tensors, as on a GPU.
                 let tensor = || Tensor::from_data(values.to_vec().as_slice(), &Device::flex());
                 let values = if as_tensors {
                     Values::Device(tensor())
@@ -61,9 +61,9 @@ fn apart(one: &Weights, other: &Weights) -> f64 {
     one.tensors.iter().map(of_tensor).sum::<f64>().sqrt()
 }
 
-/// What a GPU computes as tensor operations is what the processor's kernel computes, with clipping, decay, two batches a step, and
-/// from a checkpoint on. Single parameters may differ: Adam divides a gradient by its size, and so one that is next to nothing by
-/// its own rounding.
+/// The tensor operations that a GPU runs give the same as the processor's kernel, with clipping, weight decay, two batches a step, and
+/// after a restart from a checkpoint. Single parameters may differ: Adam divides a gradient by its size, and a gradient near zero by its
+/// rounding error.
 #[test]
 fn both_ways_are_the_same_optimiser() {
     let [start, ours, _] = learned(false, 99);
@@ -78,7 +78,7 @@ fn both_ways_are_the_same_optimiser() {
     );
 }
 
-/// Of the same gradients both make the same step.
+/// From the same gradients, tensor operations and the kernel make the same step.
 #[test]
 fn a_step_is_the_kernels() {
     let device = Device::flex();
@@ -141,8 +141,8 @@ fn gradients_pass_through_main_memory_and_back() {
     assert_eq!(flat, [30.0, 10.0, 20.0]);
 }
 
-/// Where a device decides, the steps that it makes are those that the host would make: clipped as far, and corrected by the number of
-/// steps that were made. One with a gradient or a loss that is not finite changes nothing.
+/// A device that decides makes the steps that the host would make: with the same clipping, and corrected by the number of steps made. A
+/// step with a gradient or loss that is not finite changes nothing.
 #[test]
 fn a_device_decides_as_the_host_does() {
     let device = Device::flex().autodiff();
@@ -203,7 +203,7 @@ fn a_device_decides_as_the_host_does() {
             assert!((a - b).abs() <= 1e-6, "{ours:?} and {:?}", each.0);
         }
         assert!(apart(&adam.state(), &each.1) < 1e-6);
-        // When it is read changes nothing.
+        // How often the outcomes are read changes nothing.
         for read_every in [3, 7] {
             let some = learned(read_every, clip_norm);
             assert_eq!((&some.0, some.2), (&each.0, each.2), "{read_every}");

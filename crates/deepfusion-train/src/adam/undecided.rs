@@ -1,24 +1,24 @@
-//! Steps that a device decides about, while nobody waits for its answer.
+//! Steps that a device decides about, without the host waiting for the outcome.
 
 use super::corrections::corrections;
 use burn::tensor::{Bool, Device, Int, Tensor, TensorData};
 
-/// Steps that may be begun on a device before it is heard which of them were made.
+/// Most steps that may be begun on a device before the host reads which of them were made.
 pub(crate) const MOST_UNDECIDED: usize = 10;
 
 /// Steps of which the host does not know whether they were made.
 #[derive(Debug, Clone)]
 pub(super) struct Undecided {
-    /// 1 − β₁ᵗ and 1 − β₂ᵗ of the steps that are made next, `[MOST_UNDECIDED, 2]`. The host computes them, so that a step is the same
-    /// wherever it is decided about.
+    /// 1 − β₁ᵗ and 1 − β₂ᵗ of the steps to come, `[MOST_UNDECIDED, 2]`. The host computes them, so that a step is the same whether host or
+    /// device decides about it.
     corrections: Tensor<2>,
-    /// How many of them were made, `[1]`.
+    /// How many of the begun steps were made, `[1]`.
     made: Tensor<1, Int>,
     begun: usize,
 }
 
 impl Undecided {
-    /// None yet, after `steps` that were made.
+    /// No step begun yet, after `steps` steps made.
     pub(super) fn after(steps: u32, device: &Device) -> Self {
         let next = (steps + 1..).take(MOST_UNDECIDED);
         let values: Vec<f32> = next.flat_map(corrections).collect();
@@ -29,11 +29,11 @@ impl Undecided {
         }
     }
 
-    /// The corrections of a step, `[2]`, which counts where `is_made`, `[1]`.
+    /// Begins a step, which is counted if `is_made`, `[1]`. Returns its corrections, `[2]`.
     pub(super) fn begin(&mut self, is_made: &Tensor<1, Bool>) -> Tensor<1> {
         debug_assert!(
             self.begun < MOST_UNDECIDED,
-            "nobody has asked which were made"
+            "the outcomes of earlier steps must be read first"
         );
         self.begun += 1;
         let own = self.corrections.clone().select(0, self.made.clone());

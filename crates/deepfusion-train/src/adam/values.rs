@@ -1,4 +1,4 @@
-//! Numbers of a parameter, where it is learned.
+//! Values that belong to a parameter, in main memory or on a device.
 
 use burn::tensor::Tensor;
 use deepfusion_kernels::AdamStep;
@@ -8,12 +8,12 @@ use deepfusion_nn::ops::{self, AdamFactors};
 #[derive(Debug, Clone)]
 #[expect(
     clippy::large_enum_variant,
-    reason = "some hundred of them, whose values are a thousand times as large"
+    reason = "there are a few hundred of them, and their values are a thousand times as large"
 )]
 pub(super) enum Values {
     /// In main memory: the processor's kernels read it there.
     Host(Vec<f32>),
-    /// On a GPU, which it does not leave, or not in single precision.
+    /// As a tensor: on a GPU, where it stays, or not in single precision.
     Device(Tensor<1>),
 }
 
@@ -25,7 +25,7 @@ impl Values {
         }
     }
 
-    /// As many zeros, in the same place.
+    /// Zeros of the same number, on the same device.
     pub(super) fn zeros(&self) -> Self {
         match self {
             Self::Host(values) => Self::Host(vec![0.0; values.len()]),
@@ -40,7 +40,7 @@ impl Values {
         }
     }
 
-    /// Adds others of the same parameter, which are in the same place.
+    /// Adds other values of the same parameter.
     pub(super) fn add(&mut self, others: Self) {
         match (&mut *self, others) {
             (Self::Host(sum), Self::Host(add)) => {
@@ -56,7 +56,7 @@ impl Values {
         }
     }
 
-    /// On the gradient's device: what a checkpoint held is in main memory at first.
+    /// The values on the gradient's device: after loading a checkpoint they are in main memory.
     pub(super) fn beside(&self, gradient: &Tensor<1>) -> Tensor<1> {
         match self {
             Self::Host(values) => Tensor::from_data(values.as_slice(), &gradient.device()),
@@ -73,8 +73,8 @@ impl Values {
     }
 }
 
-/// [`deepfusion_kernels::adam`] of one parameter as tensor operations: it comes back ready to learn again, with its moments, and all of
-/// them stay on the GPU.
+/// [`deepfusion_kernels::adam`] of one parameter as tensor operations. Returns the parameter, which requires its gradient again, and its
+/// moments. All of them stay on the GPU.
 pub(super) fn update_on_device<const D: usize>(
     step: &AdamStep,
     factors: &AdamFactors,

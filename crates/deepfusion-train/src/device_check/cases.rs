@@ -22,16 +22,16 @@ pub(super) struct Case {
     pub(super) run: fn(&Inputs) -> Outcome,
 }
 
-/// Values about zero.
+/// Range of values around zero.
 const SIGNED: (f32, f32) = (-1.0, 1.0);
-/// Values of images.
+/// Range of an image's values.
 const IMAGE: (f32, f32) = (0.0, 1.0);
 
-/// Batch norms whose statistics stand still: those of the dozen values that a small image leaves would carry a single rounding through
-/// the whole network. Batch statistics are compared by themselves, and in the depth networks.
+/// Batch norms with frozen statistics. Batch statistics of the dozen values that remain of a small image would carry a single rounding
+/// error through the whole network. They are compared in a case of their own, and in the depth networks.
 const STEADY: bool = true;
 
-/// All of them, the simple ones first.
+/// All cases, the simple ones first.
 pub(super) fn all() -> Vec<Case> {
     let case = |operation, needed_by, run| Case {
         operation,
@@ -159,7 +159,7 @@ pub(super) fn all() -> Vec<Case> {
     ]
 }
 
-/// The views' gradient passes through PoseNet, too.
+/// The gradient of view synthesis passes through PoseNet, too.
 fn with_pose_net(config: TrainConfig) -> TrainConfig {
     TrainConfig {
         view_motion: ViewMotion::Distance,
@@ -188,7 +188,7 @@ fn conv(kernel: usize, options: ConvOptions, on: &Inputs) -> Outcome {
     })
 }
 
-/// 40,960 pixels: above 32,768 a gradient of the weights was wrong (of Burn, by WGSL on lavapipe).
+/// 40,960 pixels: above 32,768, Burn's gradient of the weights was wrong in WGSL on lavapipe.
 fn larger_conv(on: &Inputs) -> Outcome {
     let x = on.noise([1, 4, 128, 320], 60, SIGNED);
     let weight = on.noise([8, 4, 3, 3], 61, SIGNED);
@@ -198,7 +198,7 @@ fn larger_conv(on: &Inputs) -> Outcome {
     })
 }
 
-/// Numbers that bf16 has, so that only what comes after their rounding can differ; with many channels, as tensor cores want them.
+/// Numbers that bf16 represents exactly, so that only the computation after rounding can differ. Many channels, as tensor cores require.
 fn conv_in_bf16(on: &Inputs) -> Outcome {
     let steps = |tensor: Tensor<4>| tensor.mul_scalar(128.0).round().div_scalar(128.0);
     let x = steps(on.fixed([1, 80, 24, 40], 62, SIGNED)).require_grad();
@@ -377,7 +377,7 @@ fn parameters<M: Module>(module: &M, raw: Gradients) -> Vec<f32> {
     flat
 }
 
-/// A sum that all of a network's outputs are part of.
+/// All of a network's outputs in one tensor.
 fn whole<const D: usize>(outputs: Vec<Tensor<D>>) -> Tensor<1> {
     let outputs = outputs.into_iter().map(|output| {
         let count = output.shape().num_elements();
@@ -393,7 +393,7 @@ fn depth_net(config: &DepthNetConfig, on: &Inputs) -> Outcome {
     let forward = vec![values(result.clone())];
     Outcome {
         forward,
-        // One part: a bias before a batch norm has no gradient but rounding.
+        // A single part, since the gradient of a bias before a batch norm is nothing but rounding errors.
         backward: vec![parameters(&net, result.powi_scalar(2).mean().backward())],
     }
 }
@@ -412,14 +412,14 @@ fn pose_net(on: &Inputs) -> Outcome {
     let forward = vec![values(result.clone())];
     Outcome {
         forward,
-        // One part: a bias before a batch norm has no gradient but rounding.
+        // A single part, since the gradient of a bias before a batch norm is nothing but rounding errors.
         backward: vec![parameters(&net, result.powi_scalar(2).mean().backward())],
     }
 }
 
-/// A parameter and its moments after three steps, each of a gradient that does not depend on the one before: through a network a
-/// gradient that is next to nothing would decide, which Adam divides by its own rounding. Where it is computed is also decided that a
-/// fourth one among them, whose loss is not finite, changes nothing.
+/// A parameter and its moments after three steps. Each gradient is independent of the step before: in a network, gradients near zero would
+/// dominate, since Adam divides them by their own rounding errors. A fourth step among them has a loss that is not finite; the device
+/// itself must decide that it changes nothing.
 fn optimiser(on: &Inputs) -> Outcome {
     let mut parameter = Param::from_tensor(on.fixed::<2>([12, 20], 42, SIGNED));
     let mut adam = Adam::default();
@@ -449,7 +449,7 @@ fn snippets(on: &Inputs) -> SnippetBatch {
     let (fx, fy, cx, cy) = (58.0_f32, 60.0_f32, 47.5_f32, 31.5_f32);
     let matrix = |m: [[f32; 3]; 3]| Tensor::<3>::from_data([m], &on.device).expand([2, 3, 3]);
     let ahead = Tensor::<2>::from_data([[0.0, 0.0, -0.8]], &on.device).expand([2, 3]);
-    // Smooth, so that a step of the views' sampling does not decide over the error.
+    // Smooth images, so that the error does not depend on which pixel the view synthesis samples.
     let frames = [50, 51].map(|seed| {
         let coarse = on.fixed([2, 3, 8, 12], seed, IMAGE);
         let resize = BilinearResize::new([8, 12], [height, width], &on.device);
@@ -491,7 +491,7 @@ fn steps(mut config: TrainConfig, on: &Inputs) -> Outcome {
         speed_weight: config.loss.speed,
         masks_active: true,
     };
-    // A term over all steps is a part. Shares of pixels, and what only pixels below a threshold count for, jump by whole ones.
+    // Each term over all steps is a part. Shares of pixels and terms over pixels below a threshold are left out: they jump by whole pixels.
     let mut losses: Vec<Vec<f32>> = Vec::new();
     for _ in 0..3 {
         let loss = model.loss(&model.forward(&batch), &batch, schedule);

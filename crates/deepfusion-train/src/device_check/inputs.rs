@@ -1,23 +1,23 @@
-//! The same numbers on every device.
+//! Inputs that are the same on every device.
 
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-/// What an operation gives, in parts, each of which has a size of its own.
+/// What an operation computes, in parts. Each part is compared relative to its own largest value.
 pub(super) struct Outcome {
     pub(super) forward: Vec<Vec<f32>>,
-    /// Gradients of its inputs; empty of an operation without.
+    /// Gradients of its inputs; empty for an operation without gradients.
     pub(super) backward: Vec<Vec<f32>>,
 }
 
-/// Where an operation's inputs are made.
+/// Creates an operation's inputs on a device.
 pub(super) struct Inputs {
     pub(super) device: Device,
-    /// By which share of itself every number is off, up or down: as if something before had been rounded.
+    /// Relative error of every number, up or down, as if an earlier result had been rounded.
     pub(super) rounding: f32,
 }
 
 impl Inputs {
-    /// As they are.
+    /// Inputs without rounding errors.
     pub(super) fn exact(device: &Device) -> Self {
         Self {
             device: device.clone().autodiff(),
@@ -25,7 +25,7 @@ impl Inputs {
         }
     }
 
-    /// Numbers between two ends, without a pattern, which depend on `seed` alone; a tensor that learns.
+    /// Pseudo-random numbers between two limits that depend on `seed` alone, as a tensor with a gradient.
     pub(super) fn noise<const D: usize>(
         &self,
         shape: [usize; D],
@@ -35,7 +35,7 @@ impl Inputs {
         self.fixed(shape, seed, ends).require_grad()
     }
 
-    /// The same of a tensor that does not learn.
+    /// As [`Self::noise`], as a tensor without a gradient.
     pub(super) fn fixed<const D: usize>(
         &self,
         shape: [usize; D],
@@ -76,7 +76,7 @@ pub(super) fn gradient<const D: usize>(input: &Tensor<D>, raw: &Gradients) -> Ve
     input.grad(raw).map(values).unwrap_or_default()
 }
 
-/// A result, and the gradients of its values' sum, each with a weight of its own: a sum alone would hide what cancels out.
+/// A result, and the gradients of a weighted sum of its values. In a plain sum, errors could cancel out.
 pub(super) fn outcome<const D: usize>(
     result: Tensor<D>,
     gradients: impl FnOnce(&Gradients) -> Vec<Vec<f32>>,

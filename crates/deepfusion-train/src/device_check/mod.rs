@@ -1,5 +1,5 @@
-//! Whether a device computes what this machine's processor does, forward and backward: how a GPU that nobody here has becomes
-//! trustworthy.
+//! Checks whether a device computes the same as this machine's processor, forward and backward. So users can check a GPU that we never
+//! tested.
 
 mod cases;
 mod inputs;
@@ -15,10 +15,10 @@ use inputs::{Inputs, Outcome};
 
 pub use summary::{DeviceCheck, DeviceUse};
 
-/// How far a device may be from the processor, over the largest value: both round in single precision, in another order.
+/// Largest difference between device and processor, relative to the largest value: both round in single precision, in different orders.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// What needs an operation.
+/// What an operation is needed for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NeededBy {
@@ -44,58 +44,59 @@ pub enum NeededBy {
     MixedPrecision,
 }
 
-/// An operation on the device beside the same on the processor.
+/// An operation on a device, compared with the processor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OperationCheck {
-    /// What was computed.
+    /// The operation's name.
     pub operation: &'static str,
-    /// What needs it.
+    /// What it is needed for.
     pub needed_by: NeededBy,
-    /// How far its result is from the processor's, over the largest value there; infinite where one is finite and the other is not.
+    /// Largest difference from the processor's result, relative to the largest value there; infinite where one is finite and the other is
+    /// not.
     pub forward: f64,
-    /// The same of its gradients; `None` of an operation without.
+    /// The same for its gradients; `None` for an operation without gradients.
     pub backward: Option<f64>,
-    /// Why it did not run to its end on the device.
+    /// Why it did not finish on the device; `None` if it did.
     pub failure: Option<OperationFailure>,
 }
 
-/// Why an operation did not run to its end on a device.
+/// Why an operation did not finish on a device.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OperationFailure {
-    /// It panicked, as drivers' errors do, with this message.
+    /// It panicked with this message, as driver errors do.
     #[error("{0}")]
     Panicked(String),
     /// The process that computed it ended.
     #[error("its process ended ({0})")]
     ProcessEnded(ExitStatus),
-    /// The process that computed it did not say anything for so long.
+    /// The process that computed it did not answer within this time.
     #[error("it did not answer within {} s", .0.as_secs())]
     Silent(Duration),
 }
 
 impl OperationCheck {
-    /// Whether the result is the processor's.
+    /// Whether the result equals the processor's, within [`TOLERANCE`].
     #[must_use]
     pub fn forward_is_right(&self) -> bool {
         self.failure.is_none() && self.forward <= TOLERANCE
     }
 
-    /// Whether the gradients are the processor's, too.
+    /// Whether result and gradients equal the processor's, within [`TOLERANCE`].
     #[must_use]
     pub fn is_right(&self) -> bool {
         self.forward_is_right() && self.backward.is_none_or(|error| error <= TOLERANCE)
     }
 }
 
-/// Everything that is compared, by name, the simple operations first.
+/// Names of all operations that are compared, the simple ones first.
 pub fn operations() -> impl Iterator<Item = (&'static str, NeededBy)> {
     let cases = cases::all().into_iter();
     cases.map(|case| (case.operation, case.needed_by))
 }
 
-/// Computes an operation on a device and on the processor; `None` for a name that [`operations`] does not have. One that panics, as
-/// drivers' errors do, failed; a driver that ends the process is not survived: who wants to go on starts another process behind it.
+/// Computes an operation on a device and on the processor; `None` for a name that [`operations`] does not list. A panic, as from a driver's
+/// error, counts as a failure. A driver may also end the whole process: to continue after that, run each operation in a process of its own.
 #[must_use]
 pub fn check_operation(operation: &str, device: &Device) -> Option<OperationCheck> {
     let mut cases = cases::all().into_iter();
@@ -112,13 +113,13 @@ pub fn check_operation(operation: &str, device: &Device) -> Option<OperationChec
     Some(match found {
         Ok(found) => compared(check, &right, &found),
         Err(panic) => OperationCheck {
-            failure: Some(OperationFailure::Panicked(said(&*panic))),
+            failure: Some(OperationFailure::Panicked(panic_message(&*panic))),
             ..check
         },
     })
 }
 
-/// How far what was found is from what is right.
+/// Completes the check with the differences between `right` and `found`.
 fn compared(check: OperationCheck, right: &Outcome, found: &Outcome) -> OperationCheck {
     let has_gradients = !right.backward.is_empty();
     OperationCheck {
@@ -128,7 +129,7 @@ fn compared(check: OperationCheck, right: &Outcome, found: &Outcome) -> Operatio
     }
 }
 
-/// The largest difference in a part over the largest value there, of the part where that is largest.
+/// The largest difference in a part relative to the largest value there, for the worst part.
 fn apart(right: &[Vec<f32>], found: &[Vec<f32>]) -> f64 {
     if right.len() != found.len() {
         return f64::INFINITY;
@@ -151,10 +152,10 @@ fn part_apart(right: &[f32], found: &[f32]) -> f64 {
 }
 
 /// A panic's message.
-fn said(panic: &(dyn Any + Send)) -> String {
+fn panic_message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(ToString::to_string);
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-    text.unwrap_or_else(|| "it does not say why".into())
+    text.unwrap_or_else(|| "no message".into())
 }
 
 #[cfg(test)]
@@ -175,8 +176,8 @@ mod tests {
         assert_eq!(check_operation("any", &Device::flex()), None);
     }
 
-    /// What another order of sums may do to the inputs of an operation is no error; a thousand times as much is one. So every case says
-    /// something, and none decides by a pixel.
+    /// Rounding errors in the inputs, as from another order of summation, must pass; errors a thousand times as large must fail. So every
+    /// case is sensitive enough, and none depends on a single pixel.
     #[test]
     fn rounding_is_right_and_a_percent_is_wrong() {
         for case in cases::all() {
@@ -214,11 +215,11 @@ mod tests {
         assert_eq!(apart(&[1.0, f32::NAN], &[1.0, f32::NAN]), 0.0);
         assert_eq!(apart(&[1.0, f32::NAN], &[1.0, 2.0]), f64::INFINITY);
         assert_eq!(apart(&[1.0], &[]), f64::INFINITY);
-        // A small part is not hidden by a large one.
+        // A large part does not hide a small one.
         let parts = |small| [vec![100.0], vec![small]];
         assert!(super::apart(&parts(0.1), &parts(0.2)) > 0.9);
         let broken = catch_unwind(|| panic!("out of {}", "memory")).unwrap_err();
-        assert_eq!(said(&*broken), "out of memory");
+        assert_eq!(panic_message(&*broken), "out of memory");
     }
 
     #[test]

@@ -1,26 +1,26 @@
-//! What a device is good for, by all of its operations together.
+//! What a device can be used for, from the checks of all operations.
 
 use super::{NeededBy, OperationCheck};
 
-/// What was found of a device.
+/// The checks of a device.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DeviceCheck {
-    /// Its operations, each beside the same on the processor.
+    /// Its operations, each compared with the processor.
     pub operations: Vec<OperationCheck>,
 }
 
 /// What a device can be used for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeviceUse {
-    /// Nothing: depth would not be what was trained.
+    /// Nothing: its depth would differ from the trained network's.
     Nothing,
-    /// Prediction alone: its gradients or losses are not to be relied on.
+    /// Prediction only: its gradients or losses are unreliable.
     Prediction,
-    /// Training, too, but for these; all of it where there are none.
+    /// Prediction and training, except for these; everything if the list is empty.
     TrainingWithout(Vec<NeededBy>),
 }
 
-/// What training can do without, in the order in which it is said.
+/// What training can do without, in the order in which it is listed.
 const OPTIONAL: [NeededBy; 7] = [
     NeededBy::Flow,
     NeededBy::Affine,
@@ -32,20 +32,20 @@ const OPTIONAL: [NeededBy; 7] = [
 ];
 
 impl DeviceCheck {
-    /// Whether every operation that something needs is the processor's, forward and backward.
+    /// Whether every operation needed for `needs` equals the processor's, forward and backward.
     #[must_use]
     pub fn is_right(&self, needs: NeededBy) -> bool {
         self.of(needs).all(OperationCheck::is_right)
     }
 
-    /// Whether the ResNet presets' depth is the processor's.
+    /// Whether the ResNet presets predict the same depth as on the processor.
     #[must_use]
     pub fn predicts(&self) -> bool {
         self.of(NeededBy::Network)
             .all(OperationCheck::forward_is_right)
     }
 
-    /// Whether they learn from video as on the processor.
+    /// Whether the ResNet presets learn from video as on the processor.
     #[must_use]
     pub fn trains(&self) -> bool {
         [NeededBy::Network, NeededBy::Views, NeededBy::Learning]
@@ -66,14 +66,14 @@ impl DeviceCheck {
         DeviceUse::TrainingWithout(wrong.collect())
     }
 
-    /// How many operations are not the processor's, or failed.
+    /// Number of operations that differ from the processor's or failed.
     #[must_use]
     pub fn wrong(&self) -> usize {
         let operations = self.operations.iter();
         operations.filter(|check| !check.is_right()).count()
     }
 
-    /// The operations that something needs.
+    /// The operations needed for `needs`.
     fn of(&self, needs: NeededBy) -> impl Iterator<Item = &OperationCheck> {
         let operations = self.operations.iter();
         operations.filter(move |check| check.needed_by == needs)
@@ -84,12 +84,12 @@ impl DeviceCheck {
 mod tests {
     use super::*;
 
-    /// Operations that are right, and one that is wrong in its result or in its gradients alone.
+    /// Operations that are right, except for one that is wrong in its result (`forward`) or only in its gradients.
     fn check(wrong: NeededBy, forward: bool) -> DeviceCheck {
         checks(&[(wrong, forward)])
     }
 
-    /// The same of several that are wrong.
+    /// As [`check`], with several wrong operations.
     fn checks(wrong: &[(NeededBy, bool)]) -> DeviceCheck {
         let needed = [
             NeededBy::Network,
@@ -123,7 +123,7 @@ mod tests {
             (NeededBy::Views, true, true, false),
             (NeededBy::Learning, false, true, false),
             (NeededBy::Flow, true, true, true),
-            // None of these operations is one of R-MSFM's.
+            // R-MSFM uses none of these operations.
             (NeededBy::RMsfm, true, true, true),
         ] {
             let found = check(wrong, forward);

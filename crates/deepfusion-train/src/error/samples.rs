@@ -1,34 +1,35 @@
-//! Why there is nothing to learn from, or no view by another camera.
+//! Why there are no training samples, or no view by a second camera.
 
 use deepfusion_hint::count_of;
 use std::sync::Arc;
 
-/// Standard deviation of a distance, as a share of it, above which its sample is left out: metres that unsure teach no scale.
+/// A sample is left out if the standard deviation of its distance exceeds this share of the distance: it is too uncertain to teach the
+/// scale.
 pub(crate) const MOST_SIGMA_SHARE: f64 = 0.2;
 
-/// Why there is nothing to learn from.
+/// Why there are no training samples.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleProblem {
-    /// A set of samples without one.
+    /// The set has no sample.
     #[error("it is empty")]
     Empty,
     /// No drive was given.
     #[error("it has no drive")]
     NoDrive,
-    /// All samples are images of known depth.
+    /// All samples are images with known depth, none are from video.
     #[error("nothing is learned from video")]
     NoVideo,
-    /// What drives there are have no sample.
+    /// No drive has a sample, for these reasons.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     Skipped(Vec<Skipped>),
 }
 
-/// Why a drive has no sample, or lacks some.
+/// Why all or some samples of a drive are left out.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Skipped {
-    /// Distances that teach no scale.
+    /// Samples whose distances are too uncertain to teach the scale.
     #[error(
         "{drive}: {unsure} of {} {} a distance that is known to no better than {:.0} %",
         count_of(*of, "sample"),
@@ -40,10 +41,10 @@ pub enum Skipped {
         drive: String,
         /// Samples that are left out.
         unsure: usize,
-        /// Samples that it has.
+        /// Samples that the drive has, with those.
         of: usize,
     },
-    /// Images that cannot be read, and are done without.
+    /// Images that cannot be read and are left out.
     #[error(
         "{drive}: {broken} of {} cannot be read and {} left out: {}",
         count_of(*of, "image"),
@@ -57,7 +58,7 @@ pub enum Skipped {
         broken: usize,
         /// How many images it has.
         of: usize,
-        /// The first of them, each with what is wrong with it.
+        /// The first of them, each with its error.
         images: Vec<String>,
     },
     /// No sample of the drive can be made.
@@ -72,38 +73,38 @@ pub struct SharedFrames {
     pub drive: String,
     /// Number of its validation targets that are also targets of training samples.
     pub targets: usize,
-    /// Number of further ones that are sources of training samples.
+    /// Number of its other validation targets that are sources of training samples.
     pub sources: usize,
 }
 
-/// Why a drive's other camera is no view.
+/// Why a drive's second camera cannot be used as a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoStereo {
-    /// No drive of the run has a second one among the data.
+    /// No drive of the run has a second camera among the data.
     OneCamera,
-    /// No frame of the drive has one of the other camera.
+    /// The two cameras have no frame of the same moment.
     NoCommonFrame,
-    /// The calibration does not say where the cameras are.
+    /// The calibration does not contain the cameras' positions.
     NoBaseline,
-    /// They see through other lenses, or are turned: their images are not rectified.
+    /// The images are not rectified: the cameras' intrinsics or orientations differ.
     NotRectified,
 }
 
 impl std::fmt::Display for NoStereo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::OneCamera => "its other camera is not among the data, nor is that of any other drive, and stereo asks for it",
+            Self::OneCamera => "neither this drive nor any other has a second camera among the data, and stereo requires one",
             Self::NoCommonFrame => "its two cameras have no frame in common",
-            Self::NoBaseline => "nothing says where its two cameras are",
+            Self::NoBaseline => "the calibration does not contain the positions of its two cameras",
             Self::NotRectified => {
-                "its two cameras are not rectified: their images have other intrinsics, or are turned"
+                "its two cameras are not rectified: their intrinsics or orientations differ"
             }
         })
     }
 }
 
-/// The first of so many broken images, each with what is wrong with it.
+/// The first of `broken` images that cannot be read, each with its error, and the number of the others.
 pub(super) fn named(images: &[String], broken: usize) -> String {
     let mut text = images.join("; ");
     let more = broken.saturating_sub(images.len());

@@ -1,35 +1,35 @@
-//! What ends training from outside of it: a loader's threads, other workers.
+//! Failures of what training depends on: image loaders, their threads, other workers.
 
 use std::error::Error as StdError;
 
-/// What a loader of images died of: a fault of the program.
+/// Why an image loader stopped early: a bug.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoaderProblem {
     /// A panic while a batch was made.
-    #[error("batch {batch}: {}", text.as_deref().unwrap_or("it does not say why"))]
+    #[error("batch {batch}: {}", text.as_deref().unwrap_or("no message"))]
     Panicked {
         /// The batch, counted from 0.
         batch: usize,
         /// The panic's message, where it has one.
         text: Option<String>,
     },
-    /// Its thread is gone.
-    #[error("its thread has ended before the last batch")]
+    /// Its thread ended early.
+    #[error("its thread ended before the last batch")]
     Ended,
-    /// It has ended, and should have gone on.
-    #[error("it has no further batch")]
+    /// It returned no batch though it should never end.
+    #[error("it has no more batches")]
     NoBatch,
 }
 
-/// Which threads the system does not give.
+/// Which threads could not be started.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ThreadsProblem {
-    /// Those that decode images.
+    /// The threads that decode images.
     #[error("{0}")]
     Pool(#[source] rayon::ThreadPoolBuildError),
-    /// The one that has batches made.
+    /// The thread that makes the batches.
     #[error("{0}")]
     Thread(#[source] std::io::Error),
 }
@@ -38,17 +38,17 @@ pub enum ThreadsProblem {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorkersProblem {
-    /// What connects them says so ([`Workers::sum`](crate::Workers::sum)).
+    /// The connection between them failed ([`Workers::sum`](crate::Workers::sum)).
     #[error("{0}")]
     Unreachable(#[source] Box<dyn StdError + Send + Sync>),
-    /// Their networks differ.
-    #[error("they begin from other weights")]
+    /// Their networks' weights differ.
+    #[error("the workers start from different weights")]
     OtherWeights,
-    /// Their recordings differ.
-    #[error("they have other samples")]
+    /// Their samples differ.
+    #[error("the workers have different samples")]
     OtherSamples,
     /// Their configurations differ.
-    #[error("they have other settings")]
+    #[error("the workers have different settings")]
     OtherSettings,
     /// One of the others could not make its step.
     #[error("another worker has failed")]

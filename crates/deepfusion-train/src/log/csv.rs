@@ -23,7 +23,7 @@ pub struct CsvRecord<'a> {
     pub losses: &'a LossTerms,
     /// The learning rate; 0 for a validation.
     pub learning_rate: f64,
-    /// As of a [`crate::TrainEvent::Step`].
+    /// Measured over predicted displacement, as in [`crate::TrainEvent::Step`].
     pub scale_ratio: f64,
     /// Images per second; 0 for a validation.
     pub images_per_second: f64,
@@ -40,8 +40,7 @@ fn header() -> String {
     format!("step,split,{},{EXTRA}", terms.join(","))
 }
 
-/// A line of a log that may have been begun with other columns, arranged in the current columns; missing
-/// values are empty.
+/// A line of a log that another version may have begun, rearranged into the current columns. Missing values are empty.
 fn arranged(columns: &str, line: &str) -> String {
     let values: HashMap<&str, &str> = columns.split(',').zip(line.split(',')).collect();
     let header = header();
@@ -50,7 +49,7 @@ fn arranged(columns: &str, line: &str) -> String {
 }
 
 impl CsvLog {
-    /// Opens the log; records after `step`, left by a run that was interrupted later, are dropped.
+    /// Opens the log. Drops records after `step`, which an interrupted run wrote after its last checkpoint.
     ///
     /// # Errors
     /// [`Error::Model`].
@@ -155,7 +154,7 @@ mod tests {
         assert!(text.starts_with("step,split,total,reprojection"), "{text}");
     }
 
-    /// A log of an earlier version lacks a column: its lines stay, and what is missing is empty.
+    /// If a log of an earlier version lacks a column, its lines stay and the missing values are empty.
     #[test]
     fn a_log_with_other_columns_goes_on_with_those_of_today() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! TensorBoard's event files: records of a length, its checksum, an `Event` protobuf message and its
-//! checksum. Only scalars are written, so the two messages are encoded by hand.
+//! TensorBoard's event files. A record is a length, its checksum, an `Event` protobuf message and its checksum. Only scalars are written,
+//! so the two messages are encoded by hand.
 
 use crate::Error;
 use std::fs::{File, OpenOptions};
@@ -97,7 +97,7 @@ fn bytes(field: u8, value: &[u8]) -> Vec<u8> {
     [&[field << 3 | 2][..], &varint(value.len() as u64), value].concat()
 }
 
-/// CRC-32C (Castagnoli), rotated and shifted as TFRecord wants it.
+/// CRC-32C (Castagnoli), rotated and offset as TFRecord requires.
 fn masked_crc(data: &[u8]) -> u32 {
     let crc = data.iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| {

@@ -11,8 +11,8 @@ const FLATNESS: f64 = 1e-2;
 /// The affine invariant loss (Eq. 9): a and b by least squares of a·x + b on y over the valid pixels of each image;
 /// (mean |a·x + b − y| + ε) / (mean |y − median(y)| + ε), averaged over the images, ε a hundredth of y's median.
 ///
-/// It neither depends on nor changes the scale of either. y is the reference and has no gradient: in a batch that
-/// holds both directions each depth is x once. The gradient of x goes through a and b, too.
+/// It neither depends on nor changes the scale of x or y. y is the reference and has no gradient: in a batch with both directions each
+/// depth is x once. The gradient of x includes that through a and b.
 ///
 /// A flat depth is not rewarded. Equation 9 has ε in the denominator alone, so that two flat depths would cost
 /// nothing. With ε in the numerator as well they cost 1, the maximum, as any depth that is unrelated to the other.
@@ -28,12 +28,12 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
     let outside = valid.clone().bool_not();
     let inside = flat(valid.clone().float());
     let count = inside.clone().sum_dim(1).clamp_min(1.0);
-    // What is outside may be anything, NaN included.
+    // Values outside the mask may be anything, even NaN.
     let x = flat(x.mask_fill(outside.clone(), 0.0));
     let y = flat(y.detach().mask_fill(outside, 0.0));
     let mean = |t: Tensor<2>| t.sum_dim(1).div(count.clone());
     let (mean_x, mean_y) = (mean(x.clone()), mean(y.clone()));
-    // About the means, so that f32 does not lose the spread in the sums.
+    // Relative to the means, so that the sums keep the spread in f32.
     let dx = x.sub(mean_x.clone()).mul(inside.clone());
     let dy = y.clone().sub(mean_y).mul(inside.clone());
     let ridge = mean_x.mul_scalar(FLATNESS).powi_scalar(2).add_scalar(1e-12);
@@ -102,8 +102,8 @@ mod tests {
     use super::*;
     use burn::tensor::Device;
 
-    /// Two frames of a row: nothing goes anywhere, but for one pixel of the first frame that goes where the second
-    /// frame has something else. Neither that pixel comes back, nor the one of the second frame that lies in its place.
+    /// Two frames of one row. All pixels stay in place, except that one pixel of the first frame moves to a place where the second frame
+    /// shows another point. Neither that pixel nor the pixel of the second frame in its old place comes back.
     #[test]
     fn what_is_hidden_or_moves_is_left_out() {
         let device = Device::flex();

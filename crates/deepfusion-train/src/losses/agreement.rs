@@ -15,9 +15,9 @@ pub fn agreement(rigid: Tensor<4>, flow: Tensor<4>, both: &Tensor<4, Bool>) -> T
     mean_where(rigid.sub(flow).abs(), both).mul_scalar(2.0)
 }
 
-/// Where both the rigid warp and the flow explain the pixel: in view, consistent forward and backward, and each
-/// with a smaller error than no motion at all. Without the last, a car ahead at the camera's speed, whose flow
-/// is zero, would draw its depth to infinity. No gradient.
+/// Where both the rigid warp and the flow explain the pixel: in view, consistent forward and backward, and each with a smaller error than
+/// no motion. Without the last condition, a car ahead at the camera's speed, whose flow is zero, would draw its own depth to infinity. No
+/// gradient.
 ///
 /// # Shapes
 /// - `rigid_error`, `unwarped_error`, output: `[N, 1, H, W]`
@@ -44,7 +44,7 @@ mod tests {
     fn what_stands_still_in_the_image_does_not_draw_its_depth_to_infinity() {
         let device = Device::flex();
         let row = |values: [f32; 4]| Tensor::<4>::from_data([[[values]]], &device);
-        // Both explain it; the flow alone; neither better than standing still; the warp alone.
+        // Explained by both; by the flow alone; by neither better than by standing still; by the warp alone.
         let unwarped = row([0.5, 0.5, 0.0, 0.5]);
         let flow = FlowView {
             error: row([0.1, 0.1, 0.0, 0.6]),

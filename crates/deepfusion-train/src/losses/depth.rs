@@ -10,11 +10,11 @@ const STEPS: [usize; 3] = [1, 2, 4];
 /// Ground-truth depth of a batch, pixel by pixel.
 #[derive(Debug, Clone)]
 pub struct DepthTruth {
-    /// ln D, D in metres; ln of the farthest depth that counts where `far` is 1; anything finite where neither is.
+    /// ln D, D in metres; where `far` is 1, ln of the least depth that the pixel has; any finite number where neither mask is 1.
     pub log_depth: Tensor<4>,
     /// 1 where the depth is known, else 0.
     pub known: Tensor<4>,
-    /// 1 where it is only known to be at least `log_depth`: the sky, and what lies beyond the range.
+    /// 1 where the depth is only known to be at least `log_depth`: in the sky and beyond the range.
     pub far: Tensor<4>,
 }
 
@@ -31,7 +31,7 @@ pub struct DepthLoss {
     pub bias: Tensor<1>,
 }
 
-/// e = ln D̂ − ln D where depth is known; min(e, 0) where only its least value is; 0 elsewhere.
+/// e = ln D̂ − ln D where depth is known; min(e, 0) where only its least value is known; 0 elsewhere.
 ///
 /// # Shapes
 /// - `metric_disparity`, output and the truth: B×1×H×W; disparity in 1/m
@@ -56,7 +56,7 @@ pub fn depth(
     let valid = truth.known.clone() + truth.far.clone();
     let finest = log_depth_error(metric_disparities[0].clone(), truth);
     let error = mean_over(finest.clone().abs(), valid.clone());
-    // NaN where no depth is known: then nothing says the scale.
+    // NaN where no depth is known, since then the scale is not known.
     let known = truth.known.clone();
     let bias = (finest.clone().detach() * known.clone()).sum() / known.sum();
     let gradient = STEPS
@@ -80,7 +80,7 @@ pub fn depth(
     }
 }
 
-/// Mean |e(p + step) − e(p)| along an axis, over the pairs of which both are valid.
+/// Mean |e(p + step) − e(p)| along an axis, over the pairs of two valid pixels.
 fn difference(error: &Tensor<4>, valid: &Tensor<4>, axis: usize, step: usize) -> Tensor<1> {
     let length = error.dims()[axis] - step;
     let pair = |x: &Tensor<4>| {
@@ -139,7 +139,7 @@ mod tests {
         let exact = truth.log_depth.clone().neg().exp();
         let at = |factor: f64| depth(&[exact.clone().div_scalar(factor)], &truth, &config());
         assert!(number(&at(1.0).loss).abs() < 1e-6);
-        // Twelve pixels are known and two are far: those are already as far as they must be.
+        // Twelve pixels are known; two are far, and already predicted far enough.
         let farther = at(2.0);
         assert!((number(&farther.error) - 12.0 / 14.0 * 2.0_f32.ln()).abs() < 1e-5);
         assert!((number(&farther.bias) - 2.0_f32.ln()).abs() < 1e-5);
@@ -210,7 +210,7 @@ mod tests {
         let (x, value) = loss(&point);
         let gradient = x.grad(&value.backward()).unwrap().into_data();
         for (i, exact) in gradient.iter::<f32>().enumerate() {
-            // A share of the value, since the loss sees its logarithm.
+            // A relative step, since the loss depends on the value's logarithm.
             let step = 1e-3 * point[i];
             let at = |step: f32| {
                 let mut moved = point.clone();

@@ -1,4 +1,5 @@
-//! The loss of SfMLearner (Zhou et al., CVPR 2017, Sec. 3.3): every source counts, as far as the pose network says that it can explain the pixel.
+//! The loss of SfMLearner (Zhou et al., CVPR 2017, Sec. 3.3): every source counts, weighted by how well the pose network expects it to
+//! explain the pixel.
 
 use burn::tensor::activation::log_sigmoid;
 use burn::tensor::{Bool, Tensor};
@@ -6,11 +7,11 @@ use deepfusion_nn::ops::sigmoid;
 
 use super::{ReprojectionOutput, View};
 
-/// L_rp of one scale: the mean over all pixels **and** views of E·pe. A view that does not see a pixel, or where it is dynamic, costs its
-/// unwarped error there, a constant.
+/// L_rp of one scale: the mean over all pixels **and** views of E·pe. Where a view does not see a pixel, or the pixel is dynamic, its
+/// unwarped error is used, a constant.
 ///
 /// # Shapes
-/// - `logits`: ln(E / (1 − E)) by view, N×1×H×W; none: E is 1
+/// - `logits`: ln(E / (1 − E)) by view, N×1×H×W; empty: E = 1
 ///
 /// # Panics
 /// If there are no views.
@@ -50,7 +51,7 @@ pub fn mean_reprojection(views: Vec<View>, logits: &[Tensor<4>]) -> Reprojection
     }
 }
 
-/// L_e: the mean over pixels and views of −ln E, which keeps E from explaining nothing.
+/// L_e: the mean over pixels and views of −ln E, which keeps E from becoming 0 everywhere.
 ///
 /// # Shapes
 /// - `logits`: ln(E / (1 − E)) by view, N×1×H×W
@@ -103,7 +104,7 @@ mod tests {
         close(read(masked.valid.float()), [1.0, 0.0, 1.0]);
         let expected = -(0.75_f32.ln() + 0.25_f32.ln()) / 2.0;
         assert!((number(explainability(&logits)) - expected).abs() < 1e-6);
-        // Where it explains nothing whatever, a mask is still pulled back.
+        // A mask of almost 0 still has a gradient that raises it.
         let far = [row([-200.0; 3])];
         assert!((number(explainability(&far)) - 200.0).abs() < 1e-3);
     }

@@ -23,14 +23,14 @@ pub struct FlowView {
     pub coords: Tensor<4>,
     /// f(p) + f'(p + f(p)), N×2×H×W, in pixels: zero where flow and reversed flow agree.
     pub round_trip: Tensor<4>,
-    /// Where the flow ends in view and at a pixel that comes back: ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an
-    /// image of which less than half comes back, wherever it ends in view: there the flow is wrong, not the
-    /// pixels occluded. N×1×H×W, without gradient.
+    /// Where the flow ends in view and the reversed flow leads back: ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an image where fewer than
+    /// half of the pixels are led back, every pixel whose flow ends in view: there the flow is wrong, not the pixels occluded. N×1×H×W,
+    /// without gradient.
     pub visible: Tensor<4, Bool>,
 }
 
-/// Share of an image's pixels in view that must come back for the rest to count as occluded. Without this
-/// limit two flows that contradict each other everywhere see nothing, learn nothing, and stay so.
+/// Share of an image's pixels in view that must be led back for the rest to count as occluded. Without this limit, two flows that
+/// contradict each other everywhere would have no visible pixel and never learn.
 const LEAST_CONSISTENT: f64 = 0.5;
 
 /// Warps a source to the targets by the flow between them.
@@ -60,8 +60,8 @@ pub fn flow_view(
     }
 }
 
-/// The pixels in view that are not occluded: forward and backward flow agree, ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) +
-/// 0.5. In an image of which less than half comes back, all that is in view. No gradient.
+/// The pixels in view that are not occluded: forward and backward flow agree, ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an image where
+/// fewer than half of the pixels are led back, all pixels in view. No gradient.
 ///
 /// # Shapes
 /// - `flow`: f, `[N, 2, H, W]`, pixels of one frame to those of the other
@@ -83,18 +83,18 @@ pub fn visible(
     in_view.clone().bool_and(back_again.bool_or(wrong))
 }
 
-/// The images in which too few of the pixels in view come back, N×1×1×1 expanded to the masks' size.
+/// The images in which too few of the pixels in view are led back, N×1×1×1 expanded to the masks' size.
 fn contradictory(back_again: &Tensor<4, Bool>, in_view: &Tensor<4, Bool>) -> Tensor<4, Bool> {
     let count = |mask: &Tensor<4, Bool>| mask.clone().float().sum_dim(2).sum_dim(3);
     let few = count(back_again).lower(count(in_view).mul_scalar(LEAST_CONSISTENT));
     few.expand(in_view.dims())
 }
 
-/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow in both directions. Both
-/// directions' images count alike: L_f + L_b is twice the mean error, L_c the mean over both.
+/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow in both directions. The images of both directions have the same weight:
+/// L_f + L_b is twice the mean error, L_c the mean over both.
 ///
 /// # Shapes
-/// - `views`: the flow's and the reversed flow's, N and N, or one view that holds both along the batch
+/// - `views`: the flow's and the reversed flow's, N and N, or one view with both along the batch
 /// - `flows`, `images`: of each view, `[N, 2, H, W]` and `[N, C, H, W]`
 /// - output: one value
 ///

@@ -3,12 +3,12 @@ use burn::tensor::{Bool, Tensor};
 /// Σ values / Σ weights of each image, averaged over the images; an image whose weights are 0 gives 0, not NaN. The values are 0 where the
 /// weights are.
 ///
-/// Each image counts alike, however many of its pixels do. So a batch's loss is the mean of its parts' losses, and K workers with batches of B
-/// learn what one learns with a batch of K·B.
+/// Each image has the same weight, however many of its pixels count. So a batch's loss is the mean of its parts' losses, and K workers with
+/// batches of B learn the same as one worker with a batch of K·B.
 ///
 /// # Shapes
 /// - `values`: `[N, C, H, W]`
-/// - `weights`: `[N, 1, H, W]`, of all channels
+/// - `weights`: `[N, 1, H, W]`, shared by all channels
 pub(super) fn mean_over(values: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
     let [_, channels, _, _] = values.dims();
     let count = of_image(weights).clamp_min(1.0);
@@ -17,7 +17,7 @@ pub(super) fn mean_over(values: Tensor<4>, weights: Tensor<4>) -> Tensor<1> {
         .mean()
 }
 
-/// [`mean_over`] the pixels where the mask is true. What the values are elsewhere, NaN included, is of no account.
+/// [`mean_over`] the pixels where the mask is true. Values elsewhere are ignored, even NaN.
 pub(super) fn mean_where(values: Tensor<4>, mask: &Tensor<4, Bool>) -> Tensor<1> {
     let outside = mask.clone().bool_not().expand(values.dims());
     mean_over(values.mask_fill(outside, 0.0), mask.clone().float())
@@ -52,7 +52,7 @@ mod tests {
         assert_eq!(mean_where(values, &none).into_scalar::<f32>(), 0.0);
     }
 
-    /// One image shows a pixel, the other three.
+    /// One image has one valid pixel, the other three.
     #[test]
     fn images_count_alike_whatever_they_show() {
         let device = Device::flex();
@@ -62,7 +62,7 @@ mod tests {
         assert!((mean - 4.0).abs() < 1e-6, "{mean}");
     }
 
-    /// It adds neither to the mean nor to its gradient, and the other image's is not larger for it.
+    /// An image without valid pixels adds nothing to the mean or its gradient, and does not enlarge the other image's gradient.
     #[test]
     fn an_image_that_shows_nothing_counts_as_zero() {
         let device = Device::flex().autodiff();

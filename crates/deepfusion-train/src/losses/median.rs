@@ -6,10 +6,11 @@ use deepfusion_nn::ops::is_cpu;
 /// How often [`by_counting`] halves the range in which a median lies.
 const HALVINGS: usize = 40;
 
-/// The median of each row's values inside; of an even number the upper one of the middle two. A row without any gives its first value.
+/// The median of each row's values inside; of an even number of values the upper one of the middle two. A row without values inside gives
+/// its first value.
 ///
 /// # Shapes
-/// - `values`, `inside`: `[N, H·W]`, images of a `width`; `inside` is 1 or 0
+/// - `values`, `inside`: `[N, H·W]`, images of width `width`; `inside` is 1 or 0
 /// - output: `[N, 1]`
 pub(super) fn medians(values: &Tensor<2>, inside: &Tensor<2>, width: usize) -> Tensor<2> {
     if is_cpu(&values.device()) {
@@ -19,7 +20,7 @@ pub(super) fn medians(values: &Tensor<2>, inside: &Tensor<2>, width: usize) -> T
     }
 }
 
-/// In main memory, where the values of the processor are.
+/// By selection in main memory, for values on the processor.
 fn by_selection(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
     let [n, pixels] = values.dims();
     let device = values.device().inner();
@@ -41,22 +42,22 @@ fn by_selection(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
     values.clone().gather(1, places.reshape([n, 1]))
 }
 
-/// The same as tensor operations, so that nothing leaves a GPU; Burn's own sort reads a GPU's values and sorts them on the processor.
+/// By tensor operations, so that nothing leaves a GPU. Burn's own sort would read a GPU's values and sort them on the processor.
 ///
-/// The range of the values is halved towards the median by how many of them are at most its middle. What remains holds the median alone, in
-/// single precision, where the median is at least 2⁻¹⁴ of the largest value; of a smaller one it is another value inside, less than 2⁻³⁸ of
-/// the largest away. Values inside are finite; there are fewer than 2²⁴.
+/// The range of the values is halved repeatedly: the number of values up to its middle decides which half contains the median. If the
+/// median is at least 2⁻¹⁴ of the largest value, the last range contains the median alone, in single precision. If it is smaller, the
+/// result may be another value inside, less than 2⁻³⁸ of the largest value away. Values inside must be finite and fewer than 2²⁴.
 fn by_counting(values: &Tensor<2>, inside: &Tensor<2>, width: usize) -> Tensor<2> {
     let [n, pixels] = values.dims();
     let images = |t: &Tensor<2>| t.clone().reshape([n, pixels / width, width]);
-    // Along the images' rows first: on a GPU a thread runs along each of them, and there are many.
+    // Along the images' rows first: a GPU has a thread for each of them, so there are many threads.
     let sum = |t: Tensor<3>| t.sum_dim(2).sum_dim(1);
     let least = |t: Tensor<3>| t.min_dim(2).min_dim(1);
     let most = |t: Tensor<3>| t.max_dim(2).max_dim(1);
 
     let count = sum(images(inside));
     let outside = images(inside).lower_elem(0.5);
-    // Of what is sorted the median has more than half the values up to it: floor(count / 2) + 1 at least.
+    // More than half of the values are at most the median: floor(count / 2) + 1 or more.
     let half = count.clone().mul_scalar(0.5);
     let kept = images(values).mask_fill(outside.clone(), f32::MAX);
     let lowest = least(kept.clone());
@@ -101,7 +102,7 @@ mod tests {
         let every_third = (0..PIXELS).map(|i| if i % 3 == 1 { 1.0 } else { 0.0 });
         let repeated = (0..PIXELS).map(|i| [3.0, 3.0, 9.0, 1.0][i % 4]);
         let scattered = depths(7).into_iter().enumerate();
-        // What lies outside may be anything that is finite.
+        // Values outside may be any finite number.
         let wild = scattered.map(|(i, d)| if i < 11 { d } else { 1e30 });
         let around_zero = depths(5).into_iter().map(|d| d - 50.0);
         let mut rows = vec![
@@ -123,7 +124,7 @@ mod tests {
         rows
     }
 
-    /// What a GPU computes is what is selected on the processor, of even and odd numbers of pixels, equal ones, one and none.
+    /// Counting finds the same median as selection, for even and odd numbers of values, equal values, one value and none.
     #[test]
     fn both_ways_find_the_same_median() {
         let rows = rows();
@@ -138,7 +139,7 @@ mod tests {
             let counted = read(by_counting(&values, &inside, WIDTH));
             assert_eq!(selected, counted);
             assert_eq!(selected, read(medians(&values, &inside, WIDTH)));
-            // The upper one of the middle two, and of no pixel the first value.
+            // The upper one of the middle two; the first value where no pixel is inside.
             for ((values, inside), found) in rows.iter().zip(counted) {
                 let pixels = values.iter().zip(inside);
                 let mut kept: Vec<f32> =

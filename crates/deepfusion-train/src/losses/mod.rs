@@ -36,14 +36,13 @@ pub struct LossTerms {
     pub reprojection: f64,
     /// Edge-aware smoothness, mean over scales, weighted by 1/2ˢ but not by λ_s.
     pub smoothness: f64,
-    /// L_speed in metres per pair, unweighted; if the measured motion synthesises the views, the
-    /// distance of PoseNet's motion from it.
+    /// L_speed in metres per pair, unweighted; if views are warped by the measured motion, the distance of PoseNet's motion from it.
     pub speed: f64,
     /// The affine invariant loss, unweighted.
     pub affine: f64,
     /// L_flow: photometric error both ways, consistency and smoothness, unweighted.
     pub flow: f64,
-    /// Distance of the rigid flow from the flow where both explain the pixel, in pixels, unweighted.
+    /// Distance between the rigid flow and the optical flow where both explain the pixel, in pixels, unweighted.
     pub agreement: f64,
     /// L_depth of known depth, unweighted.
     pub depth: f64,
@@ -51,7 +50,7 @@ pub struct LossTerms {
     pub uncertainty: f64,
     /// L_e: −ln of the explainability masks, unweighted.
     pub explainability: f64,
-    /// Share of pixels that the warp finds in view, at full resolution.
+    /// Share of pixels that the warp keeps in view, at full resolution.
     pub valid_share: f64,
     /// Share of pixels that the warped source explains best (the rest are masked).
     pub explained_share: f64,
@@ -80,7 +79,7 @@ impl LossTerms {
         ]
     }
 
-    /// Sets every term, in the order of [`Self::named`]; values that are not given stay.
+    /// Sets the terms in the order of [`Self::named`]. Terms beyond the end of `values` stay as they are.
     pub fn set_from(&mut self, values: &[f64]) {
         let Self {
             total,

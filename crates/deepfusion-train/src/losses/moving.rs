@@ -5,7 +5,7 @@ use crate::{Motion, Synthesised};
 use burn::tensor::{Bool, Tensor};
 use deepfusion_nn::ops;
 
-/// A target's rigid view (by depth and camera motion), as the test for dynamic pixels needs it.
+/// A target's rigid view, by depth and camera motion, for the test for dynamic pixels.
 #[derive(Debug, Clone)]
 pub struct RigidView<'a> {
     /// The source warped to the target.
@@ -20,10 +20,9 @@ pub struct RigidView<'a> {
     pub inverse_intrinsics: &'a Tensor<3>,
 }
 
-/// The dynamic pixels (docs/concepts/losses.md): the flow explains them and the rigid warp does not, by the limits of the
-/// settings; and the flow leaves the epipolar line, or follows it much farther or less far than the depth allows. The
-/// test along the line is needed for traffic ahead of the camera or towards it, which never leaves its epipolar lines. No
-/// gradient.
+/// The dynamic pixels (docs/concepts/losses.md). The flow explains them and the rigid warp does not, within the limits of the settings.
+/// Also, the flow leaves the epipolar line, or follows it much farther or less far than the depth allows. The test along the line is needed
+/// for oncoming traffic and traffic ahead, which never leaves its epipolar lines. No gradient.
 ///
 /// # Shapes
 /// - output: `[N, 1, H, W]`
@@ -59,8 +58,8 @@ pub fn moving_pixels(
     }
 }
 
-/// Where no depth, or none near the predicted one, lets a static pixel end where the flow does; `None`
-/// where the settings ask for neither.
+/// Where a static pixel could not end where the flow ends, at any depth or at any depth near the predicted one; `None` where the settings
+/// require neither test.
 fn impossible(
     ends: &Tensor<4>,
     rigid_ends: &Tensor<4>,

@@ -1,6 +1,6 @@
 use burn::tensor::{Bool, Tensor};
 
-/// One source of the targets, warped and as it is.
+/// One source of the targets: the errors of its warped and its unwarped image.
 #[derive(Debug, Clone)]
 pub struct View {
     /// pe(warped source, target), N×1×H×W.
@@ -17,10 +17,10 @@ pub struct View {
 const NO_ERROR: f64 = 10.0;
 
 impl View {
-    /// A view that only some samples have (`there`, N, 1 or 0): in the others it sees no pixel, and its constant is larger than any
-    /// error, so that it wins nowhere.
+    /// A view that only some samples have (`there`, N, 1 or 0). In the others it sees no pixel, and its constant is larger than any error,
+    /// so that it is never the smallest.
     ///
-    /// Each sample must have another view.
+    /// Each sample must have at least one other view.
     #[must_use]
     pub fn only_where(self, there: &Tensor<1>) -> Self {
         let [n] = there.dims();
@@ -50,10 +50,10 @@ pub struct ReprojectionOutput {
 
 /// L_rp of one scale: the mean over **all** pixels of the smallest error among the views.
 ///
-/// A view contributes a pixel's warped error where it sees the pixel, and its unwarped error, a constant, where the
-/// pixel is dynamic. With `automask` the unwarped errors of all views compete at every pixel. Without it a view that
-/// does not see a pixel does not take part in the minimum there; where no view sees it, the smallest of their
-/// constants is used. The denominator never shrinks, so that throwing pixels out of view does not pay.
+/// A view contributes a pixel's warped error where it sees the pixel, and its unwarped error, a constant, where the pixel is dynamic. With
+/// `automask` the unwarped errors of all views compete at every pixel. Without it a view that does not see a pixel does not take part in
+/// the minimum there; where no view sees it, the smallest of their constants is used. The denominator never shrinks, so that moving pixels
+/// out of view does not lower the loss.
 ///
 /// # Panics
 /// If there are no views.
@@ -162,8 +162,8 @@ mod tests {
         assert!(number(reprojection(views, true).loss) < 1e-6);
     }
 
-    /// Four pixels and two sources, by hand. Seen by both: the smaller warped error, 0.4. By the first alone: its
-    /// 0.9, though the other's constant is 0.1. By the second alone: 0.8. By none: the smaller constant, 0.2.
+    /// Four pixels and two sources, by hand. Seen by both: the smaller warped error, 0.4. Seen by the first alone: its 0.9, though the
+    /// other's constant is 0.1. Seen by the second alone: 0.8. Seen by none: the smaller constant, 0.2.
     #[test]
     fn a_source_that_does_not_see_a_pixel_has_no_part_in_it() {
         let device = Device::flex().autodiff();
@@ -183,7 +183,7 @@ mod tests {
             assert_eq!(read(out.error), [0.4, 0.9, 0.8, 0.2]);
             assert_eq!(read(out.explained.float()), [1.0, 1.0, 1.0, 0.0]);
             assert_eq!(read(out.valid.float()), [1.0, 1.0, 1.0, 0.0]);
-            // The mean is over all four pixels, whoever sees them.
+            // The mean is over all four pixels, whichever source sees them.
             assert!((number(out.loss.clone()) - 2.3 / 4.0).abs() < 1e-6);
             let gradients = out.loss.backward();
             let [first, second] = [0, 1].map(|i: usize| read(errors[i].grad(&gradients).unwrap()));
@@ -195,7 +195,7 @@ mod tests {
         }
     }
 
-    /// Of two samples the second lacks the better view: it costs what it would cost with the first view alone, and only that is drawn.
+    /// Of two samples the second lacks the better view: its loss is that of the first view alone, and only the first view has a gradient.
     #[test]
     fn a_view_that_a_sample_lacks_wins_nowhere() {
         let device = Device::flex().autodiff();
@@ -209,7 +209,7 @@ mod tests {
         };
         for automask in [false, true] {
             let there = Tensor::<1>::from_data([1.0, 0.0], &device);
-            // The target in its place has no error at all.
+            // The target in its place has no error.
             let other = view(&beside, [0.9, 0.0]).only_where(&there);
             for views in [
                 vec![view(&in_time, [0.8, 0.8]), other.clone()],
@@ -279,7 +279,7 @@ mod tests {
             .require_grad();
         let constant = Tensor::<4>::full([1, 1, 8, 8], 0.9, &device);
         let mut left = view(&target, image.clone(), constant, true);
-        // The left half moves; SSIM's windows reach one column over the border.
+        // The left half is dynamic; SSIM's windows reach one column beyond the border.
         let column = Tensor::<1>::from_data([0., 1., 2., 3., 4., 5., 6., 7.], &device);
         let moving = column.lower_elem(4.0).reshape([1, 1, 1, 8]);
         left.moving = Some(moving.expand([1, 1, 8, 8]));

@@ -1,12 +1,12 @@
 use crate::Motion;
 use burn::tensor::Tensor;
 
-/// Standard deviation of a distance, as a share of it, at which its pair weighs half.
+/// Standard deviation of a distance, as a share of it, at which its pair has half the weight.
 const HALF_WEIGHT_SHARE: f64 = 0.05;
 
-/// The weight of a pair in [`speed`] by how sure its distance is: 1 / (1 + (σ / 0.05 d)²), and 1 where σ is not known. It is the
-/// share that a distance of that variance has in a mean with one of 5 %, so that a receiver's slow and uncertain metres pull
-/// less than its fast ones.
+/// The weight of a pair in [`speed`] from the uncertainty of its distance: 1 / (1 + (σ / 0.05 d)²), or 1 where σ is not known. It is the
+/// weight of this distance in a mean, weighted by inverse variance, with a distance known to 5 %. So slow pairs, whose distances a GPS
+/// receiver measures poorly, count less than fast ones.
 #[must_use]
 pub fn distance_weight(distance_m: f64, sigma_m: Option<f64>) -> f64 {
     match sigma_m.filter(|sigma| *sigma > 0.0) {
@@ -68,7 +68,7 @@ const METRES_PER_RADIAN: f64 = 10.0;
 /// - output: one value, in metres
 #[must_use]
 pub fn motion(predicted: &Motion, measured: &Motion, weight: Option<Tensor<1>>) -> Tensor<1> {
-    // Its length is then the distance between the two translations.
+    // A motion whose length is the distance between the two translations.
     let apart = Motion {
         rotation: predicted.rotation.clone(),
         translation: predicted
@@ -122,7 +122,7 @@ mod tests {
     fn an_unsure_distance_pulls_less() {
         assert!((distance_weight(2.0, None) - 1.0).abs() < 1e-12);
         assert!((distance_weight(2.0, Some(0.0)) - 1.0).abs() < 1e-12);
-        // 5 % weighs half, 15 % a tenth.
+        // 5 % gives a weight of a half, 15 % of a tenth.
         assert!((distance_weight(2.0, Some(0.1)) - 0.5).abs() < 1e-12);
         assert!((distance_weight(-2.0, Some(0.3)) - 0.1).abs() < 1e-12);
         assert!(distance_weight(0.0, Some(0.3)).abs() < 1e-12);
@@ -171,9 +171,8 @@ mod tests {
         assert!((loss - 0.02).abs() < 1e-5, "{loss}");
     }
 
-    /// The gradient of `loss` with respect to a motion's axis-angle and translation equals central
-    /// differences. In f32 a step of 1e-2 on a smooth function of order 1 leaves 1e-4; the losses are looked
-    /// at away from their kinks.
+    /// The gradient of `loss` with respect to a motion's axis-angle and translation equals central differences. In f32 a step of 1e-2 on a
+    /// smooth function of order 1 leaves 1e-4; the losses are evaluated away from their kinks.
     fn check_gradient(what: &str, point: [f32; 6], loss: &dyn Fn(&Motion) -> Tensor<1>) {
         let device = Device::flex().autodiff();
         let at = |point: [f32; 6]| {
@@ -226,7 +225,7 @@ mod tests {
             let weight = Tensor::<1>::from_data([0.4], &device);
             motion(predicted, &measured, Some(weight))
         });
-        // As the views see it: a weighted sum, so that every component has a gradient of its own.
+        // As used for warping: a weighted sum, so that every component has a gradient of its own.
         let weights = Tensor::<2>::from_data([[0.9, -1.3, 0.4]], &device);
         check_gradient("with_distance", point, &|motion| {
             let views = motion.with_distance(distance());

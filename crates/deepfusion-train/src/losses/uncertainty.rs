@@ -37,7 +37,7 @@ mod tests {
         Tensor::from_data(TensorData::new(values.to_vec(), SIZE), device)
     }
 
-    /// Depths of 10 m but for a pixel of unknown depth and one of the sky.
+    /// Depths of 10 m, except for a pixel of unknown depth and one of the sky.
     fn truth(device: &Device) -> DepthTruth {
         DepthTruth {
             log_depth: tensor([10.0_f32.ln(); 6], device),
@@ -46,7 +46,7 @@ mod tests {
         }
     }
 
-    /// Errors of 0.1, 0.2, 0.4 and 0.8 in ln depth, and others where nothing is known.
+    /// Errors of 0.1, 0.2, 0.4 and 0.8 in ln depth, and other errors where depth is not known.
     fn seen(device: &Device) -> Tensor<4> {
         let error = [0.1_f32, -0.2, 0.4, -0.8, 3.0, -3.0];
         tensor(error.map(|e| (-e).exp() / 10.0), device)
@@ -73,7 +73,7 @@ mod tests {
                 assert!(more > least + 0.01, "{pixel} {off}: {more} {least}");
             }
         }
-        // Where nothing is known b says nothing.
+        // Where depth is not known, b has no effect.
         let mut other = right;
         (other[4], other[5]) = (1.7, -2.0);
         let same = number(&uncertainty(seen, tensor(other, &device), &truth));

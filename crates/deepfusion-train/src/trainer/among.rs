@@ -1,4 +1,4 @@
-//! What several workers hold in common.
+//! What several workers share.
 
 use super::Trainer;
 use crate::Error;
@@ -8,7 +8,7 @@ use deepfusion_nn::weights::{apply, collect};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 impl Trainer {
-    /// That all workers begin from the same.
+    /// Checks that all workers have the same weights, samples and settings.
     pub(super) fn agree(&mut self) -> Result<(), Error> {
         if self.workers.count() == 1 {
             return Ok(());
@@ -48,10 +48,10 @@ impl Trainer {
         common(&self.config).hash(&mut settings);
         (self.state.step, self.steps()).hash(&mut settings);
         self.workers
-            .hold_the_same([weights.finish(), samples.finish(), settings.finish()])
+            .check_equal([weights.finish(), samples.finish(), settings.finish()])
     }
 
-    /// Running statistics of batch norms are each worker's own between checkpoints; now they become their means.
+    /// Averages the running statistics of batch norms over the workers. Between checkpoints each worker has its own.
     pub(super) fn share_statistics(&mut self) -> Result<(), Error> {
         if self.workers.count() == 1 {
             return Ok(());
@@ -68,7 +68,7 @@ impl Trainer {
     }
 }
 
-/// What of a configuration must be every worker's: all of it but the places of files, and what is a machine's own.
+/// The part of a configuration that all workers must share: everything except paths and settings of the machine.
 fn common(config: &TrainConfig) -> String {
     let mut common = config.clone();
     common.data.paths.clear();

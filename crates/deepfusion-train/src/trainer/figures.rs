@@ -1,4 +1,4 @@
-//! What a step has to say: of each batch on the device at first, then read.
+//! The numbers of a step: first on the device, batch by batch, then read.
 
 use crate::unread::{BatchNumbers, Unread, transfer};
 use crate::{Error, LossTerms, StepOutcome};
@@ -7,14 +7,14 @@ use burn::tensor::{Bool, Tensor};
 /// A batch whose numbers are still on the device.
 pub(super) struct UnreadBatch {
     pub(super) numbers: Unread,
-    /// Drives and frames.
+    /// Drives and frames of the samples.
     pub(super) names: Vec<String>,
     pub(super) is_video: bool,
-    /// Whether its scale is the run's: known depth says it only where no PoseNet on video does.
-    pub(super) says_scale: bool,
+    /// Whether the run's scale ratio is taken from it: from known depth only if no PoseNet learns from video.
+    pub(super) gives_scale: bool,
 }
 
-/// Figures of each batch that are smoothed over the steps.
+/// Numbers of each batch that are smoothed over the steps.
 #[derive(Default)]
 pub(super) struct Monitors {
     pub(super) ratio: Vec<f64>,
@@ -22,16 +22,16 @@ pub(super) struct Monitors {
     pub(super) moving: Vec<f64>,
 }
 
-/// What the batches of a step say.
+/// The numbers of a step's batches.
 #[derive(Default)]
 pub(super) struct Figures {
-    /// The mean over the batches.
+    /// The mean losses over the batches.
     pub(super) losses: LossTerms,
     pub(super) monitors: Monitors,
 }
 
 impl Figures {
-    /// Adds a batch of a step, a `share` of it.
+    /// Adds a batch that is a `share` of the step.
     ///
     /// # Errors
     /// [`Error::NotFinite`] naming the first term that is not finite.
@@ -56,22 +56,22 @@ impl Figures {
             self.monitors.valid.push(terms.valid_share);
             self.monitors.moving.push(terms.moving_share);
         }
-        if batch.says_scale {
+        if batch.gives_scale {
             self.monitors.ratio.push(numbers.scale_ratio);
         }
         Ok(())
     }
 }
 
-/// A step that the device has decided about, and its numbers there.
+/// A step that the device has decided about, with its numbers still there.
 pub(super) struct UnreadStep {
     batches: Vec<UnreadBatch>,
-    /// The terms of all batches, the gradient's sum of squares, 1 where the step was made and 0 where not, and what says the scale.
+    /// The terms of all batches, the gradient's sum of squares, 1 if the step was made and 0 if not, and the values of the scale ratio.
     values: Tensor<1>,
 }
 
 impl UnreadStep {
-    /// Of what has to be finite: the batches' terms and the gradient's sum of squares, in this order.
+    /// `checked` are the values that must be finite: the batches' terms and the gradient's sum of squares, in this order.
     pub(super) fn new(
         mut batches: Vec<UnreadBatch>,
         checked: [Tensor<1>; 2],
@@ -107,7 +107,7 @@ impl UnreadStep {
         steps.iter().map(of_step).collect()
     }
 
-    /// What the batches say, each a `share` of the step with this number.
+    /// The numbers of the batches, each a `share` of the step with this number.
     ///
     /// # Errors
     /// As [`Figures::add`].
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use burn::tensor::Device;
 
-    /// A step of a batch of video, one of known depth, which does not say the scale, and another one of video.
+    /// A step of three batches: video, known depth, from which no scale ratio is taken, and video again.
     fn step(at: f32, made: bool) -> UnreadStep {
         let device = Device::flex().autodiff();
         let value = |number: f32| Tensor::<1>::from_data([number], &device);
@@ -171,7 +171,7 @@ mod tests {
             numbers,
             names: Vec::new(),
             is_video,
-            says_scale: is_video,
+            gives_scale: is_video,
         });
         let terms = batches.iter_mut().flat_map(|b| b.numbers.take_terms());
         let losses = Tensor::cat(terms.collect(), 0);
@@ -180,7 +180,7 @@ mod tests {
         UnreadStep::new(batches.into(), [losses, squares], is_made)
     }
 
-    /// Two steps that are read together: each batch of each has its own numbers.
+    /// Two steps that are read together: each of their batches gets its own numbers.
     #[test]
     fn the_numbers_of_steps_go_where_they_belong() {
         let steps = [step(3.0, true), step(f32::INFINITY, false), step(5.0, true)];

@@ -1,9 +1,9 @@
-//! How fast a run goes.
+//! The speed of a run.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Number of steps over which the scale ratio is averaged, and the pace.
+/// Number of steps over which the scale ratio and the pace are averaged.
 const SMOOTHING: usize = 20;
 
 /// An exponential mean that starts at its first value.
@@ -14,7 +14,7 @@ impl Smoothed {
         Self(None)
     }
 
-    /// NaN, of a batch that does not say it, is left out.
+    /// Adds a value. NaN, from a batch without this number, is ignored.
     pub(super) fn add(&mut self, value: f64) {
         if value.is_nan() {
             return;
@@ -28,7 +28,7 @@ impl Smoothed {
     }
 }
 
-/// Time a step takes: the mean of the last ones. The first, in which a GPU's kernels are compiled, is forgotten with the others.
+/// Time that a step takes: the mean of the last steps. The first step, which compiles a GPU's kernels, drops out like any other.
 pub(super) struct Pace {
     last: Instant,
     seconds: VecDeque<f64>,
@@ -49,7 +49,7 @@ impl Pace {
         self.last.elapsed()
     }
 
-    /// Ends a lap of some steps: the seconds that each took.
+    /// Ends a lap of some steps. Returns the seconds that each took.
     pub(super) fn lap(&mut self, steps: usize) -> f64 {
         let seconds = self.last.elapsed().as_secs_f64();
         self.last = Instant::now();
@@ -64,7 +64,7 @@ impl Pace {
         self.images = images as f64;
     }
 
-    /// The shortest of the last steps; 0 before the first.
+    /// Seconds of the shortest of the last steps; 0 before the first.
     pub(super) fn least_seconds_per_step(&self) -> f64 {
         let seconds = self.seconds.iter().copied();
         seconds.reduce(f64::min).unwrap_or_default()
@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(mean.value(), 2.0);
     }
 
-    /// Steps that are heard of together share their time.
+    /// Steps that are read together share their time.
     #[test]
     fn the_pace_is_the_mean_of_the_last_steps() {
         let mut pace = Pace::new();

@@ -1,4 +1,4 @@
-//! What a run says of itself, and its checkpoints.
+//! A run's reports and checkpoints.
 
 use super::Trainer;
 use super::step::PanelInput;
@@ -8,13 +8,13 @@ use crate::selection::selection;
 use crate::{CheckpointKind, Checkpoints, Control, Error, TrainEvent, TrainWarning};
 use deepfusion_model::LearnedCamera;
 
-/// Below this share of pixels in view the geometry has diverged: a warning.
+/// Below this share of pixels in view the geometry has diverged, and a warning is given.
 const MIN_VALID_SHARE: f64 = 0.2;
-/// Above this share of dynamic pixels the masks remove too much of what depth should learn from: a warning.
+/// Above this share of dynamic pixels the masks remove too much of what depth should learn from, and a warning is given.
 const MAX_MOVING_SHARE: f64 = 0.4;
 
 impl Trainer {
-    /// Panel, validation and checkpoints.
+    /// Reports the panel, validates and writes checkpoints.
     pub(super) fn report(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
@@ -27,7 +27,7 @@ impl Trainer {
             let panel = Box::new(shown.panel());
             listen(TrainEvent::Panel { step, panel });
         }
-        // Without video both are NaN, and are no reason to warn.
+        // Without video both are NaN, which gives no warning.
         if valid_share < MIN_VALID_SHARE {
             let warning = TrainWarning::FewInView { share: valid_share };
             listen(TrainEvent::Warning { step, warning });
@@ -67,7 +67,7 @@ impl Trainer {
         self.save_last(listen)
     }
 
-    /// Says which camera was learned and how well, and keeps it among what the run found out.
+    /// Reports which camera was learned and how well, and stores it among the run's findings.
     pub(super) fn report_camera(
         &self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,

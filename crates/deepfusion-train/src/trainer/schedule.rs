@@ -1,4 +1,4 @@
-//! What changes over a run: learning rate, weights of the losses, when a checkpoint is due.
+//! What changes during a run: learning rate, loss weights, when a checkpoint is due.
 
 use super::Trainer;
 use crate::losses::speed_weight;
@@ -35,7 +35,7 @@ impl Trainer {
         learning_rate(&self.config, self.state.step, steps)
     }
 
-    /// A step of the optimiser at the focal length's own learning rate, as far into its schedule as the networks'.
+    /// The step with the focal length's own learning rate, at the same point of the schedule as the networks'.
     pub(super) fn focal_step(&self, step: PreparedStep) -> PreparedStep {
         let own = self.config.learned_camera();
         let share = f64::from(step.settings.learning_rate) / self.config.learning_rate;

@@ -1,4 +1,4 @@
-//! What must hold before a run begins, and what its samples say.
+//! Checks before a run begins, and what is found in its samples.
 
 use super::validation::no_samples;
 use crate::{Error, SampleSet, TrainConfig, TrainWarning, ViewMotion};
@@ -7,7 +7,7 @@ use deepfusion_model::{SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, supports};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A share by which focal lengths may differ and count as one: KITTI's days of recording are within 1 %.
+/// Focal lengths that differ by less than this share count as the same: those of KITTI's recording days are within 1 %.
 const FOCAL_TOLERANCE: f64 = 0.02;
 
 /// Metres per unit of PoseNet's translation; 1 without video, where it does not matter.
@@ -19,7 +19,7 @@ fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
     }
 }
 
-/// What the training samples say: their cameras, and the units that the configuration leaves open.
+/// What is found in the training samples: their cameras, and the units that the configuration leaves open.
 pub(super) fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings {
     let unit = |set: f64, samples: &SampleSet| (set == 0.0).then(|| first_unit(config, samples));
     let sets = config.data.sets.iter().enumerate().map(|(i, set)| {
@@ -40,16 +40,16 @@ pub(super) fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings
     }
 }
 
-/// The focal length to which all samples are brought where the configuration names none: the first one's, where they differ. Predictions then go by the
-/// first camera, as those of any run. Not with `data.sets`, whose predictions go by the camera of one of them.
+/// The canonical focal length if the configuration names none: that of the first sample, if focal lengths differ. Predictions then use the
+/// first camera, as in any run. `None` with `data.sets`, where predictions use the camera of one of the sets.
 fn found_focal_px(config: &TrainConfig, train: &SampleSet) -> Option<f64> {
     let open = config.canonical_focal_px.is_none() && config.data.sets.is_empty();
     let first = train.focal_lengths_px(config).next()?.1;
     (open && has_several_focal_lengths(config, train)).then_some(first)
 }
 
-/// Whether a pixel of known size would be of different depths, so that the network's metres need a focal length to be those of: cameras of one data set
-/// differ, or their images are shown in parts or at other sizes, or simulated cameras are drawn.
+/// Whether the same size in pixels can mean different depths, so that the network's metres must refer to one focal length: cameras of one
+/// data set differ, images are cropped or shown at several sizes, or simulated cameras are drawn at random.
 fn has_several_focal_lengths(config: &TrainConfig, train: &SampleSet) -> bool {
     let augmented = config.augmentation.zoom > 1.0 || !config.augmentation.sizes.is_empty();
     if !train.depth.is_empty() && (augmented || train.depth.draws_cameras()) {
@@ -62,14 +62,14 @@ fn has_several_focal_lengths(config: &TrainConfig, train: &SampleSet) -> bool {
     })
 }
 
-/// With data sets: that one of them has several focal lengths, and nothing brings them together.
+/// The warning about a data set with several focal lengths and no canonical one.
 pub(super) fn focal_warning(config: &TrainConfig, train: &SampleSet) -> Option<TrainWarning> {
     let several = config.canonical_focal_px.is_none() && has_several_focal_lengths(config, train);
     several.then_some(TrainWarning::SeveralFocalLengths)
 }
 
 /// # Errors
-/// [`Error::Precision`] for a number format that the device does not compute in.
+/// [`Error::Precision`] for a number format that the device does not support.
 pub(super) fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
     if supports(device, config.precision) {
         return Ok(());
@@ -83,8 +83,7 @@ pub(super) fn check_precision(config: &TrainConfig, device: &Device) -> Result<(
 }
 
 /// # Errors
-/// [`Error::NoSamples`] without anything to train on, [`Error::NoValidation`] if samples should be held out and
-/// none are.
+/// [`Error::NoSamples`] without training samples, [`Error::NoValidation`] if samples should be held out and none are.
 pub(super) fn check_samples(
     config: &TrainConfig,
     train: &SampleSet,
@@ -100,7 +99,7 @@ pub(super) fn check_samples(
 }
 
 impl SampleSet {
-    /// The names of the drives with samples of video whose turns are not known, in the order of their recordings.
+    /// The names of the drives with video samples whose turns are not known, in the order of their recordings.
     #[must_use]
     pub fn without_turns(&self) -> Vec<&str> {
         let used: BTreeSet<usize> = self.samples.iter().map(|s| s.dataset).collect();
@@ -114,7 +113,7 @@ impl SampleSet {
     }
 }
 
-/// With `auto`: which drives are warped by PoseNet's turns.
+/// The warning, with `auto`, about drives that are warped by PoseNet's turns.
 pub(super) fn turns_warning(config: &TrainConfig, samples: &SampleSet) -> Option<TrainWarning> {
     if config.view_motion != ViewMotion::Auto {
         return None;

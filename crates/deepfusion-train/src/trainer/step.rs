@@ -1,4 +1,4 @@
-//! What one worker learns from its part of a step: losses, and their gradients by name; and the step of the optimiser.
+//! One worker's part of a step: its losses, their gradients by name, and the step of the optimiser.
 
 use super::Trainer;
 use super::figures::{Figures, UnreadBatch, UnreadStep};
@@ -17,17 +17,17 @@ use deepfusion_nn::ops::autocast;
 const FOCAL: &str = "focal";
 
 impl Trainer {
-    /// Whether the device decides about its steps, and their numbers wait there for those of others. What several workers clip is the mean
-    /// of their gradients, which passes through main memory in any case.
+    /// Whether the device decides about steps, and the numbers of several steps are read together. Not with several workers: they clip the
+    /// mean of their gradients, which passes through main memory anyway.
     pub(super) fn decides_on_device(&self) -> bool {
         self.reads_late && self.workers.count() == 1
     }
 
-    /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches. Where the device decides about the
-    /// step, its losses are still there.
+    /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches. If the device decides about the step,
+    /// the losses are still there.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] of the first batch with such a loss, else that of a batch that could not be made.
+    /// [`Error::NotFinite`] for the first batch with such a loss, else the error of a batch that could not be made.
     pub(super) fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<WorkerStep, Error> {
         let mut learned = WorkerStep::default();
         if self.reads_late {
@@ -35,7 +35,7 @@ impl Trainer {
         }
         let learning = self.learn_batches(loaders, schedule, &mut learned);
         if learning.is_err() || !self.decides_on_device() {
-            // Of what failed, a loss that waits to be read was the first.
+            // A loss of an earlier batch that is not finite comes before the error.
             self.read(&mut learned)?;
         }
         learning.map(|()| learned)
@@ -57,8 +57,8 @@ impl Trainer {
                     let (loss, numbers) = self.model().loss_on_device(&pass, &batch, schedule);
                     (pass, loss, numbers)
                 });
-                let says_scale = self.model().pose_net.is_some();
-                if says_scale {
+                let gives_scale = self.model().pose_net.is_some();
+                if gives_scale {
                     numbers.note_displacements(displacements(&pass, &batch));
                 }
                 self.note(
@@ -67,12 +67,12 @@ impl Trainer {
                         numbers,
                         names: batch.names.clone(),
                         is_video: true,
-                        says_scale,
+                        gives_scale,
                     },
                 )?;
                 self.model()
                     .add_gradients(&loss.total, scale as f32, &mut learned.gradients);
-                // The pass's first target is the batch's first sample.
+                // The first target of the pass is the batch's first sample.
                 let shown = batch.names.first().cloned().unwrap_or_default();
                 learned.names.extend(batch.names);
                 learned.panel = Some(PanelInput::View(Box::new((pass, loss, shown))));
@@ -89,7 +89,7 @@ impl Trainer {
                         numbers,
                         names: batch.names.clone(),
                         is_video: false,
-                        says_scale: loaders.video.is_none() || self.model().pose_net.is_none(),
+                        gives_scale: loaders.video.is_none() || self.model().pose_net.is_none(),
                     },
                 )?;
                 self.model()
@@ -102,7 +102,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// Keeps a batch's numbers. Where they are not read late, they are read now.
+    /// Keeps a batch's numbers, and reads them now unless the trainer reads late.
     fn note(&self, learned: &mut WorkerStep, batch: UnreadBatch) -> Result<(), Error> {
         learned.unread.push(batch);
         if self.reads_late {
@@ -111,7 +111,7 @@ impl Trainer {
         self.read(learned)
     }
 
-    /// Reads the numbers of the batches that wait for it: a single transfer from the device.
+    /// Reads the numbers of all unread batches in a single transfer from the device.
     fn read(&self, learned: &mut WorkerStep) -> Result<(), Error> {
         let mut batches = std::mem::take(&mut learned.unread);
         let mut unread: Vec<_> = batches.iter_mut().map(|b| &mut b.numbers).collect();
@@ -135,7 +135,7 @@ impl Trainer {
             terms.extend(batch.numbers.take_terms());
         }
         let losses = Tensor::cat(terms, 0);
-        // None are in main memory.
+        // No gradients are in main memory.
         let (_, squares) = gradients.squares();
         let squares = squares.unwrap_or_else(|| Tensor::zeros([1], &losses.device()));
         let (is_made, step) = self.adam.begin_on_device(
@@ -148,9 +148,9 @@ impl Trainer {
         UnreadStep::new(batches, [losses, squares], is_made)
     }
 
-    /// A step of the optimiser on everything that learns.
+    /// Applies a step of the optimiser to the networks and the learned focal length.
     pub(super) fn apply(&mut self, step: PreparedStep, gradients: &NamedGradients) {
-        // Moved, not cloned: what nobody else holds is changed where it is.
+        // Moved, not cloned: tensors with a single owner are updated in place.
         let Some(model) = self.model.take() else {
             return;
         };
@@ -159,7 +159,7 @@ impl Trainer {
         let focal = model.focal.take();
         let applied = focal.map(|focal| self.adam.apply(&step, FOCAL, focal, gradients));
         model.focal = match self.config.learned_camera() {
-            Some(camera) => applied.map(|focal| focal.held_to(camera)),
+            Some(camera) => applied.map(|focal| focal.clamped_to(camera)),
             None => applied,
         };
         self.model = Some(model);
@@ -167,7 +167,7 @@ impl Trainer {
 }
 
 impl Model {
-    /// Adds a loss' gradients to those of a step, `scale` times.
+    /// Adds a loss's gradients, times `scale`, to those of a step.
     pub fn add_gradients(&self, total: &Tensor<1>, scale: f32, step: &mut NamedGradients) {
         let mut raw = total.backward();
         step.add("depth", &self.depth_net, &mut raw, scale);
@@ -182,7 +182,7 @@ impl Model {
         }
     }
 
-    /// The networks after a step of the optimiser. A learned focal length stays: its step is another.
+    /// The networks after a step of the optimiser. A learned focal length stays the same: it has a step of its own.
     #[must_use]
     pub fn updated(self, adam: &mut Adam, step: &PreparedStep, gradients: &NamedGradients) -> Self {
         Self {
@@ -205,7 +205,7 @@ pub(super) struct Loaders {
 }
 
 impl Loaders {
-    /// From a step on, this worker's batches: of K workers every K-th.
+    /// This worker's batches from a step on: every K-th batch for K workers.
     pub(super) fn training(
         config: &TrainConfig,
         set: &SampleSet,
@@ -226,20 +226,20 @@ impl Loaders {
     }
 }
 
-/// What a worker has learned from its part of a step.
+/// The results of a worker's part of a step.
 #[derive(Default)]
 pub(super) struct WorkerStep {
     pub(super) gradients: NamedGradients,
     pub(super) figures: Figures,
-    /// Drives and frames.
+    /// Drives and frames of the samples.
     pub(super) names: Vec<String>,
     pub(super) images: usize,
     pub(super) panel: Option<PanelInput>,
-    /// Batches whose numbers the figures lack.
+    /// Batches whose numbers are not in `figures` yet.
     pub(super) unread: Vec<UnreadBatch>,
 }
 
-/// What a panel shows.
+/// What a panel is made from.
 pub(super) enum PanelInput {
     View(Box<(ForwardPass, BatchLoss, String)>),
     Depth(Box<(DepthPass, DepthBatch)>),

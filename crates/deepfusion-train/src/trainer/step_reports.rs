@@ -1,4 +1,4 @@
-//! What a run says of its steps: each at once, or some together, whose numbers waited on the device.
+//! Reports of a run's steps: one at a time, or several together whose numbers waited on the device.
 
 use super::figures::{Figures, Monitors, UnreadStep};
 use super::pace::{Pace, Smoothed};
@@ -8,15 +8,16 @@ use crate::adam::MOST_UNDECIDED;
 use crate::{Control, Error, StepOutcome, TrainEvent, TrainWarning};
 use std::time::Duration;
 
-/// When numbers are read that wait on the device. Whatever else is due, a validation, a checkpoint or the run's end, reads them before.
+/// When the numbers that wait on the device are read. A validation, a checkpoint and the run's end always read them first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ReadInterval {
-    /// The first steps of a call are read one by one: they say how long a run will take, and most of what goes wrong does so there.
+    /// Number of first steps of a call that are read one by one: they show how long a run will take, and most errors occur there.
     pub(super) alone: usize,
-    /// So many steps together at most, and no more than [`MOST_UNDECIDED`].
+    /// Most steps that are read together, limited by [`MOST_UNDECIDED`].
     pub(super) together: usize,
-    /// No longer than this after the last ones, nor more steps than take as long: where steps are slow, someone waits for each, and to
-    /// stop a run is to answer its event. The clock alone would come late, since a step is queued sooner than a device has made it.
+    /// Longest time between two reads, and longest time that the waiting steps may take. Slow steps are awaited one by one, and a run can
+    /// only be stopped in response to an event. Measuring the time between reads would not be enough, since steps are queued faster than a
+    /// device computes them.
     pub(super) time: Duration,
 }
 
@@ -27,7 +28,7 @@ impl ReadInterval {
         time: Duration::from_secs(1),
     };
 
-    /// Whether steps that wait are read now, in a call that has reported `reported` steps.
+    /// Whether the waiting steps are read now, in a call that has reported `reported` steps.
     fn is_due(self, reported: usize, waiting: usize, pace: &Pace) -> bool {
         reported < self.alone
             || waiting >= self.together.min(MOST_UNDECIDED)
@@ -40,18 +41,18 @@ impl ReadInterval {
 pub(super) struct Step {
     /// Counted from 1.
     number: usize,
-    /// Drives and frames.
+    /// Drives and frames of the samples.
     names: Vec<String>,
-    /// Of all workers.
+    /// Number of images of all workers.
     images: usize,
     learning_rate: f64,
 }
 
-/// What was said of the steps of a run, and those of which nothing was yet.
+/// What has been reported about a run's steps, and the steps still to be reported.
 pub(super) struct StepReports {
     /// Steps of the whole run.
     pub(super) steps: usize,
-    /// In this call.
+    /// Steps reported in this call.
     reported: usize,
     waiting: Vec<(Step, UnreadStep)>,
     skipped_in_row: usize,
@@ -75,7 +76,7 @@ impl StepReports {
         }
     }
 
-    /// The shares of pixels that are in view, and of dynamic ones.
+    /// The shares of pixels in view and of dynamic pixels.
     pub(super) fn shares(&self) -> [f64; 2] {
         [self.low_view.value(), self.moving.value()]
     }
@@ -96,8 +97,8 @@ impl StepReports {
 }
 
 impl Trainer {
-    /// Makes a step of what was learned, or skips it where its gradient is not finite, and says so: at once, or, where the device decides,
-    /// when the numbers of the steps are due to be read.
+    /// Makes a step, or skips it if its gradient is not finite, and reports it: at once, or, if the device decides, when its numbers are
+    /// due to be read.
     ///
     /// # Errors
     /// As [`Self::report_waiting`].
@@ -146,13 +147,13 @@ impl Trainer {
         self.report_step(reports, step, (figures, outcome), seconds, listen)
     }
 
-    /// Reads the numbers of the steps that wait on the device, in one transfer, and says of each what it was. Nothing is done where none
-    /// waits. Until then the host does not know how many steps Adam has made: a checkpoint has to wait for it.
+    /// Reads the numbers of the steps that wait on the device, in one transfer, and reports each step. Does nothing if none waits. Until
+    /// then the host does not know how many steps Adam has made, so a checkpoint must wait for this.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] of the first step with such a loss: nothing is said of the steps after it. The device has not made that step, so
-    /// the weights are as good as before. Running statistics of batch norms are not: the forward pass moves them at once, and they stay NaN
-    /// where the images' features were. The run ends here, before anything is written, and goes on from the checkpoint before.
+    /// [`Error::NotFinite`] for the first step with such a loss; later steps are not reported. The device has not made that step, so the
+    /// weights are still good. Running statistics of batch norms may not be: the forward pass updates them at once, and they stay NaN where
+    /// features were NaN. The run ends here before anything is written, and can be resumed from the previous checkpoint.
     /// [`Error::GradientsNotFinite`].
     pub(super) fn report_waiting(
         &mut self,
@@ -173,7 +174,7 @@ impl Trainer {
         for ((step, unread), read) in waiting.into_iter().zip(read) {
             let figures = unread.figures(&read, share, step.number)?;
             let said = (figures, read.outcome());
-            // Who asks to stop hears of the steps that were made already.
+            // After a request to stop, steps that were already made are still reported.
             if self.report_step(reports, step, said, seconds, listen)? == Control::Stop {
                 control = Control::Stop;
             }
@@ -181,7 +182,7 @@ impl Trainer {
         Ok(control)
     }
 
-    /// Says what a step was.
+    /// Reports a step.
     fn report_step(
         &mut self,
         reports: &mut StepReports,
@@ -232,12 +233,12 @@ impl Trainer {
 mod tests {
     use super::*;
 
-    /// The device is asked for ten steps in no time: how long it takes to make them is known from those before.
+    /// Ten steps are queued in no time. How long the device takes for them is known from earlier steps.
     #[test]
     fn steps_that_wait_are_made_within_a_second() {
         for (seconds, together) in [(0.01, MOST_UNDECIDED), (0.3, 4), (1.5, 1)] {
             let mut pace = Pace::new();
-            // In the first one kernels are compiled.
+            // The first step compiles kernels.
             pace.step(1, 30.0);
             pace.step(1, seconds);
             let is_due = |waiting: &usize| ReadInterval::USUAL.is_due(10, *waiting, &pace);

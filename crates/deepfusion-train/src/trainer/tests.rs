@@ -1,4 +1,4 @@
-//! Numbers that wait to be read, as on a GPU, on the processor.
+//! Numbers that are read late, as on a GPU, tested on the processor.
 
 use super::figures::Monitors;
 use super::step::WorkerStep;
@@ -44,13 +44,13 @@ fn started(drive: &Path, run: &Path, reads_late: bool, init: fn(Model) -> Model)
     trainer
 }
 
-/// From the run's first batch on, all of them.
+/// Loaders from the run's first batch on.
 fn loaders(trainer: &Trainer) -> Loaders {
     let alone = WorkerGroup::of(Box::new(SingleWorker));
     Loaders::training(&trainer.config, &trainer.train, 0, &alone)
 }
 
-/// A first step's losses and gradients, and how often numbers were read.
+/// The first step's losses and gradients, and how often numbers were read.
 fn learned(trainer: &Trainer) -> (Result<WorkerStep, Error>, usize) {
     let loaders = loaders(trainer);
     let before = TRANSFERS.get();
@@ -73,7 +73,7 @@ fn assert_close(ours: impl IntoIterator<Item = f64>, theirs: impl IntoIterator<I
     }
 }
 
-/// One of two; nothing is added up here.
+/// One of two workers, without a sum.
 struct OneOfTwo;
 
 impl Workers for OneOfTwo {
@@ -90,7 +90,7 @@ impl Workers for OneOfTwo {
     }
 }
 
-/// Losses, monitors and the norm are those that are read batch by batch, in a single transfer: what several workers read at a step's end.
+/// Reading losses, monitors and norm in a single transfer at a step's end, as several workers do, gives the same as reading batch by batch.
 #[test]
 fn numbers_read_at_the_end_are_those_read_at_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -120,7 +120,7 @@ fn numbers_read_at_the_end_are_those_read_at_once() {
     }
     assert_eq!((soon.names, soon.images), (late.names, late.images));
     assert_eq!(flat(&soon.gradients).len(), flat(&late.gradients).len());
-    // One is summed in single precision.
+    // One of the two is summed in single precision.
     let ratio = late.gradients.norm() / soon.gradients.norm();
     assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
 }
@@ -133,7 +133,7 @@ fn damaged(mut model: Model) -> Model {
     model
 }
 
-/// A loss that is not finite is the same error, of the same batch, whenever it is read.
+/// A loss that is not finite is the same error, for the same batch, whenever it is read.
 #[test]
 fn a_loss_that_is_not_finite_is_named_either_way() {
     let folder = tempfile::tempdir().unwrap();
@@ -144,7 +144,7 @@ fn a_loss_that_is_not_finite_is_named_either_way() {
         let (learned, transfers) = learned(&trainer);
         assert_eq!(transfers, 1);
         let Err(error) = learned else {
-            panic!("no number says where the camera went");
+            panic!("a step with NaN motions must fail");
         };
         assert!(matches!(error, Error::NotFinite { step: 1, .. }), "{error}");
         error.to_string()
@@ -152,7 +152,7 @@ fn a_loss_that_is_not_finite_is_named_either_way() {
     assert_eq!(soon, late);
 }
 
-/// So many steps together, and nothing before.
+/// Reads every `together` steps, and not earlier.
 fn every(together: usize) -> ReadInterval {
     ReadInterval {
         alone: 0,
@@ -161,29 +161,29 @@ fn every(together: usize) -> ReadInterval {
     }
 }
 
-/// A run of some steps whose numbers are read every so many, and nothing is held out.
+/// A run whose numbers are read every `read_every` steps, without held-out samples.
 fn run_of(steps: usize, drive: &Path, run: &Path, read_every: Option<usize>) -> Trainer {
     let mut trainer = started(drive, run, read_every.is_some(), |model| model);
     trainer.read_interval = every(read_every.unwrap_or(1));
-    // A validation would read them before.
+    // A validation would read the numbers earlier.
     (trainer.config.steps, trainer.config.validate_every) = (Some(steps), 1000);
     trainer.config.clip_norm = 0.05;
     trainer.validation.samples.clear();
     trainer
 }
 
-/// What a run said of its steps.
+/// What a run reported about its steps.
 #[derive(Default)]
-struct Said {
-    /// Number, loss, norm and scale of each.
+struct Reported {
+    /// Number, loss, gradient norm and scale ratio of each step.
     steps: Vec<(usize, f64, f64, f64)>,
-    /// After so many transfers.
+    /// Number of transfers before each report.
     transfers: Vec<usize>,
     skipped: Vec<usize>,
 }
 
-impl Said {
-    fn hear(&mut self, event: &TrainEvent) -> Control {
+impl Reported {
+    fn note(&mut self, event: &TrainEvent) -> Control {
         match event {
             TrainEvent::Step {
                 step,
@@ -192,8 +192,8 @@ impl Said {
                 scale_ratio,
                 ..
             } => {
-                let said = (*step, losses.total, *gradient_norm, *scale_ratio);
-                self.steps.push(said);
+                let reported = (*step, losses.total, *gradient_norm, *scale_ratio);
+                self.steps.push(reported);
                 self.transfers.push(TRANSFERS.get());
             }
             TrainEvent::Warning {
@@ -221,41 +221,42 @@ fn weights(trainer: &Trainer) -> Vec<f64> {
         deepfusion_nn::weights::collect(model.pose_net.as_ref().unwrap()),
     ];
     let tensors = networks.iter().flat_map(|n| &n.tensors);
-    // Those that learn: running statistics follow the images of every step, made or skipped.
+    // Only learned weights: running statistics change with every step, made or skipped.
     let learning = tensors.filter(|(name, _)| !name.contains("running"));
     let values = learning.flat_map(|(_, tensor)| &tensor.values);
     values.map(|v| f64::from(*v)).collect()
 }
 
-/// Numbers that are read now and then are the same as those of each step, of the same weights.
+/// Numbers that are read every few steps, and the weights, are the same as with a read after each step.
 #[test]
 fn a_run_that_is_read_now_and_then_is_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let run = |read_every: Option<usize>| {
         let at = folder.path().join(format!("{read_every:?}"));
-        let (mut trainer, mut said) = (run_of(12, &drive, &at, read_every), Said::default());
+        let (mut trainer, mut reported) =
+            (run_of(12, &drive, &at, read_every), Reported::default());
         let before = TRANSFERS.get();
-        let summary = trainer.run(&mut |event| said.hear(&event)).unwrap();
+        let summary = trainer.run(&mut |event| reported.note(&event)).unwrap();
         assert_eq!((summary.step, summary.skipped), (12, 0));
-        assert_eq!(said.numbers(), (1..=12).collect::<Vec<_>>());
+        assert_eq!(reported.numbers(), (1..=12).collect::<Vec<_>>());
         assert_eq!(trainer.adam.steps(), 12);
-        said.transfers.iter_mut().for_each(|t| *t -= before);
-        (said, weights(&trainer))
+        reported.transfers.iter_mut().for_each(|t| *t -= before);
+        (reported, weights(&trainer))
     };
     let (each, each_weights) = run(Some(1));
     assert_eq!(each.transfers, (1..=12).collect::<Vec<_>>());
     let (some, some_weights) = run(Some(5));
     assert_eq!(some.transfers, [1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3]);
-    let figures = |said: &Said| {
-        let steps = said.steps.iter();
+    let figures = |reported: &Reported| {
+        let steps = reported.steps.iter();
         let figures = steps.flat_map(|(_, loss, norm, ratio)| [*loss, *norm, *ratio]);
         figures.collect::<Vec<_>>()
     };
     assert_close(figures(&each), figures(&some));
     assert_close(each_weights, some_weights);
 
-    // On the processor's own way, whose rounding is another.
+    // The processor's own kernels, which round differently.
     let (soon, _) = run(None);
     assert_close(soon.losses().take(1), some.losses().take(1));
     for (a, b) in soon.losses().zip(some.losses()) {
@@ -263,17 +264,17 @@ fn a_run_that_is_read_now_and_then_is_the_same() {
     }
 }
 
-/// Makes steps of what `learn` gives for each.
+/// Makes steps from the results of `learn`.
 fn by_hand(
     trainer: &mut Trainer,
     steps: usize,
-    said: &mut Said,
+    reported: &mut Reported,
     learn: fn(&mut Trainer, &Loaders, usize) -> WorkerStep,
 ) -> (StepReports, Result<(), Error>) {
     let (loaders, mut reports) = (loaders(trainer), StepReports::new(steps));
     for number in 1..=steps {
         let learned = learn(trainer, &loaders, number);
-        let mut listen = |event: TrainEvent| said.hear(&event);
+        let mut listen = |event: TrainEvent| reported.note(&event);
         if let Err(error) = trainer.make_step(learned, &mut reports, &mut listen) {
             return (reports, Err(error));
         }
@@ -281,16 +282,19 @@ fn by_hand(
     (reports, Ok(()))
 }
 
-/// A gradient of NaN skips its own step alone, and Adam does not count it.
+/// A NaN gradient skips only its own step, and Adam does not count it.
 #[test]
 fn a_gradient_that_is_not_finite_skips_one_step() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let run = |read_every: Option<usize>| {
         let at = folder.path().join(format!("{read_every:?}"));
-        let (mut trainer, mut said) = (run_of(6, &drive, &at, read_every), Said::default());
-        let (mut reports, made) =
-            by_hand(&mut trainer, 6, &mut said, |trainer, loaders, number| {
+        let (mut trainer, mut reported) = (run_of(6, &drive, &at, read_every), Reported::default());
+        let (mut reports, made) = by_hand(
+            &mut trainer,
+            6,
+            &mut reported,
+            |trainer, loaders, number| {
                 let mut learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
                 if number == 3 {
                     let mut values = flat(&learned.gradients);
@@ -298,21 +302,22 @@ fn a_gradient_that_is_not_finite_skips_one_step() {
                     learned.gradients.take_from(&values);
                 }
                 learned
-            });
+            },
+        );
         made.unwrap();
-        let mut listen = |event: TrainEvent| said.hear(&event);
+        let mut listen = |event: TrainEvent| reported.note(&event);
         trainer.report_waiting(&mut reports, &mut listen).unwrap();
         assert_eq!((trainer.state.step, trainer.state.skipped), (6, 1));
         assert_eq!(trainer.adam.steps(), 5);
-        assert_eq!(said.skipped, [3]);
-        assert_eq!(said.numbers(), [1, 2, 3, 4, 5, 6]);
-        for (number, loss, norm, _) in &said.steps {
+        assert_eq!(reported.skipped, [3]);
+        assert_eq!(reported.numbers(), [1, 2, 3, 4, 5, 6]);
+        for (number, loss, norm, _) in &reported.steps {
             assert!(loss.is_finite());
             assert_eq!(norm.is_nan(), *number == 3);
         }
         let weights = weights(&trainer);
         assert!(weights.iter().all(|weight| weight.is_finite()));
-        (said, weights)
+        (reported, weights)
     };
     let (each, each_weights) = run(Some(1));
     let (some, some_weights) = run(Some(4));
@@ -324,32 +329,38 @@ fn a_gradient_that_is_not_finite_skips_one_step() {
     }
 }
 
-/// A loss of NaN in the middle ends the run when it is read, by its own step's name; that step was not made, and what went before it is reported.
+/// A NaN loss ends the run when it is read, with an error that names its step. That step was not made, and the steps before it are
+/// reported.
 #[test]
 fn a_loss_that_is_not_finite_is_found_late() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
-    let (mut trainer, mut said) = (
+    let (mut trainer, mut reported) = (
         run_of(6, &drive, &folder.path().join("run"), Some(5)),
-        Said::default(),
+        Reported::default(),
     );
-    let (_, made) = by_hand(&mut trainer, 6, &mut said, |trainer, loaders, number| {
-        let good = trainer.model.clone();
-        if number == 3 {
-            trainer.model = good.clone().map(damaged);
-        }
-        let learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
-        trainer.model = good;
-        learned
-    });
+    let (_, made) = by_hand(
+        &mut trainer,
+        6,
+        &mut reported,
+        |trainer, loaders, number| {
+            let good = trainer.model.clone();
+            if number == 3 {
+                trainer.model = good.clone().map(damaged);
+            }
+            let learned = trainer.learn(loaders, trainer.schedule(6)).unwrap();
+            trainer.model = good;
+            learned
+        },
+    );
     let error = made.unwrap_err();
     assert!(matches!(error, Error::NotFinite { step: 3, .. }), "{error}");
-    assert_eq!(said.numbers(), [1, 2]);
+    assert_eq!(reported.numbers(), [1, 2]);
     assert_eq!((trainer.state.step, trainer.adam.steps()), (5, 4));
     assert!(weights(&trainer).iter().all(|weight| weight.is_finite()));
 }
 
-/// A checkpoint waits for the numbers of the steps before it, and is not written after a loss of NaN.
+/// A checkpoint waits for the numbers of the steps before it, and is not written after a NaN loss.
 #[test]
 fn nothing_is_saved_after_a_loss_that_is_not_finite() {
     let folder = tempfile::tempdir().unwrap();
@@ -361,33 +372,33 @@ fn nothing_is_saved_after_a_loss_that_is_not_finite() {
         (trainer.config.steps, trainer.config.validate_every) = (Some(3), 1000);
         trainer.config.checkpoint_minutes = 1e-9;
         trainer.validation.samples.clear();
-        let (before, mut said) = (weights(&trainer), Said::default());
-        let outcome = trainer.run(&mut |event| said.hear(&event));
+        let (before, mut reported) = (weights(&trainer), Reported::default());
+        let outcome = trainer.run(&mut |event| reported.note(&event));
         let saved = trainer.folder.checkpoint_path(CheckpointKind::Last);
         if name == "good" {
             assert_eq!(outcome.unwrap().step, 3);
-            assert_eq!(said.numbers(), [1, 2, 3]);
+            assert_eq!(reported.numbers(), [1, 2, 3]);
             assert!(saved.exists());
             assert_eq!(trainer.adam.steps(), 3);
         } else {
             let error = outcome.unwrap_err();
             assert!(matches!(error, Error::NotFinite { step: 1, .. }), "{error}");
-            assert!(said.steps.is_empty() && !saved.exists());
+            assert!(reported.steps.is_empty() && !saved.exists());
             let bits = |weights: Vec<f64>| weights.into_iter().map(f64::to_bits);
             assert!(bits(before).eq(bits(weights(&trainer))), "no step was made");
         }
     }
 }
 
-/// Who stops a run hears of all steps that were made, and its checkpoint is of the last.
+/// A run that is stopped reports all steps that were made, and its checkpoint is that of the last.
 #[test]
 fn a_run_stops_with_the_steps_that_were_made() {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(folder.path());
     let mut trainer = run_of(9, &drive, &folder.path().join("run"), Some(4));
-    let mut said = Said::default();
+    let mut reported = Reported::default();
     let summary = trainer.run(&mut |event| {
-        said.hear(&event);
+        reported.note(&event);
         let stops = matches!(event, TrainEvent::Step { step: 2, .. });
         if stops {
             Control::Stop
@@ -398,7 +409,7 @@ fn a_run_stops_with_the_steps_that_were_made() {
     let summary = summary.unwrap();
     assert!(summary.stopped);
     assert_eq!((summary.step, trainer.adam.steps()), (4, 4));
-    assert_eq!(said.numbers(), [1, 2, 3, 4]);
+    assert_eq!(reported.numbers(), [1, 2, 3, 4]);
     assert!(
         trainer
             .folder
@@ -407,7 +418,7 @@ fn a_run_stops_with_the_steps_that_were_made() {
     );
 }
 
-/// A run that was stopped goes on with Adam's moments and its count of steps, and ends where one ends that was not.
+/// A run that was stopped resumes with Adam's moments and step count, and ends with the same weights as an uninterrupted run.
 #[test]
 fn a_run_resumes_with_the_steps_that_were_made() {
     let folder = tempfile::tempdir().unwrap();
@@ -434,7 +445,7 @@ fn a_run_resumes_with_the_steps_that_were_made() {
     assert_close(weights(&whole), weights(&resumed));
 }
 
-/// The first steps are heard of one by one; later ones at the latest after a while.
+/// The first steps are read one by one; later ones after a certain time at the latest.
 #[test]
 fn steps_are_read_when_it_is_time() {
     let folder = tempfile::tempdir().unwrap();
@@ -456,11 +467,11 @@ fn steps_are_read_when_it_is_time() {
         ),
     ] {
         let at = folder.path().join(format!("{}", interval.alone));
-        let (mut trainer, mut said) = (run_of(5, &drive, &at, Some(9)), Said::default());
+        let (mut trainer, mut reported) = (run_of(5, &drive, &at, Some(9)), Reported::default());
         trainer.read_interval = interval;
         let before = TRANSFERS.get();
-        trainer.run(&mut |event| said.hear(&event)).unwrap();
-        let transfers = said.transfers.iter().map(|t| t - before);
+        trainer.run(&mut |event| reported.note(&event)).unwrap();
+        let transfers = reported.transfers.iter().map(|t| t - before);
         assert_eq!(transfers.collect::<Vec<_>>(), expected);
     }
 }

@@ -1,4 +1,4 @@
-//! The mean loss over the samples that are held out.
+//! The mean loss over the held-out samples.
 
 use crate::model::displacements;
 use crate::{
@@ -7,9 +7,8 @@ use crate::{
 };
 use burn::tensor::Device;
 
-/// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which exists
-/// only in training; and the ratio of measured to predicted displacement, without PoseNet of true to predicted depth: NaN where nothing
-/// says it.
+/// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which exists only in training. Also returns
+/// the ratio of measured to predicted displacement; without PoseNet, of true to predicted depth; NaN if neither is known.
 ///
 /// # Errors
 /// [`Error::NoSamples`] without samples, [`Error::Data`] if an image cannot be read, [`Error::Loader`] if the
@@ -65,7 +64,7 @@ pub fn validation_loss(
 struct Mean {
     terms: LossTerms,
     ratio: f64,
-    /// Images of the batches that say it.
+    /// Images of the batches that have a ratio.
     with_ratio: f64,
     count: f64,
 }
@@ -81,7 +80,7 @@ impl Mean {
         self.terms.add(terms, n);
     }
 
-    /// NaN where no batch says it.
+    /// NaN if no batch has a ratio.
     fn ratio(&self) -> f64 {
         self.ratio / self.with_ratio
     }

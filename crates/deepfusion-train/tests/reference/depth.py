@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Reference values for the losses on known depth, from PyTorch: of the depth, and of how sure it is.
+"""Reference values for the losses on known depth, from PyTorch: for depth and for its uncertainty.
 
     python crates/deepfusion-train/tests/reference/depth.py
 
 writes `depth.safetensors` beside this file: the inputs (float32), and the loss, its parts and the gradient with respect to
-the disparity of every scale, computed in double precision from those inputs. Errors are drawn until each, and each
-difference between neighbours, is clear of 0, so that rounding cannot decide the sign of a gradient.
+the disparity of every scale, computed in double precision from those inputs. Errors are drawn until each of them,
+and each difference between neighbours, is clear of 0, so that rounding cannot decide the sign of a gradient.
 
 `uncertainty/` has the scale ln b of the error at the finest scale, the negative log-likelihood of the known pixels by PyTorch's own
 Laplace distribution, without its constant ln 2, and the gradient with respect to ln b. Some scales are beyond the limits, where
@@ -49,7 +49,7 @@ def errors(inverse, log_depth, known, far):
 
 
 def mean_of(values, where):
-    """Of each image, then over the images."""
+    """The mean over each image, then over the images."""
     return torch.stack([v[w].mean() for v, w in zip(values, where)]).mean()
 
 
@@ -70,7 +70,7 @@ def loss(predictions, log_depth, known, far):
 
 
 def clear(predictions, log_depth, known, far):
-    """Whether no kink is near."""
+    """Whether all values are away from kinks."""
     raw = [-torch.log(p) - log_depth for p in predictions]
     e = errors(predictions[0], log_depth, known, far)
     apart = [r[known | far].abs().min() for r in raw]

@@ -29,7 +29,7 @@ rng = np.random.default_rng(11)
 
 
 def given(name, values, grad=True):
-    """An input, rounded to float32 before anything is computed from it."""
+    """An input, rounded to float32 before it is used."""
     values = np.asarray(values, dtype=np.float32)
     tensors[name] = values
     return torch.from_numpy(values).double().requires_grad_(grad)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Reference values for the terms of the loss, from PyTorch.
+"""Reference values for the loss terms, from PyTorch.
 
     python crates/deepfusion-train/tests/reference/losses.py
 
 writes `losses.safetensors` beside this file: the inputs of each term (float32), and its value and the gradient
-with respect to every input that has one, computed in double precision from those inputs. What is compared with a
-limit (in view, back again, moving) is drawn until every pixel is clear of that limit, so that rounding cannot
-decide it.
+with respect to every input that has one, computed in double precision from those inputs. Values that are compared with a
+limit (in view, led back by the reversed flow, dynamic) are drawn until every pixel is clear of that limit, so that
+rounding cannot decide.
 
 Needs torch and numpy.
 """
@@ -33,7 +33,7 @@ def keep(name, tensor):
 
 
 def given(name, values, grad=True):
-    """An input, rounded to float32 before anything is computed from it."""
+    """An input, rounded to float32 before it is used."""
     values = np.asarray(values, dtype=np.float32)
     tensors[name] = values
     return torch.from_numpy(values).double().requires_grad_(grad)
@@ -77,7 +77,7 @@ def clear(margin, *distances):
 
 
 def masked_mean(values, mask):
-    """Of each image, then over the images."""
+    """The mean over each image, then over the images."""
     mask = mask.expand_as(values)
     return ((values * mask).sum((1, 2, 3)) / mask.sum((1, 2, 3))).mean()
 
@@ -94,7 +94,7 @@ def flow_view(target, source, flow, back):
     edges = [coords[:, :1], W - 1 - coords[:, :1], coords[:, 1:], H - 1 - coords[:, 1:]]
     inside = in_view(coords)
     back_again = inside & (spare > 0)
-    # Where less than half of an image comes back, its flow is wrong and not its pixels hidden.
+    # If fewer than half of an image's pixels are led back, the flow is wrong, not the pixels occluded.
     wrong = back_again.sum((1, 2, 3), keepdim=True) < 0.5 * inside.sum((1, 2, 3), keepdim=True)
     visible = (back_again | (inside & wrong)).detach()
     error = photometric(sample(source, coords), target)
@@ -129,7 +129,7 @@ while True:
     if clear(2e-3, *there[4], *back[4]):
         break
 assert 0.3 < there[3].double().mean() < 0.9
-# Both directions' images together, and the two terms.
+# The images of both directions together, and the two terms.
 error, trip, visible = (torch.cat([x, y]) for x, y in zip((there[0], there[2], there[3]), (back[0], back[2], back[3])))
 l_photo = 2 * masked_mean(error, visible)
 l_consistency = 2 * masked_mean(trip.abs(), visible)  # the L1 norm of two components is twice their mean
@@ -150,7 +150,7 @@ for n in range(N):
     ridge = (0.01 * xs.mean()) ** 2 + 1e-12
     a_ = ((xs - xs.mean()) * (ys - ys.mean())).mean() / (((xs - xs.mean()) ** 2).mean() + ridge)
     b_ = ys.mean() - a_ * xs.mean()
-    # The element in the middle of the sorted values, the upper one of two.
+    # The middle one of the sorted values; the upper one of two.
     median = ys.sort().values[len(ys) // 2]
     floor = 0.01 * median + 1e-6
     total = total + ((a_ * xs + b_ - ys).abs().mean() + floor) / ((ys - median).abs().mean() + floor)

@@ -1,22 +1,21 @@
 #!/usr/bin/env python3
-"""Each network's whole training step, and twenty of them, from PyTorch.
+"""Each network's whole training step, and the losses of twenty steps, from PyTorch.
 
     python crates/deepfusion-train/tests/reference/whole_step.py [NETWORK...]
 
-writes `whole_step/NETWORK.safetensors` beside this file. Three frames; the depth networks of `deepfusion-nn/tests/reference` and a ResNet
-for the poses, batch norms in training mode, weights by the formula; disparities, poses in time order and inverted, warps, the
-losses, backward, Adam. Everything in double precision from float32 weights and images; gradients in float32 as well, with oneDNN's
-convolutions and with PyTorch's own, to show how far rounding alone carries them. So are the steps' losses: `main` fails where one is
-off by more than a third of 1e-3, which is what the test allows, or where twenty steps change the loss by less than a hundredth.
+writes `whole_step/NETWORK.safetensors` beside this file. The step: three frames; the depth networks of `deepfusion-nn/tests/reference` and
+a ResNet for the poses, batch norms in training mode, weights by the formula; disparities, poses in time order and inverted, warps, the
+losses, backward, Adam. Everything is in double precision from float32 weights and images. Gradients and the steps' losses are also computed
+in float32, with oneDNN's convolutions and with PyTorch's own, to show the effect of rounding alone. `main` fails if a loss is off by more
+than a third of 1e-3, the test's tolerance, or if twenty steps change the loss by less than a hundredth.
 
-The losses are the presets' but for the speed's: minimum reprojection with automask and smoothness (Godard et al., ICCV 2019), at the
-scales and with the weights of each network; for SfMLearner the mean of all sources' colour errors with explainability masks and
-smoothness. The paper's depth network has the losses of Monodepth2 here; those of its preset are held against PyTorch one by one
-(`losses.py`).
+The losses are the presets' without the speed loss: minimum reprojection with automask and smoothness (Godard et al., ICCV 2019), at the
+scales and with the weights of each network; for SfMLearner the mean of all sources' colour errors with explainability masks and smoothness.
+The paper's depth network has the losses of Monodepth2 here; those of its preset are compared with PyTorch one by one (`losses.py`).
 
-Two things differ from the published trainings, here and in the program: both pairs pass the pose encoder in one batch, so that its
-batch norms see them together; and a source that does not see a pixel does not explain it (there, its border-padded warp takes part in
-the minimum). `main` prints what each does to the loss. Weight decay leaves out biases and the weights of norms, as the program does.
+Two things differ from the published trainings, here and in the program: both pairs pass the pose encoder in one batch, so that its batch
+norms use statistics of both; and a source that does not see a pixel does not explain it (there, its border-padded warp takes part in the
+minimum). `main` prints what each does to the loss. Weight decay leaves out biases and the weights of norms, as the program does.
 
 Needs torch, torchvision and numpy.
 """
@@ -51,7 +50,7 @@ NEAR, SMOOTHNESS, EXPLAINABILITY = 0.1, 1e-3, 0.2
 
 
 class TwoFiles(nn.Module):
-    """A depth network whose encoder and decoder are in files of their own; disparities from the finest, or the newest, on."""
+    """A depth network whose encoder and decoder are in separate files; disparities start with the finest, or the newest."""
 
     def __init__(self, encoder, decoder, oldest_first=False):
         super().__init__()
@@ -78,7 +77,8 @@ def r_msfm_depth(iterations):
 
 
 class Explainability(nn.Module):
-    """From the pose encoder's coarsest feature to logits of a mask for the first and the second frame. The names are the program's."""
+    """Computes the logits of a mask for the first and the second frame from the pose encoder's coarsest feature, with the program's
+    names."""
 
     def __init__(self, channels):
         super().__init__()
@@ -115,15 +115,15 @@ class PoseNet(nn.Module):
 class Training:
     """A depth network, its losses, the images' size, and the optimiser's settings.
 
-    The rates are small: batch norms over a dozen values make steep networks, and at these they learn much of the way while
-    rounding stays small. The images are smaller where twenty steps would take the test long. Weights decay where the preset's do,
-    so much more that twenty such steps show it (a thousandth each), and gradients are clipped as there, where they exceed its norm.
+    The learning rates are small: batch norms over a dozen values make steep networks. With these rates the networks still learn, and
+    rounding errors stay small. Images are smaller if twenty steps would make the test slow. Weights decay if the preset's do, but faster,
+    so that twenty steps show it (a thousandth each). Gradients are clipped at the preset's norm if they exceed it.
     """
 
     depth: Callable[[], nn.Module]
-    # Halvings, weight and weight of the smoothness of each disparity.
+    # For each disparity: number of halvings, weight, and weight of its smoothness.
     scales: list
-    # The program's names of weights from the beginning to the end of the depth network, and PyTorch's.
+    # Names of weights from the beginning to the end of the depth network: the program's and PyTorch's.
     compared: dict
     rate: float
     # Height, width.
@@ -192,7 +192,7 @@ DISP_NET = {
     "disp_net.heads.3": "predict_disp4.0",
 }
 
-# The network's names are the program's.
+# Here the network has the program's names.
 PAPER = {
     name: name
     for name in (
@@ -234,7 +234,7 @@ TRAININGS = {
 
 
 def picture(offset, size):
-    """The frame at an offset in time, N×3×H×W in (0, 1): waves that move about as the new pose networks say."""
+    """The frame at an offset in time, N×3×H×W in (0, 1): waves that move roughly as new pose networks predict."""
     n, c, v, u = np.meshgrid(*map(np.arange, (N, 3, *size)), indexing="ij")
     moved = offset * (1 + 0.3 * n)
     x, y = u + DRIFT[0] * moved, v + DRIFT[1] * moved
@@ -287,7 +287,7 @@ class Networks:
         return [*self.depth.parameters(), *self.pose.parameters()]
 
     def compared(self):
-        """The weights whose gradients are kept, by the program's names."""
+        """The weights whose gradients are written, by the program's names."""
         nets = (("depth", self.depth, self.training.compared), ("pose", self.pose, POSE | self.training.pose_compared))
         return {
             f"{prefix}.{ours}.weight": net.get_parameter(f"{theirs}.weight")
@@ -307,7 +307,7 @@ class Networks:
                 turn = turn.mT
                 step = -(turn @ step[:, :, None])[:, :, 0]
             motions.append((turn, step))
-        # Where the source is before it, the target is the second of the two.
+        # If the source comes before the target, the target is the second frame.
         logits = [torch.cat([l[:, 1:] if o < 0 else l[:, :1] for o, l in zip(OFFSETS, both)], 1) for both in logits]
         return motions, *logits
 
@@ -352,7 +352,7 @@ class Networks:
 def train(networks):
     """The losses of the steps, and the first gradient's norm."""
     training, learned = networks.training, networks.parameters()
-    # Lite-Mono's temperatures are a number a head, whatever their shape.
+    # Lite-Mono's temperatures are one number for each head, whatever their shape.
     is_kernel = lambda p: p.squeeze().dim() > 1  # noqa: E731
     kernels, others = [p for p in learned if is_kernel(p)], [p for p in learned if not is_kernel(p)]
     groups = [{"params": kernels, "weight_decay": training.decay}, {"params": others, "weight_decay": 0.0}]
@@ -403,7 +403,7 @@ def written(name, training):
     exact, norms = train(Networks(training, torch.float64))
     rounded, rounded_norms = train(Networks(training, torch.float32))
     tensors["losses"] = exact.astype(np.float32)
-    # Of all gradients together.
+    # The norm of all gradients together.
     tensors["all/norm"] = norms[:1].astype(np.float32)
     tensors["all/float32"] = np.abs(rounded_norms / norms - 1)[:1].astype(np.float32)
 

@@ -6,7 +6,7 @@ use deepfusion_train::{Preset, SampleSet, TrainConfig};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// A street without scans.
+/// A simulated street without scans.
 pub(crate) fn street(frames: usize) -> Simulation {
     Simulation::new(&SimConfig {
         seed: 5,
@@ -17,7 +17,7 @@ pub(crate) fn street(frames: usize) -> Simulation {
     .unwrap()
 }
 
-/// A small network on a short drive, in seconds.
+/// A small network on a short drive, which trains in seconds.
 pub(crate) fn small(drive: &Path, steps: usize) -> (TrainConfig, SampleSet, SampleSet) {
     let config = small_without_data(steps);
     let datasets = Dataset::open(drive, &OpenOptions::default()).unwrap();
@@ -47,7 +47,7 @@ pub(crate) fn drive(folder: &Path, frames: usize) -> PathBuf {
     .unwrap()
 }
 
-/// The same drive as a folder of images with speeds and yaw rates, of which nothing says the camera.
+/// The simulation as a folder of images with speeds and yaw rates, but without a camera.
 pub(crate) fn folder_without_camera(simulation: &Simulation, folder: &Path) {
     let images = folder.join("images");
     std::fs::create_dir_all(&images).unwrap();

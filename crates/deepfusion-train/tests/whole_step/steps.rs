@@ -1,9 +1,9 @@
-//! A network's whole training step beside PyTorch's in double precision (`reference/whole_step.py`): three frames, the presets' losses but
-//! for the speed's, their scales, weight decay and clipping.
+//! A network's whole training step against PyTorch in double precision (`reference/whole_step.py`): three frames, the presets' losses
+//! without the speed loss, their scales, weight decay and clipping.
 //!
-//! In double precision ours is the same to 1e-5, gradients included. In single precision two choices can be as good as each other
-//! (automask, the nearer source, a cell of the warp, a ReLU's kink): rounding decides for a pixel, and the gradient jumps. What that does
-//! to PyTorch's own float32 is in the reference, too.
+//! In double precision ours is the same to 1e-5, gradients included. In single precision two choices can be equally good (automask, the
+//! better source, a cell of the warp, a ReLU's kink). Then rounding decides about a pixel, and the gradient jumps. The reference also has
+//! this effect on PyTorch's own float32.
 
 #[path = "../../../deepfusion-nn/tests/networks/formula.rs"]
 mod formula;
@@ -36,15 +36,15 @@ fn reference(of: &str, file: &str) -> PathBuf {
         .join(file)
 }
 
-/// What the networks and losses are computed in.
-#[allow(dead_code, reason = "each of two programs of tests has one of them")]
+/// The precision of networks and losses.
+#[allow(dead_code, reason = "each of two test binaries uses one of them")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Numbers {
     Single,
     Double,
 }
 
-/// A network, and the images' size and the optimiser's settings of the reference.
+/// A network, with the reference's image size and optimiser settings.
 struct Training {
     preset: Preset,
     width: usize,
@@ -56,7 +56,8 @@ struct Training {
 
 impl Training {
     fn of(preset: Preset) -> Self {
-        // Where the preset decays, a decay that a few steps show (a thousandth each); clipping at the preset's norm where it is exceeded.
+        // If the preset has weight decay, a decay that shows after a few steps (a thousandth each). Clipping at the preset's norm where it
+        // is exceeded.
         let (learning_rate, clip_norm, weight_decay) = match preset {
             Preset::LiteMono => (5e-7, 0.0, 2000.0),
             Preset::RMsfm3 | Preset::RMsfm6 => (5e-7, 1.0, 2000.0),
@@ -81,7 +82,7 @@ impl Training {
 
     fn config(&self) -> TrainConfig {
         let mut config = match self.preset {
-            // Its network, narrow, with Monodepth2's losses; its own are compared in `losses.rs`.
+            // The paper's network, narrow, with Monodepth2's losses; its own losses are compared in `losses.rs`.
             Preset::Paper => TrainConfig {
                 depth_net: DepthNetConfig {
                     encoder: ResNetConfig::new(ResNetDepth::ResNet18)
@@ -103,7 +104,7 @@ impl Training {
         config
     }
 
-    /// The networks with the formula's weights, those in files through their import.
+    /// The networks with weights by the formula, imported from files where that is possible.
     fn model(&self, device: &Device) -> Model {
         let folder = tempfile::tempdir().unwrap();
         let config = self.config();
@@ -117,14 +118,14 @@ impl Training {
             }
             _ => networks.depth_net,
         };
-        // No file has explainability masks: those are filled by our names.
+        // No file has explainability masks: they are filled by our own names.
         let pose_net = filled(PoseNet::new(&config.pose_net, device).unwrap());
         let (_, in_files) = networks.pose.unwrap();
         let (pose_net, _) = pose_net.with_weights(&collect(&in_files)).unwrap();
         Model::with_networks(&config, depth_net, pose_net, device)
     }
 
-    /// The depth network's files, or Monodepth2's where it has none of such names, and the pose network's.
+    /// Writes the files of the depth network (Monodepth2's if it has no such files) and of the pose network.
     fn files(&self, folder: &Path) -> Monodepth2Files {
         let (file, network) = match self.preset {
             Preset::Monodepth2R50 => ("manifest.json", "monodepth2_50"),
@@ -139,7 +140,7 @@ impl Training {
         listed("depth", &listing(file, &format!("{network}/depth")));
         let mut pose = listing("manifest.json", "pose_18/pose");
         if self.preset == Preset::Monodepth2R50 {
-            // The depth network's ResNet, on two images; its coarsest feature has four times the channels.
+            // The depth network's ResNet for two images; its coarsest feature has four times the channels.
             let mut encoder = listing(file, "monodepth2_50/encoder");
             reshape(&mut encoder, "encoder.conv1.weight", 6);
             reshape(&mut pose, "net.0.weight", 2048);
@@ -153,7 +154,7 @@ impl Training {
     }
 }
 
-/// The names and shapes in a real file.
+/// The names and shapes of the tensors in a real file.
 fn listing(file: &str, name: &str) -> Listing {
     let text = std::fs::read_to_string(reference("deepfusion-nn", file)).unwrap();
     let mut all: BTreeMap<String, Listing> = serde_json::from_str(&text).unwrap();
@@ -165,7 +166,7 @@ fn reshape(listing: &mut Listing, name: &str, channels_in: usize) {
     shape[1] = channels_in;
 }
 
-/// The frame at an offset in time: waves that move about as the new pose networks say.
+/// The frame at an offset in time: waves that move roughly as new pose networks predict.
 fn picture(offset: i32, [height, width]: [usize; 2], device: &Device) -> Tensor<4> {
     let at = |index: usize| {
         let (u, v) = ((index % width) as f64, (index / width % height) as f64);
@@ -188,7 +189,7 @@ fn batch(size: [usize; 2], device: &Device) -> SnippetBatch {
         .map(|offset| picture(offset, size, device))
         .into();
     let [height, width] = size.map(|side| side as f32);
-    // Single precision is what is given; its inverse is as good as the numbers are.
+    // The matrix is rounded to single precision; its inverse is computed in the device's precision.
     let [fx, fy] = [0.58 * width, 0.87 * height].map(f64::from);
     let [cx, cy] = [0.5 * width, 0.5 * height].map(f64::from);
     let matrix = |rows: [[f64; 3]; 3]| Tensor::<3>::from_data([rows, rows], device);
@@ -205,7 +206,7 @@ fn batch(size: [usize; 2], device: &Device) -> SnippetBatch {
             [0.0, 1.0 / fy, -cy / fy],
             [0.0, 0.0, 1.0],
         ]),
-        // Nothing measured enters the loss.
+        // The loss uses nothing measured.
         distance_m: vec![Tensor::ones([BATCH], device); 2],
         distance_weight: vec![None; 2],
         measured: vec![still.clone(), still],
@@ -221,12 +222,12 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().iter::<f32>().collect()
 }
 
-/// The expected values, and the worst of what was compared of a kind.
+/// The expected values, and the worst error of each kind.
 struct Comparison {
     numbers: Numbers,
     expected: Weights,
     worst: BTreeMap<&'static str, (f32, String)>,
-    /// Gradients compared.
+    /// Number of gradients compared.
     compared: usize,
 }
 
@@ -256,8 +257,8 @@ impl Comparison {
         }
     }
 
-    /// How far off every `step`-th value is, as a share of what is expected or of its root mean square where that is more, in ascending
-    /// order.
+    /// The relative errors of every `step`-th value, in ascending order: relative to the expected value, or to the root mean square if that
+    /// is larger.
     fn errors(&self, name: &str, ours: &[f32], step: usize) -> Vec<f32> {
         let expected = self.expected(name);
         assert_eq!(ours.len().div_ceil(step), expected.len(), "{name}");
@@ -270,13 +271,13 @@ impl Comparison {
         errors
     }
 
-    /// All of them, to 1e-4.
+    /// Compares every `step`-th value, to 1e-4.
     fn close(&mut self, kind: &'static str, name: &str, ours: &[f32], step: usize) {
         let errors = self.errors(name, ours, step);
         self.note(kind, name, errors[errors.len() - 1], 1e-4);
     }
 
-    /// Rounding through up to a hundred layers, and batch norms of a dozen values: measured 2e-6 of disparities, 2e-5 of poses in single
+    /// Rounding in up to a hundred layers and in batch norms of a dozen values: measured 2e-6 for disparities and 2e-5 for poses in single
     /// precision.
     fn outputs(&mut self, pass: &ForwardPass, width: usize) {
         for (scale, disparity) in pass.disparities.iter().enumerate() {
@@ -292,8 +293,8 @@ impl Comparison {
         }
     }
 
-    /// To 1e-4 (measured 9e-6); in single precision the share of pixels that a warp explains, to 1e-3, a dozen pixels that may be on
-    /// either side.
+    /// Compares to 1e-4 (measured 9e-6). In single precision the share of pixels that a warp explains is compared to 1e-3, a dozen pixels
+    /// that rounding may decide.
     fn terms(&mut self, terms: &LossTerms) {
         let pixels = match self.numbers {
             Numbers::Single => 1e-3,
@@ -306,7 +307,7 @@ impl Comparison {
             ("explained", terms.explained_share, pixels),
             ("explainability", terms.explainability, 1e-4),
         ];
-        // The last is SfMLearner's alone.
+        // Only SfMLearner has the last one.
         let expected = self.expected("terms").to_vec();
         for ((name, ours, allowed), expected) in ours.into_iter().zip(expected) {
             let error = (ours / f64::from(expected) - 1.0).abs() as f32;
@@ -314,8 +315,8 @@ impl Comparison {
         }
     }
 
-    /// What is allowed of a gradient: 1e-5, twice what was measured; in single precision 1e-3, or three times as far off as PyTorch's own
-    /// float32 is.
+    /// Tolerance of a gradient: 1e-5, twice the measured error; in single precision 1e-3, or three times the error of PyTorch's own float32
+    /// if that is more.
     fn allowed(&self, name: &str) -> f32 {
         match self.numbers {
             Numbers::Single => f32::max(1e-3, 3.0 * self.expected(&format!("{name}/float32"))[0]),
@@ -323,13 +324,13 @@ impl Comparison {
         }
     }
 
-    /// What is allowed of half of a gradient's values, and of all: [`Self::allowed`] and, in single precision, twice as much, since the worst of 23 differs
-    /// more from one float32 to another (measured 1.6e-3 where PyTorch's is 4e-4).
+    /// Tolerances of half of a gradient's values, and of all: [`Self::allowed`], for all values in single precision twice as much, since
+    /// the worst of 23 values varies more (measured 1.6e-3 where PyTorch's error is 4e-4).
     ///
-    /// More is allowed of the pose network's first convolution on the larger images. A value that rounding puts on the other side of
-    /// its ReLU moves what lies before it and hardly a norm. One in `layer1` (in double precision they come as near to 0 as 8e-7 of
-    /// their root mean square) moves that convolution's by 1.1e-2, half of them by 2.6e-3, its norm by 4e-4. PyTorch's float32 leaves
-    /// that value where it is.
+    /// The tolerance is larger for the pose network's first convolution on the larger images. A value that rounding puts on the other side
+    /// of its ReLU changes the gradients of earlier layers, but hardly their norms. One such value in `layer1` (in double precision some
+    /// are as close to 0 as 8e-7 of their root mean square) changes that convolution's gradients by 1.1e-2, half of them by 2.6e-3, and
+    /// their norm by 4e-4. In PyTorch's float32 it stays on its side.
     fn allowed_of_values(&self, name: &str, width: usize) -> (f32, f32) {
         let allowed = self.allowed(name);
         if self.numbers == Numbers::Double {
@@ -347,7 +348,7 @@ impl Comparison {
         self.note("norm", name, error, self.allowed(name));
     }
 
-    /// Norms and 23 values of each.
+    /// Compares the norm and 23 values of each gradient.
     fn gradients(&mut self, gradients: &Weights, width: usize) {
         for (name, gradient) in &gradients.tensors {
             if !self.expected.tensors.contains_key(&format!("{name}/norm")) {
@@ -372,7 +373,7 @@ impl Comparison {
     }
 }
 
-/// The gradients by name: Adam's first moments after its first step are a tenth of them.
+/// The gradients by name, taken from Adam: after its first step the first moments are a tenth of them.
 fn named(gradients: &NamedGradients, model: &Model) -> Weights {
     let mut adam = Adam::default();
     let (_, step) = adam.begin(gradients, 0.0, 0.0, 0.0);
@@ -383,7 +384,7 @@ fn named(gradients: &NamedGradients, model: &Model) -> Weights {
     found
 }
 
-/// Runs the reference's steps, `steps` of the twenty, in the device's own precision.
+/// Runs the first `steps` of the reference's twenty steps, in the device's precision.
 pub(crate) fn check(preset: Preset, numbers: Numbers, steps: usize) {
     let training = Training::of(preset);
     let mut comparison = Comparison::of(preset, numbers);
@@ -410,7 +411,7 @@ pub(crate) fn check(preset: Preset, numbers: Numbers, steps: usize) {
             comparison.norm("all", gradient_norm);
         }
         let off = (loss.terms.total / f64::from(*exact) - 1.0).abs() as f32;
-        // PyTorch's own float32 is off by less than a third of that.
+        // The error of PyTorch's own float32 is less than a third of that.
         comparison.note("loss", &format!("loss {step}"), off, 1e-3);
         model = model.updated(&mut adam, &update.unwrap(), &gradients);
     }

@@ -12,7 +12,7 @@ use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
 use burn_cubecl::tensor::CubeTensor;
 use deepfusion_kernels::AdamStep;
 
-/// The step.
+/// Adam on a GPU.
 #[backend_extension(Cube)]
 pub(in super::super) trait AdamOps: Backend {
     /// Values and both moments after the step; all four are flat. `factors` are those of `AdamFactors`.
@@ -25,7 +25,8 @@ pub(in super::super) trait AdamOps: Backend {
         step: AdamStep,
     ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
 
-    /// Sums of squares, each of a share of the values of six flat tensors, added to such sums of others. Of the tensors that many count.
+    /// Sums of squares, each over a share of the values of six flat tensors, added to earlier such sums. Only the first `count` tensors are
+    /// read.
     fn kernel_squares(
         others: FloatTensor<Self>,
         a: FloatTensor<Self>,
@@ -38,7 +39,7 @@ pub(in super::super) trait AdamOps: Backend {
     ) -> FloatTensor<Self>;
 }
 
-/// Groups that share the values out.
+/// Groups that share the values of a launch.
 const GROUPS: u32 = 512;
 /// Tensors of a launch.
 const AT_ONCE: usize = 6;
@@ -90,11 +91,11 @@ fn squares(
     }
 }
 
-/// The sum of the squares of all values: a launch for six tensors, which a network has more than a hundred of.
+/// The sum of the squares of all values. A launch handles six tensors; a network has more than a hundred.
 pub(in super::super) fn sum_of_squares(tensors: &[Tensor<1>]) -> Tensor<1> {
     let mut shares = Tensor::<1>::zeros([GROUPS as usize], &tensors[0].device());
     for some in tensors.chunks(AT_ONCE) {
-        // What is missing is not read.
+        // Missing tensors are not read.
         let [a, b, c, d, e, f] =
             std::array::from_fn(|i| some.get(i).unwrap_or(&some[0]).clone().into_dispatch());
         let own = shares.into_dispatch();
@@ -129,7 +130,7 @@ fn adam(
     let v = second[at] * beta2 + g * g * (1.0f32 - beta2);
     let direction = m / factors[1] / ((v / factors[2]).sqrt() + epsilon);
     let moved = values[at] * kept - direction * learning_rate;
-    // Chosen, not multiplied: a gradient of NaN is none afterwards.
+    // Selected, not multiplied, so that a NaN gradient has no effect.
     let is_made = factors[3] > 0.5f32;
     new_values[at] = select(is_made, moved, values[at]);
     new_first[at] = select(is_made, m, first[at]);

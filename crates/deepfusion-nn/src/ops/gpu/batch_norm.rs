@@ -6,7 +6,8 @@ use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::tensor::CubeTensor;
 
-/// Mean and variance of a channel, a group of threads for each: the variance from the differences, in a second pass.
+/// Mean and variance of the channels, with a group of threads for each channel. The variance is computed from the differences, in a second
+/// pass.
 #[cube(launch)]
 fn moments(
     x: &[f32],
@@ -69,7 +70,7 @@ fn normalise(
     let scale = gamma[channel] / (variance[channel] + epsilon).sqrt();
     let value = (x[at] - mean[channel]) * scale + beta[channel];
     if comptime!(relu) {
-        // So NaN stays NaN, which a maximum would hide.
+        // NaN stays NaN; a maximum would hide it.
         out[at] = select(value <= 0.0f32, 0.0f32, value);
     } else {
         out[at] = value;

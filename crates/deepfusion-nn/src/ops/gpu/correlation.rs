@@ -6,7 +6,7 @@ use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::tensor::CubeTensor;
 
-/// A plane is an image's displacement.
+/// A plane is a displacement of an image.
 #[cube(launch)]
 fn correlation(
     first: &[f32],
@@ -39,8 +39,8 @@ fn correlation(
     out[plane * area + pixel] = sum / (channels as f32);
 }
 
-/// The gradient of one of the images from the other: of the first from the second at p + d, of the second from the first at p − d.
-/// A plane is a channel.
+/// The gradient of one image from the other: that of the first from the second at p + d, that of the second from the first at p − d. A
+/// plane is a channel.
 #[cube(launch)]
 fn correlation_backward(
     other: &[f32],

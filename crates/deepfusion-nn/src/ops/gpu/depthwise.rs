@@ -7,7 +7,7 @@ use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 
-/// A plane is an image's channel. `is_backward`: the gradient of the input from that of the output, which the taps read the other way.
+/// A plane is an image's channel. `is_backward`: the gradient of the input from that of the output, with the taps in the opposite order.
 #[cube(launch)]
 fn depthwise(
     x: &[f32],
@@ -49,7 +49,7 @@ fn depthwise(
     out[plane * area + pixel] = sum;
 }
 
-/// A group of threads sums a tap of a channel's kernel over all images.
+/// Each group of threads sums one tap of a channel's kernel over all images.
 #[cube(launch)]
 fn weight_gradient(
     x: &[f32],

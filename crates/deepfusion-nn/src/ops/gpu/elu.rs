@@ -20,7 +20,7 @@ fn elu(x: &[f32], out: &mut [f32]) {
     );
 }
 
-/// Below 0 the derivative eˣ is the output and 1.
+/// Below 0 the derivative is eˣ, the output plus 1.
 #[cube(launch)]
 fn elu_backward(y: &[f32], grad: &[f32], out: &mut [f32]) {
     let at = ABSOLUTE_POS;

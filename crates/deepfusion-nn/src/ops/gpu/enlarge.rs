@@ -27,7 +27,7 @@ pub(in super::super) trait EnlargeBackward: Backend {
     fn enlarge_grad(grad: FloatTensor<Self>, height: usize, width: usize) -> FloatTensor<Self>;
 }
 
-/// The two pixels along an axis that one of the result lies between, and how far it is on the way to the second.
+/// The two pixels along an axis between which a pixel of the result lies, and its fraction of the way to the second.
 #[derive(CubeType)]
 struct PixelPair {
     low: i32,
@@ -67,7 +67,7 @@ fn enlarge(x: &[f32], out: &mut [f32], height: i32, width: i32, out_height: i32,
     out[plane * area + pixel as usize] = upper * (1.0f32 - down.fraction) + lower * down.fraction;
 }
 
-/// How much of a pixel of the result is a pixel of the input, along an axis.
+/// The weight of an input pixel in a pixel of the result, along an axis.
 #[cube]
 fn share(own: i32, at: i32, from: i32, to: i32) -> f32 {
     let place = between(at, from, to);
@@ -75,7 +75,7 @@ fn share(own: i32, at: i32, from: i32, to: i32) -> f32 {
         + select(place.high == own, place.fraction, 0.0f32)
 }
 
-/// The pixels along an axis of the result, first and behind the last, among which all are that a pixel of the input is part of.
+/// A range (start and end) of the result's pixels along an axis that contains all pixels with a share of an input pixel.
 #[cube]
 fn readers(own: i32, from: i32, to: i32) -> (i32, i32) {
     let scale = to as f32 / from as f32;

@@ -1,4 +1,4 @@
-//! How threads are laid out, and how a group of them sums.
+//! How threads are arranged, and how a group of them sums.
 
 use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl;
@@ -8,17 +8,17 @@ use burn_cubecl::tensor::CubeTensor;
 
 /// Threads of a group that runs along pixels.
 const THREADS: u32 = 256;
-/// Threads of a group that sums: what WebGPU has at least.
+/// Threads of a group that sums: the number that WebGPU guarantees.
 pub(super) const SUM_THREADS: u32 = 256;
 /// Groups that sum a plane together.
 pub(super) const SUM_GROUPS: u32 = 32;
-/// Groups along an axis that every GPU has.
+/// Number of groups along an axis that every GPU supports.
 pub(super) const MOST_GROUPS: usize = 65_535;
 
-/// A thread for each pixel of each plane; [`plane_of_group`] is which.
+/// A thread for each pixel of each plane. In a kernel, [`plane_of_group`] returns the plane.
 pub(super) fn along_pixels(pixels: usize, planes: usize) -> (CubeCount, CubeDim) {
     let groups = (pixels as u32).div_ceil(THREADS);
-    // Few planes are too many for an axis, and most of those are even.
+    // Rarely are there too many planes for one axis, and then their number is usually even.
     let fits = |layers: &usize| planes.is_multiple_of(*layers) && planes / layers <= MOST_GROUPS;
     let layers = (1..=planes).find(fits).unwrap_or(1);
     let count = CubeCount::Static(groups, (planes / layers) as u32, layers as u32);
@@ -41,13 +41,13 @@ pub(super) fn values(tensor: &CubeTensor) -> (CubeCount, CubeDim) {
     )
 }
 
-/// `groups` groups of threads for each of some planes, which sum over it.
+/// `groups` groups of threads for each plane, which sum over it.
 pub(super) fn summing(groups: u32, planes: usize) -> (CubeCount, CubeDim) {
     let count = CubeCount::Static(groups, planes as u32, 1);
     (count, CubeDim::new_1d(SUM_THREADS))
 }
 
-/// The sum of every thread's value, for all of them. A tree: the order of a sum does not depend on which thread is first.
+/// The sum of all threads' values, returned to all of them. Summed as a tree, so that the order does not depend on which thread is first.
 #[cube]
 pub(super) fn over_group(value: f32, #[comptime] threads: u32) -> f32 {
     let mut shared = Shared::<[f32]>::new_slice(comptime!(threads as usize));

@@ -23,7 +23,7 @@ pub(in super::super) trait MaxPoolOps: Backend {
 
 /// The backward pass.
 pub(in super::super) trait MaxPoolBackward: Backend {
-    /// The gradient of the input from input, output and its gradient.
+    /// The gradient of the input, from the input, the output and the output's gradient.
     fn max_pool_grad(
         x: FloatTensor<Self>,
         output: FloatTensor<Self>,
@@ -41,7 +41,7 @@ fn max_pool(x: &[f32], out: &mut [f32], height: i32, width: i32) {
     let plane = plane_of_group();
     let from = plane * (height * width) as usize;
     let (middle_y, middle_x) = (pixel / out_width * 2, pixel % out_width * 2);
-    // The middle is always in the image.
+    // The middle of a window is always in the image.
     let mut most = x[from + (middle_y * width + middle_x) as usize];
     #[unroll]
     for tap in 0..9u32 {
@@ -49,14 +49,14 @@ fn max_pool(x: &[f32], out: &mut [f32], height: i32, width: i32) {
         let at = middle_x + comptime!(tap as i32 % 3 - 1);
         if y >= 0 && y < height && at >= 0 && at < width {
             let value = x[from + (y * width + at) as usize];
-            // NaN is greater than anything.
+            // NaN counts as greater than anything.
             most = select(value > most || value.is_nan(), value, most);
         }
     }
     out[plane * (out_height * out_width) as usize + pixel as usize] = most;
 }
 
-/// A pixel has the gradient of each window whose maximum it is, unless one before it in the window is as large.
+/// A pixel gets the gradient of each window whose maximum it is, unless an earlier pixel of the window is equally large.
 #[cube(launch)]
 fn max_pool_backward(x: &[f32], y: &[f32], grad: &[f32], out: &mut [f32], height: i32, width: i32) {
     let (out_height, out_width) = ((height + 1) / 2, (width + 1) / 2);
@@ -70,7 +70,7 @@ fn max_pool_backward(x: &[f32], y: &[f32], grad: &[f32], out: &mut [f32], height
     let (own_y, own_x) = (pixel / width, pixel % width);
     let own = x[from + pixel as usize];
     let mut sum = 0.0f32;
-    // The windows around pixels 2·(y/2) and, of an odd row, the next one; so along both axes.
+    // Along each axis, the windows around 2·(y/2) and, for an odd y, the next one.
     #[unroll]
     for i in 0..4u32 {
         let window_y = own_y / 2 + comptime!(i as i32 / 2);

@@ -7,7 +7,7 @@ use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::tensor::CubeTensor;
 
-/// The pixel along an axis of `size` that one outside mirrors, or that it is.
+/// The pixel along an axis of `size` that a pixel outside mirrors; a pixel inside is itself.
 #[cube]
 pub(super) fn source(at: i32, size: i32) -> i32 {
     let last = size - 1;
@@ -72,7 +72,7 @@ fn is_needed(options: ConvOptions) -> bool {
     options.reflect && options.padding > 0
 }
 
-/// The same convolution of an image that is padded already.
+/// The same convolution for an image that is already padded.
 fn without(options: ConvOptions) -> ConvOptions {
     ConvOptions {
         padding: 0,
@@ -81,7 +81,7 @@ fn without(options: ConvOptions) -> ConvOptions {
     }
 }
 
-/// How wide a margin is mirrored, and the same convolution of an image that has it.
+/// The width of the mirrored margin, and the same convolution for an image with that margin.
 pub(super) fn margin(options: ConvOptions) -> (usize, ConvOptions) {
     if is_needed(options) {
         (options.padding, without(options))
@@ -90,7 +90,7 @@ pub(super) fn margin(options: ConvOptions) -> (usize, ConvOptions) {
     }
 }
 
-/// An image with a margin that mirrors it, where that has any width.
+/// An image with a mirrored margin; unchanged if the margin is 0.
 pub(super) fn padded(x: CubeTensor, margin: usize) -> CubeTensor {
     match margin {
         0 => x,
@@ -119,7 +119,7 @@ fn forward(x: CubeTensor, margin: usize) -> CubeTensor {
     out
 }
 
-/// The gradient of what was padded.
+/// The gradient of the image without padding.
 pub(super) fn backward(grad: CubeTensor, margin: usize) -> CubeTensor {
     let [batch, channels, height, width] = dims(&grad);
     let (height, width) = (height - 2 * margin, width - 2 * margin);

@@ -10,7 +10,7 @@ use burn_cubecl::tensor::CubeTensor;
 const C1: f32 = deepfusion_kernels::SSIM_C1 as f32;
 const C2: f32 = deepfusion_kernels::SSIM_C2 as f32;
 
-/// The pixel that a coordinate at most one beyond the image means: the image is mirrored without repeating its edge.
+/// The pixel for a coordinate at most one beyond the image, which is mirrored without repeating its edge.
 #[cube]
 fn mirrored(at: i32, size: i32) -> i32 {
     let last = size - 1;
@@ -118,7 +118,7 @@ fn error(
     out[n * area + pixel] = sum / (channels as f32);
 }
 
-/// How the loss moves with each window's mean of a, of a² and of ab.
+/// The derivatives of the loss with respect to each window's means of a, a² and ab.
 #[cube(launch)]
 fn window_gradients(
     a: &[f32],
@@ -158,7 +158,7 @@ fn window_gradients(
     of_product[at] = g * 2.0f32 * terms.a1 / (b1 * b2);
 }
 
-/// How often the window around `centre` reads the pixel `at`, one away at most: twice at the edge, where it is mirrored.
+/// How often the window around `centre` reads the pixel `at`, at most one away: twice at a mirrored edge.
 #[cube]
 fn times(centre: i32, at: i32, size: i32) -> f32 {
     let first = select(centre == 0 && at == 1, 1.0f32, 0.0f32);
@@ -166,7 +166,7 @@ fn times(centre: i32, at: i32, size: i32) -> f32 {
     1.0f32 + first + last
 }
 
-/// What the windows that read a pixel say of it, and the absolute difference.
+/// A pixel's gradient from the windows that read it, and from the absolute difference.
 #[cube(launch)]
 fn image_gradient(
     a: &[f32],

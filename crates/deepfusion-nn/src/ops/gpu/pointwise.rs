@@ -1,4 +1,4 @@
-//! Values one by one that Burn computes in several launches: the end of a residual block, and the sigmoid.
+//! Pointwise operations for which Burn needs several launches: the end of a residual block, and the sigmoid.
 
 use super::{dims, input, output, room, values};
 use burn::backend::autodiff::{
@@ -25,10 +25,10 @@ pub(in super::super) trait PointwiseOps: Backend {
 
 /// The backward passes, each from the output.
 pub(in super::super) trait PointwiseBackward: Backend {
-    /// Of both that were added.
+    /// The gradient of both terms of the sum.
     fn add_relu_grad(output: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// Of the input.
+    /// The gradient of the sigmoid's input.
     fn sigmoid_grad(output: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
 }
 
@@ -39,7 +39,7 @@ fn add_relu(a: &[f32], b: &[f32], out: &mut [f32]) {
         terminate!();
     }
     let sum = a[at] + b[at];
-    // So NaN stays NaN, which a maximum would hide.
+    // NaN stays NaN; a maximum would hide it.
     out[at] = select(sum <= 0.0f32, 0.0f32, sum);
 }
 

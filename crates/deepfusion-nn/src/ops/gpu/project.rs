@@ -1,4 +1,4 @@
-//! The pixels of one view in another (the paper's Eq. 3–5).
+//! Projection of one view's pixels into another (the paper's Eq. 3–5).
 
 use super::grid::{over_group, plane_of_group};
 use super::{SUM_GROUPS, SUM_THREADS, along_pixels, dims, input, output, room, summing};

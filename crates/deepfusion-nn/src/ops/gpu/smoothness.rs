@@ -64,7 +64,7 @@ fn image_sums(
     }
 }
 
-/// The images' weighted differences, each over its mean disparity, added up.
+/// The sum over the images of the weighted differences divided by the mean disparity.
 #[cube(launch)]
 fn over_means(sums: &[f32], out: &mut [f32], batch: usize, area: usize) {
     let mut loss = 0.0f32;
@@ -76,7 +76,7 @@ fn over_means(sums: &[f32], out: &mut [f32], batch: usize, area: usize) {
     }
 }
 
-/// What the difference between two pixels says of the one at `to`.
+/// The derivative of the weighted difference of two pixels with respect to the disparity at `to`.
 #[cube]
 fn pull(
     disparity: &[f32],
@@ -111,7 +111,7 @@ fn gradient(
     }
     let n = plane_of_group();
     let mean = sums[2 * n] / (area as f32) + EPSILON;
-    // Through the mean, which every pixel moves alike.
+    // Through the mean, which every pixel changes equally.
     let through_mean = 0.0f32 - sums[2 * n + 1] / (mean * mean * (area as f32));
     let column = pixel % width;
     let mut along_x = 0.0f32;
@@ -132,7 +132,7 @@ fn gradient(
     out[n * area + pixel] = grad[0] * (through_mean + direct);
 }
 
-/// One over the differences along x and along y, over all images.
+/// One over the number of differences along x and along y, over all images.
 fn per_difference([batch, _, height, width]: [usize; 4]) -> (f32, f32) {
     let per = |count: usize| 1.0f32 / (batch * count).max(1) as f32;
     (per(height * (width - 1)), per((height - 1) * width))

@@ -1,4 +1,4 @@
-//! Every pixel twice in both directions, then a skip feature.
+//! Every pixel is repeated twice in both directions, and a skip feature appended.
 
 use super::grid::plane_of_group;
 use super::{along_pixels, dims, input, output, room};
@@ -35,7 +35,7 @@ fn upsample(
     }
 }
 
-/// A plane is an image's channel of x, of `height` times `width` pixels: the sum over the four that repeat a pixel.
+/// A plane is an image's channel of x, of `height` times `width` pixels: the sum over the four repetitions of each pixel.
 #[cube(launch)]
 fn sum_of_four(
     grad: &[f32],
@@ -77,7 +77,7 @@ pub(super) fn forward(x: CubeTensor, skip: CubeTensor) -> CubeTensor {
     let out = room(&x, [batch, channels + skips, height, width]);
     let (count, dim) = along_pixels(height * width, batch * (channels + skips));
     let client = out.client.clone();
-    // A buffer of nothing cannot be bound; where there is no skip feature none is read.
+    // An empty buffer cannot be bound. Without a skip feature this one is not read.
     let skip = if skips == 0 { x.clone() } else { skip };
     upsample::launch(
         &client,
@@ -94,7 +94,7 @@ pub(super) fn forward(x: CubeTensor, skip: CubeTensor) -> CubeTensor {
     out
 }
 
-/// The gradients of x, which has so many channels, and of the skip feature.
+/// The gradients of x, which has `channels` channels, and of the skip feature.
 pub(super) fn backward(grad: CubeTensor, channels: usize) -> [CubeTensor; 2] {
     let [batch, all, height, width] = dims(&grad);
     let skips = all - channels;

@@ -10,7 +10,7 @@ use burn_cubecl::cubecl::prelude::*;
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
 
-/// The lower neighbour of a coordinate along an axis: the last but one at the end, so that there is a higher one.
+/// The lower neighbour of a coordinate along an axis. At the end it is the last but one, so that there is a higher one.
 #[cube]
 fn lower(p: f32, size: usize) -> f32 {
     let last = (size as f32) - 1.0f32;
@@ -20,14 +20,14 @@ fn lower(p: f32, size: usize) -> f32 {
         .min((last - 1.0f32).max(0.0f32))
 }
 
-/// How far a coordinate lies beyond its lower neighbour; outside the image its border counts.
+/// The distance of a coordinate from its lower neighbour; outside the image, that of the border.
 #[cube]
 fn beyond(p: f32, low: f32, size: usize) -> f32 {
     p.max(0.0f32).min((size as f32) - 1.0f32) - low
 }
 
-/// What a pixel reads: a coordinate, the corner below it of a plane, how far the others are from it, and how far the coordinate lies
-/// beyond it.
+/// What a pixel reads: its coordinates, the index of the lower corner in a plane, the steps to the other corners, and the coordinates'
+/// distances from the lower corner.
 #[derive(CubeType)]
 struct Reading {
     u: f32,
@@ -90,7 +90,7 @@ fn warp(
     }
 }
 
-/// The gradient of the coordinates: none where the border counts.
+/// The gradient of the coordinates: zero outside the image, where the border is read.
 #[cube(launch)]
 fn grad_of_coords(
     image: &[f32],
@@ -127,7 +127,7 @@ fn grad_of_coords(
     out[(2 * n + 1) * area + pixel] = select(moves_y, along_y, 0.0f32);
 }
 
-/// What each pixel of the output gives one of the four it reads, and where that is in its plane.
+/// The gradient that each output pixel adds to one of the four pixels it reads, and the index of that pixel in its plane.
 #[cube(launch)]
 fn grad_of_corner(
     coords: &[f32],
@@ -208,7 +208,7 @@ pub(super) fn grad_coords(image: CubeTensor, coords: CubeTensor, grad: CubeTenso
     out
 }
 
-/// The gradient of the image, corner by corner: several pixels may read one, which Burn's scatter adds up.
+/// The gradient of the image, corner by corner. Several pixels may read the same one; Burn's scatter adds their gradients.
 pub(super) fn grad_image(image: CubeTensor, coords: CubeTensor, grad: CubeTensor) -> CubeTensor {
     let sizes @ [batch, channels, height, width] = dims::<4>(&image);
     let [_, _, out_height, out_width] = dims(&coords);

@@ -1,11 +1,11 @@
-//! The two factors of a product in single precision, as a group of threads brings them to shared memory, and where its result goes.
+//! How a group of threads loads the two factors of a product in single precision into shared memory, and where it writes the result.
 
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
 
 use super::tile::{SIDE, THREADS, Tile, Window};
 
-/// What is computed.
+/// Which product is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Product {
     Output,
@@ -14,7 +14,7 @@ pub(super) enum Product {
 }
 
 impl Product {
-    /// Terms that are worth a group of threads of their own, where there are few groups.
+    /// Fewest terms for which another group of threads pays off, if there are few groups.
     pub(super) fn least_terms(self) -> usize {
         match self {
             Self::Output | Self::InputGradient => 512,
@@ -37,8 +37,8 @@ pub(super) struct Sizes {
     pub(super) depth: usize,
 }
 
-/// A pixel of the output, by where its window begins in the input; for the gradient of the input one of the input, by how far it lies
-/// behind the first tap that reads it.
+/// A pixel of the output, given by the start of its window in the input. For the gradient of the input: a pixel of the input, given by its
+/// distance from the first tap that reads it.
 #[derive(CubeType)]
 pub(super) struct Pixel {
     image: usize,
@@ -73,7 +73,7 @@ pub(super) fn pixel_of(
     }
 }
 
-/// Channel and tap of a weight: of the terms or, for the gradient of the weights, of the columns.
+/// Channel and tap of a term's weight or, for the gradient of the weights, of a column's.
 #[cube]
 fn channel_and_tap(
     index: usize,
@@ -89,7 +89,7 @@ fn channel_and_tap(
     }
 }
 
-/// Where a weight of a left factor's row is in a layer's weights.
+/// Index of a left factor's weight in a layer's weights.
 #[cube]
 fn weight_place(
     row: usize,
@@ -109,8 +109,8 @@ fn weight_place(
     }
 }
 
-/// The left factor of weights tap by tap, row after row: read in place, neighbouring threads would read far from each other, again and
-/// again.
+/// Arranges weights as a left factor, row after row and tap by tap. Without this, neighbouring threads would repeatedly read distant
+/// values.
 #[cube(launch_unchecked)]
 pub(super) fn weights_by_taps(
     weights: &[f32],
@@ -127,7 +127,7 @@ pub(super) fn weights_by_taps(
     }
 }
 
-/// The terms `start` to `end` of the left factor's rows.
+/// Loads the terms `start` to `end` of the left factor's rows.
 #[cube]
 pub(super) fn bring_left(
     values: &[f32],
@@ -152,7 +152,7 @@ pub(super) fn bring_left(
                 let area = sizes.out_height * sizes.out_width;
                 (term / area * sizes.rows + row) * area + term % area
             } else if comptime!(tile.tap_by_tap || product == Product::Output) {
-                // As `weights_by_taps` arranged them, or as they are.
+                // In the order of `weights_by_taps`, or in the layer's own order.
                 row * sizes.depth + term
             } else {
                 weight_place(row, term, sizes, product, window, tile)
@@ -163,8 +163,8 @@ pub(super) fn bring_left(
     }
 }
 
-/// Where a value of the right factor is in its tensor, if it is: what a tap of a channel reads for a pixel of the output or, for the gradient
-/// of the input, the gradient of the output that reads the pixel by it.
+/// The place of a value of the right factor in its tensor, if it lies inside: the value that a channel's tap reads for a pixel of the
+/// output. For the gradient of the input: the gradient of the output pixel that reads the input pixel through the tap.
 #[derive(CubeType)]
 struct Source {
     exists: bool,
@@ -203,10 +203,10 @@ fn source(
     }
 }
 
-/// The terms `start` to `end` of the right factor's columns. `own` is the pixel of this thread's column, where columns are pixels.
+/// Loads the terms `start` to `end` of the right factor's columns. `own` is the pixel of this thread's column, if columns are pixels.
 ///
-/// Tap by tap, a block of 16 terms (for the gradient of the weights: all columns of a tile) has one tap, so that from one to the next it is
-/// a plane of the image; else every value has to be found by itself.
+/// Tap by tap, all 16 terms of a block (for the gradient of the weights: all columns of a tile) have the same tap, so that the next term is
+/// one plane of the image further. Otherwise the place of every value is computed.
 #[cube]
 pub(super) fn bring_right(
     values: &[f32],
@@ -297,7 +297,7 @@ pub(super) fn bring_right(
     }
 }
 
-/// Where a column's first row is written, and how far it is from row to row; the parts of a sum follow each other.
+/// Where a column's first row is written, and the distance from row to row. The parts of a sum follow each other.
 #[cube]
 pub(super) fn result_place(
     column: usize,
@@ -322,7 +322,7 @@ pub(super) fn result_place(
     }
 }
 
-/// What a group computes: its first row and column, which part of the sums, and that part's first term and end.
+/// What a group computes: its first row and column, which part of the sums, and that part's range of terms.
 #[derive(CubeType)]
 pub(super) struct Share {
     pub(super) first_row: usize,

@@ -1,5 +1,5 @@
-//! Convolution and its gradients as products of matrices in tiles, whose larger matrix is never formed: its values are read from the image
-//! as they are needed.
+//! Convolution and its gradients as tiled matrix products. The larger matrix is never stored: its values are read from the image when they
+//! are needed.
 //!
 //! | | rows | columns | summed over |
 //! |---|---|---|---|
@@ -7,9 +7,9 @@
 //! | gradient of the input | input channels | input pixels of all images | weights that read a channel |
 //! | gradient of the weights | output channels | weights of a channel | output pixels of all images |
 //!
-//! A group of 256 threads computes a tile: both factors are brought to shared memory some terms at a time and multiplied there. That is in
-//! single precision (`factors`, `products`) or on tensor cores (`quads`, `tensor_cores`), for which the tensors are rounded to bf16 and
-//! arranged before (`rounded`).
+//! A group of 256 threads computes a tile: it loads both factors into shared memory, some terms at a time, and multiplies them there. It
+//! does so in single precision (`factors`, `products`) or on tensor cores (`quads`, `tensor_cores`), for which the tensors are first
+//! rounded to bf16 and rearranged (`rounded`).
 
 mod factors;
 mod products;
@@ -34,12 +34,12 @@ use rounded::{channels_last, left_factor};
 use tensor_cores::product_in_bf16;
 use tile::{SIDE, THREADS, Tile, Window};
 
-/// A convolution's tensors by their sizes.
+/// The sizes of a convolution's tensors.
 struct Convolution {
     channels: usize,
-    /// With the margin.
+    /// Height and width of the image with its margin.
     size: [usize; 2],
-    /// Pixels on each side of the image in which it is mirrored.
+    /// Width of the mirrored margin on each side of the image, in pixels.
     margin: usize,
     out_channels: usize,
     out_size: [usize; 2],
@@ -47,7 +47,7 @@ struct Convolution {
 }
 
 impl Convolution {
-    /// Of images of `channels` and `size`.
+    /// A convolution of images with `channels` channels, of size `size`.
     fn of(
         channels: usize,
         size: [usize; 2],
@@ -59,7 +59,7 @@ impl Convolution {
         let (margin, inner) = mirror::margin(options);
         assert!(
             margin == 0 || size.iter().all(|side| margin < *side),
-            "an image is mirrored no farther than it goes"
+            "the mirrored margin must be smaller than the image"
         );
         Self {
             channels,
@@ -71,7 +71,7 @@ impl Convolution {
         }
     }
 
-    /// Whether it runs on tensor cores, in this precision and on a tensor's device.
+    /// Whether it runs on tensor cores in this precision, on the tensor's device.
     fn is_on_tensor_cores(&self, precision: Precision, beside: &CubeTensor) -> bool {
         precision.is_bf16_for(self.channels, self.out_channels)
             && tensor_cores::are_on(&beside.client)
@@ -148,10 +148,10 @@ impl Convolution {
         let shape = self.shape(product, images);
         let out = room_for_parts(&left, parts, shape);
         let has_bias = bias.is_some();
-        // Without one a buffer that is not read.
+        // Without a bias any buffer: it is not read.
         let bias = bias.unwrap_or_else(|| left.clone());
-        // SAFETY: every place is compared with the sizes before it is read or written; what is taken tap by tap comes in whole blocks, or
-        // for the gradient of the weights whole tiles, of which the first place is compared.
+        // SAFETY: every index is compared with the sizes before it is read or written. Tap by tap, values come in whole blocks (for the
+        // gradient of the weights, whole tiles), and the first index of each is compared.
         unsafe {
             product_in_f32::launch_unchecked(
                 &out.client,
@@ -172,7 +172,7 @@ impl Convolution {
         summed(out, parts, shape)
     }
 
-    /// The same on tensor cores, of factors that [`rounded`] arranged.
+    /// The product of two factors on tensor cores, from tensors that [`rounded`] arranged.
     fn in_bf16(
         &self,
         product: Product,
@@ -191,9 +191,9 @@ impl Convolution {
             Product::InputGradient => (self.out_channels, self.size),
         };
         let has_bias = bias.is_some();
-        // Without one a buffer that is not read.
+        // Without a bias any buffer: it is not read.
         let bias = bias.unwrap_or_else(|| out.clone());
-        // SAFETY: every place is compared with the sizes before it is read or written, and channels come in blocks of sixteen.
+        // SAFETY: every index is compared with the sizes before it is read or written, and channels come in blocks of sixteen.
         unsafe {
             product_in_bf16::launch_unchecked(
                 &out.client,
@@ -215,7 +215,7 @@ impl Convolution {
         summed(out, parts, shape)
     }
 
-    /// The left factor of a layer's weights, where they are taken tap by tap.
+    /// A layer's weights as a left factor, for products that run tap by tap.
     fn weights_by_taps(
         &self,
         product: Product,
@@ -226,7 +226,7 @@ impl Convolution {
         let out = room(&weights, [rows, depth]);
         let (count, dim) = values(&out);
         let client = out.client.clone();
-        // SAFETY: every place is compared with the sizes before it is read or written.
+        // SAFETY: every index is compared with the sizes before it is read or written.
         unsafe {
             weights_by_taps::launch_unchecked(
                 &client,
@@ -244,7 +244,7 @@ impl Convolution {
     }
 }
 
-/// Room for a result in f32, one for each part of its sums.
+/// Memory for a result in f32, one copy for each part of its sums.
 fn room_for_parts(beside: &CubeTensor, parts: usize, shape: [usize; 4]) -> CubeTensor {
     let [first, others @ ..] = shape;
     room(beside, [parts * first, others[0], others[1], others[2]])
@@ -263,7 +263,7 @@ fn summed(all: CubeTensor, parts: usize, sizes: [usize; 4]) -> CubeTensor {
     CubeBackend::float_reshape(all, sizes.into())
 }
 
-/// The output, and what the gradient of the weights will read of the input.
+/// The output, and the form of the input that the gradient of the weights will read.
 pub(super) fn forward(
     x: CubeTensor,
     weight: CubeTensor,
@@ -286,7 +286,7 @@ pub(super) fn forward(
     }
 }
 
-/// The gradients of the input, of `[N, C, height, width]`, and of the weights: each where it is wanted.
+/// The gradients of the input, `[N, C, height, width]`, and of the weights, each if it is required.
 pub(super) fn backward(
     kept: CubeTensor,
     size @ [_, channels, height, width]: [usize; 4],
@@ -319,7 +319,7 @@ pub(super) fn backward(
             wants_input.then(|| convolution.in_f32(of_input, images, [weight, grad], None));
         [grad_of_input, grad_of_weights]
     };
-    // Of the image with its margin, which mirrors the pixels beside it.
+    // The gradient is that of the image with its mirrored margin.
     let grad_of_input = grad_of_input.map(|grad| match convolution.margin {
         0 => grad,
         margin => mirror::backward(grad, margin),
@@ -327,7 +327,7 @@ pub(super) fn backward(
     [grad_of_input, grad_of_weights]
 }
 
-/// Each group's share of a channel's sum.
+/// Sums each group's share of a channel.
 #[cube(launch)]
 fn channel_shares(
     x: &[f32],

@@ -37,7 +37,7 @@ fn multiply(
     }
 }
 
-/// Of a part of the terms: the parts are summed afterwards.
+/// The product over one part of the terms: the parts are summed afterwards.
 #[cube(launch_unchecked)]
 pub(super) fn product_in_f32(
     left_values: &[f32],

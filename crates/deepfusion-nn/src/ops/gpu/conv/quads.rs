@@ -1,5 +1,5 @@
-//! The two factors of a product on tensor cores, as a group of threads brings them from where `rounded` left them: four numbers at a time, all
-//! loads of a step before any of its stores.
+//! How a group of threads loads the two factors of a product on tensor cores, as `rounded` arranged them: four numbers (a quad) at a time,
+//! all loads of a step before any of its stores.
 
 use burn_cubecl::cubecl;
 use burn_cubecl::cubecl::prelude::*;
@@ -10,20 +10,20 @@ use super::factors::{Product, Share, Sizes};
 use super::rounded::{QUAD, Quad};
 use super::tile::{SIDE, THREADS, Tile, Window};
 
-/// How a factor lies in shared memory, and which quads a thread brings of it.
+/// How a factor lies in shared memory, and which of its quads a thread loads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Lines {
-    /// Rows or columns, each with its terms; or terms, each with its rows or columns.
+    /// Number of lines: rows or columns, each with its terms; or terms, each with its rows or columns.
     count: usize,
-    /// Quads of a line that neighbouring threads bring, and how often they do.
+    /// Quads of a line that neighbouring threads load, and how often they do.
     quads: usize,
     blocks: usize,
-    /// Values from a line to the next: eight more than it has, so that the lines of a square lie in banks of their own.
+    /// Values from a line to the next: eight more than a line has, so that the lines of a square lie in different banks.
     pub(super) stride: usize,
 }
 
 impl Lines {
-    /// Of rows or columns whose terms lie together: a block is 16 terms, which have one tap.
+    /// Lines that are rows or columns, whose terms lie together: a block is 16 terms, which have the same tap.
     fn of_terms(lines: usize, depth: usize) -> Self {
         Self {
             count: lines,
@@ -33,7 +33,7 @@ impl Lines {
         }
     }
 
-    /// Of terms whose rows or columns lie together.
+    /// Lines that are terms, whose rows or columns lie together.
     fn term_after_term(lines: usize, depth: usize) -> Self {
         Self {
             count: depth,
@@ -51,7 +51,7 @@ impl Lines {
         Self::of(product, tile.columns, tile.depth)
     }
 
-    /// The gradient of the weights sums over pixels, whose channels lie together; the other products sum over those channels.
+    /// The gradient of the weights sums over pixels, whose channels lie together. The other products sum over the channels.
     fn of(product: Product, lines: usize, depth: usize) -> Self {
         match product {
             Product::WeightGradient => Self::term_after_term(lines, depth),
@@ -64,29 +64,29 @@ impl Lines {
         THREADS / self.quads
     }
 
-    /// Quads that a thread brings of a block.
+    /// Number of quads of a block that a thread loads.
     fn passes(self) -> usize {
         self.count.div_ceil(self.step())
     }
 
-    /// Quads in shared memory.
+    /// Number of quads in shared memory.
     pub(super) fn room(self) -> usize {
         self.count * self.stride / QUAD
     }
 }
 
-/// What the tensors are divided by to find a place.
+/// Divisors for computing indices into the tensors.
 #[derive(CubeType, CubeLaunch)]
 pub(super) struct Divisors {
     /// Channels of the image that is read window by window.
     pub(super) channels: FastDivmod<usize>,
-    /// Pixels of an image whose pixels are columns or terms, and of its rows.
+    /// Number of pixels of an image whose pixels are columns or terms, and of its rows.
     pub(super) area: FastDivmod<usize>,
     pub(super) width: FastDivmod<usize>,
 }
 
-/// A pixel that reads a window: where its image begins in the tensor that is read, in pixels, and where in it its first tap lies; for the
-/// gradient of the input, how far it lies behind the first tap that reads it.
+/// A pixel that reads a window: the start of its image in the tensor that is read, in pixels, and the place of its first tap in the image.
+/// For the gradient of the input: its distance from the first tap that reads it.
 #[derive(CubeType)]
 pub(super) struct Reader {
     image: usize,
@@ -120,7 +120,7 @@ fn reader(
     }
 }
 
-/// What a tap reads: the pixel, counted from the tensor's first, if it is in the image.
+/// The pixel that a tap reads, counted from the tensor's first, if it is in the image.
 #[derive(CubeType)]
 struct Read {
     exists: bool,
@@ -156,8 +156,8 @@ fn read(
     }
 }
 
-/// What a thread keeps from step to step of the right factor: the pixels of its columns or, for the gradient of the weights, tap and channel
-/// of its four columns.
+/// What a thread keeps of the right factor from step to step: the pixels of its columns or, for the gradient of the weights, tap and
+/// channel of its four columns.
 #[derive(CubeType)]
 pub(super) struct Columns {
     pixels: Sequence<Reader>,
@@ -199,7 +199,7 @@ pub(super) fn columns_of_thread(
     }
 }
 
-/// A thread's quads of the left factor, of the terms from `start` on.
+/// Loads a thread's quads of the left factor, for the terms from `start` on.
 #[cube]
 pub(super) fn load_left(
     values: &[Quad],
@@ -236,7 +236,7 @@ pub(super) fn load_left(
     quads
 }
 
-/// The same of the right factor.
+/// The same for the right factor.
 #[cube]
 pub(super) fn load_right(
     values: &[Quad],
@@ -293,7 +293,7 @@ pub(super) fn load_right(
     quads
 }
 
-/// Puts a thread's quads where they belong in shared memory.
+/// Stores a thread's quads in shared memory.
 #[cube]
 pub(super) fn store(quads: &Sequence<Quad>, into: &mut Shared<[Quad]>, #[comptime] lines: Lines) {
     let thread = UNIT_POS as usize;

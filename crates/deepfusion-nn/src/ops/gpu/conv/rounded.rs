@@ -1,4 +1,4 @@
-//! Tensors as tensor cores take them: rounded to bf16, and arranged so that what is multiplied together lies together.
+//! Prepares tensors for tensor cores: rounded to bf16, and arranged so that values that are multiplied together lie together.
 
 use burn::tensor::{DType, Shape};
 use burn_cubecl::cubecl;
@@ -11,20 +11,20 @@ use super::super::{dims, input, mirror, output, values};
 use super::factors::Product;
 use super::tile::SIDE;
 
-/// Values that are read and written at once.
+/// Number of values that are read and written at once.
 pub(super) const QUAD: usize = 4;
-/// Four neighbours.
+/// Four neighbouring values.
 pub(super) type Quad = Vector<bf16, Const<QUAD>>;
 
 /// Pixels that a group of threads rearranges at a time, in [`SIDE`] channels.
 const PIXELS: usize = 128;
 /// Threads of such a group.
 const THREADS: usize = 256;
-/// From a channel to the next in shared memory: one more than there are pixels keeps threads out of each other's banks.
+/// Values from a channel to the next in shared memory: one more than there are pixels, to avoid bank conflicts.
 const STRIDE: usize = PIXELS + 1;
 
-/// The nearest number of bf16, of two as near the even one; NaN stays NaN. A conversion alone cuts the digits off on some devices, which
-/// makes every sum too small.
+/// Rounds to the nearest bf16 number, ties to even; NaN stays NaN. On some devices a conversion alone truncates, which makes every sum too
+/// small.
 #[cube]
 fn rounded(value: f32) -> bf16 {
     let bits = u32::reinterpret(value);
@@ -96,8 +96,8 @@ pub(super) fn channels_last(x: CubeTensor, margin: usize) -> CubeTensor {
     let pixels = (out_height * out_width).div_ceil(PIXELS) as u32;
     let count = CubeCount::Static(pixels, (channels / SIDE) as u32, images as u32);
     let client = out.client.clone();
-    // SAFETY: pixels are compared with the image's, channels come in whole groups, and a mirrored place is one of the image's, as the margin
-    // is narrower than it.
+    // SAFETY: pixel indices are compared with the image's size, channels come in whole groups, and a mirrored index lies in the image,
+    // since the margin is narrower than the image.
     unsafe {
         channels_last_kernel::launch_unchecked(
             &client,
@@ -114,7 +114,7 @@ pub(super) fn channels_last(x: CubeTensor, margin: usize) -> CubeTensor {
     out
 }
 
-/// Each value of the left factor from its place in a layer's weights `[O, C, kernel height, kernel width]`.
+/// Reads each value of the left factor from a layer's weights `[O, C, kernel height, kernel width]`.
 #[cube(launch_unchecked)]
 fn weights_kernel(
     weights: &[f32],
@@ -151,7 +151,7 @@ pub(super) fn left_factor(weights: CubeTensor, product: Product) -> CubeTensor {
     let out = room(&weights, Shape::from([count]));
     let (groups, dim) = values(&out);
     let client = out.client.clone();
-    // SAFETY: every place is compared with the sizes before it is read or written.
+    // SAFETY: every index is compared with the sizes before it is read or written.
     unsafe {
         weights_kernel::launch_unchecked(
             &client,
@@ -169,7 +169,7 @@ pub(super) fn left_factor(weights: CubeTensor, product: Product) -> CubeTensor {
     out
 }
 
-/// Room for a tensor in bf16.
+/// Memory for a tensor in bf16.
 fn room(beside: &CubeTensor, shape: Shape) -> CubeTensor {
     let (client, device) = (beside.client.clone(), beside.device.clone());
     empty_device_contiguous_dtype(client, device, shape, DType::BF16)

@@ -1,4 +1,4 @@
-//! The product on tensor cores: factors rounded to bf16, sums in f32. Each 32 threads multiply squares of 16.
+//! The product on tensor cores: factors rounded to bf16, sums in f32. Every 32 threads multiply 16×16 squares together.
 
 use burn_cubecl::CubeDevice;
 use burn_cubecl::cubecl;
@@ -21,7 +21,7 @@ pub(in super::super::super) fn has_tensor_cores(device: &CubeDevice) -> bool {
     are_on(&device.client())
 }
 
-/// The same of a tensor's client.
+/// The same for a tensor's client.
 pub(super) fn are_on(client: &Client) -> bool {
     let properties = client.properties();
     let square = MmaConfig {
@@ -39,7 +39,7 @@ pub(super) fn are_on(client: &Client) -> bool {
     planes == [PLANE as u32; 2] && properties.features.matmul.cmma.contains(&square)
 }
 
-/// How a factor lies in shared memory, as the library names it: a left factor's lines are rows, a right one's columns, unless lines are
+/// The library's name for a factor's layout in shared memory: a left factor's lines are rows, a right one's columns, unless lines are
 /// terms.
 fn layout(product: Product, is_left: bool) -> MatrixLayout {
     if (product == Product::WeightGradient) == is_left {
@@ -116,7 +116,7 @@ fn multiply(
     }
 }
 
-/// Of a part of the terms: the parts are summed afterwards. The next terms are on their way from the tensors while those in shared memory are
+/// The product over one part of the terms: the parts are summed afterwards. The next terms are loaded while those in shared memory are
 /// multiplied.
 #[cube(launch_unchecked)]
 pub(super) fn product_in_bf16(
@@ -177,7 +177,7 @@ pub(super) fn product_in_bf16(
     sync_cube();
     while start < share.end {
         start += tile.depth;
-        // Beyond the end there are zeros, which are not multiplied.
+        // Beyond the end, zeros are loaded, which are not multiplied.
         let next_left = load_left(left_values, &share, start, &sizes, product, tile);
         let next_right = load_right(
             right_values,
@@ -196,7 +196,7 @@ pub(super) fn product_in_bf16(
         store(&next_right, &mut right, right_lines);
         sync_cube();
     }
-    // Square by square through shared memory, as which thread holds which value of a square is the device's secret.
+    // Square by square through shared memory, since which thread has which value of a square depends on the device.
     let lane = thread % PLANE;
     #[unroll]
     for i in 0..tile.own_rows {

@@ -9,27 +9,29 @@ use super::super::grid::MOST_GROUPS;
 pub(super) const THREADS: usize = 256;
 /// Side of the square matrices that tensor cores multiply.
 pub(super) const SIDE: usize = 16;
-/// Groups that keep a large GPU busy: on tensor cores two for each of its 132 processors, as adding the parts of a sum up costs a launch more.
+/// Number of groups that keep a large GPU busy. On tensor cores two for each of its 132 processors are enough, since adding up the parts of
+/// a sum costs another launch.
 const ENOUGH: usize = 512;
 const ENOUGH_ON_TENSOR_CORES: usize = 264;
 
-/// What a group of threads computes of a product.
+/// The part of a product that a group of threads computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Tile {
     pub(super) rows: usize,
     pub(super) columns: usize,
-    /// What a thread computes of it: rows and columns or, on tensor cores, what 32 threads compute of it, in squares of 16.
+    /// Rows and columns that a thread computes or, on tensor cores, those that 32 threads compute, in squares of 16.
     pub(super) own_rows: usize,
     pub(super) own_columns: usize,
-    /// Terms in shared memory at a time.
+    /// Number of terms in shared memory at a time.
     pub(super) depth: usize,
-    /// Whether weights are taken tap by tap, all channels of each, and not channel by channel.
+    /// Whether the terms run tap by tap, with all channels of each tap, and not channel by channel.
     pub(super) tap_by_tap: bool,
     on_tensor_cores: bool,
 }
 
 impl Tile {
-    /// As high as there are rows, since few channels have many pixels; large where that leaves enough tiles.
+    /// A tile for a product of this size. It is not much higher than the number of rows, since few channels have many pixels, and large if
+    /// that leaves enough tiles.
     pub(super) fn of(rows: usize, columns: usize, tensor_cores: bool) -> Self {
         let tile = |rows, columns, own: [usize; 2], squares: [usize; 2]| Self {
             rows,
@@ -54,7 +56,7 @@ impl Tile {
         }
     }
 
-    /// The same tap by tap, where so many channels are a multiple of what lies together then.
+    /// The same tile, tap by tap if `channels` is a multiple of `together`, the number of values that then lie together.
     pub(super) fn tap_by_tap(self, channels: usize, together: usize) -> Self {
         Self {
             tap_by_tap: channels.is_multiple_of(together),
@@ -62,13 +64,13 @@ impl Tile {
         }
     }
 
-    /// Tiles of a matrix.
+    /// Number of tiles of a matrix.
     fn count(self, rows: usize, columns: usize) -> usize {
         rows.div_ceil(self.rows) * columns.div_ceil(self.columns)
     }
 
-    /// In how many parts a sum of `depth` terms is shared out, and the terms of a part: more than one where there are few tiles, of
-    /// `least` terms at least.
+    /// The number of parts of a sum of `depth` terms, and the terms of a part. There are several parts, of at least `least` terms, if there
+    /// are few tiles.
     pub(super) fn parts(
         self,
         rows: usize,
@@ -89,7 +91,7 @@ impl Tile {
         (depth.div_ceil(per_part), per_part)
     }
 
-    /// Columns along the first two axes, since there may be too many for one; rows, and parts, along the third.
+    /// The grid: columns along the first two axes, since there may be too many for one; rows and parts along the third.
     pub(super) fn grid(self, rows: usize, columns: usize, parts: usize) -> CubeCount {
         let across = columns.div_ceil(self.columns);
         let lines = across.div_ceil(MOST_GROUPS);
@@ -98,14 +100,14 @@ impl Tile {
         CubeCount::Static(count[0], count[1], count[2])
     }
 
-    /// Values of a factor of so many rows or columns in shared memory, term after term; one more than there are keeps threads out of
-    /// each other's banks.
+    /// Number of values in shared memory of a factor with `lines` rows or columns, term after term. Each term has one value more, to avoid
+    /// bank conflicts.
     pub(super) fn room(self, lines: usize) -> usize {
         self.depth * (lines + 1)
     }
 }
 
-/// What a pixel of the output reads of a channel.
+/// The window of a channel that an output pixel reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Window {
     pub(super) height: usize,
