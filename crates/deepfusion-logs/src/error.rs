@@ -162,7 +162,7 @@ impl Hint for ColumnProblem {
     fn hint(&self) -> Option<String> {
         let text = match self {
             Self::NoSpeedUnit(_) => {
-                "say the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
+                "give the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
             }
             Self::NoTimeUnit(_) => "name the column time_s, time_ms, time_us or time_ns",
             Self::Missing(_) | Self::NoTime | Self::NoSpeed => {

@@ -35,7 +35,7 @@ fn hint(reason: &FindingReason) -> Option<String> {
     match reason {
         FindingReason::Log(reason) => of_log(reason),
         FindingReason::Motion(MotionReason::ClockOffset { camera_ahead_s, .. }) => Some(format!(
-            "clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or a clock offset of {:.0} ms given (--clock-offset auto measures it \
+            "set clock.camera_ahead_s = {camera_ahead_s:.3} in dataset.toml or the TOML file beside a bag, or a clock offset of {:.0} ms given (--clock-offset auto measures it \
              again on opening). Better: one clock for all (PTP, trigger)",
             1e3 * camera_ahead_s
         )),
