@@ -29,7 +29,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[non_exhaustive]
 pub enum ImageProblem {
     /// It ends early.
-    #[error("the image is truncated: the file ends within it")]
+    #[error("the image is truncated: the file ends inside it")]
     Truncated,
     /// It is of another kind.
     #[error("neither a PNG nor a JPEG")]

@@ -232,7 +232,7 @@ mod tests {
                     log: "trip.csv".into(),
                     note: TableNote::HeaderAgain { more: 1 }.into(),
                 },
-                "trip.csv: the header stands once more among the rows",
+                "trip.csv: the header is repeated once among the rows",
             ),
             (
                 MotionWarning::Bridged {
@@ -272,7 +272,7 @@ mod tests {
                     topic: topic(),
                     sigma_mps: 0.123,
                 },
-                "/gnss/fix: speeds are those of its positions, smoothed, sure to 0.12 m/s in the middle",
+                "/gnss/fix: speeds are those of its positions, smoothed, with a median standard deviation of 0.12 m/s",
             ),
             (
                 MotionWarning::Commanded {
