@@ -53,7 +53,7 @@ impl ImageProblem {
             Self::Truncated => {
                 "the file was cut off while copying or unpacking: fetch it again, or delete it, with its line where times are listed (frames.csv, timestamps.txt), to leave the frame out"
             }
-            _ => "PNG and JPEG are read",
+            _ => "give a PNG or JPEG image",
         }
     }
 }
