@@ -315,7 +315,12 @@ fn a_log_by_itself_is_reported_with_what_to_do() {
             "CAN trace with 121 speeds",
             import,
         );
-        says(trace, "opening", "a DBC file that describes its frames is needed", "--dbc FILE");
+        says(
+            trace,
+            "opening",
+            "a DBC file that describes its frames is needed",
+            "--dbc FILE",
+        );
     }
     says(
         "german.csv",

@@ -259,7 +259,10 @@ mod tests {
         for nameless in ["camera:", "camera:?fps=5"] {
             let address = Address::parse(nameless).unwrap();
             let error = address.check().unwrap_err();
-            assert_eq!(error.to_string(), format!("{nameless} does not name a camera"));
+            assert_eq!(
+                error.to_string(),
+                format!("{nameless} does not name a camera")
+            );
             assert!(error.hint().unwrap().contains("camera:0"), "{error:?}");
             assert!(address.input("linux").is_err());
         }
