@@ -25,7 +25,7 @@ pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
         return Some(path);
     }
     eprintln!(
-        "skipped: no folder {} (set DEEPFUSION_DATA)",
+        "skipped: {} is not there (set DEEPFUSION_DATA)",
         path.display()
     );
     None

@@ -272,7 +272,7 @@ mod tests {
                     topic: topic(),
                     sigma_mps: 0.123,
                 },
-                "/gnss/fix: speeds are those of its positions, smoothed, with a median standard deviation of 0.12 m/s",
+                "/gnss/fix: speeds are those of its positions, smoothed, sure to 0.12 m/s in the middle",
             ),
             (
                 MotionWarning::Commanded {
