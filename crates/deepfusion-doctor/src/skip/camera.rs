@@ -66,7 +66,7 @@ impl fmt::Display for UnsureHeading {
         } = self;
         write!(
             f,
-            "{angle} of the way ahead {off_deg:.1} ± {std_error_deg:.1} degrees"
+            "{angle} of the direction of travel {off_deg:.1} ± {std_error_deg:.1} degrees"
         )
     }
 }
@@ -114,7 +114,7 @@ mod tests {
             ),
             (
                 CameraSkip::Unsure([HeadingAngle::Pitch, HeadingAngle::Yaw].map(unsure).into()),
-                "not sure enough: pitch of the way ahead -0.4 ± 0.7 degrees, yaw of the way ahead -0.4 ± 0.7 degrees",
+                "not sure enough: pitch of the direction of travel -0.4 ± 0.7 degrees, yaw of the direction of travel -0.4 ± 0.7 degrees",
             ),
             (
                 CameraSkip::NoMount,

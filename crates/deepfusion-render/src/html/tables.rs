@@ -199,15 +199,15 @@ fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
     let row = |label: &str, value: Option<String>| value.map(|v| vec![label.to_owned(), v]);
     [
         row(
-            "depth boundaries: how far from the true ones (accuracy)",
+            "depth boundaries: distance to the true ones (accuracy)",
             sharpness.boundary_accuracy_px.map(px),
         ),
         row(
-            "depth boundaries: the same with those missed, each 10 px (completeness)",
+            "depth boundaries: the same, with missed ones counted as 10 px (completeness)",
             sharpness.boundary_completeness_px.map(px),
         ),
         row(
-            "flying pixels: at depth jumps, between the two sides",
+            "flying pixels: at depth jumps, with a depth between the two sides",
             sharpness.flying_share.map(percent),
         ),
     ]

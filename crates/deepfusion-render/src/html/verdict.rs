@@ -22,8 +22,7 @@ impl HtmlReport {
         };
         rows.extend(evidence_rows(found));
         let page = self.section("Without ground truth").properties(&rows).note(
-            "The scale follows from how far scene points move between frames while the vehicle drives a measured way. The frames are \
-             none that training saw.",
+            "The scale follows from how far scene points move between frames while the vehicle drives a measured distance. Training did not use these frames.",
         );
         add_speeds(add_ranges(page, found), found)
     }
