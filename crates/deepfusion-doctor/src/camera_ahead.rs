@@ -206,7 +206,7 @@ impl Hint for NoCameraAhead {
 }
 
 /// Measures how far the camera's clock is ahead of the vehicle's, from the turns of an inertial unit or a yaw rate, else of a receiver's
-/// course, and by changes of speed. A few hundred pictures are read.
+/// course, and from changes of speed. A few hundred pictures are read.
 ///
 /// # Errors
 /// If the offset is not known well enough to be applied; the error says why.
@@ -219,7 +219,7 @@ pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
     })
 }
 
-/// The offset that [`camera_ahead`] applies, compared with the one that the recording gives itself.
+/// The offset that [`camera_ahead`] applies, relative to the one that the recording gives itself.
 pub(super) fn offset(dataset: &Dataset) -> Result<TimeOffset, NoCameraAhead> {
     let drive = || dataset.name().to_owned();
     let turning = dataset.turning_as_its_course();

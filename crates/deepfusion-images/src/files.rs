@@ -85,7 +85,8 @@ pub fn image_size(path: &Path) -> Result<(u32, u32)> {
 }
 
 /// Checks that an image was not cut off. One that begins and ends as its format does is taken as complete. Any other is read, as some
-/// programs leave out the end or add to it: cameras append data to a JPEG. A JPEG is then searched for its end, and any other file is decoded.
+/// programs leave out the end or add to it: cameras append data to a JPEG. A JPEG is then searched for its end; anything else is
+/// decoded.
 ///
 /// # Errors
 /// As [`load_rgb`].

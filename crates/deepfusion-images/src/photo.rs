@@ -16,8 +16,8 @@ pub struct Photo {
     /// The picture, upright: rotated by EXIF's orientation.
     pub image: RgbImage,
     /// The camera from EXIF's focal length in 35 mm film, or from the phone's model and lens if their field of view is known, with
-    /// square pixels and the principal point in the centre; `None` if EXIF gives neither. It is the lens's nominal focal length, so it is wrong for a
-    /// picture that was cropped later.
+    /// square pixels and the principal point in the centre; `None` if EXIF gives neither. It is the lens's nominal focal length, so it
+    /// is wrong for a picture that was cropped later.
     pub intrinsics: Option<Intrinsics>,
     /// EXIF's orientation, by which the picture was rotated: 1 is as it is stored, 6 and 8 are quarter turns, 3 is half a turn.
     pub orientation: u8,

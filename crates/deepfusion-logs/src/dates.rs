@@ -79,7 +79,7 @@ pub(crate) fn nanoseconds(word: &str, style: TimeStyle, after: Option<i64>) -> O
             let Some(after) = after else { return Some(ns) };
             let days = after.div_euclid(DAY_NS);
             let same_day = days * DAY_NS + ns;
-            // A step back of half a day or more is a passed midnight; a smaller one is a clock that went back, which is reported elsewhere.
+            // A step back of more than half a day is a passed midnight; a smaller one is a clock that went back, which is reported elsewhere.
             let passed = same_day < after - DAY_NS / 2;
             Some(same_day + if passed { DAY_NS } else { 0 })
         }

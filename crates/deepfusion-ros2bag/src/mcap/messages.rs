@@ -108,7 +108,7 @@ impl<'a> Messages<'a> {
     }
 }
 
-/// The messages, in time order, whose times a selection contains. Often one image of many is requested, so the others are not visited.
+/// The messages, in time order, within the times of a selection. Often one image of many is requested, so the others are not visited.
 fn within<'a>(ordered: &'a [Entry], selection: &Selection) -> impl Iterator<Item = &'a Entry> {
     let from = ordered.partition_point(|entry| entry.time < selection.start());
     let rest = ordered[from..].iter();

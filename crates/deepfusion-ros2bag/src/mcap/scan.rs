@@ -7,7 +7,7 @@ use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, RecordProblem, op, record}
 use super::{ChunkInfo, Index};
 use deepfusion_rosbag::Time;
 
-/// Builds the index by scanning the file. `summary` is what is wrong with its summary, `None` if the summary is merely incomplete.
+/// Builds the index by scanning the file. `summary` is what is wrong with its summary, `None` if the summary is only incomplete.
 pub(super) fn read(bytes: &[u8], summary: Option<McapProblem>) -> Index {
     let mut scan = Scan {
         bytes,
